@@ -5,34 +5,10 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from routed_floors import BODY, MARGIN_M, TABLE, WALL, floor_codes, known, seen_cells
 
-from lidarium.mapping.sparse.exploring.ground_map import ground_map
-from lidarium.mapping.sparse.exploring.navigation import sparse_navigation
 from lidarium.mapping.sparse.exploring.routes import is_route_free, path_to_stand
-from lidarium.mapping.sparse.swept_body import SweptBody, is_free
-
-BODY = SweptBody(radius=0.2, height=0.6)
-MARGIN_M = 0.05
-WALL = np.array([[[2.9, -0.1, 0.0], [3.1, 3.0, 2.0]]])
-TABLE = np.array([[[1.0, 1.0, 0.4], [2.0, 2.0, 0.45]]])
-
-
-def floor_codes(low, high, spacing=0.2):
-    x, y = np.meshgrid(np.arange(low[0], high[0], spacing), np.arange(low[1], high[1], spacing))
-    return np.column_stack([x.ravel(), y.ravel(), np.zeros(x.size)])
-
-
-def seen_cells(*rectangles, shape=(50, 70)):
-    cells = np.zeros(shape, np.bool_)
-    for x0, y0, x1, y1 in rectangles:
-        cells[round(10 * y0) : round(10 * y1), round(10 * x0) : round(10 * x1)] = True
-    return cells
-
-
-def known(boxes, free, trail, cells=None, body=BODY):
-    cells = np.ones((50, 70), np.bool_) if cells is None else cells
-    ground = ground_map(cells, (0.0, 0.0), 0.1, boxes, body)
-    return sparse_navigation(free, boxes, ground, np.array(trail, float).reshape(-1, 3), body, MARGIN_M)
+from lidarium.mapping.sparse.swept_body import is_free
 
 
 def is_driveable(points, boxes, radius=BODY.radius, height=BODY.height):
@@ -129,51 +105,7 @@ def test_goals_in_boxes_and_behind_walls_have_their_reasons():
     assert navigation.nearest_standing(np.array([1.5, 1.5]), 0.3) is None
 
 
-def test_without_nodes_a_route_is_straight_or_there_is_none():
-    navigation = known(TABLE, np.empty((0, 3)), [[1.5, 1.5, 0.0]])
-    assert navigation.graph is None
-    assert len(navigation.route(np.array([0.2, 0.2]), np.array([3.0, 0.2])).points) == 2
-    assert navigation.route(np.array([0.2, 1.5]), np.array([3.0, 1.5])).reason == "no path"
-
-
-def test_obstacles_that_stand_there_for_now_are_driven_round():
-    codes = floor_codes((0.0, 0.0), (7.0, 5.0))
-    navigation = known(np.empty((0, 2, 3)), codes, [[0.5, 2.5, 0.0]])
-    start, goal = np.array([0.5, 2.5]), np.array([6.5, 2.5])
-    obstacle = np.array([[[3.0, 2.0, 0.0], [3.5, 3.0, 0.6]]])
-    blocked = navigation.amid(obstacle)
-    route = blocked.route(start, goal)
-    assert is_driveable(route.points, obstacle, BODY.radius + MARGIN_M)
-    assert not blocked.is_free(navigation.route(start, goal).points[:, :2])
-    assert navigation.is_free(navigation.route(start, goal).points[:, :2]), "the map itself is left alone"
-    assert navigation.amid(np.empty((0, 2, 3))) is navigation
-
-
 def test_a_route_of_one_point_is_free_where_the_body_can_stand():
     index, body = known(TABLE, np.empty((0, 3)), [[0.1, 0.1, 0.0]]).index, BODY.numbers
     assert is_route_free(index, body, np.array([[0.2, 0.2, 0.0]]))
     assert not is_route_free(index, body, np.array([[1.5, 1.5, 0.0]]))
-
-
-def test_ground_that_is_unknown_leads_to_goals_that_seen_ground_does_not():
-    seen = seen_cells((0, 0, 2, 5))
-    navigation = known(WALL, floor_codes((0.0, 0.0), (2.0, 5.0)), [[0.5, 0.5, 0.0]], seen)
-    start, goal = np.array([0.5, 0.5]), np.array([6.0, 1.0])
-    assert navigation.route(start, goal).reason == "no path"
-    route = navigation.hopeful(goal).route(start, goal)
-    assert not route.reason
-    assert is_driveable(route.points, WALL, BODY.radius + MARGIN_M)
-    walled = np.array([[[2.9, -99.0, 0.0], [3.1, 99.0, 2.0]]])
-    shut = known(walled, floor_codes((0.0, 0.0), (2.0, 5.0)), [[0.5, 0.5, 0.0]], seen)
-    assert shut.hopeful(goal).route(start, goal).reason == "no path"
-
-
-def test_unknown_ground_counts_where_it_is_joined_to_the_trail_and_large_enough():
-    cells = seen_cells((1, 1, 4, 4), (5, 1, 6, 4))
-    cells[20, 20] = False
-    navigation = known(np.empty((0, 2, 3)), floor_codes((1.0, 1.0), (4.0, 4.0)), [[2.0, 2.5, 0.0]], cells)
-    found = navigation.ground.centres(navigation.unknown_ground(0.3).cells)
-    assert len(found)
-    assert found[:, 0].max() < 4.2, "what is seen apart is no part of it"
-    assert not (np.hypot(*(found - (2.05, 2.05)).T) < 0.3).any(), "nobody could stand on one cell"
-    assert navigation.ground.are_unknown(found).all()

@@ -5,52 +5,15 @@ import math
 import numpy as np
 import pytest
 
-from lidarium.mapping.sparse.exploring.ground_camera import ground_pixels
-from lidarium.mapping.sparse.exploring.ground_map import BLOCKED, SEEN, UNKNOWN, ground_map
 from lidarium.mapping.sparse.exploring.seen_ground import SeenGround, joined_ground
-from lidarium.mapping.sparse.swept_body import SweptBody
 from tests.ground_views import depth_image, looking
 
-BODY = SweptBody(radius=0.2, height=0.6)
 WALL = np.array([[[2.0, -3.0, 0.0], [2.2, 3.0, 2.0]]])
 
 
 def seen_at(ground, x, y):
     column, row = np.floor(np.array([x, y]) / ground.cell_m).astype(int) - ground.low
     return bool(ground.cells[row, column])
-
-
-def test_the_camera_knows_between_which_distances_it_sees_the_ground():
-    camera = looking(pitch=0.0, rows=60)
-    lowest = math.atan(29.5 / camera.intrinsics.fy)
-    assert camera.nearest_m == pytest.approx(0.5 / math.tan(lowest))
-    assert camera.farthest_m == pytest.approx(math.sqrt(4.0**2 - 0.5**2))
-    assert looking(pitch=1.2).farthest_m == pytest.approx(0.5 / math.tan(1.2 - lowest))
-    assert looking(pitch=0.3, pan=0.7).bearing == pytest.approx(0.7)
-    assert camera.half_angle == pytest.approx(math.radians(29.0))
-
-
-def test_a_camera_that_sees_no_ground_is_refused_with_the_cure():
-    with pytest.raises(ValueError, match=r"sees the ground only from inf m on.*a larger pitch"):
-        looking(pitch=-0.6)
-    with pytest.raises(ValueError, match=r"at a height of 2 m .* beyond its range of 2\.5 m"):
-        looking(pitch=0.0, height=2.0, range_m=2.5)
-
-
-def test_pixels_show_ground_where_their_points_lie_on_it_within_range():
-    camera = looking()
-    depth = depth_image(camera, (0.0, 0.0, 0.0), WALL)
-    shown = ground_pixels(depth, camera.numbers)
-    pinhole = camera.intrinsics
-    for row, column in np.argwhere(depth > 0.0)[::37]:
-        point = depth[row, column] * np.array(
-            [(column - pinhole.cx) / pinhole.fx, (row - pinhole.cy) / pinhole.fy, 1.0]
-        )
-        height = (camera.pose[:3, :3] @ point + camera.pose[:3, 3])[2]
-        is_ground = abs(height) < 1e-3 and np.linalg.norm(point) <= 4.0
-        assert shown[row, column] == is_ground or (0.0 < height < 0.05)
-    assert shown.any()
-    assert not ground_pixels(np.zeros_like(depth), camera.numbers).any()
 
 
 def test_a_coarse_image_leaves_no_gaps():
@@ -115,34 +78,3 @@ def test_the_ground_of_several_is_what_any_of_them_has_seen():
             assert cells[y, x]
     assert cells.sum() <= one.cells.sum() + other.cells.sum()
     assert joined_ground([])[0].shape == (1, 1)
-
-
-def test_a_map_of_the_ground_says_what_is_taken_up_and_what_a_body_passes_below():
-    cells = np.zeros((20, 30), np.bool_)
-    cells[:, 10:] = True
-    table = np.array([[[0.6, 0.0, 0.7], [1.2, 1.0, 0.74]]])
-    low = ground_map(cells, (0.0, 0.0), 0.1, np.concatenate([WALL, table]), BODY)
-    high = ground_map(cells, (0.0, 0.0), 0.1, table, SweptBody(radius=0.2, height=1.2))
-    assert (low.levels[:, 20:22] == BLOCKED).all()
-    assert (low.levels[:, 12:19] == SEEN).all()
-    assert (low.levels[:, :10] == UNKNOWN).all()
-    assert (high.levels[:10, 6:12] == BLOCKED).all()
-    assert low.seen_m2 == pytest.approx(0.01 * np.count_nonzero(low.levels == SEEN))
-    assert low.are_unknown(np.array([[0.5, 0.5], [1.5, 0.5], [2.1, 0.5], [99.0, 0.0]])).tolist() == [
-        True,
-        False,
-        False,
-        True,
-    ]
-
-
-def test_frontiers_are_where_seen_ground_borders_on_unknown_cells():
-    cells = np.zeros((20, 20), np.bool_)
-    cells[5:15, 5:15] = True
-    known = ground_map(cells, (0.0, 0.0), 0.1, np.array([[[0.5, 0.5, 0.0], [0.6, 1.5, 1.0]]]), BODY)
-    clusters = known.frontiers(0.3)
-    assert len(clusters) == 1
-    # Three sides of ten cells are open; corners belong to two of them.
-    assert len(clusters.cells) == 9 + 9 + 8
-    assert not len(known.frontiers(10.0))
-    assert known.centres(np.array([[0, 3]]))[0] == pytest.approx([0.35, 0.05])

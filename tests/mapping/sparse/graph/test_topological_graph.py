@@ -6,7 +6,6 @@ import pytest
 from lidarium.mapping.sparse.graph.obstacles import ChangingGraph
 from lidarium.mapping.sparse.graph.thesis_graph import ThesisGraphSettings, build_thesis_graph
 from lidarium.mapping.sparse.graph.topological_graph import GraphSettings, build_graph, components_of
-from lidarium.mapping.sparse.graph.voxel_index import NEIGHBOURHOODS, KdTreeIndex, VoxelIndex
 from lidarium.mapping.sparse.swept_body import SweptBody, are_free, index_boxes
 
 WALL = [[2.9, -1.0, 0.0], [3.1, 2.0, 2.5]]
@@ -73,31 +72,6 @@ def test_a_wall_parts_the_graph():
     assert len(np.unique(components_of(graph))) == 2
 
 
-def test_repair_is_the_test_of_all_edges_and_removal_restores_every_bit():
-    base = room()
-    changing, generator, numbers = ChangingGraph(base), np.random.default_rng(3), []
-    for _ in range(12):
-        low = generator.uniform((0.0, 0.0, 0.0), (5.5, 5.5, 0.9))
-        numbers.append(changing.insert(np.stack([low, low + generator.uniform(0.05, 0.8, 3)])))
-        if len(numbers) > 4:
-            changing.remove(numbers.pop(int(generator.integers(len(numbers)))))
-        firsts = np.repeat(np.arange(len(base.nodes)), np.diff(base.starts))
-        there = index_boxes(np.array(list(changing.obstacles.values())))
-        is_open = are_free(there, base.nodes[firsts], base.nodes[base.ends], BODY.numbers)
-        assert (np.isfinite(changing.graph.weights) == is_open).all()
-        assert (~is_open).any()
-    for number in numbers:
-        changing.remove(number)
-    assert changing.graph.weights.tobytes() == base.weights.tobytes()
-    assert changing.graph.index is base.index
-
-
-@pytest.mark.parametrize("box", [np.zeros(3), [[0, 0, 0], [1, -1, 1]], [[0, 0, 0], [1, 1, np.nan]]])
-def test_obstacles_that_are_no_boxes_are_refused(box):
-    with pytest.raises(ValueError, match="box is"):
-        ChangingGraph(room()).insert(box)
-
-
 def test_unknown_obstacles_and_maps_without_nodes_are_refused():
     with pytest.raises(ValueError, match="no obstacle 7"):
         ChangingGraph(room()).remove(7)
@@ -105,47 +79,3 @@ def test_unknown_obstacles_and_maps_without_nodes_are_refused():
         build_graph(np.zeros((0, 3)), np.array([WALL]), BODY)
     with pytest.raises(ValueError, match="can stand at none"):
         build_graph(np.array([[3.0, 0.0, 0.0]]), np.array([WALL]), BODY)
-
-
-@pytest.mark.parametrize("neighbours", NEIGHBOURHOODS)
-def test_voxels_beside_a_place_have_the_points_of_a_plain_search(neighbours):
-    generator = np.random.default_rng(2)
-    points, size = generator.uniform(-1.0, 2.0, (400, 3)), np.array([0.5, 0.4, 0.3])
-    index = VoxelIndex(points, size)
-    cells = np.floor((points - points.min(axis=0)) / size).astype(int)
-    for query in generator.uniform(-1.5, 2.5, (40, 3)):
-        own = index.voxel(query)
-        offsets = np.vstack([NEIGHBOURHOODS[neighbours], [(0, 0, 0)]])
-        wanted = (cells[:, None] == own + offsets).all(axis=2).any(axis=1)
-        assert index.beside(query, neighbours).tolist() == np.flatnonzero(wanted).tolist()
-
-
-def test_neighbourhoods_that_are_none_are_refused():
-    with pytest.raises(ValueError, match="neighbours is 5"):
-        VoxelIndex(np.zeros((1, 3))).beside(np.zeros(3), 5)
-    with pytest.raises(ValueError, match="size of voxels"):
-        VoxelIndex(np.zeros((1, 3)), 0.0)
-
-
-@pytest.mark.parametrize("make", [VoxelIndex, KdTreeIndex])
-def test_points_within_a_ball_are_those_of_a_plain_search(make):
-    generator = np.random.default_rng(3)
-    points = generator.uniform(-1.0, 2.0, (400, 3))
-    index = make(points)
-    for query in generator.uniform(-2.5, 3.5, (40, 3)):
-        for radius in (0.1, 0.6, 2.0):
-            wanted = np.flatnonzero(np.linalg.norm(points - query, axis=1) <= radius)
-            assert index.within(query, radius).tolist() == wanted.tolist()
-
-
-def test_the_thesis_graph_is_the_same_with_every_support():
-    generator = np.random.default_rng(4)
-    free = np.column_stack([generator.uniform(0.0, 4.0, (300, 2)), generator.uniform(0.0, 0.05, 300)])
-    occupied = generator.uniform([0.0, 0.0, 0.1], [4.0, 4.0, 1.0], (60, 3))
-    plain = build_thesis_graph(free, occupied, ThesisGraphSettings(support="none", height=0.5))
-    assert len(plain.edges) > 20
-    for support in ("voxels", "kd_tree"):
-        found = build_thesis_graph(free, occupied, ThesisGraphSettings(support=support, height=0.5))
-        assert np.array_equal(found.edges, plain.edges)
-    with pytest.raises(ValueError, match="support of the thesis's graph is 'octree'"):
-        ThesisGraphSettings(support="octree")

@@ -1,11 +1,9 @@
 """Boxes merge where their union adds nothing."""
 
 import numpy as np
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lidarium.mapping.sparse.mapper.covered_volume import MOST_PIECES, uncovered_volume
 from lidarium.mapping.sparse.mapper.explained_points import are_covered
 from lidarium.mapping.sparse.mapper.merging import MOST_SLACK_M, merged_boxes
 
@@ -95,22 +93,3 @@ def test_too_many_boxes_merge_with_a_larger_slack():
     # A gap that a robot may fit through is never closed.
     wide = boxes * [8.0 * MOST_SLACK_M, 8.0 * MOST_SLACK_M, 1.0] * 5.0
     assert len(merged_boxes(wide, NOTHING_FREE, 0.01, 50)[0]) == 400
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_the_uncovered_volume_is_exact(seed):
-    boxes = random_boxes(12, seed, extent=0.7).reshape(-1, 6)
-    around = np.array([0.1, 0.1, 0.05, 0.9, 0.8, 0.5])
-    room = np.empty((MOST_PIECES, 6)), np.empty(MOST_PIECES, np.int64)
-    found = uncovered_volume(around, 0.05, boxes, np.inf, *room)
-    points = np.random.default_rng(seed).uniform(around[:3] - 0.05, around[3:] + 0.05, (40_000, 3))
-    wide = boxes.reshape(-1, 2, 3) + np.array([[[-0.05], [0.05]]])
-    share = 1.0 - are_covered(points, wide).mean()
-    assert found == pytest.approx(share * np.prod(around[3:] - around[:3] + 0.1), abs=0.01)
-
-
-def test_points_on_the_border_of_a_box_are_covered():
-    boxes = np.array([[[0.0, 0, 0], [1, 1, 1]], [[3.0, 3, 0], [3, 3, 0]]])
-    points = np.array([[0.0, 0, 0], [1, 1, 1], [3, 3, 0], [1.0001, 1, 1], [3, 3, 0.1], [-5, 0, 0], [0, 9, 0]])
-    assert are_covered(points, boxes).tolist() == [True, True, True, False, False, False, False]
-    assert not are_covered(points, np.empty((0, 2, 3))).any()

@@ -5,12 +5,9 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from scipy.sparse import csr_array
-from scipy.sparse.csgraph import dijkstra
 
 from lidarium.mapping.sparse.graph.obstacles import ChangingGraph
 from lidarium.mapping.sparse.graph.topological_graph import GraphSettings, build_graph
-from lidarium.mapping.sparse.planning.a_star import shortest_path
 from lidarium.mapping.sparse.planning.requests import plan
 from lidarium.mapping.sparse.swept_body import SweptBody, are_free
 
@@ -28,29 +25,6 @@ def room(boxes=BOXES):
     generator = np.random.default_rng(0)
     free = np.column_stack([generator.uniform(0.0, 6.0, (1200, 2)), np.zeros(1200)])
     return build_graph(free, boxes, BODY, GraphSettings())
-
-
-@pytest.mark.parametrize("seed", range(20))
-def test_costs_are_those_of_dijkstra(seed):
-    generator = np.random.default_rng(seed)
-    for _ in range(10):
-        count = int(generator.integers(2, 120))
-        nodes = generator.uniform(0.0, 5.0, (count, 3))
-        graph = build_graph(nodes, np.zeros((0, 2, 3)), BODY, GraphSettings(merge_radius=0.0, neighbours=3))
-        first, last = np.full(count, np.inf), np.full(count, np.inf)
-        source, target = generator.integers(count, size=2)
-        first[source] = last[target] = 0.0
-        path, cost = shortest_path(
-            graph.nodes, graph.starts, graph.ends, graph.weights, first, last, graph.nodes[target]
-        )
-        matrix = csr_array((graph.weights, graph.ends, graph.starts), shape=(count, count))
-        expected = dijkstra(matrix, indices=int(source))[target]
-        assert cost == pytest.approx(expected)
-        if np.isfinite(expected):
-            steps = np.linalg.norm(np.diff(graph.nodes[path], axis=0), axis=1)
-            assert steps.sum() == pytest.approx(expected)
-        else:
-            assert len(path) == 0
 
 
 def is_path_free(path, boxes, body):

@@ -25,11 +25,6 @@ BAD = {
     "weights": (lambda: quantise(POINTS, 4, weights=np.ones(3)), "weights have shape"),
     "weight": (lambda: quantise(POINTS[:2], 1, weights=[1.0, 0.0]), "above 0"),
     "start": (lambda: quantise(POINTS, 4, start=POINTS[:3]), r"want \(4, 3\)"),
-    "method": (lambda: QuantisationSettings("median"), "method of quantisation is 'median'"),
-    "mode": (lambda: QuantisationSettings(mode="printed"), "want one of default, thesis"),
-    "device": (lambda: QuantisationSettings(device="tpu"), "want one of cpu"),
-    "budget": (lambda: QuantisationSettings(budget_s=0.0), "budget_s of quantisation"),
-    "steps": (lambda: QuantisationSettings(steps=-1), "steps of quantisation"),
 }
 
 
