@@ -41,9 +41,11 @@ def footprint_mask(
     covered = np.zeros(shape, np.uint8)
     if len(trail):
         thickness = max(round(2.0 * (radius + margin_m) / resolution), 1)
+        # A single place is a line from there to there: of one point nothing is drawn.
+        line = trail if len(trail) > 1 else np.repeat(trail, 2, axis=0)
         cv2.polylines(
             covered,
-            [_pixels(trail, origin, resolution).reshape(-1, 1, 2)],
+            [_pixels(line, origin, resolution).reshape(-1, 1, 2)],
             False,
             1,
             thickness,

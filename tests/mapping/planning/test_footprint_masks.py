@@ -27,6 +27,16 @@ def test_cells_within_body_and_margin_are_covered_to_a_cell():
     assert not mask[away > RADIUS + MARGIN_M + 1.5 * RESOLUTION].any()
 
 
+def test_a_body_that_has_not_moved_covers_a_disc_where_it_stands():
+    stand = footprint_mask(SHAPE, ORIGIN, TRAIL[:1], RADIUS, RESOLUTION, 0.0)
+    area = stand.sum() * RESOLUTION**2
+    assert 0.8 * np.pi * RADIUS**2 < area < 1.5 * np.pi * RADIUS**2
+    rows, columns = np.nonzero(stand)
+    np.testing.assert_allclose(
+        (np.mean([columns, rows], axis=1) + 0.5) * RESOLUTION + ORIGIN, TRAIL[0], atol=0.03
+    )
+
+
 def test_no_trail_covers_nothing():
     for mask in (footprint_mask, passed):
         assert not mask(SHAPE, ORIGIN, np.empty((0, 2)), RADIUS, RESOLUTION).any()
