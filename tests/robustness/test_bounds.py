@@ -16,7 +16,7 @@ from lidarium.envs.settings.odometry import OdometrySettings
 from lidarium.envs.settings.robots import Robot
 from lidarium.envs.settings.table import settings_table
 from lidarium.evaluation.suites.suite import suite_of
-from lidarium.mapping.geometry.bounds import UNBOUNDED, Bounds, above, rules_of, shown, within
+from lidarium.mapping.geometry.bounds import UNBOUNDED, rules_of
 
 NAMES = [row.name for row in settings_table() if row.bounds]
 
@@ -108,23 +108,6 @@ def test_the_ends_of_each_bound_can_be_simulated_or_are_refused(row, end):
         _step(make_settings(**nested(row.name, value)), random.Random(0))
     except ValueError as error:
         assert re.search("want|do not fit", str(error))  # noqa: PT017
-
-
-def test_bounds_tell_themselves():
-    assert str(within(1, 64)) == "from 1 to 64"
-    assert str(above(0.0, 5.0)) == "above 0 and at most 5"
-    assert str(within(0.0, 1e6)) == "of 0 or more and at most 1,000,000"
-    assert within(1, 64).interval == "[1, 64]"
-    assert Bounds(0.0, 1.0, has_most=False).interval == "[0, 1)"
-    assert not within(0.0, 1.0).hold(math.nan)
-
-
-def test_what_is_shown_is_never_longer_than_a_line():
-    deep: list = []
-    for _ in range(10_000):
-        deep = [deep, deep]
-    for value in (10**5000, "x" * 10_000, list(range(10_000)), deep, np.zeros(10_000)):
-        assert len(shown(value)) <= 100
 
 
 def test_settings_of_records_are_those_of_the_class():

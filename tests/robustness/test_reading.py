@@ -8,7 +8,6 @@ import struct
 import time
 import zipfile
 import zlib
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -23,10 +22,6 @@ from lidarium.mapping.files.carmen_logs import read_carmen_log
 from lidarium.mapping.files.guarded_arrays import array_of
 from lidarium.mapping.files.guarded_reading import (
     MOST_MESSAGE,
-    READING_ERRORS,
-    read_bytes,
-    reading,
-    shortened,
 )
 from lidarium.mapping.files.images import MOST_PIXELS, picture_size, read_image
 from lidarium.mapping.files.map_files import read_ros_map
@@ -230,31 +225,6 @@ def test_an_outline_with_far_corners_is_refused(far, tmp_path):
 def test_a_suite_with_values_of_another_kind_is_refused_by_name(text, words, tmp_path):
     (tmp_path / "suite.toml").write_text(f'policies = ["random_walk"]\nfloors = ["apartment"]\n{text}\n')
     assert "suite.toml" in refused(read_suite, tmp_path / "suite.toml", words)
-
-
-def test_whatever_a_reader_raises_comes_out_as_one_error_that_names_the_file(tmp_path):
-    for kind in READING_ERRORS:
-        error = zlib.error("x") if kind is zlib.error else kind("x" * 5000)
-        with (
-            pytest.raises(ValueError, match=r"f\.npz is not a log") as caught,
-            reading(tmp_path / "f.npz", "a log", "want another"),
-        ):
-            raise error
-        assert len(str(caught.value)) <= MOST_MESSAGE
-    with pytest.raises(KeyboardInterrupt), reading(tmp_path, "a log"):
-        raise KeyboardInterrupt
-
-
-def test_a_message_is_cut_in_its_middle():
-    assert shortened("a" * 400 + "b" * 400).startswith("aaa")
-    assert shortened("a" * 400 + "b" * 400).endswith("bbb")
-    assert len(shortened("a" * 10_000)) <= MOST_MESSAGE
-
-
-def test_a_file_of_proc_that_tells_no_length_is_read_to_its_cap():
-    assert read_bytes(Path("/proc/self/cmdline"))
-    with pytest.raises(ValueError, match="more than 2 bytes"):
-        read_bytes(Path("/proc/self/cmdline"), 2)
 
 
 def test_the_command_line_tells_a_damaged_file_with_the_code_of_bad_input(tmp_path, capsys):

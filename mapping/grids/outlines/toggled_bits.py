@@ -34,5 +34,5 @@ def toggle_edge(
 
 @kernel(inline=True)
 def row_of(y: float) -> int:
-    """First row whose centre line is not below y; y is not negative."""
+    """First row whose centre line is above y; y is not negative."""
     return int(y + 0.5)

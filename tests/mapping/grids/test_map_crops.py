@@ -1,37 +1,15 @@
 """Crops of a map equal what numpy cuts, pools and turns, at every place, heading and scale."""
 
 import math
-import os
-import subprocess
-import sys
 
 import numpy as np
 import pytest
+from cropped_maps import crop, pooled_levels, random_map
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lidarium.mapping.grids.map_crops import crop_levels, crop_turned, turn_by_cells
+from lidarium.mapping.grids.map_crops import crop_levels
 from lidarium.mapping.grids.occupancy import FREE, OCCUPIED, UNKNOWN, three_levels
-from lidarium.mapping.grids.pooled_maps import forget_touched, pool_touched, touch, untouched
-
-
-def random_map(seed, rows=40, columns=128):
-    """A map in which most cells agree with their neighbours, so that pooled cells are of all levels."""
-    generator = np.random.default_rng(seed)
-    coarse = generator.integers(-1, 2, (-(-rows // 8), -(-columns // 8))).astype(np.int8) * np.int8(20)
-    fine = np.kron(coarse, np.ones((8, 8), np.int8))[:rows, :columns]
-    return np.where(
-        generator.random((rows, columns)) < 0.03, generator.integers(-40, 71, (rows, columns)), fine
-    ).astype(np.int8)
-
-
-def pooled_levels(log_odds, scale):
-    """Levels of the pooled cells; the least level of their cells wins, and what lies beyond the map is
-    unknown."""
-    rows, columns = (-(-size // scale) for size in log_odds.shape)
-    padded = np.zeros((rows * scale, columns * scale), np.int8)
-    padded[: log_odds.shape[0], : log_odds.shape[1]] = log_odds
-    return three_levels(padded).reshape(rows, scale, columns, scale).min(axis=(1, 3))
 
 
 def levels_around(log_odds, row, column, scale, half):
@@ -55,50 +33,6 @@ def turned(log_odds, row, column, heading, scale, cells):
     left, forward = np.meshgrid(*[2 * np.arange(cells, dtype=np.int64) + 1 - cells] * 2, indexing="ij")
     x, y = forward * step_x - left * step_y, forward * step_y + left * step_x
     return pooled[(y >> 16) + half, (x >> 16) + half]
-
-
-def all_touched(log_odds):
-    touched = untouched(*log_odds.shape)
-    touch(touched, (0, log_odds.shape[0]), (0, log_odds.shape[1] // 64))
-    return touched
-
-
-def pools_of(log_odds, scales, touched):
-    """Pooled maps from a blank start, and their table."""
-    pools = [
-        log_odds if scale == 1 else np.zeros([-(-size // scale) for size in log_odds.shape], np.int8)
-        for scale in scales
-    ]
-    for scale, pooled in zip(scales, pools, strict=True):
-        if scale > 1:
-            pool_touched(log_odds, touched, scale, pooled)
-    return pools, np.array([(pooled.ctypes.data, *pooled.shape) for pooled in pools], np.int64)
-
-
-def crop(log_odds, row, column, heading, scales, cells, turn=crop_turned):
-    crops = np.full((len(scales), cells, cells), 99, np.uint8)
-    pools, table = pools_of(log_odds, scales, all_touched(log_odds))
-    turn(table, float(column), float(row), heading, np.array(scales, np.int64), crops)
-    assert pools
-    return crops
-
-
-@given(seed=st.integers(0, 10**6), scale=st.integers(2, 17), changes=st.integers(1, 6))
-@settings(max_examples=60)
-def test_a_pooled_map_kept_up_to_date_is_the_one_made_anew(seed, scale, changes):
-    generator = np.random.default_rng(seed)
-    log_odds = np.zeros((37, 192), np.int8)
-    pooled, touched = np.zeros((-(-37 // scale), -(-192 // scale)), np.int8), untouched(37, 192)
-    for _ in range(changes):
-        row, word, height = generator.integers(0, 37), generator.integers(0, 3), generator.integers(1, 12)
-        words = int(generator.integers(1, 4 - word))
-        block = log_odds[row : row + height, 64 * word : 64 * (word + words)]
-        block[:] = generator.integers(-40, 71, block.shape)
-        touch(touched, (row, min(row + height, 37)), (word, word + words))
-        pool_touched(log_odds, touched, scale, pooled)
-        forget_touched(touched, 37)
-        assert not touched.any()
-    assert np.array_equal(three_levels(pooled), pooled_levels(log_odds, scale))
 
 
 @given(
@@ -139,43 +73,6 @@ def test_a_turned_crop_is_right_all_around_within_a_large_map(heading, cells, sc
     crops = crop(log_odds, 310, 301, heading, scales, cells)
     for k, scale in enumerate(scales):
         assert np.array_equal(crops[k], turned(log_odds, 310, 301, heading, scale, cells))
-
-
-@given(
-    row=st.integers(-60, 100),
-    column=st.integers(-60, 190),
-    heading=st.floats(-4.0, 4.0),
-    scales=st.lists(st.integers(1, 9), min_size=1, max_size=3),
-    blocks=st.integers(1, 10),
-    seed=st.integers(0, 99),
-)
-@settings(max_examples=200)
-def test_crops_of_whole_blocks_are_those_looked_up_cell_by_cell(row, column, heading, scales, blocks, seed):
-    log_odds = random_map(seed)
-    crops = crop(log_odds, row, column, heading, scales, 8 * blocks)
-    by_cells = crop(log_odds, row, column, heading, scales, 8 * blocks, turn_by_cells)
-    assert np.array_equal(crops, by_cells)
-
-
-def test_a_processor_that_cannot_look_up_in_registers_turns_the_same_crops(tmp_path):
-    code = (
-        "import sys, numpy as np; from lidarium.mapping.grids.map_crops import CAN_LOOK_UP_IN_REGISTERS, "
-        "crop_turned;"
-        "cells = np.random.default_rng(4).integers(-1, 2, (100, 128)).astype(np.int8);"
-        "crops = np.zeros((1, 64, 64), np.uint8); pools = np.array([(cells.ctypes.data, 100, 128)], "
-        "np.int64);"
-        "crop_turned(pools, 70.0, 30.0, 0.7, np.array([1]), crops); assert not CAN_LOOK_UP_IN_REGISTERS; "
-        "np.save(sys.argv[1], crops)"
-    )
-    without = {"NUMBA_ENABLE_AVX": "0", "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
-    subprocess.run(
-        [sys.executable, "-c", code, str(tmp_path / "crops.npy")],
-        env={**os.environ, **without},
-        check=True,
-        timeout=120,
-    )
-    log_odds = np.random.default_rng(4).integers(-1, 2, (100, 128)).astype(np.int8)
-    assert np.array_equal(np.load(tmp_path / "crops.npy"), crop(log_odds, 30, 70, 0.7, [1], 64))
 
 
 @given(

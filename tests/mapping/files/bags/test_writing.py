@@ -1,0 +1,125 @@
+"""Bags are written as the library's own encoder does, or not at all."""
+
+import io
+import math
+
+import numpy as np
+import pytest
+
+pytest.importorskip("mcap_ros2", reason="mcap-ros2-support is not installed: extra [mcap]")
+
+from mcap.reader import make_reader
+from mcap_ros2._dynamic import serialize_dynamic
+
+from lidarium.mapping.files.bags import schemas
+from lidarium.mapping.files.bags.writing import BagWriter, bag
+from lidarium.mapping.files.laser_logs import LaserLog
+from lidarium.mapping.grids.scan_geometry import ScanGeometry
+
+GEOMETRY = ScanGeometry(beams=9, field_of_view=math.pi, range_min=0.1, range_max=5.0)
+
+
+@pytest.fixture
+def log():
+    """Scans, the laser before the robot's middle, odometry that turns past pi."""
+    draws = np.random.default_rng(1)
+    ranges = draws.uniform(0.2, 4.9, (20, 9)).astype(np.float32)
+    ranges[3, 2], ranges[4, 5] = np.inf, np.nan
+    turns = np.linspace(0.0, 8.0, 20)
+    poses = np.stack([0.1 * turns, -0.2 * turns, turns], axis=1)
+    return LaserLog(0.25 * np.arange(20) + 3.0, ranges, GEOMETRY, poses, np.array([0.1, 0.02, 0.3]))
+
+
+def quaternion(theta):
+    return {"x": 0.0, "y": 0.0, "z": math.sin(theta / 2), "w": math.cos(theta / 2)}
+
+
+def header(frame, sec, nanosec):
+    return {"stamp": {"sec": sec, "nanosec": nanosec}, "frame_id": frame}
+
+
+def pose(x, y, theta, z=0.0):
+    return {"position": {"x": x, "y": y, "z": z}, "orientation": quaternion(theta)}
+
+
+def expected_messages():
+    """Return messages as dicts, as the library's own encoder takes them."""
+    nothing = dict.fromkeys("xyz", 0.0)
+    return {
+        schemas.LASER_SCAN: {
+            "header": header("odd", 2, 500_000_000),
+            "angle_min": GEOMETRY.angle_first,
+            "angle_max": -GEOMETRY.angle_first,
+            "angle_increment": GEOMETRY.angle_increment,
+            "time_increment": 0.0,
+            "scan_time": 0.0,
+            "range_min": 0.1,
+            "range_max": 5.0,
+            "ranges": [0.5 * k for k in range(9)],
+            "intensities": [],
+        },
+        schemas.ODOMETRY: {
+            "header": header("odom", 2, 500_000_000),
+            "child_frame_id": "base_link",
+            "pose": {"pose": pose(1.0, -2.0, 0.5), "covariance": [0.0] * 36},
+            "twist": {"twist": {"linear": nothing, "angular": nothing}, "covariance": [0.0] * 36},
+        },
+        schemas.TRANSFORMS: {
+            "transforms": [
+                {
+                    "header": header("map", 2, 500_000_000),
+                    "child_frame_id": "odom",
+                    "transform": {
+                        "translation": {"x": 1.0, "y": 2.0, "z": 0.25},
+                        "rotation": quaternion(-1.5),
+                    },
+                }
+            ]
+        },
+        schemas.GRID: {
+            "header": header("map", 2, 500_000_000),
+            "info": {
+                "map_load_time": {"sec": 2, "nanosec": 500_000_000},
+                "resolution": 0.05,
+                "width": 3,
+                "height": 2,
+                "origin": pose(-1.0, -2.0, 0.0),
+            },
+            "data": [100, -1, 0, 0, 0, -1],
+        },
+        schemas.PATH: {
+            "header": header("map", 2, 500_000_000),
+            "poses": [
+                {"header": header("map", 1, 0), "pose": pose(0.0, 1.0, 2.0)},
+                {"header": header("map", 2, 0), "pose": pose(0.5, 1.5, -2.0)},
+            ],
+        },
+    }
+
+
+def write_all(writer):
+    writer.scan("/scan", "odd", 2.5, np.arange(9, dtype=np.float32) * 0.5, GEOMETRY)
+    writer.odometry("/odom", "odom", "base_link", 2.5, (1.0, -2.0, 0.5))
+    writer.transform("map", "odom", 2.5, (1.0, 2.0, -1.5), height=0.25)
+    levels = np.array([[0, 127, 255], [255, 255, 127]], np.uint8)
+    writer.grid("/map", "map", 2.5, levels, (-1.0, -2.0), 0.05)
+    writer.path("/path", "map", 2.5, [1.0, 2.0], np.array([[0.0, 1.0, 2.0], [0.5, 1.5, -2.0]]))
+
+
+@pytest.mark.parametrize("name", list(expected_messages()))
+def test_bytes_are_those_of_the_library_s_own_encoder(name):
+    file = io.BytesIO()
+    writer = BagWriter(file)
+    write_all(writer)
+    writer.finish()
+    reader = make_reader(io.BytesIO(file.getvalue()))
+    (ours,) = [message.data for schema, _, message in reader.iter_messages() if schema.name == name]
+    encode = serialize_dynamic(name, schemas.definition(name))[name]
+    assert ours == bytes(encode(expected_messages()[name]))
+
+
+def test_nothing_is_written_where_writing_fails(log, tmp_path):
+    lent = bag(tmp_path / "half.mcap")
+    write_all(lent.__enter__())
+    assert not lent.__exit__(RuntimeError, RuntimeError("half-way"), None)
+    assert list(tmp_path.iterdir()) == []

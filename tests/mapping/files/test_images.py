@@ -1,0 +1,69 @@
+"""Pictures are read with all their channels, and their sizes are known before."""
+
+import cv2
+import numpy as np
+import pytest
+
+from lidarium.mapping.files.images import check_picture_size, picture_size, read_image
+
+GREYS = np.random.default_rng(0).integers(0, 256, (21, 34)).astype(np.uint8)
+
+
+def encoded(suffix, pixels):
+    return cv2.imencode(suffix, pixels)[1].tobytes()
+
+
+@pytest.mark.parametrize("suffix", [".png", ".pgm", ".bmp", ".tif", ".jpg"])
+def test_the_size_of_each_format_is_that_of_its_pixels(suffix, tmp_path):
+    content = encoded(suffix, GREYS)
+    assert picture_size(content) == (34, 21)
+    check_picture_size(content)
+    (tmp_path / "a").write_bytes(content)
+    pixels = read_image(tmp_path / "a")
+    assert pixels.shape[:2] == (21, 34)
+    if suffix != ".jpg":
+        np.testing.assert_array_equal(pixels if pixels.ndim == 2 else pixels[..., 0], GREYS)
+
+
+def test_sixteen_bits_and_opacity_are_kept(tmp_path):
+    deep = GREYS.astype(np.uint16) * np.uint16(257)
+    clear = np.dstack([GREYS, GREYS, GREYS, 255 - GREYS])
+    for pixels in (deep, clear):
+        (tmp_path / "a.png").write_bytes(encoded(".png", pixels))
+        np.testing.assert_array_equal(read_image(tmp_path / "a.png"), pixels)
+
+
+@pytest.mark.parametrize("content", [b"P2\n3 1\n100\n0 50 100", b"P5\n3 1\n100\n\x00\x32\x64"])
+def test_white_is_the_greatest_number_whatever_the_file_calls_white(content, tmp_path):
+    (tmp_path / "a.pgm").write_bytes(content)
+    found = read_image(tmp_path / "a.pgm")
+    assert found[0, 0] == 0
+    assert found[0, 2] == 255
+    assert abs(int(found[0, 1]) - 128) <= 1
+
+
+@pytest.mark.parametrize("white", [1.0, 255.0])
+def test_float_pixels_are_shares_or_greys(white, tmp_path):
+    pixels = np.float32([[0.0, 0.4 * white, white]])
+    (tmp_path / "a.tif").write_bytes(encoded(".tif", pixels))
+    assert read_image(tmp_path / "a.tif").tolist() == [[0, 102 * 257, 65535]]
+    (tmp_path / "a.tif").write_bytes(encoded(".tif", pixels - 1.0))
+    with pytest.raises(ValueError, match="has float pixels from -1"):
+        read_image(tmp_path / "a.tif")
+
+
+@pytest.mark.parametrize("content", [b"", b"P5\n", b"no picture at all", b"\x89PNG\r\n\x1a\n", b"BM"])
+def test_what_is_no_picture_has_no_size_and_is_refused_by_name(content, tmp_path):
+    assert picture_size(content) is None
+    with pytest.raises(ValueError, match="no picture that is known"):
+        check_picture_size(content)
+    (tmp_path / "a.png").write_bytes(content)
+    with pytest.raises(ValueError, match=r"a\.png is not an image that can be read"):
+        read_image(tmp_path / "a.png")
+
+
+def test_coloured_pictures_may_have_fewer_pixels():
+    grey, coloured = b"P5\n5000 5000\n255\n" + bytes(25_000), b"P6\n5000 5000\n255\n" + bytes(25_000)
+    check_picture_size(grey)
+    with pytest.raises(ValueError, match=r"it has 5,000 x 5,000 pixels .* want at most 12,000,000"):
+        check_picture_size(coloured)
