@@ -1,34 +1,18 @@
 import copy
-import json
 import math
 import pickle
 
 import numpy as np
 import pytest
-from polygon_scans import distances_to, ring, scan
+from curved_room import LASER, ROOM, ROUND, taken
+from polygon_scans import distances_to, scan
 
-from lidarium.mapping.files.spline_files import compact_bytes, read_spline_map, write_spline_map
-from lidarium.mapping.geometry.rigid import Transform, yaw_of_quaternion
-from lidarium.mapping.grids.scan_geometry import ScanGeometry
-from lidarium.mapping.splines.curve_lookup import CurveLookup
-from lidarium.mapping.splines.curves.settings import SplineSettings, spline_settings
+from lidarium.mapping.files.spline_files import compact_bytes
+from lidarium.mapping.geometry.rigid import Transform
+from lidarium.mapping.splines.curves.settings import spline_settings
 from lidarium.mapping.splines.features import observe
 from lidarium.mapping.splines.scan_points import scan_points
 from lidarium.mapping.splines.spline_map import SplineMap
-
-LASER = ScanGeometry()
-ROOM = np.vstack(
-    [ring((-2, -1.5), (3, -1.5), (3, 2), (-2, 2)), ring((0.5, 0.5), (1.1, 0.5), (1.1, 1.0), (0.5, 1.0))]
-)
-ROUND = [(0.3 * k, -0.8 + 0.1 * math.sin(0.7 * k), 0.6 * k) for k in range(8)]
-
-
-def taken(walls=ROOM, poses=ROUND, noise=0.01, settings=None):
-    spline_map = SplineMap(settings)
-    for k, pose in enumerate(poses):
-        points = scan_points(scan(walls, pose, LASER, noise, seed=k), LASER)
-        spline_map.update(observe(points, settings), Transform(*pose))
-    return spline_map
 
 
 @pytest.fixture(scope="module")
@@ -105,68 +89,6 @@ def test_the_same_scans_make_the_same_map_to_the_bit(room_map):
     np.testing.assert_array_equal(again.sample(), room_map.sample())
     for copied in (copy.deepcopy(again), pickle.loads(pickle.dumps(again))):
         np.testing.assert_array_equal(copied.sample(), room_map.sample())
-
-
-def test_json_keeps_the_map_to_the_bit(room_map, tmp_path):
-    write_spline_map(tmp_path / "room.json", room_map)
-    read = read_spline_map(tmp_path / "room.json")
-    np.testing.assert_array_equal(read.sample(), room_map.sample())
-    np.testing.assert_array_equal(read.corners.points, room_map.corners.points)
-    assert [curve.count for curve in read.curves] == [curve.count for curve in room_map.curves]
-
-
-def test_the_compact_form_keeps_the_map_to_a_millimetre_and_can_go_on(room_map, tmp_path):
-    write_spline_map(tmp_path / "room.npz", room_map)
-    read = read_spline_map(tmp_path / "room.npz")
-    for mine, theirs in zip(read.curves, room_map.curves, strict=True):
-        assert theirs.spline.closest(mine.spline.sample(0.05))[1].max() < 0.0015
-    np.testing.assert_allclose(read.peaks.points, room_map.peaks.points, atol=0.001)
-    assert read.updates == room_map.updates
-    before = len(read.curves)
-    read.update(observe(scan_points(scan(ROOM, ROUND[0], LASER), LASER)), Transform(*ROUND[0]))
-    assert len(read.curves) <= before + 1
-
-
-def test_the_compact_form_is_small(room_map):
-    assert compact_bytes(room_map) < 0.1 * 100 * 70
-
-
-def test_a_blank_map_is_kept_too(tmp_path):
-    for name in ("blank.json", "blank.npz"):
-        write_spline_map(tmp_path / name, SplineMap())
-        assert read_spline_map(tmp_path / name, SplineSettings()).curves == []
-
-
-def test_files_that_are_no_maps_are_refused(room_map, tmp_path):
-    with pytest.raises(ValueError, match=r"\.json or \.npz"):
-        write_spline_map(tmp_path / "room.txt", room_map)
-    with pytest.raises(FileNotFoundError, match="there is no file"):
-        read_spline_map(tmp_path / "none.json")
-    (tmp_path / "other.json").write_text(json.dumps({"version": 1}))
-    (tmp_path / "broken.npz").write_bytes(b"PK not really")
-    np.savez(tmp_path / "arrays.npz", frame=np.zeros(6))
-    for name in ("other.json", "broken.npz", "arrays.npz"):
-        with pytest.raises(ValueError, match="is not a spline map"):
-            read_spline_map(tmp_path / name)
-
-
-def test_the_lookup_finds_the_nearest_curve_and_how_far_it_is(room_map):
-    lookup = CurveLookup(reach=5.6, distance=0.3)
-    lookup.renew(room_map.curves, np.zeros(2))
-    points = np.array([(2.9, 0.0), (0.0, -1.45), (0.0, 0.0)])
-    pieces, distances = lookup.look_up(points)
-    assert (pieces >= 0).tolist() == [True, True, False]
-    expected = [min(curve.spline.closest([point])[1][0] for curve in room_map.curves) for point in points[:2]]
-    np.testing.assert_allclose(distances[:2], expected, atol=0.002)
-    assert distances[2] == math.inf
-    assert lookup.covers(np.array([0.9, 0.0]))
-    assert not lookup.covers(np.array([1.1, 0.0]))
-
-
-@pytest.mark.parametrize("theta", np.linspace(-3.1, 3.1, 9))
-@pytest.mark.parametrize("scale", [1.0, -1.0, 3.0])
-def test_the_yaw_of_a_quaternion_is_right_in_all_quadrants_and_for_both_signs(theta, scale):
-    assert yaw_of_quaternion(scale * math.sin(theta / 2), scale * math.cos(theta / 2)) == pytest.approx(theta)
 
 
 def test_a_map_in_another_frame_joins_the_same_walls_once(room_map):
