@@ -109,25 +109,6 @@ def test_the_team_shares_its_frontiers_out():
     assert sorted(y < 2.0) == [False, True]
 
 
-@pytest.mark.parametrize("robots", [1, 3])
-@pytest.mark.parametrize("cost_weight", [0.05, 0.4])
-def test_frontiers_far_away_are_left_out_only_where_they_change_no_choice(robots, cost_weight, monkeypatch):
-    """Looking over the whole floor at once, or ever further where it matters, gives the same run to the
-    bit."""
-
-    def choices(first_slack):
-        monkeypatch.setattr("lidarium.agents.frontier_policies.FIRST_SLACK", first_slack)
-        env = lidarium.parallel_env(
-            "building:4", robots=robots, horizon_s=120.0, stop_coverage=None, map_cells=32, resolution=0.05
-        )
-        run_episode(UtilityFrontier(cost_weight=cost_weight), env, 3)
-        return env.world.poses
-
-    whole, stepwise, careful = choices(math.inf), choices(0.25), choices(4.0)
-    assert np.array_equal(whole, stepwise)
-    assert np.array_equal(whole, careful)
-
-
 def test_policies_read_beliefs_and_never_the_truth():
     """With noise in the map, what a policy may ask for is the believed pose and the noisy map."""
     env = lidarium.parallel_env(TWO_ROOMS, robots=2, noise="thesis", map_cells=32)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import lidarium
-from lidarium.agents import GivenUp, PerRobot, Policy, Stop, make_policy, policy_names, register_policy
+from lidarium.agents import GivenUp, PerRobot, Policy, Stop, policy_names
 from lidarium.envs.radio.messages import Target
 from lidarium.evaluation.episodes.runner import run_episode
 
@@ -89,25 +89,6 @@ def test_all_registered_policies_are_tested_here_and_have_a_line_about_them():
     assert set(names) >= {*FRONTIER_POLICIES, "random_walk"}
     assert list(names) == sorted(names)
     assert all(summary and "\n" not in summary for summary in names.values())
-
-
-@pytest.mark.parametrize(
-    ("wrong", "meant"),
-    [("nearest_frontir", "nearest_frontier"), ("utility", "utility_frontier"), ("randomwalk", "random_walk")],
-)
-def test_an_unknown_policy_is_refused_with_the_nearest_name(wrong, meant):
-    with pytest.raises(ValueError, match=f"did you mean '{meant}'"):
-        make_policy(wrong)
-
-
-def test_a_name_that_is_nothing_like_any_lists_all():
-    with pytest.raises(ValueError, match=r"unknown policy 'zzz' \(known: random_walk, "):
-        make_policy("zzz")
-
-
-def test_a_name_is_registered_once():
-    with pytest.raises(ValueError, match="registered already"):
-        register_policy("random_walk", object, "another")
 
 
 class Recorder(Policy):

@@ -1,44 +1,14 @@
 """Without a goal the tree goes to the first frontier of the shortest tour past all."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
+from srt_halls import LIMITS, RADIUS, RESOLUTION, hall, senses_at
 
 from lidarium.agents.intent import Intent
-from lidarium.agents.srt.candidates import Candidate, CandidateSource
-from lidarium.agents.srt.choice import WayChooser
 from lidarium.agents.srt.frontier_tour import first_on_tour
-from lidarium.agents.srt.memories.map_memory import MapMemory
 from lidarium.agents.srt.memories.region_memory import RegionMemory
-from lidarium.agents.srt.motion.drive import Limits
-from lidarium.agents.srt.safe_region import DIRECTIONS, safe_region, seen_region
-from lidarium.agents.srt.senses import Senses
-from lidarium.agents.srt.settings import SrtSettings
-from lidarium.agents.srt.tree import Node, Tree
-from lidarium.envs.onboard.navigation import NavigationMap
-
-RADIUS, RESOLUTION = 0.2, 0.05
-LIMITS = Limits(speed=0.5, turn_rate=1.5, deceleration=0.5, radius=RADIUS)
-
-
-def hall(openings):
-    """Return the map of a hall of 12 x 4 m whose walls were seen, but for stretches (x from, x to) of the
-    upper one."""
-    log_odds = np.zeros((120, 320), np.int8)
-    log_odds[20:100, 20:260] = -40
-    log_odds[19], log_odds[:, 19], log_odds[:, 260], log_odds[100] = 40, 40, 40, 40
-    for low, high in openings:
-        log_odds[100, 20 + round(low / RESOLUTION) : 20 + round(high / RESOLUTION)] = 0
-    navigation = NavigationMap(log_odds, RESOLUTION)
-    navigation.changed((0, 120, 0, 320))
-    return MapMemory(navigation, RADIUS)
-
-
-def senses_at(x, y, theta=0.0):
-    """Return what a robot at a place of the hall [m] tells, its lower left corner at (1, 1)."""
-    return Senses(0.0, np.array([x + 1.0, y + 1.0, theta]), np.full(3, np.inf, np.float32), False, None, [])
 
 
 def x_of(found):
@@ -110,46 +80,3 @@ def test_what_a_teammate_goes_for_is_left_to_it_and_frontiers_near_by_cost_more(
 @pytest.mark.parametrize("memory", [hall([]), hall([(3.0, 3.5)]), RegionMemory([])])
 def test_there_is_no_tour_without_frontiers_of_that_length(memory):
     assert first_on_tour(memory, senses_at(5.0, 2.0), LIMITS, 0.8, Intent(), ()) is None
-
-
-def test_ways_between_frontiers_are_no_longer_than_past_the_robot():
-    frontiers = hall([(1.0, 2.0), (5.0, 6.0), (10.0, 11.0)]).frontiers(np.array([5.0, 3.0]), 0.8, 14)
-    assert len(frontiers.sizes) == 3
-    assert (np.diff(frontiers.costs) >= 0.0).all()
-    between = frontiers.between(np.arange(3))
-    assert (between <= frontiers.costs[:, None] + frontiers.costs[None] + 1e-9).all()
-    np.testing.assert_array_equal(between, between.T)
-    np.testing.assert_array_equal(frontiers.between(np.array([0, 2])), between[::2, ::2])
-    assert (
-        len(hall([(1.0, 2.0), (5.0, 6.0), (10.0, 11.0)]).frontiers(np.array([5.0, 3.0]), 0.8, 2).sizes) == 2
-    )
-
-
-def went_for(memory, goal, targets=()):
-    """Return the x that a robot at (4, 2) goes for, whose only node shows walls all round."""
-    srt, there = SrtSettings(), senses_at(4.0, 2.0, math.pi / 2)
-    there = replace(there, goal=None if goal is None else np.array(goal) + 1.0)
-    place, view = there.pose[:2], np.ones(DIRECTIONS)
-    safe = safe_region(place, view, 0.0, "radial", RADIUS, 4.0)
-    node = Node(0, "robot_0", there.pose, safe, seen_region(place, view, 4.0), [], None, view)
-    tree = Tree()
-    tree.add(node, None, set())
-    source = CandidateSource(srt, RADIUS, np.random.default_rng(0))
-    chooser = WayChooser(source, srt, LIMITS, np.random.default_rng(0))
-    way = chooser.choose(node, tree, {0}, memory, there, targets)
-    return float(way[-1].candidate.focus[0]) - 1.0
-
-
-def test_towards_a_goal_a_robot_goes_to_the_frontier_from_which_least_is_left():
-    """The nearest one may lie on the wrong side."""
-    memory = hall([(2.5, 3.5), (6.0, 7.0), (10.5, 11.5)])
-    assert went_for(memory, None) < 4.0
-    assert 6.0 <= went_for(memory, (8.0, 10.0)) <= 7.0
-    assert went_for(memory, (11.0, 4.5)) > 10.0
-    assert went_for(memory, (0.0, 10.0)) < 4.0
-
-
-def test_towards_a_goal_what_a_teammate_goes_for_is_left_to_it():
-    memory = hall([(2.5, 3.5), (10.5, 11.5)])
-    teammate = Candidate(0, np.array([12.0, 4.0]), None, np.array([12.0, 5.0]), is_frontier=True)
-    assert went_for(memory, (11.0, 8.0), [teammate]) < 4.0
