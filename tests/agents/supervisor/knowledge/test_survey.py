@@ -1,0 +1,102 @@
+"""What the merged map of a group offers to its robots."""
+
+import math
+
+import numpy as np
+import pytest
+from reported_halls import RADIUS, RESOLUTION, hall, report
+
+from lidarium.agents.supervisor.knowledge.survey import Survey
+from lidarium.agents.supervisor.settings import SupervisorSettings
+from lidarium.envs.driving.path_planner import footprint_of
+from lidarium.mapping.geometry.rigid import Transform
+from lidarium.mapping.merging.fusion import fuse
+
+WEST, EAST, NORTH = (0.0, 2.0), (7.95, 2.0), (4.0, 3.95)
+TURNED = Transform(1.0, -2.0, math.pi / 2.0)
+"""Of the second robot's map frame in the hall's."""
+
+
+def survey_of(openings, given_up=(), wall_at=None, **robots):
+    """A survey of the hall for robots at places, each with a target or none; the second's frame is turned."""
+    levels = hall(openings=openings).levels.copy()
+    if wall_at is not None:
+        column = round(wall_at / RESOLUTION)
+        levels[:, column : column + 3] = 0
+    frames = {agent: Transform() if agent == "a" else TURNED for agent in robots}
+    reports = {}
+    for agent, (place, target) in robots.items():
+        own = frames[agent].inverse()
+        there = None if target is None else tuple(own.apply(target).tolist())
+        reports[agent] = report(hall(), *own.apply(place).tolist(), there)
+    fused = fuse([levels], [Transform()], RESOLUTION)
+    blacklist = np.array(given_up, float).reshape(-1, 2)
+    settings = SupervisorSettings()
+    return Survey(fused, frames, reports, list(robots), blacklist, footprint_of(RADIUS), settings)
+
+
+def test_openings_are_goals_and_robots_go_to_the_nearest_that_they_are_sent_to():
+    survey = survey_of((WEST, EAST), a=((2.0, 2.0), (0.3, 2.0)), b=((6.0, 2.0), None))
+    assert survey.goals.costs.shape == (2, 2)
+    west = int(np.argmin(survey.goals.costs[0]))
+    assert survey.going == {"a": west, "b": -1}
+    assert survey.places["b"] is None
+    assert survey.places["a"] == pytest.approx((0.3, 2.0))
+    assert survey.has_frontier()
+    assert survey.is_goal().all()
+
+
+def test_stands_and_observed_cells_are_in_the_robots_own_frame():
+    survey = survey_of((WEST, EAST), a=((2.0, 2.0), None), b=((6.0, 2.0), None))
+    east = int(np.argmin(survey.goals.costs[1]))
+    x, y, heading = survey.stand("b", east)
+    place = TURNED.apply((x, y))
+    observed = TURNED.apply(survey.observed_cell("b", east))
+    assert abs(observed[0] - 7.95) < 0.15
+    assert math.dist(place, observed) < RADIUS + 3.0 * RESOLUTION
+    aim = observed - place
+    assert math.cos(heading + TURNED.theta - math.atan2(aim[1], aim[0])) == pytest.approx(1.0, abs=1e-6)
+
+
+def test_what_robots_have_given_up_is_no_goal():
+    given_up = [(0.0, 1.5 + 0.1 * k) for k in range(11)]
+    assert survey_of((WEST, EAST), given_up, a=((2.0, 2.0), None)).goals.costs.shape[1] == 1
+    survey = survey_of((), a=((2.0, 2.0), None))
+    assert not survey.has_frontier()
+
+
+def test_robots_that_go_to_one_place_or_frontier_have_one_goal():
+    survey = survey_of((WEST, EAST), a=((2.0, 2.0), (0.3, 2.2)), b=((3.0, 2.0), (0.3, 1.7)))
+    assert survey.is_same_goal("a", "b", 0.1)
+    apart = survey_of((WEST, EAST), a=((2.0, 2.0), (0.3, 2.0)), b=((6.0, 2.0), (7.7, 2.0)))
+    assert not apart.is_same_goal("a", "b", 0.1)
+    assert apart.is_same_goal("a", "b", 8.0)
+    idle = survey_of((WEST, EAST), a=((2.0, 2.0), (0.3, 2.0)), b=((6.0, 2.0), None))
+    assert not idle.is_same_goal("a", "b", 99.0)
+
+
+def test_robots_meet_whose_goals_are_near_and_in_sight_and_bring_them_nearer():
+    near = {"a": ((2.0, 2.0), (3.9, 2.0)), "b": ((6.0, 2.0), (4.2, 2.0))}
+    assert survey_of((WEST,), **near).are_meeting("a", "b")
+    assert not survey_of((WEST,), wall_at=4.0, **near).are_meeting("a", "b")
+    assert not survey_of((WEST,), a=((4.0, 2.0), (3.9, 2.0)), b=((4.1, 2.0), (4.3, 2.0))).are_meeting(
+        "a", "b"
+    )
+
+
+def test_goals_see_each_other_less_the_farther_they_are_apart():
+    survey = survey_of((WEST, EAST, NORTH), a=((2.0, 2.0), None))
+    seen = survey.seen()
+    np.testing.assert_allclose(np.diag(seen), 1.0)
+    np.testing.assert_allclose(seen, seen.T, atol=1e-9)
+    assert ((seen >= 0.0) & (seen <= 1.0)).all()
+    here = survey.seen_at((0.5, 2.0))
+    assert here.argmax() == survey.goals.costs[0].argmin()
+
+
+def test_the_way_home_is_that_of_the_map_and_endless_where_there_is_none():
+    survey = survey_of((WEST,), a=((2.0, 2.0), None), b=((6.0, 2.0), None))
+    home = TURNED.inverse() @ Transform(3.0, 2.0, 0.0)
+    assert survey.way_home_m("b", home) == pytest.approx(3.0, rel=0.1)
+    parted = survey_of((WEST,), wall_at=4.0, b=((6.0, 2.0), None))
+    assert math.isinf(parted.way_home_m("b", home))
