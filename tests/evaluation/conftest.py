@@ -45,6 +45,25 @@ def rows(episodes_folder):
 
 
 @pytest.fixture
+def row(rows):
+    """Makes an episode of one robot out of a real one."""
+
+    def make(policy="a", seed=0, floor="apartment", **changes):
+        base = {
+            "policy": policy,
+            "seed": seed,
+            "floor": floor,
+            "robots": 1,
+            "horizon_s": 100.0,
+            "time_s": 100.0,
+            "ended_because": {"robot_0": "horizon"},
+        }
+        return {**rows[0], **base, "path_m": [10.0 + seed], "t90_s": None, "t99_s": None, **changes}
+
+    return make
+
+
+@pytest.fixture
 def directory_of(tmp_path):
     """Writes given rows as a directory."""
 

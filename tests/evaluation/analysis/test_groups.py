@@ -1,31 +1,8 @@
 import numpy as np
-import pytest
 
-from lidarium.evaluation.analysis.figures import compared, further_figure, further_keys, time_figure
 from lidarium.evaluation.analysis.groups import floor_set_of, grouped, paired, repeats, times_to
-from lidarium.evaluation.drawing.profiles import profiles
 
 ENDED = {"robot_0": "no_frontier"}
-CUT = {"robot_0": "horizon"}
-
-
-@pytest.fixture
-def row(rows):
-    """Makes an episode of one robot out of a real one."""
-
-    def make(policy="a", seed=0, floor="apartment", **changes):
-        base = {
-            "policy": policy,
-            "seed": seed,
-            "floor": floor,
-            "robots": 1,
-            "horizon_s": 100.0,
-            "time_s": 100.0,
-            "ended_because": CUT,
-        }
-        return {**rows[0], **base, "path_m": [10.0 + seed], "t90_s": None, "t99_s": None, **changes}
-
-    return make
 
 
 def test_floors_belong_to_sets():
@@ -79,61 +56,3 @@ def test_pairs_share_floor_starts_and_seed(row):
 
 def test_runs_that_differ_in_the_seed_alone_are_repeats(row):
     assert repeats([row(path_m=[5.0]), row(seed=1, path_m=[5.0], steps_per_s=3.0), row(seed=2)]) == 1
-
-
-def test_a_time_that_none_reached_has_no_mean_but_a_success_rate(row):
-    figure = time_figure([row(seed=seed) for seed in range(8)], "t99_s", 100.0, 0)
-    assert figure.restricted_mean is None
-    assert (figure.success.estimate, figure.median.estimate) == (0.0, np.inf)
-
-
-def test_numbers_under_other_keys_are_figures_too(row):
-    runs = [row(seed=seed, sharing_lag_s=2.0 + seed, t50_s=None, auc=None) for seed in range(3)]
-    keys = further_keys(runs)
-    assert "sharing_lag_s" in keys
-    assert "t50_s" in keys
-    assert not {"auc", "seed", "robots", "interrupted", "t90_s", "version"} & set(keys)
-    assert further_figure(runs, "sharing_lag_s").estimate == 3.0
-    assert further_figure(runs, "t50_s").estimate == np.inf
-
-
-def test_a_faster_policy_is_found_pair_by_pair(row):
-    slow = [
-        row("slow", seed, t90_s=40.0 + 7.0 * seed % 31, t99_s=60.0 + 7.0 * seed % 31) for seed in range(20)
-    ]
-    fast = [
-        row("fast", seed, t90_s=each["t90_s"] - 5.0 - 0.1 * seed, t99_s=each["t99_s"] - 2.0)
-        for seed, each in enumerate(slow)
-    ]
-    (group,) = grouped([*slow, *fast])
-    by_key = {each.key: each for each in compared(group, "slow", seed=0)}
-    assert by_key["t90_s"].difference.estimate == pytest.approx(-5.95)
-    assert by_key["t90_s"].difference.high < 0.0
-    assert by_key["t90_s"].ratio.high < 1.0
-    assert (by_key["t90_s"].wilcoxon.less, by_key["t90_s"].pairs) == (20, 20)
-    assert by_key["t90_s"].wilcoxon.p_value < by_key["t90_s"].p_holm < 0.001
-    assert by_key["path_m"].difference.low == by_key["path_m"].difference.high == 0.0
-    assert by_key["path_m"].p_holm == 1.0
-
-
-def test_of_a_policy_that_never_gets_there_the_horizon_counts(row):
-    never = [row("never", seed) for seed in range(10)]
-    always = [row("always", seed, t90_s=30.0 + seed, t99_s=None) for seed in range(10)]
-    (group,) = grouped([*never, *always])
-    by_key = {each.key: each for each in compared(group, "never", seed=0)}
-    assert by_key["t90_s"].difference.estimate == pytest.approx(34.5 - 100.0)
-    assert by_key["t99_s"].difference is None
-    assert by_key["t99_s"].wilcoxon.ties == 10
-
-
-@pytest.mark.parametrize("lowest", [0.137, 0.42, 0.9, 0.98])
-def test_a_profile_of_coverage_turns_where_episodes_end(row, lowest):
-    (group,) = grouped(
-        [row(coverage_final=0.99), row(seed=1, coverage_final=0.9903), row(seed=2, coverage_final=lowest)]
-    )
-    found = profiles(group)["coverage_at_least"]
-    share = dict(zip(found["thresholds"], found["share_low_high"]["a"][0], strict=True))
-    assert found["thresholds"][0] <= lowest
-    assert share[0.99] == pytest.approx(2 / 3)
-    assert share[0.995] == 0.0
-    assert share[1.0] == 0.0

@@ -5,15 +5,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from linked_rooms import ROOM, TWO_ROOMS, settings_of
 
 import lidarium
 from lidarium.envs.floors.catalogue.store import FOLDER_VARIABLE
-from lidarium.envs.floors.floor import Floor, Solid
 from lidarium.envs.settings.making import make_settings
-from lidarium.evaluation.bounds.bound import graph_of, known_floor_bound
-from lidarium.evaluation.bounds.view_graph import bits_of, count, numbers_of
+from lidarium.evaluation.bounds.bound import known_floor_bound
 from lidarium.evaluation.episodes.runner import run_episode
-from lidarium.mapping.grids.grid_lines import visible
 
 pytest.importorskip("ortools", reason="OR-Tools is not installed")
 
@@ -21,23 +19,6 @@ pytest.importorskip("ortools", reason="OR-Tools is not installed")
 @pytest.fixture(autouse=True)
 def no_store(monkeypatch):
     monkeypatch.setenv(FOLDER_VARIABLE, "off")
-
-
-def wall(x, y, width, height):
-    return Solid(np.array([[x, y], [x + width, y], [x + width, y + height], [x, y + height]]))
-
-
-ROOM = Floor("room", (0.0, 0.0, 4.0, 3.0), (), starts=np.array([[2.0, 1.5, 0.0]]))
-TWO_ROOMS = Floor(
-    "two_rooms",
-    (0.0, 0.0, 8.0, 4.0),
-    (wall(3.9, 0.0, 0.2, 1.4), wall(3.9, 2.6, 0.2, 1.4)),
-    starts=np.array([[1.0, 2.0, 0.0], [1.0, 1.0, 0.0]]),
-)
-
-
-def settings_of(robots=1, **changes):
-    return make_settings(robots=robots, resolution=0.05, stop_coverage=0.99, **changes)
 
 
 def test_a_room_is_seen_from_where_the_robot_stands():
@@ -94,24 +75,6 @@ def test_a_bound_is_kept_and_the_same_again(monkeypatch, tmp_path):
     again = known_floor_bound(TWO_ROOMS, settings_of(), TWO_ROOMS.starts[:1])
     assert (again.time_s, again.length_m, again.share) == (first.time_s, first.length_m, first.share)
     assert np.array_equal(again.walks[0].points, first.walks[0].points)
-
-
-def test_views_are_what_lines_of_sight_reach():
-    settings = settings_of()
-    graph = graph_of(TWO_ROOMS, settings, TWO_ROOMS.starts[:1])
-    levels = np.where(graph.laser.solid > 0, 1, -1).astype(np.int8)
-    for place in (0, len(graph.places) // 2):
-        cell = np.floor((graph.places[place] - graph.laser.origin) / graph.laser.resolution)[::-1]
-        reach = settings.lidar.range_max / graph.laser.resolution
-        wanted = visible(levels, (int(cell[0]), int(cell[1])), graph.points, reach)
-        assert np.array_equal(numbers_of(graph.views[place]), np.flatnonzero(wanted))
-
-
-def test_bits_and_numbers_are_the_same():
-    numbers = np.array([0, 5, 63, 64, 130])
-    bits = bits_of(numbers, 3)
-    assert np.array_equal(numbers_of(bits), numbers)
-    assert count(bits) == 5
 
 
 def test_settings_without_a_share_and_wrong_starts_are_refused():

@@ -5,13 +5,11 @@ import pytest
 
 import lidarium
 from lidarium.envs.exploration import ExplorationEnv
-from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.settings.making import make_settings
 from lidarium.evaluation.episodes.events import in_floor_frame
 from lidarium.evaluation.episodes.history import History
 from lidarium.evaluation.episodes.result import result_of
 from lidarium.evaluation.episodes.runner import run_episode
-from lidarium.evaluation.episodes.settings_identity import realism_of, settings_sha256
 from lidarium.evaluation.episodes.watching import WatchedExploration
 from lidarium.evaluation.metrics import path_lengths
 from lidarium.evaluation.suites.episodes_file import TIMINGS
@@ -199,15 +197,6 @@ def test_a_run_interrupted_before_its_start_has_no_result():
 def test_a_history_that_has_not_begun_is_none():
     result = result_of(explored(horizon_s=1.0), history=History())
     assert result["overlap_mv"] is None
-
-
-def test_noise_is_not_ideal():
-    assert realism_of(make_settings(noise="datasheet")) == "custom"
-
-
-def test_the_hash_of_settings_tells_all_that_matters_and_threads_do_not():
-    assert settings_sha256(ExplorationSettings()) == settings_sha256(ExplorationSettings(threads=4))
-    assert settings_sha256(ExplorationSettings()) != settings_sha256(ExplorationSettings(robots=2))
 
 
 def test_the_team_map_is_the_same_wherever_the_robots_believe_to_start():

@@ -12,7 +12,6 @@ import pytest
 from films_read import read_film, share_of
 
 from lidarium.envs.drawing.frame_parts import EXPLORED
-from lidarium.evaluation.episodes.interrupts import PatientInterrupt, Termination
 from lidarium.evaluation.suites.episodes_file import read_episodes
 from lidarium.scripts.main import main
 
@@ -131,19 +130,3 @@ def test_termination_ends_each_command_as_an_interrupt_does(tmp_path, capsys, mo
         assert main(arguments) == 143, arguments
         assert "interrupted" in capsys.readouterr().err
     assert signal.getsignal(signal.SIGTERM) == before
-
-
-def test_a_patient_interrupt_notes_a_first_termination_and_raises_at_the_second():
-    termination = Termination()
-    before = signal.signal(signal.SIGTERM, termination)
-    try:
-        with PatientInterrupt() as interrupt:
-            assert not interrupt.is_asked
-            signal.raise_signal(signal.SIGTERM)
-            assert interrupt.is_asked
-            assert termination.is_asked
-            with pytest.raises(KeyboardInterrupt):
-                signal.raise_signal(signal.SIGTERM)
-        assert signal.getsignal(signal.SIGTERM) is termination
-    finally:
-        signal.signal(signal.SIGTERM, before)

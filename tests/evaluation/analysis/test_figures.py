@@ -1,0 +1,69 @@
+"""Figures of a policy, and of policies against a baseline, pair by pair."""
+
+import numpy as np
+import pytest
+
+from lidarium.evaluation.analysis.figures import (
+    compared,
+    further_figure,
+    further_keys,
+    time_figure,
+    value_figure,
+)
+from lidarium.evaluation.analysis.groups import grouped
+
+
+def test_a_time_that_none_reached_has_no_mean_but_a_success_rate(row):
+    figure = time_figure([row(seed=seed) for seed in range(8)], "t99_s", 100.0, 0)
+    assert figure.restricted_mean is None
+    assert (figure.success.estimate, figure.median.estimate) == (0.0, np.inf)
+
+
+def test_numbers_under_other_keys_are_figures_too(row):
+    runs = [row(seed=seed, sharing_lag_s=2.0 + seed, t50_s=None, auc=None) for seed in range(3)]
+    keys = further_keys(runs)
+    assert "sharing_lag_s" in keys
+    assert "t50_s" in keys
+    assert not {"auc", "seed", "robots", "interrupted", "t90_s", "version"} & set(keys)
+    assert further_figure(runs, "sharing_lag_s").estimate == 3.0
+    assert further_figure(runs, "t50_s").estimate == np.inf
+
+
+def test_a_faster_policy_is_found_pair_by_pair(row):
+    slow = [
+        row("slow", seed, t90_s=40.0 + 7.0 * seed % 31, t99_s=60.0 + 7.0 * seed % 31) for seed in range(20)
+    ]
+    fast = [
+        row("fast", seed, t90_s=each["t90_s"] - 5.0 - 0.1 * seed, t99_s=each["t99_s"] - 2.0)
+        for seed, each in enumerate(slow)
+    ]
+    (group,) = grouped([*slow, *fast])
+    by_key = {each.key: each for each in compared(group, "slow", seed=0)}
+    assert by_key["t90_s"].difference.estimate == pytest.approx(-5.95)
+    assert by_key["t90_s"].difference.high < 0.0
+    assert by_key["t90_s"].ratio.high < 1.0
+    assert (by_key["t90_s"].wilcoxon.less, by_key["t90_s"].pairs) == (20, 20)
+    assert by_key["t90_s"].wilcoxon.p_value < by_key["t90_s"].p_holm < 0.001
+    assert by_key["path_m"].difference.low == by_key["path_m"].difference.high == 0.0
+    assert by_key["path_m"].p_holm == 1.0
+
+
+def test_of_a_policy_that_never_gets_there_the_horizon_counts(row):
+    never = [row("never", seed) for seed in range(10)]
+    always = [row("always", seed, t90_s=30.0 + seed, t99_s=None) for seed in range(10)]
+    (group,) = grouped([*never, *always])
+    by_key = {each.key: each for each in compared(group, "never", seed=0)}
+    assert by_key["t90_s"].difference.estimate == pytest.approx(34.5 - 100.0)
+    assert by_key["t99_s"].difference is None
+    assert by_key["t99_s"].wilcoxon.ties == 10
+
+
+def test_a_policy_without_a_pair_is_not_compared(row):
+    (group,) = grouped([row("a", 0), row("b", 1)])
+    assert compared(group, "a", seed=0) == []
+
+
+def test_the_interquartile_mean_of_a_value_leaves_out_what_lies_far_off():
+    figure = value_figure([0.0, 1.0, 2.0, 1000.0], seed=0)
+    assert (figure.median.estimate, figure.mean.estimate) == (1.5, 250.75)
+    assert figure.interquartile_mean.estimate == 1.5
