@@ -13,7 +13,6 @@ from lidarium.evaluation.episodes.runner import run_episode
 from lidarium.evaluation.episodes.watching import WatchedExploration
 from lidarium.evaluation.metrics import path_lengths
 from lidarium.evaluation.suites.episodes_file import TIMINGS
-from lidarium.evaluation.truth.beliefs import team_log_odds
 
 KEYS = {
     "floor": str,
@@ -197,18 +196,6 @@ def test_a_run_interrupted_before_its_start_has_no_result():
 def test_a_history_that_has_not_begun_is_none():
     result = result_of(explored(horizon_s=1.0), history=History())
     assert result["overlap_mv"] is None
-
-
-def test_the_team_map_is_the_same_wherever_the_robots_believe_to_start():
-    turned = {"starts": np.array([(2.5, 4.0, 0.0), (8.4, 6.3, np.pi / 2)])}
-    maps = []
-    for known_starts in (True, False):
-        env = ExplorationEnv("apartment", make_settings(robots=2, resolution=0.05, known_starts=known_starts))
-        env.reset(seed=0, options=turned)
-        maps.append(np.sign(team_log_odds(env)[0]))
-    known, unknown = maps
-    either = (known != 0) | (unknown != 0)
-    assert (known == unknown)[either].mean() > 0.9
 
 
 def test_positions_are_told_in_the_frame_of_the_floor():

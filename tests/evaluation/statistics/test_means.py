@@ -45,13 +45,6 @@ def test_draws_come_from_the_seed():
     assert mean_interval(skewed, resamples=500, seed=1) != mean_interval(skewed, resamples=500)
 
 
-def test_each_resample_draws_as_many_values_as_there_are():
-    counts = resample_counts(7, 1100, 0)
-    assert counts.shape == (1100, 7)
-    assert (counts.sum(axis=1) == 7).all()
-    assert counts.mean(axis=0) == pytest.approx(np.ones(7), abs=0.15)
-
-
 def test_equal_values_have_an_interval_of_no_width():
     for interval in (mean_interval, interquartile_mean_interval):
         found = interval([0.1] * 30)

@@ -8,7 +8,6 @@ from lidarium.evaluation.analysis.groups import grouped
 from lidarium.evaluation.analysis.records import Entry
 from lidarium.evaluation.report import write_report
 from lidarium.evaluation.report.page.content import chosen_replays, rounded
-from lidarium.evaluation.report.plain_text import as_text, code, plain
 
 EVIL = '</script><img src=x onerror=alert(1)>"&amp; `a|b` \\*'
 
@@ -69,13 +68,6 @@ def test_names_cannot_end_the_script_that_they_stand_in(rows, directory_of, tmp_
     assert list(data["policies"]) == [EVIL]
     assert data["episodes"]["floors"] == [EVIL]
     assert any(EVIL in warning for warning in data["warnings"])
-
-
-@pytest.mark.parametrize("name", [EVIL, "plain", "`", "a`b", "\\`", "&amp;", "a\\*b", "", "|"])
-def test_markdown_reads_as_the_name_that_was_written(name):
-    assert as_text(plain(name)) == name
-    assert as_text(code(name)) == name
-    assert as_text(f"1 of {code(name)}, {plain(name)}.") == f"1 of {name}, {name}."
 
 
 def recorded_rows(floors, seeds, policies):

@@ -1,0 +1,44 @@
+"""One trial is one line, and its record is whole or the campaign ends."""
+
+import pytest
+
+from lidarium.evaluation.record import read_record
+from lidarium.evaluation.suites.suite import Suite
+from lidarium.evaluation.suites.trial_run import RecordNotWrittenError, run_trial, write_record_bytes
+
+SETTINGS = {"horizon_s": 3.0, "resolution": 0.05}
+
+
+def test_a_line_says_what_was_run_from_where(tmp_path):
+    suite = Suite(
+        policies=("nearest_frontier",),
+        floors=("apartment",),
+        variants={"short": SETTINGS},
+        starts={"apartment": (((2.5, 4.0, 0.5),),)},
+        stop={"decisions": 1},
+    )
+    (trial,) = suite.trials()
+    line = run_trial(suite, trial, tmp_path)
+    assert (line["key"], line["variant"]) == (trial.key, "short")
+    assert line["starts"] == [[2.5, 4.0, 0.5]]
+    assert line["ended_because"] == {"robot_0": "stop_rule"}
+    assert 2.0 <= line["time_s"] < 2.2
+    assert line["record"] == f"records/{trial.file_name}.npz"
+    (path,) = tmp_path.iterdir()
+    assert read_record(path).header["starts"] == [[2.5, 4.0, 0.5]]
+
+
+def test_without_a_folder_there_is_no_record():
+    suite = Suite(policies=("random_walk",), floors=("apartment",), variants={"default": SETTINGS})
+    (trial,) = suite.trials()
+    line = run_trial(suite, trial)
+    assert line["record"] is None
+    assert "bound_s" not in line
+
+
+def test_a_record_that_cannot_be_written_says_what_is_kept(tmp_path):
+    write_record_bytes(tmp_path / "a.npz", b"abc")
+    assert (tmp_path / "a.npz").read_bytes() == b"abc"
+    with pytest.raises(RecordNotWrittenError, match="the episodes before are kept"):
+        write_record_bytes(tmp_path / "a.npz" / "b.npz", b"abc")
+    assert [path.name for path in tmp_path.iterdir()] == ["a.npz"]
