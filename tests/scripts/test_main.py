@@ -519,20 +519,6 @@ def test_the_first_start_tells_that_it_compiles(tmp_path, capsys, monkeypatch, i
     assert ("compiling the kernels" in capsys.readouterr().err) == is_first_start
 
 
-def test_progress_is_a_line_every_few_seconds_where_there_is_no_terminal(capsys):
-    from types import SimpleNamespace
-
-    from lidarium.scripts.common import Progress
-
-    times = iter([0.0, 1.0, 6.0])
-    progress = Progress(is_quiet=False, clock=lambda: next(times))
-    env = SimpleNamespace(scorer=SimpleNamespace(coverage=0.5, time=12.0))
-    for _ in range(3):
-        progress.show(env)
-    progress.close()
-    assert capsys.readouterr().err == "explored 50.0 %, simulated 12 s\n" * 2
-
-
 def test_a_run_on_a_floor_with_a_goal_ends_there(tmp_path, capsys):
     assert (
         main(

@@ -9,7 +9,6 @@ from lidarium.envs.floors.catalogue.names import load_floor
 from lidarium.mapping.files.map_files import read_ros_map
 from lidarium.mapping.geometry.rigid import Transform
 from lidarium.scripts.main import main
-from lidarium.scripts.options.supervisor import gathered, supervisor_options
 
 TEAM = ["run", "--robots", "2", "--noise", "none", "--map-resolution", "0.05", "--seed", "0"]
 
@@ -89,24 +88,6 @@ def test_robots_that_nobody_joins_are_alone(tmp_path, capsys):
     capsys.readouterr()
     known = json.loads((tmp_path / "transforms.json").read_text())
     assert known["maps"] == {"robot_0": None, "robot_1": None}
-
-
-def test_settings_of_the_supervisor_are_one_option():
-    words = ["run", "--supervisor.period-s", "5", "--robots", "2", "--supervisor.assignment=utility"]
-    assert gathered(words) == [
-        "run",
-        "--robots",
-        "2",
-        "--supervisor",
-        "period_s=5",
-        "assignment=utility",
-    ]
-    assert gathered(["run", "--seed", "1"]) == ["run", "--seed", "1"]
-    assert supervisor_options(["returns_home=true", "assignment=utility", "period_s=5"]) == {
-        "returns_home": True,
-        "assignment": "utility",
-        "period_s": 5,
-    }
 
 
 @pytest.mark.parametrize(

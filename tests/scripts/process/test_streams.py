@@ -8,8 +8,6 @@ import sys
 
 import pytest
 
-from lidarium.scripts.common import notify
-
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="streams are closed as on Unix")
 
 PROGRAM = "import sys; from lidarium.scripts.main import main; sys.exit(main())"
@@ -56,16 +54,3 @@ def test_files_are_not_mixed_with_what_is_told_where_streams_are_closed(tmp_path
     told = in_shell('"$@" >&- 2>&-', "show", "robots", "--out", tmp_path)
     assert told.returncode == 0
     assert json.loads((tmp_path / "robots.json").read_text())["robots"]
-
-
-def test_work_goes_on_where_nobody_reads_its_messages(monkeypatch):
-    reading, writing = os.pipe()
-    os.close(reading)
-    with os.fdopen(writing, "w", buffering=1) as stream:
-        monkeypatch.setattr(sys, "stderr", stream)
-        notify("explored 50 %")
-        notify("explored 60 %")
-        monkeypatch.undo()
-        os.dup2(os.open(os.devnull, os.O_WRONLY), writing)
-    monkeypatch.setattr(sys, "stderr", stream)
-    notify("the stream is closed now")
