@@ -3,35 +3,11 @@
 import numpy as np
 import pytest
 from films_read import share_of
+from watched_frames import explored
 
 import lidarium
 from lidarium.envs.drawing.frame_parts import EXPLORED, team_colours
-from lidarium.envs.settings.making import make_settings
 from lidarium.evaluation.drawing.films.map_frames import MapFrames
-from lidarium.evaluation.drawing.films.own_maps import LINE, OwnMaps
-from lidarium.evaluation.episodes.runner import run_episode
-from lidarium.evaluation.episodes.watching import WatchedExploration, Watcher
-
-
-class Taken(Watcher):
-    """Keeps what is drawn each second."""
-
-    def __init__(self, draw):
-        self.draw, self.frames = draw, []
-
-    def step(self, env, commands):
-        if int(env.world.steps[0]) % 10 == 1:
-            self.frames.append(self.draw(env))
-
-
-def explored(draw, floor="apartment", robots=3, horizon_s=4.0, resolution=0.05):
-    settings = make_settings(
-        robots=robots, resolution=resolution, horizon_s=horizon_s, known_starts=False, localization="slam"
-    )
-    taken = Taken(draw)
-    env = WatchedExploration(floor, settings, watchers=[taken])
-    run_episode(lidarium.policy("nearest_frontier_own_map"), env, 0)
-    return env, taken.frames
 
 
 @pytest.mark.parametrize(
@@ -49,40 +25,3 @@ def test_frames_have_the_width_and_show_more_and_more(floor, robots, resolution,
     first, last = (sum(share_of(frame, tuple(colour)) for colour in pale) for frame in (drawn[0], drawn[-1]))
     assert first < last
     assert share_of(drawn[-1][len(drawn[-1]) // 2 :], EXPLORED) < 0.02
-
-
-def test_maps_of_robots_do_not_move_as_they_grow():
-    tiles = []
-
-    def draw(env):
-        if not tiles:
-            tiles.append(OwnMaps(env, 600))
-        return tiles[0].draw(env, [{0}, {1}, {2}])
-
-    env, drawn = explored(draw)
-    width = 600 // 3
-    for robot, colour in enumerate(team_colours(3)):
-        side = slice(robot * width, robot * width + width - 10)
-        walls = [(np.abs(frame[LINE:, side].astype(int) - colour) <= 2).all(axis=2) for frame in drawn]
-        before, after = walls[0].sum(), (walls[0] & walls[-1]).sum()
-        assert before > 50
-        # All but the robot itself, and what later scans correct, is where it was.
-        assert after > 0.6 * before
-    assert not np.array_equal(drawn[0], drawn[-1])
-    assert env.beliefs.believed.shape == (3, 3)
-
-
-def test_maps_that_are_joined_have_another_line():
-    drawn = {}
-
-    def draw(env):
-        tiles = OwnMaps(env, 600)
-        drawn["alone"], drawn["joined"] = tiles.draw(env, [{0}, {1}]), tiles.draw(env, [{0, 1}])
-        return drawn["alone"]
-
-    explored(draw, robots=2, horizon_s=1.0)
-    alone, joined = drawn["alone"], drawn["joined"]
-    assert (alone[2, 2] == team_colours(2)[0]).all()
-    assert (joined[2, 2] == joined[2, 400]).all()
-    assert (joined[2, 2] != alone[2, 2]).any()
-    assert (alone[LINE:] == joined[LINE:]).all()
