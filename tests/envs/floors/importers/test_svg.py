@@ -1,11 +1,8 @@
 import math
-import xml.etree.ElementTree as ElementTree
 
-import numpy as np
 import pytest
 
 from lidarium.envs.floors.importers import load_file, takes_resolution
-from lidarium.envs.floors.importers.svg_paths import outlines, transform_of
 
 ROOM = '<rect x="0" y="0" width="600" height="400" fill="none" stroke="black" stroke-width="10"/>'
 
@@ -19,10 +16,6 @@ def free_area(tmp_path, inside, resolution=0.01):
     """Return the free area of a plan [m2]."""
     floor = load_file(written(tmp_path, inside), resolution)
     return float((floor.raster(0.025, 0.2, 0.2).solid == 0).sum()) * 0.025**2
-
-
-def path(text):
-    return outlines(ElementTree.fromstring(f'<path d="{text}"/>'), "path")
 
 
 def test_a_room_is_as_large_as_it_is_drawn(tmp_path):
@@ -66,51 +59,6 @@ def test_a_thin_line_lets_nothing_through(tmp_path):
 def test_what_is_dark_is_solid(tmp_path, shape, area):
     # Where a ring encloses something, what it encloses is no part of the largest area.
     assert free_area(tmp_path, ROOM + shape) == pytest.approx(5.9 * 3.9 - area, abs=0.06)
-
-
-def test_curves_of_paths_go_where_their_definitions_say():
-    (cubic,) = path("M0 0C0 1 2 3 4 4")
-    share = np.arange(17)[:, None] / 16
-    wanted = 3 * share * (1 - share) ** 2 * [0, 1] + 3 * share**2 * (1 - share) * [2, 3] + share**3 * [4, 4]
-    assert np.allclose(cubic, wanted)
-    (smooth,) = path("M0 0C0 1 2 3 4 4S8 4 8 0")
-    (written_out,) = path("M0 0C0 1 2 3 4 4C6 5 8 4 8 0")
-    assert np.allclose(smooth, written_out)
-    (quadratic,) = path("m1 1q1 0 1 1t1 1")
-    (again,) = path("M1 1Q2 1 2 2Q2 3 3 3")
-    assert np.allclose(quadratic, again)
-
-
-@pytest.mark.parametrize(("large", "sweep"), [(0, 0), (0, 1), (1, 0), (1, 1)])
-def test_arcs_are_on_their_ellipse_and_the_wanted_part_of_it(large, sweep):
-    (arc,) = path(f"M0 2A3 2 0 {large} {sweep} 3 4")
-    # One of the two ellipses through both ends has its middle at 3, 2; the other at 0, 4.
-    middle = np.array([3.0, 2.0]) if large == sweep else np.array([0.0, 4.0])
-    assert np.allclose((((arc - middle) / [3.0, 2.0]) ** 2).sum(axis=1), 1.0)
-    assert np.allclose(arc[-1], [3.0, 4.0])
-    turns = np.unwrap(np.arctan2(*((arc - middle) / [3.0, 2.0]).T[::-1]))
-    assert (abs(turns[-1] - turns[0]) > math.pi) == bool(large)
-    assert (turns[-1] > turns[0]) == bool(sweep)
-
-
-def test_an_arc_that_is_too_small_is_enlarged():
-    (arc,) = path("M0 0A1 1 0 0 1 10 0")
-    assert np.allclose(np.hypot(*(arc - [5.0, 0.0]).T), 5.0)
-
-
-@pytest.mark.parametrize(
-    ("text", "point", "wanted"),
-    [
-        ("rotate(90)", (1, 0), (0, 1)),
-        ("rotate(90, 1, 1)", (1, 0), (2, 1)),
-        ("translate(2) scale(3,4)", (1, 1), (5, 4)),
-        ("matrix(1 2 3 4 5 6)", (1, 1), (9, 12)),
-        ("skewX(45)", (0, 1), (1, 1)),
-    ],
-)
-def test_transforms_move_points_as_defined(text, point, wanted):
-    matrix = transform_of(ElementTree.fromstring(f'<g transform="{text}"/>'))
-    assert np.allclose((matrix @ [*point, 1.0])[:2], wanted)
 
 
 def test_a_drawing_needs_a_resolution(tmp_path):
