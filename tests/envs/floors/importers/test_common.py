@@ -48,3 +48,9 @@ def test_a_scale_beside_the_files_own_is_refused():
     common.refuse_resolution(Path("a.xml"), None)
     with pytest.raises(ValueError, match=r"has its own scale, but a resolution of 0\.1 m"):
         common.refuse_resolution(Path("a.xml"), 0.1)
+
+
+@pytest.mark.parametrize("wall", [(0.0, 0.0, 4.0, 0.0), (0.0, 0.0, 4.0, 1.0), (1.0, 1.0, 1.0, 1.0)])
+def test_a_lone_wall_encloses_nothing(wall):
+    with pytest.raises(ValueError, match="a has no walls that enclose a space; want a floor plan"):
+        common.floor_of_lines(Path("a"), np.array([wall]), np.zeros((0, 4)))
