@@ -6,41 +6,16 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scored_halls import hall, tables_of, team
 
 from lidarium.envs.floors.catalogue.names import load_floor
-from lidarium.envs.floors.floor import Floor, Raster, Solid
+from lidarium.envs.floors.floor import Floor, Solid
 from lidarium.envs.floors.free_space import reachable_free_space
-from lidarium.envs.outcome.scorer import THRESHOLDS, Scorer
 from lidarium.envs.scoring.coverage import count_bits, mark_seen, pack_bits, share_new_cells, unpack_bits
-from lidarium.envs.scoring.rewards import reward_weights
 from lidarium.envs.scoring.score import counted_cells
-from lidarium.envs.settings.exploration import ExplorationSettings
-from lidarium.envs.settings.lidar import Lidar
-from lidarium.envs.settings.rewards import RewardSettings
-from lidarium.envs.settings.robots import ROBOTS
-from lidarium.envs.simulation.kernels.contact import distance_bound
 from lidarium.envs.simulation.kernels.floor_cache import floor_tables
 from lidarium.envs.simulation.kernels.floor_tables import FloorTables
-from lidarium.envs.simulation.kernels.ray_tables import RayTables
-from lidarium.envs.simulation.kinematic_simulation import KinematicSimulation
-from lidarium.mapping.grids.occupancy import OccupancySettings
 from lidarium.mapping.kernels.compilation import kernel
-
-
-def tables_of(solid, resolution=0.025):
-    raster = Raster(solid.astype(np.uint8), (0.0, 0.0), resolution)
-    return FloorTables(raster, raster, RayTables(raster.solid), distance_bound(raster.solid))
-
-
-def hall(rows=160, columns=240):
-    solid = np.zeros((rows, columns), np.uint8)
-    solid[0], solid[-1], solid[:, 0], solid[:, -1] = 1, 1, 1, 1
-    return solid
-
-
-def team(robots, resolution=0.05, beams=181, noise=0.0, weights=None):
-    lidar, maps = Lidar(beams=beams, noise_floor=noise), OccupancySettings(resolution=resolution)
-    return KinematicSimulation.of_team([ROBOTS["kobuki"]] * robots, lidar, maps, reward_weights=weights)
 
 
 def starts_on(tables, count, generator, apart=0.6):
@@ -204,17 +179,6 @@ def test_the_cells_that_count_are_those_that_the_smallest_disc_sweeps():
     assert not counted[1, 1]
 
 
-def test_a_coarse_cell_counts_only_where_all_its_fine_cells_do():
-    free = np.ones((7, 9), bool)
-    free[3, 4] = False
-    counted = counted_cells(free, 2)
-    assert counted.shape == (4, 5)
-    assert not counted[1, 2]
-    assert counted[0, 0]
-    assert not counted[3].any()
-    assert not counted[:, 4].any()
-
-
 def test_noise_changes_the_map_and_not_the_score():
     generator = np.random.default_rng(8)
     tables = floor_tables(load_floor("building:3"), 0.025, 0.3, 0.52)
@@ -229,54 +193,6 @@ def test_noise_changes_the_map_and_not_the_score():
         assert np.array_equal(exact.score.gains, noisy.score.gains)
         assert exact.score.team_seen[0] == noisy.score.team_seen[0]
     assert not np.array_equal(exact.beliefs.log_odds[0], noisy.beliefs.log_odds[0])
-
-
-def scored(weights, robots=2):
-    options = ExplorationSettings(robots=robots, reward=weights)
-    simulation = team(robots, weights=reward_weights(options))
-    simulation.place(0, tables_of(hall()), np.array([[1.0, 2.0, 0.0], [3.0, 2.0, math.pi]])[:robots], 1)
-    scorer = Scorer(simulation, options)
-    simulation.step(np.zeros((robots, 2)), moves_bodies=False)
-    scorer.start()
-    return simulation, scorer
-
-
-def test_rewards_are_area_less_prices_and_sum_over_the_steps_since_they_were_taken():
-    weights = RewardSettings(area=2.0, time=0.5, contact=3.0, energy=0.25)
-    simulation, scorer = scored(weights)
-    assert scorer.take_rewards() == [0.0, 0.0]
-    expected = np.zeros(2)
-    for _ in range(30):
-        before = simulation.world.travelled.copy()
-        simulation.step(np.array([[0.5, 0.0], [0.6, 0.0]]))
-        scorer.advance()
-        expected += (
-            2.0 * 0.05**2 * simulation.score.gains
-            - 0.5 * 0.1
-            - 3.0 * simulation.world.contacts
-            - 0.25 * (simulation.world.travelled - before)
-        )
-    assert simulation.world.contacts.any()
-    assert np.allclose(scorer.take_rewards(), expected)
-    assert scorer.take_rewards() == [0.0, 0.0]
-
-
-def test_thresholds_are_timed_once_and_in_order():
-    simulation, scorer = scored(RewardSettings(), 1)
-    for _ in range(400):
-        simulation.step(np.array([[0.3, 0.8]]))
-        scorer.advance()
-    times = list(scorer.times.values())
-    assert list(scorer.times) == list(THRESHOLDS[: len(times)])
-    assert times == sorted(times)
-    assert len(times) >= 2
-    curve_times, coverages = zip(*scorer.curve, strict=True)
-    assert list(coverages) == sorted(coverages)
-    assert curve_times[0] == 0.0
-    for threshold, time in scorer.times.items():
-        assert min(t for t, c in scorer.curve if c >= threshold) == time
-    gaps = np.diff([time for time, _ in scorer.track])
-    assert np.allclose(gaps, 0.2)
 
 
 def test_body_and_laser_share_their_tables_unless_something_stands_at_one_height_only():

@@ -3,7 +3,7 @@
 import json
 import math
 import pickle
-from dataclasses import FrozenInstanceError, asdict, fields, replace
+from dataclasses import FrozenInstanceError, asdict, replace
 
 import numpy as np
 import pytest
@@ -11,8 +11,6 @@ import pytest
 from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.settings.lidar import LIDARS, NOISE, Lidar
 from lidarium.envs.settings.making import make_settings
-from lidarium.envs.settings.reset_options import read_options
-from lidarium.envs.settings.rewards import RewardSettings
 from lidarium.envs.settings.robots import ROBOTS
 from lidarium.mapping.grids.occupancy import OccupancySettings
 
@@ -111,13 +109,6 @@ def test_an_unknown_option_is_a_type_error_that_lists_the_known_ones():
         make_settings(robotss=3)
 
 
-@pytest.mark.parametrize("weight", [field.name for field in fields(RewardSettings)])
-@pytest.mark.parametrize("value", [math.inf, math.nan])
-def test_weights_of_the_reward_are_finite(weight, value):
-    with pytest.raises(ValueError, match=weight):
-        RewardSettings(**{weight: value})
-
-
 def test_short_options_name_robots_lidars_noise_resolution_and_cycles():
     made = make_settings(
         robots=2, robot="pioneer", lidar="lidar_360_6m", noise="thesis", resolution=0.025, max_cycles=50
@@ -176,26 +167,3 @@ def test_the_presets_are_those_of_the_data_sheets():
     assert NOISE["datasheet"] == (0.01, 0.01)
     assert NOISE["thesis"] == (0.03, 0.0)
     assert all(lidar.is_full_circle for name, lidar in LIDARS.items() if "360" in name)
-
-
-def test_reset_options_that_are_unknown_are_ignored_and_known_ones_checked():
-    assert read_options(None, 2) == read_options({}, 2)
-    assert read_options({"colour": "red"}, 2).floor is None
-    chosen = read_options({"starts": [[1, 2, 3], [4, 5, 6]], "goal": [1, 2], "floor": "clinic"}, 2)
-    assert chosen.goal == (1.0, 2.0)
-    assert chosen.floor == "clinic"
-    assert np.array_equal(chosen.starts, [[1, 2, 3], [4, 5, 6]])
-
-
-@pytest.mark.parametrize(
-    ("options", "words"),
-    [
-        ({"starts": [[1.0, 2.0, 3.0]]}, r"starts has shape \(1, 3\); want \(2, 3\)"),
-        ({"starts": [[1.0, 2.0], [1.0, 2.0]]}, "want"),
-        ({"starts": [[math.nan, 0, 0], [1, 1, 1]]}, "starts"),
-        ({"goal": (math.inf, 0.0)}, "goal"),
-    ],
-)
-def test_reset_options_with_bad_values_are_refused(options, words):
-    with pytest.raises(ValueError, match=words):
-        read_options(options, 2)

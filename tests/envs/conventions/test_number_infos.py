@@ -1,0 +1,57 @@
+"""Infos as numbers under the same names."""
+
+from enum import Enum
+
+import numpy as np
+
+from lidarium.envs.conventions.number_infos import ending_number, flat_infos, flat_row_infos
+from lidarium.envs.outcome.endings import REASONS
+
+
+class Kind(Enum):
+    """Words by number."""
+
+    ONE = 1
+
+
+def test_numbers_have_their_names_joined_and_words_are_left_out():
+    infos = {
+        "truth": {"pose": np.array([1.0, 2.0]), "failed": np.bool_(True)},
+        "coverage": np.float32(0.5),
+        "steps": 3,
+        "words": "none",
+        "kind": Kind.ONE,
+        "list": [1, 2],
+    }
+    assert flat_infos(infos) == {
+        "truth.pose.0": 1.0,
+        "truth.pose.1": 2.0,
+        "truth.failed": 1.0,
+        "coverage": 0.5,
+        "steps": 3.0,
+        "ended": 0.0,
+    }
+
+
+def test_reasons_are_numbered_and_a_policys_own_come_last():
+    numbers = [ending_number(reason) for reason in (None, *REASONS[1:])]
+    assert len(set(numbers)) == len(numbers)
+    assert ending_number("out of coffee") == len(REASONS)
+    assert flat_infos({"ended_because": REASONS[1]})["ended"] == 1.0
+
+
+def test_rows_have_the_names_of_single_infos_with_masks_beside_them():
+    rows = {
+        "truth": {"pose": np.arange(6.0).reshape(2, 3), "_pose": np.ones(2, bool)},
+        "coverage": np.array([0.5, 0.25], np.float32),
+        "_coverage": np.ones(2, bool),
+        "ended_because": np.array([None, REASONS[1]], object),
+    }
+    found = flat_row_infos(rows, 2)
+    assert found["truth.pose.1"].tolist() == [1.0, 4.0]
+    assert found["coverage"].tolist() == [0.5, 0.25]
+    assert found["ended"].tolist() == [0.0, 1.0]
+    names = {name for name in found if not name.startswith("_")}
+    assert names == set(flat_infos({"truth": {"pose": np.zeros(3)}, "coverage": 0.5}))
+    assert all(found[f"_{name}"].tolist() == [True, True] for name in names)
+    assert flat_row_infos({}, 3)["ended"].tolist() == [0.0, 0.0, 0.0]
