@@ -6,8 +6,6 @@ import numpy as np
 from lidarium.evaluation.drawing.merge_picture import (
     SEVERAL,
     _coloured,
-    _contradicting,
-    _Panel,
     save_merge_picture,
 )
 from lidarium.mapping.geometry.rigid import Transform
@@ -24,16 +22,6 @@ def test_walls_of_several_are_dark_and_of_one_in_its_colour():
     fused = FusedMap(levels, np.zeros((1, 4), np.float32), sources, (0.0, 0.0), 0.1)
     picture = _coloured(fused, [RED, BLUE])[0].tolist()
     assert picture == [list(RED), SEVERAL.tolist(), [191, 191, 216], [240, 240, 240]]
-
-
-def test_a_wall_contradicts_where_the_other_map_is_free_all_around():
-    one, other = np.full((20, 20), 127, np.uint8), np.full((20, 20), 127, np.uint8)
-    one[5, 5] = one[5, 12] = one[15, 5] = 0
-    other[:10] = 255
-    other[6, 15] = 0  # beside the second wall, once the maps lie over each other
-    panel = _Panel(["a", "b"], [Transform(0.2, 0.0, 0.0), Transform()], "", [])
-    merged = Merged({"a": one, "b": other}, 0.1, {}, FrameTree())
-    assert np.allclose(_contradicting(merged, (panel, 0), 1), [[0.55, 0.55]])
 
 
 def test_maps_of_which_nothing_is_known_have_a_picture_that_says_so(tmp_path):

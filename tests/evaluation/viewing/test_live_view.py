@@ -19,9 +19,14 @@ from lidarium.evaluation.viewing.live_view import LiveView
 
 SETTINGS = make_settings(robots=2, horizon_s=8.0, resolution=0.05)
 APART = make_settings(
-    robots=2, horizon_s=8.0, resolution=0.05, known_starts=False, localization="slam", noise="datasheet",
+    robots=2,
+    horizon_s=8.0,
+    resolution=0.05,
+    known_starts=False,
+    localization="slam",
+    noise="datasheet",
     odometry="typical",
-)  # fmt: skip
+)
 
 
 WITH_CAMERA = settings_for(
