@@ -1,0 +1,88 @@
+"""How a robot travels along the legs of a way."""
+
+import math
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from srt_halls import hall, senses_at
+
+from lidarium.agents.srt.settings import SrtSettings
+from lidarium.agents.srt.travel import BACKING_S, Travel
+from lidarium.envs.settings.lidar import Lidar
+from lidarium.envs.settings.robots import Robot
+
+LIDAR = Lidar(beams=3)
+MEMORY = hall([])
+
+
+def travel(**settings):
+    return Travel(SrtSettings(**settings), Robot(), LIDAR)
+
+
+def leg(x, y):
+    """A leg to a place of the hall, as of a way that was chosen."""
+    return SimpleNamespace(place=np.array([x + 1.0, y + 1.0]), candidate=f"at {x:g}", is_goal=False)
+
+
+def later(senses, seconds):
+    return replace(senses, time_s=senses.time_s + seconds)
+
+
+def test_the_target_is_what_the_last_leg_leads_to():
+    one, there = travel(), senses_at(2.0, 2.0)
+    assert one.target is None
+    one.set_out([leg(4.0, 2.0), leg(8.0, 3.0)], there, is_aside=True)
+    assert (one.target, one.is_aside) == ("at 8", True)
+    assert one.began_at.tolist() == [3.0, 3.0]
+    one.end_leg()
+    assert [each.candidate for each in one.legs] == ["at 8"]
+    one.drop()
+    assert one.target is None
+
+
+def test_corners_are_cut_where_the_map_has_room():
+    one, there = travel(memory="map"), senses_at(2.0, 2.0)
+    one.set_out([leg(4.0, 0.5), leg(5.0, 3.0), leg(9.0, 2.0)], there)
+    one.begin_leg(there, MEMORY)
+    assert [each.candidate for each in one.legs] == ["at 9"]
+    kept = travel(memory="regions")
+    kept.set_out([leg(4.0, 0.5), leg(9.0, 2.0)], there)
+    kept.begin_leg(there, MEMORY)
+    assert len(kept.legs) == 2
+
+
+def test_a_leg_ends_where_the_robot_is_at_its_end():
+    one, there = travel(), senses_at(2.0, 2.0)
+    one.set_out([leg(4.0, 2.0)], there)
+    one.begin_leg(there, MEMORY)
+    speed, turn_rate = one.drive(there)
+    assert speed >= 0.0
+    assert abs(turn_rate) < 0.1
+    assert one.drive(senses_at(4.0, 2.0)) is None
+
+
+def test_a_blocked_robot_backs_out_for_a_while():
+    one, there = travel(), senses_at(2.0, 2.0)
+    assert not one.is_backing(there)
+    one.back_out(there)
+    assert one.is_backing(later(there, 0.99 * BACKING_S))
+    assert not one.is_backing(later(there, BACKING_S))
+
+
+@pytest.mark.parametrize(("heading", "sign"), [(math.pi / 2.0, 1.0), (-math.pi / 2.0, -1.0)])
+def test_a_robot_turns_on_the_spot_no_faster_than_it_can_until_it_is_there(heading, sign):
+    one, there = travel(), senses_at(2.0, 2.0)
+    one.follow([leg(4.0, 2.0)], there)
+    focus = there.pose[:2] + np.array([0.0, sign])
+    one.turns.plan_frontier(focus, there)
+    assert one.turn(there) == pytest.approx((0.0, sign * one.limits.turn_rate))
+    assert one.turn(senses_at(2.0, 2.0, heading)) is None
+
+
+def test_a_robot_looks_around_only_where_it_is_asked_to():
+    for looks_around in (True, False):
+        one = travel(looks_around=looks_around)
+        one.look_around(senses_at(2.0, 2.0))
+        assert one.turns.is_over is not looks_around
