@@ -3,32 +3,13 @@ and batteries."""
 
 import numpy as np
 import pytest
+from looked_reports import EAST, NORTH, WEST, looked, rules
 from reported_halls import RADIUS, RESOLUTION, hall, report
 
 from lidarium.agents.supervisor.knowledge.station import MergeStation
 from lidarium.agents.supervisor.settings import SupervisorSettings
-from lidarium.agents.supervisor.supervisor import Supervisor
-from lidarium.envs.driving.path_planner import footprint_of
 from lidarium.envs.radio.messages import OperatingState, OrderKind
 from lidarium.mapping.merging.growing_maps import GrowingMap
-
-WEST, EAST, NORTH = (0.0, 2.0), (7.95, 2.0), (4.0, 3.95)
-
-
-def looked(reports, time_s=10.0, given_up=None, agents=None, **settings):
-    """The supervisor after one look at reports of robots whose frames are known, and its commands by
-    robot."""
-    chosen = SupervisorSettings(trusts_starts=True, **settings)
-    station = MergeStation(agents or list(reports), RESOLUTION, RADIUS, chosen)
-    for agent, one in reports.items():
-        station.receive(agent, one, time_s)
-    station.merge(time_s)
-    supervisor = Supervisor(station, footprint_of(RADIUS))
-    return supervisor, {command.agent: command for command in supervisor.decide(time_s, given_up or {})}
-
-
-def rules(supervisor):
-    return {decision.agent: (decision.rule, decision.order) for decision in supervisor.decisions}
 
 
 def test_of_two_robots_with_one_goal_the_farther_one_is_sent_to_the_other_opening():
@@ -75,29 +56,6 @@ def test_where_no_frontier_is_left_all_stop_and_what_was_given_up_is_none():
     frontier = np.array([[7.98, 1.55 + 0.05 * k] for k in range(19)])
     supervisor, _ = looked({"a": report(open_hall, 6.5, 2.0)}, given_up={"a": frontier})
     assert rules(supervisor) == {"a": (5, "stop")}
-
-
-def test_a_robot_that_knows_much_less_is_sent_where_there_is_more_to_map():
-    levels, small = hall(openings=(WEST, EAST)), hall(1.5, 4.0, openings=(WEST,))
-    supervisor, commands = looked({"a": report(levels, 6.5, 2.0, (7.7, 2.0)), "b": report(small, 0.8, 1.0)})
-    assert rules(supervisor)["b"] == (4, "go_to")
-    assert commands["b"].target.x < 1.0
-    shares = {decision.agent: decision.inputs.map_known for decision in supervisor.decisions}
-    assert shares["b"] < 0.5 * shares["a"]
-
-
-def test_a_robot_that_drives_far_and_maps_little_within_walls_is_stopped():
-    cell = hall(1.5, 1.5)
-    settings = SupervisorSettings(trusts_starts=True)
-    station = MergeStation(["a", "b"], RESOLUTION, RADIUS, settings)
-    big = GrowingMap(hall(openings=(EAST,)).levels, (3.0, 0.0))
-    for step in range(13):
-        station.receive("b", report(cell, 0.7, 0.7, travelled_m=float(step), time_s=float(step)), float(step))
-    station.receive("a", report(big, 8.0, 2.0, (10.7, 2.0), time_s=12.0), 12.0)
-    station.merge(12.0)
-    supervisor = Supervisor(station, footprint_of(RADIUS))
-    (command,) = supervisor.decide(12.0, {})
-    assert (command.agent, command.kind, command.rule) == ("b", OrderKind.STOP, 4)
 
 
 def test_failed_robots_are_left_out_with_their_maps_and_paused_ones_keep_theirs_in_without_orders():
@@ -167,34 +125,8 @@ def test_all_robots_get_goals_of_their_own_at_once_where_that_is_asked_for(assig
     assert min(np.hypot(a[0] - b[0], a[1] - b[1]) for k, a in enumerate(targets) for b in targets[:k]) > 1.0
 
 
-def test_robots_that_are_about_to_meet_are_separated_where_that_is_asked_for():
-    levels = hall(openings=((7.95, 1.0), (7.95, 3.0), WEST))
-    team = {"a": report(levels, 6.5, 1.0, (7.6, 1.0)), "b": report(levels, 4.0, 3.9 - 0.9, (7.6, 3.0))}
-    assert looked(team)[1] == {}
-    supervisor, commands = looked(team, avoids_rendezvous=True)
-    assert rules(supervisor) == {"a": (0, None), "b": (7, "go_to")}
-    assert commands["b"].target.x < 1.0
-
-
 def test_when_the_work_is_done_robots_drive_home_where_that_is_asked_for():
     supervisor, commands = looked({"a": report(hall(), 6.5, 2.0)}, returns_home=True)
     assert rules(supervisor) == {"a": (8, "go_to")}
     assert commands["a"].is_home
     assert (commands["a"].target.x, commands["a"].target.y) == (1.0, 2.0)
-
-
-@pytest.mark.parametrize(("left", "rule"), [(900.0, 0), (105.0, 9)])
-def test_a_robot_turns_back_before_its_battery_is_too_low_to_bring_it_home(left, rule):
-    levels = hall(openings=(EAST,))
-    settings = SupervisorSettings(trusts_starts=True, battery_margin=1.5)
-    station = MergeStation(["a"], RESOLUTION, RADIUS, settings)
-    supervisor = Supervisor(station, footprint_of(RADIUS))
-    for time_s, way, energy in ((10.0, 0.5, 1000.0), (20.0, 50.0, left)):
-        station.receive(
-            "a",
-            report(levels, 6.5, 2.0, (7.7, 2.0), travelled_m=way, energy_left_j=energy, time_s=time_s),
-            time_s,
-        )
-        station.merge(time_s)
-        supervisor.decide(time_s, {})
-    assert supervisor.decisions[-1].rule == rule
