@@ -48,7 +48,8 @@ PAGE = """# Learned explorers
 `learned` beside `tour_frontier`, whose tours it corrects, and `tour_frontier` beside the other classic
 explorers: simulated time to 99 % of `C_free`, pair by pair, from the same starts. Kobuki, URG-04LX, perfect
 poses, no noise, maps of 5 cm, cut at {horizon:.0f} s; runs that did not get there count as that. Nothing was
-chosen by these floors.
+chosen by these floors. Beside `srt`, with SLAM and with unknown starts it is on the
+[leaderboard](leaderboard.md).
 
 Made with `{command}` on {date}: lidarium {version}, Python {python}.
 
