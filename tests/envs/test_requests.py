@@ -5,8 +5,6 @@ import numpy as np
 import pytest
 
 import lidarium
-from lidarium.envs.levels.frontiers import FrontierExploration
-from lidarium.envs.wrappers.merged_maps import MergedMaps
 
 LEVELS = ("velocity", "waypoint", "frontier")
 SMALL = {"robots": 2, "map_cells": 64, "lidar": "lidar_360_6m"}
@@ -105,10 +103,3 @@ def test_settings_that_are_nearly_known_are_named():
 def test_two_horizons_are_refused():
     with pytest.raises(ValueError, match=r"max_cycles is 30 and horizon_s is 3\.0; want one of them"):
         lidarium.parallel_env(max_cycles=30, horizon_s=3.0)
-
-
-@pytest.mark.parametrize("wrapper", [FrontierExploration, MergedMaps])
-def test_a_batch_in_a_wrapper_of_one_team_is_refused(wrapper):
-    batch = lidarium.vector_env(2, "scene_room", robots=2)
-    with pytest.raises(ValueError, match=f"{wrapper.__name__} is put around ExplorationVectorEnv, a batch"):
-        wrapper(batch)

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 import lidarium
-from lidarium.envs.drawing.batch_frames import tiled
 from lidarium.envs.floors.floor import Floor
 
 SMALL = {"robots": 2, "map_cells": 32, "lidar": "lidar_360_6m"}
@@ -42,13 +41,6 @@ def test_a_batch_without_a_mode_draws_nothing_but_its_picture():
     assert env.render() is None
     height, width, _ = env.batch.frames()[0].shape
     assert env.picture().shape == (2 * height, 3 * width, 3)
-
-
-def test_tiles_are_side_by_side():
-    frames = [np.full((2, 4, 3), k, np.uint8) for k in range(3)]
-    assert tiled(frames)[:, :, 0].tolist() == [[0] * 4 + [1] * 4] * 2 + [[2] * 4 + [255] * 4] * 2
-    with pytest.raises(ValueError, match="frames are empty"):
-        tiled([])
 
 
 def test_other_modes_are_refused():

@@ -1,17 +1,14 @@
 """Pictures in three dimensions show what stands where."""
 
-import math
-
 import numpy as np
 import pytest
 
 from lidarium.envs.drawing.frame_parts import INK, team_colours
-from lidarium.envs.drawing.shading import Viewpoint, shade
 from lidarium.envs.drawing.views import FloorViews, camera_panel, false_colours
 from lidarium.envs.exploration import ExplorationEnv
-from lidarium.envs.floors.faces import SECTION, faces_of, section_of
+from lidarium.envs.floors.faces import SECTION, section_of
 from lidarium.envs.floors.floor import Floor, Solid
-from lidarium.envs.floors.raster import Raster, rectangles_of
+from lidarium.envs.floors.raster import Raster
 from lidarium.envs.settings.making import make_settings
 from lidarium.envs.settings.sensors.cameras import CAMERAS
 
@@ -42,16 +39,6 @@ def test_the_section_of_an_image_covers_its_solid_cells():
     tops = section.corners[section.owners == SECTION]
     sides = np.ptp(tops[:, :, :2], axis=1)
     assert sides.prod(axis=1).sum() == pytest.approx(0.01 * solid.sum())
-
-
-def test_rectangles_cover_each_cell_once():
-    generator = np.random.default_rng(1)
-    for _ in range(20):
-        solid = generator.integers(0, 3, (13, 17)) > 0
-        counts = np.zeros(solid.shape, int)
-        for first_row, first_column, row, column in rectangles_of(solid):
-            counts[first_row:row, first_column:column] += 1
-        assert (counts == solid).all()
 
 
 def test_a_robot_is_where_it_stands_in_each_picture():
@@ -94,16 +81,6 @@ def test_a_panel_has_the_height_of_its_frame(height):
     panel = camera_panel(views(), POSES, np.zeros((2, 3)), depth, camera, height)
     assert panel.shape[0] == height
     assert panel.shape[1] % 2 == 0
-
-
-def test_a_viewpoint_straight_down_has_an_upright_picture():
-    viewpoint = Viewpoint.towards(np.array([2.0, 2.0, 9.0]), np.array([2.0, 2.0, 0.0]), math.radians(60.0))
-    picture = shade(
-        section_of(ROOM, 1.3), viewpoint, (200, 200), np.zeros((0, 5)), [], np.array([True, False])
-    )
-    ink = (picture == (60, 66, 80)).all(axis=2)
-    assert np.nonzero(ink)[0].mean() > 135.0  # the wall at the lowest y is at the bottom
-    assert len(faces_of(ROOM)) > 0
 
 
 def test_frames_of_robots_with_cameras_are_wider():

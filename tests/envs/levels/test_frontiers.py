@@ -6,7 +6,6 @@ import pytest
 
 import lidarium
 from lidarium.envs.floors.floor import Floor, Solid
-from lidarium.envs.levels.frontier_ranking import choose_offers
 from lidarium.envs.settings.exploration import ExplorationSettings
 
 MOST = ExplorationSettings().frontiers
@@ -173,28 +172,6 @@ def test_on_their_own_maps_robots_explore_twice():
         shares.append(float((base.score.seen / base.score.counted[0]).min()))
     assert shares[1] >= 0.97
     assert shares[0] <= shares[1]
-
-
-def plain_offers(left, sizes, is_wanted, by_size, most):
-    """Choose as the kernel does, by sorting."""
-    wanted = np.flatnonzero(is_wanted)
-    by_cost = wanted[np.argsort(-left[wanted], kind="stable")]
-    cheapest = by_cost[: most - by_size]
-    others = np.setdiff1d(wanted, cheapest)
-    longest = others[np.argsort(-sizes[others], kind="stable")][:by_size]
-    return [k for k in by_cost if k in cheapest or k in longest]
-
-
-@pytest.mark.parametrize("by_size", [0, 1, 4, 8])
-@pytest.mark.parametrize("clusters", [0, 3, 8, 9, 40])
-def test_offers_are_the_cheapest_and_the_longest_of_the_others(clusters, by_size):
-    generator = np.random.default_rng(clusters + by_size)
-    for _ in range(20):
-        left, sizes = generator.integers(0, 50, clusters), generator.integers(1, 20, clusters)
-        is_wanted, ranked = generator.random(clusters) < 0.8, np.empty(8, np.int64)
-        wanted = plain_offers(left, sizes, is_wanted, by_size, 8)
-        count = choose_offers(left, sizes, is_wanted.copy(), by_size, ranked)
-        assert ranked[:count].tolist() == wanted
 
 
 def table_of(observations):

@@ -1,8 +1,12 @@
 """Lasers, with the noise of their ranges."""
 
+import math
+
+import numpy as np
 import pytest
 
 from lidarium.envs.settings.lidar import LIDARS, MOST_RANGE_M, Lidar
+from lidarium.mapping.grids.scan_geometry import MOST_BEAMS
 
 
 def test_either_part_of_the_noise_makes_a_laser_noisy():
@@ -25,3 +29,30 @@ def test_either_part_of_the_noise_makes_a_laser_noisy():
 def test_lasers_that_cannot_be_simulated_are_refused(options, message):
     with pytest.raises(ValueError, match=message):
         Lidar(**options)
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"beams": 0},
+        {"beams": MOST_BEAMS + 1},
+        {"field_of_view": 0.0},
+        {"field_of_view": 7.0},
+        {"range_min": 6.0},
+        {"range_min": -1.0},
+        {"range_max": math.inf},
+        {"range_max": math.nan},
+        {"noise_floor": -0.1},
+        {"noise_share": math.nan},
+        {"height": 0.0},
+    ],
+)
+def test_a_lidar_that_cannot_be_is_refused(options):
+    with pytest.raises(ValueError, match=next(iter(options))):
+        Lidar(**options)
+
+
+def test_a_full_circle_has_equal_gaps_and_does_not_repeat_its_first_beam():
+    lidar = Lidar(beams=180, field_of_view=2.0 * math.pi, range_max=6.0)
+    gaps = np.diff(np.append(lidar.angles, lidar.angles[0] + 2.0 * math.pi))
+    assert np.allclose(gaps, math.radians(2.0))

@@ -13,7 +13,7 @@ from lidarium.envs.simulation.kernels.face_casting import FaceTable, cast_by_fac
 from lidarium.envs.simulation.kernels.ray_casting import cast_scan, cast_scans, cut_by_disc
 from lidarium.envs.simulation.kernels.ray_tables import RayTables
 from lidarium.envs.simulation.kernels.ray_travel import cast_by_squares, cast_in_lanes, cast_one_by_one
-from lidarium.mapping.grids.scan_geometry import MOST_BEAMS, Beams, ScanGeometry, beam_directions
+from lidarium.mapping.grids.scan_geometry import Beams, ScanGeometry, beam_directions
 
 TENTH_OF_A_MILLIMETRE = 1e-4 / 0.025
 """In cells of a raster of 2.5 cm."""
@@ -355,12 +355,6 @@ def test_a_lidar_of_one_beam_looks_straight_ahead():
     assert all(abs(float(ranges[0]) - 28.5) < 1e-9 for ranges in casts)
 
 
-def test_a_full_circle_has_equal_gaps_and_does_not_repeat_its_first_beam():
-    lidar = Lidar(beams=180, field_of_view=2.0 * math.pi, range_max=6.0)
-    gaps = np.diff(np.append(lidar.angles, lidar.angles[0] + 2.0 * math.pi))
-    assert np.allclose(gaps, math.radians(2.0))
-
-
 def test_many_poses_in_one_call_are_the_scans_of_the_single_poses():
     generator = np.random.default_rng(3)
     solid = rooms(generator)
@@ -419,33 +413,3 @@ def test_a_disc_never_lengthens_a_beam_and_one_around_the_laser_is_not_seen():
     assert (ranges == 2.0).all()
     cut_by_disc(beams, 1.0, 0.0, 3.0, ranges)
     assert (ranges == 2.0).all()
-
-
-@pytest.mark.parametrize(
-    ("solid", "words"),
-    [(np.ones((2, 5), np.uint8), "at least 3 rows"), (np.zeros((5, 5), np.uint8), "outermost ring")],
-)
-def test_a_raster_that_rays_could_leave_is_refused(solid, words):
-    with pytest.raises(ValueError, match=words):
-        RayTables(solid)
-
-
-@pytest.mark.parametrize(
-    "options",
-    [
-        {"beams": 0},
-        {"beams": MOST_BEAMS + 1},
-        {"field_of_view": 0.0},
-        {"field_of_view": 7.0},
-        {"range_min": 6.0},
-        {"range_min": -1.0},
-        {"range_max": math.inf},
-        {"range_max": math.nan},
-        {"noise_floor": -0.1},
-        {"noise_share": math.nan},
-        {"height": 0.0},
-    ],
-)
-def test_a_lidar_that_cannot_be_is_refused(options):
-    with pytest.raises(ValueError, match=next(iter(options))):
-        Lidar(**options)
