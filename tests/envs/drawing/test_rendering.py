@@ -1,12 +1,9 @@
 import pickle
-import warnings
 
 import numpy as np
 import pytest
-from matplotlib import pyplot
 
 import lidarium
-from lidarium.envs.drawing.frame_window import FrameWindow
 from lidarium.envs.drawing.rendering import EXPLORED, PALETTE, classify, draw_frame, team_colours
 from lidarium.envs.exploration import ExplorationEnv
 from lidarium.envs.floors.floor import Floor, Solid
@@ -95,19 +92,6 @@ def test_a_frame_needs_a_reset_and_room():
         draw_frame(ExplorationEnv(small_floor(), make_settings(robots=1)).scene())
     with pytest.raises(ValueError, match="size of the frame is 10"):
         draw_frame(started().scene(), 10)
-
-
-def test_a_window_without_a_display_says_so_once():
-    pyplot.switch_backend("agg")
-    window = FrameWindow("title")
-    frame = np.zeros((60, 80, 3), np.uint8)
-    with pytest.warns(UserWarning, match="no display"):
-        window.show(frame)
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        window.show(frame)
-        window.close()
-        window.close()
 
 
 def test_an_environment_that_was_drawn_can_be_pickled():

@@ -4,7 +4,6 @@ import cv2
 import numpy as np
 import pytest
 
-from lidarium.evaluation.analysis.records import coverage_at
 from lidarium.evaluation.report import write_report
 from lidarium.evaluation.report.report import jsonable
 from lidarium.evaluation.statistics import Interval
@@ -114,11 +113,6 @@ def test_a_baseline_without_episodes_is_refused_and_nothing_written(rows, direct
     ):
         write_report(directory_of(rows), tmp_path / "out", baseline="best")
     assert not (tmp_path / "out").exists()
-
-
-def test_coverage_holds_from_each_change_on():
-    coverage = np.array([[0.0, 0.1], [2.0, 0.4], [3.0, 0.9]])
-    assert coverage_at(coverage, np.array([0.0, 1.9, 2.0, 10.0])).tolist() == [0.1, 0.1, 0.4, 0.9]
 
 
 def test_what_is_not_finite_becomes_null():
