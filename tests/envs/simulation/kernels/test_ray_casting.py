@@ -5,168 +5,28 @@ import math
 
 import numpy as np
 import pytest
+from cast_rays import (
+    FLOORS,
+    all_casts,
+    beams_of,
+    by_choice,
+    by_faces,
+    by_squares,
+    check_against_reference,
+    directions_of,
+    free_position,
+    reach_bounds,
+    rooms,
+    speckled,
+    walled,
+)
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lidarium.envs.settings.lidar import Lidar
-from lidarium.envs.simulation.kernels.face_casting import FaceTable, cast_by_faces
-from lidarium.envs.simulation.kernels.ray_casting import cast_scan, cast_scans, cut_by_disc
+from lidarium.envs.simulation.kernels.ray_casting import cast_scans, cut_by_disc
 from lidarium.envs.simulation.kernels.ray_tables import RayTables
-from lidarium.envs.simulation.kernels.ray_travel import cast_by_squares, cast_in_lanes, cast_one_by_one
-from lidarium.mapping.grids.scan_geometry import Beams, ScanGeometry, beam_directions
-
-TENTH_OF_A_MILLIMETRE = 1e-4 / 0.025
-"""In cells of a raster of 2.5 cm."""
-
-CORNER = 5e-9
-"""A ray that passes a lattice corner nearer than this may go either way [cells]."""
-
-
-def reach_bounds(solid, x, y, dx, dy, reach):
-    """Least and greatest range [cells] that a ray may have, cell by cell: they differ where it runs along
-    or through a corner."""
-    lower = math.inf
-    columns, rows = _lanes(x, dx), _lanes(y, dy)
-    step_x, step_y = (1 if dx > 0.0 else -1), (1 if dy > 0.0 else -1)
-    distance = 0.0
-    for _ in range(10_000):
-        states = [solid[row, column] != 0 for row in rows for column in columns]
-        if any(states):
-            lower = min(lower, distance)
-        if all(states):
-            return min(lower, reach), min(distance, reach)
-        if distance >= reach:
-            return min(lower, reach), reach
-        next_x, next_y = _crossing(columns, x, dx, step_x), _crossing(rows, y, dy, step_y)
-        offset = (
-            abs(next_x - next_y) * min(abs(dx), abs(dy))
-            if math.isfinite(next_x) and math.isfinite(next_y)
-            else math.inf
-        )
-        if offset < CORNER:
-            distance = max(next_x, next_y)
-            sides = [solid[rows[0], columns[0] + step_x] != 0, solid[rows[0] + step_y, columns[0]] != 0]
-            if any(sides):
-                lower = min(lower, min(next_x, next_y))
-            if all(sides):
-                return min(lower, reach), min(distance, reach)
-            columns, rows = [columns[0] + step_x], [rows[0] + step_y]
-        elif next_x < next_y:
-            distance, columns = next_x, [columns[0] + step_x]
-        else:
-            distance, rows = next_y, [rows[0] + step_y]
-    raise AssertionError("the reference did not end")
-
-
-def _lanes(position, direction):
-    """Cells beside each other in which the ray begins: two where it runs along a lattice line, or starts
-    on one."""
-    cell = math.floor(position)
-    if abs(position - round(position)) < 1e-9 and abs(direction) < 1e-12:
-        return [round(position) - 1, round(position)]
-    if position == cell and direction < 0.0:
-        return [cell - 1]
-    return [cell]
-
-
-def _crossing(lanes, position, direction, step):
-    if abs(direction) < 1e-12:
-        return math.inf
-    return (lanes[0] + (1 if step > 0 else 0) - position) / direction
-
-
-def walled(rows, columns):
-    solid = np.zeros((rows, columns), np.uint8)
-    solid[0], solid[-1], solid[:, 0], solid[:, -1] = 1, 1, 1, 1
-    return solid
-
-
-def rooms(generator, rows=150, columns=180):
-    solid = walled(rows, columns)
-    for _ in range(8):
-        row, column = generator.integers(2, rows - 6), generator.integers(2, columns - 6)
-        height, width = (int(generator.integers(2, 60)), int(generator.integers(1, 4)))[
-            :: generator.choice([-1, 1])
-        ]
-        solid[row : row + height, column : column + width] = 1
-    return solid
-
-
-def turned(generator, rows=150, columns=180):
-    """Walls turned by any angle, as stairs of cells that touch along sides."""
-    solid = walled(rows, columns)
-    for _ in range(5):
-        angle, thickness = generator.uniform(0.0, math.pi), generator.uniform(1.5, 4.0)
-        cx, cy, length = (
-            generator.uniform(20, columns - 20),
-            generator.uniform(20, rows - 20),
-            generator.uniform(10, 50),
-        )
-        j, i = np.meshgrid(np.arange(columns) + 0.5 - cx, np.arange(rows) + 0.5 - cy)
-        along, across = j * math.cos(angle) + i * math.sin(angle), -j * math.sin(angle) + i * math.cos(angle)
-        solid[(abs(along) < length / 2) & (abs(across) < thickness / 2)] = 1
-    return solid
-
-
-def speckled(generator, rows=90, columns=100):
-    return walled(rows, columns) | (
-        generator.random((rows, columns)) < generator.choice([0.003, 0.02, 0.1])
-    ).astype(np.uint8)
-
-
-FLOORS = {"rooms": rooms, "turned": turned, "speckled": speckled}
-
-
-def free_position(solid, generator):
-    i, j = (int(value) for value in generator.choice(np.argwhere(solid == 0)))
-    return j + generator.uniform(0.001, 0.999), i + generator.uniform(0.001, 0.999)
-
-
-def directions_of(geometry, heading):
-    directions = np.empty((4, geometry.beams))
-    beam_directions(heading, geometry.unit_vectors, directions)
-    return directions
-
-
-def beams_of(x, y, heading, geometry, directions, reach):
-    return Beams(x, y, heading, geometry.angle_first, geometry.angle_increment, directions, reach)
-
-
-def by_squares(tables, beams):
-    ranges = np.full(beams.directions.shape[1], np.nan)
-    cast_by_squares(tables.squares.ravel(), tables.rows, tables.columns, beams, ranges)
-    return ranges
-
-
-def by_faces(tables, beams):
-    ranges = np.full(beams.directions.shape[1], np.nan)
-    tile_rows, tile_columns = -(-tables.rows // 128), tables.tile_columns
-    window = (0, tile_rows - 1, 0, tile_columns - 1)
-    cast_by_faces(FaceTable(tables.faces, tables.face_starts, tile_columns), window, beams, ranges)
-    return ranges
-
-
-def by_choice(tables, beams):
-    ranges = np.full(beams.directions.shape[1], np.nan)
-    cast_scan(tables.addresses, beams, ranges)
-    return ranges
-
-
-def all_casts(tables, x, y, heading, geometry, reach):
-    directions = directions_of(geometry, heading)
-    beams = beams_of(x, y, heading, geometry, directions, reach)
-    return directions, (by_squares(tables, beams), by_faces(tables, beams), by_choice(tables, beams))
-
-
-def check_against_reference(solid, tables, x, y, heading, geometry, reach):
-    directions, casts = all_casts(tables, x, y, heading, geometry, reach)
-    bounds = np.array(
-        [reach_bounds(solid, x, y, directions[0, k], directions[1, k], reach) for k in range(geometry.beams)]
-    )
-    for ranges in casts:
-        assert (ranges >= bounds[:, 0] - TENTH_OF_A_MILLIMETRE).all()
-        assert (ranges <= bounds[:, 1] + TENTH_OF_A_MILLIMETRE).all()
-    return casts, bounds
+from lidarium.mapping.grids.scan_geometry import ScanGeometry
 
 
 @pytest.mark.parametrize("kind", FLOORS)
@@ -291,59 +151,12 @@ def test_rays_from_lattice_points_through_lattice_points_never_hang_or_leak(x, y
     assert drawn <= high + 1e-6 or low == 0.0
 
 
-def test_the_casters_agree_with_each_other_on_real_sizes():
-    generator = np.random.default_rng(5)
-    solid = turned(generator, 400, 500)
-    tables = RayTables(solid)
-    geometry = ScanGeometry()
-    for _ in range(20):
-        x, y = free_position(solid, generator)
-        _, (squares, faces, chosen) = all_casts(
-            tables, x, y, generator.uniform(-math.pi, math.pi), geometry, 224.0
-        )
-        assert np.abs(squares - faces).max() < 1e-6
-        assert np.abs(squares - chosen).max() < 1e-6
-
-
-@pytest.mark.parametrize("kind", FLOORS)
-@pytest.mark.parametrize("beams", [32, 33, 48, 63, 121, 720])
-@pytest.mark.parametrize("view", [0.3, math.radians(240.0), 2.0 * math.pi])
-def test_beams_in_lanes_are_those_cast_one_by_one_to_the_bit(kind, beams, view):
-    generator = np.random.default_rng([beams, len(kind)])
-    tables = RayTables(FLOORS[kind](generator))
-    geometry = ScanGeometry(beams=beams, field_of_view=view)
-    free = np.argwhere(tables.squares[0] > 0)
-    for reach in (3.0, 40.0, 300.0):
-        row, column = generator.choice(free)
-        for x, y, heading in [
-            (column + generator.random(), row + generator.random(), generator.uniform(-4.0, 4.0)),
-            (column + 0.5, row + 0.5, math.pi / 4),
-            (float(column), float(row), math.pi / 2),
-        ]:
-            cast = beams_of(x, y, heading, geometry, directions_of(geometry, heading), reach)
-            both = []
-            for caster in (cast_in_lanes, cast_one_by_one):
-                ranges = np.full(beams, np.nan)
-                caster(tables.squares.ravel(), tables.rows, tables.columns, cast, ranges)
-                both.append(ranges.tolist())
-            assert both[0] == both[1]
-
-
 def test_nothing_in_reach_gives_the_reach_itself():
     tables = RayTables(walled(400, 400))
     geometry = ScanGeometry(beams=90, field_of_view=2.0 * math.pi)
     _, casts = all_casts(tables, 200.3, 199.7, 0.4, geometry, 150.0)
     for ranges in casts:
         assert (ranges == 150.0).all()
-
-
-@pytest.mark.parametrize("fixed", [0, 1])
-def test_a_hall_longer_than_the_largest_square_is_crossed_exactly(fixed):
-    solid = walled(12, 1500) if fixed else walled(1500, 12)
-    tables = RayTables(solid)
-    x, y = (3.5, 6.5) if fixed else (6.5, 3.5)
-    heading = 0.001 if fixed else math.pi / 2 + 0.001
-    check_against_reference(solid, tables, x, y, heading, ScanGeometry(beams=9, field_of_view=0.01), 5000.0)
 
 
 def test_a_lidar_of_one_beam_looks_straight_ahead():
