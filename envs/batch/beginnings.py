@@ -1,5 +1,6 @@
 """How the episodes of a batch begin, each by draws of its own."""
 
+import copy
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -63,7 +64,8 @@ class Beginnings:
         generators = self._generators.copy()
         for k, episode in enumerate(int(episode) for episode in beginning):
             seed = None if seeds is None else seeds[k]
-            generator = generators[episode]
+            # Drawn from a copy: where a later episode cannot begin, nothing has been drawn.
+            generator = copy.deepcopy(generators[episode])
             if seed is not None or generator is None:
                 generator = np.random.default_rng(seed)
             chosen = of_curriculum(
