@@ -25,7 +25,9 @@ RESAMPLES = 10_000
 """Resamples of an interval unless something else is asked for."""
 
 FEWEST_RESAMPLES = 100
-_MOST_VALUES = 65_535
+MOST_VALUES = 65_535
+"""Largest sample."""
+
 _CHUNK = 500
 
 Replicates = Callable[[Counts], tuple[Values, Values]]
@@ -58,8 +60,10 @@ def resample_counts(size: int, resamples: int, seed: int) -> Counts:
     """
     if resamples < FEWEST_RESAMPLES:
         raise ValueError(f"resamples is {resamples}; want at least {FEWEST_RESAMPLES}")
-    if not 1 <= size <= _MOST_VALUES:
-        raise ValueError(f"the sample has {size} values; want 1 to {_MOST_VALUES}")
+    if not 1 <= size <= MOST_VALUES:
+        raise ValueError(
+            f"the sample has {size:,} values; want 1 to {MOST_VALUES:,}: part the episodes by settings"
+        )
     generator = np.random.default_rng(seed)
     counts = np.empty((resamples, size), np.uint16)
     for first in range(0, resamples, _CHUNK):

@@ -30,12 +30,15 @@ def memory_mb(kind: str = "VmRSS", process: str = "self") -> float:
 
 
 def run_short(folder: Path, first: int, last: int, workers: int) -> dict[str, Any]:
-    """Run the short episodes of some seeds into a folder; return what each took."""
+    """Run the short episodes of some seeds into a folder; return what each took.
+
+    They have settings of a name of their own: a report compares within settings.
+    """
     suite = Suite(
         policies=("random_walk",),
         floors=("apartment",),
         seeds=tuple(range(first, last)),
-        variants={"default": SHORT},
+        variants={f"from {first}": SHORT},
     )
     began, path = time.perf_counter(), folder / EPISODES_FILE
     for _ in Campaign(suite, folder, workers, records=False).run():

@@ -16,6 +16,7 @@ from lidarium.benchmarks.studies.evaluation.machines import (
 )
 from lidarium.benchmarks.studies.shared.kept import Progress, do_missing, kept_lines
 from lidarium.benchmarks.studies.shared.study import Study
+from lidarium.evaluation.statistics.resampling import MOST_VALUES
 from lidarium.mapping.files.guarded_reading import MOST_FILE_BYTES
 
 EPISODES, PIECE = 100_000, 10_000
@@ -34,7 +35,8 @@ PAGE = """{heading}
 ## 10^5 episodes
 
 Short episodes (`random_walk` on the apartment for one simulated second, maps of 10 cm, no records) with
-{workers} workers, in pieces of {piece:,}: what is measured is what stands around episodes.
+{workers} workers, in pieces of {piece:,} with settings of their own: what is measured is what stands around
+episodes.
 
 | episodes | a piece, each [ms] | memory of the command [MB] | `episodes.jsonl` [MB] |
 |---:|---:|---:|---:|
@@ -44,9 +46,15 @@ With all {episodes:,} there, the command opens the file in {opened_s:.1f} s when
 `lidarium report --replays 0` takes {report_s:.0f} s and {report_mb:,.0f} MB, and its page has
 {page_mb:.1f} MB.
 
-A line takes {line_bytes:,.0f} bytes. Files above {most:,.1f} GB are refused, so a folder ends at
-{limit:,.0f} episodes: that breaks first. Before it, the memory of the report becomes tight:
-{mb_each:.1f} kB an episode. [Run many episodes](../tutorials/run_many_episodes.md) says how to part them.
+What breaks first:
+
+1. A report compares at most {group:,} episodes of one policy, with the same settings and number of robots.
+   Its resamples take 20 kB for each, 1.3 GB at that size. Part settings, or take fewer seeds of more floors.
+2. A line takes {line_bytes:,.0f} bytes. Files above {most:,.1f} GB are refused, so a folder ends at
+   {limit:,.0f} episodes.
+3. The report above took {mb_each:.1f} kB an episode, and a browser has to open its page.
+
+[Run many episodes](../tutorials/run_many_episodes.md) says how to part them.
 
 ## Nodes
 
@@ -146,6 +154,7 @@ def page(folder: Path, command: str) -> str:
         page_mb=again["page_bytes"] / 1e6,
         line_bytes=line_bytes,
         most=MOST_FILE_BYTES / 1e9,
+        group=MOST_VALUES,
         limit=round(MOST_FILE_BYTES / line_bytes, -4),
         mb_each=1e3 * again["report_mb"] / again["episodes"],
         gain=gain,

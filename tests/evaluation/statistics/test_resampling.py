@@ -52,5 +52,5 @@ def test_the_symmetric_form_reaches_equally_far_to_both_sides():
 
 @pytest.mark.parametrize("size", [0, 65_536])
 def test_sizes_that_cannot_be_counted_are_refused(size):
-    with pytest.raises(ValueError, match=f"the sample has {size} values; want 1 to 65535"):
+    with pytest.raises(ValueError, match=f"the sample has {size:,} values; want 1 to 65,535"):
         resample_counts(size, 100, 0)

@@ -45,7 +45,7 @@ def test_the_page_tells_what_breaks_first(tmp_path, monkeypatch):
     assert done[-1] == ("killed nodes", 1, 1)
     page = machines_study.page(tmp_path, "lidarium reproduce machines")
     assert "| 10,000 | 4.0 | 200 | 8 |" in page
-    assert "so a folder ends at\n2,680,000 episodes" in page
+    assert "so a folder ends at\n   2,680,000 episodes" in page
     assert "1.90 x as fast as one (1.90 to 1.90 in 3 rounds" in page
     assert "killed 5 times" in page
 
