@@ -111,7 +111,7 @@ def test_intervals_move_and_stretch_with_the_values(values, shift, scale):
         (lambda: mean_interval([1.0, np.inf]), r"values\[1\] is inf; want finite"),
         (lambda: mean_interval([1.0, 2.0], resamples=10), "resamples is 10; want at least 100"),
         (lambda: mean_interval([1.0, 2.0], confidence=95), "confidence is 95"),
-        (lambda: mean_interval(np.zeros(70_000)), "1 to 65535"),
+        (lambda: mean_interval(np.zeros(70_000)), "1 to 65,535"),
         (lambda: paired_difference([1.0, 2.0], [1.0]), "a has 2 values and b has 1"),
         (lambda: paired_difference([1.0], [np.nan]), r"b\[0\] is nan"),
         (lambda: paired_ratio([1.0, 2.0], [1.0, 0.0]), r"b\[1\] is 0.0; want values above 0"),
