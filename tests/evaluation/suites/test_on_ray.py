@@ -7,6 +7,7 @@ from functools import partial
 
 import pytest
 
+from lidarium.benchmarks.studies.evaluation.machines import local_cluster
 from lidarium.evaluation.suites import on_ray as module
 from lidarium.evaluation.suites.campaign import Campaign
 from lidarium.evaluation.suites.episodes_file import TIMINGS
@@ -28,15 +29,8 @@ pytestmark = [
 
 @pytest.fixture(scope="module")
 def cluster():
-    from ray.cluster_utils import Cluster
-
-    handler = signal.getsignal(signal.SIGTERM)  # nodes put one of their own there
-    made = Cluster(initialize_head=True, head_node_args={"num_cpus": 1, "include_dashboard": False})
-    made.add_node(num_cpus=1)
-    signal.signal(signal.SIGTERM, handler)
-    yield made
-    made.shutdown()
-    signal.signal(signal.SIGTERM, handler)
+    with local_cluster(2) as made:
+        yield made
 
 
 def suite():
