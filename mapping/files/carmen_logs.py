@@ -58,11 +58,11 @@ def read_carmen_log(path: Path, field_of_view: float | None = None) -> LaserLog:
     """
     path = Path(path)
     content = Content()
-    for line in _lines(path, content.skipped):
-        read_line(line, content)
-    if not content.scans:
-        raise ValueError(f"{path} holds no scans; want a CARMEN log with FLASER or ROBOTLASER1 lines")
     with reading(path, "a CARMEN log"):
+        for line in _lines(path, content.skipped):
+            read_line(line, content)
+        if not content.scans:
+            raise ValueError(f"{path} holds no scans; want a CARMEN log with FLASER or ROBOTLASER1 lines")
         give_directions(content, field_of_view)
         return made_usable(_log(path, content), str(path))
 

@@ -142,6 +142,10 @@ def _bag(scans: int, beams: int) -> bytes:
 
 
 _LINE = "0 LINE 8 0 10 {} 20 {} 11 {} 21 {} "
+_ARC = "0 ARC 8 0 10 0 20 0 40 1 50 0 51 1 "
+_ELLIPSE = "0 ELLIPSE 8 0 10 0 20 0 11 1 21 0 40 1 41 0 42 .1 "
+_LIGHT = "0 LWPOLYLINE 100 AcDbPolyline 90 2 10 0 20 0 10 1 20 1 "
+_HEAVY, _VERTICES = "0 POLYLINE 66 1 ", "0 VERTEX 8 0 10 0 20 0 0 VERTEX 8 0 10 0 20 4 "
 _ROOM = "".join(map(_LINE.format, (0, 9, 9, 0), (0, 0, 9, 9), (9, 9, 0, 0), (0, 9, 9, 0)))
 
 CASES: dict[str, tuple[str, Callable[[], bytes]]] = {
@@ -174,6 +178,7 @@ CASES: dict[str, tuple[str, Callable[[], bytes]]] = {
     "nested file": ("drawn.json", lambda: _repeated('{"a":', "", "")),
     "many lines of a drawing": ("svg.svg", lambda: _svg('<path d="M1 1L9 9"/>', count=0)),
     "a long path": ("svg.svg", lambda: _svg('<path d="M0 0', "L9 1L1 9" * 120_000, '"/>')),
+    "curves of a long path": ("svg.svg", lambda: _svg('<path d="M0 0', "t1 1" * 240_000, '"/>')),
     "long lines of a drawing": ("svg.svg", lambda: _svg('<path d="M0 0H9000V9000H0Z"/>', count=200)),
     "curves of a drawing": (
         "svg.svg",
@@ -206,6 +211,22 @@ CASES: dict[str, tuple[str, Callable[[], bytes]]] = {
         "dxf.dxf",
         lambda: _dxf(
             "0 INSERT 8 0 2 B0 10 0 20 0 70 30000 71 30000 44 1 45 1 " + _ROOM, _nested_blocks(0, 0, _ROOM)
+        ),
+    ),
+    "light polylines of a DXF": ("dxf.dxf", lambda: _dxf(_LIGHT * 18_000 + _ROOM)),
+    "heavy polylines of a DXF": ("dxf.dxf", lambda: _dxf(_HEAVY + _VERTICES * 12_000 + "0 SEQEND " + _ROOM)),
+    "arcs of a DXF": ("dxf.dxf", lambda: _dxf(_ARC * 4_700 + "0 TEXT 8 0 1 a " * 50_000 + _ROOM)),
+    "many arcs of a DXF": ("dxf.dxf", lambda: _dxf(_ARC * 28_000 + _ROOM)),
+    "ellipses of a DXF": ("dxf.dxf", lambda: _dxf(_ELLIPSE * 4_000 + _ROOM)),
+    "points of a DXF": ("dxf.dxf", lambda: _dxf("0 POINT 8 0 10 0 20 0 " * 45_000 + _ROOM)),
+    "places of a block": (
+        "dxf.dxf",
+        lambda: _dxf("0 INSERT 8 0 2 B0 10 0 20 0 " * 3_900, _nested_blocks(0, 0, _ROOM)),
+    ),
+    "a damaged DXF": (
+        "dxf.dxf",
+        lambda: _dxf(_ARC * 3_900 + _LINE.format(0, 0, 9, 9) * 24_000 + _ROOM).replace(
+            b"0\nENDSEC\n0\nEOF", b"0\nEOF"
         ),
     ),
     "a large circle": ("dxf.dxf", lambda: _dxf("0 CIRCLE 8 0 10 0 20 0 40 1e12 " + _ROOM)),

@@ -8,7 +8,6 @@ from lidarium.envs.floors.floor import Floor
 from lidarium.envs.floors.importers import (
     amrl,
     arrays,
-    dxf,
     houseexpo,
     images,
     kth,
@@ -18,6 +17,7 @@ from lidarium.envs.floors.importers import (
     sdf,
     svg,
 )
+from lidarium.envs.floors.importers.dxf import drawing as dxf
 from lidarium.mapping.files.guarded_reading import check_file, reading
 from lidarium.mapping.files.map_files import RESOLUTION
 from lidarium.mapping.geometry.bounds import shown

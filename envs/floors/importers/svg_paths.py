@@ -13,6 +13,8 @@ from xml.etree.ElementTree import Element
 import numpy as np
 from numpy.typing import NDArray
 
+from lidarium.envs.floors.importers.common import MOST_POINTS
+
 Polyline = NDArray[np.float64]
 """Points x, y (n, 2) in the drawing's units; closed where the last is the first."""
 
@@ -28,11 +30,12 @@ _ARCS = re.compile(
 )
 _TRANSFORM = re.compile(r"(matrix|translate|scale|rotate|skewX|skewY)\s*\(([^)]*)\)")
 _WANTS = {"M": 2, "L": 2, "H": 1, "V": 1, "C": 6, "S": 4, "Q": 4, "T": 2, "A": 7}
+_WANTS |= {command.lower(): count for command, count in _WANTS.items()}
 
 
 def numbers(text: str) -> list[float]:
     """Return the numbers of a text."""
-    return [float(number) for number in _NUMBERS.findall(text)]
+    return list(map(float, _NUMBERS.findall(text)))
 
 
 def length(text: str | None, otherwise: float = 0.0) -> float:
@@ -98,9 +101,8 @@ def outlines(element: Element, kind: str) -> list[Polyline]:
 
 def _commands(text: str) -> Iterator[tuple[str, list[float]]]:
     """Yield each command of a path with the numbers that it wants."""
-    for found in _COMMANDS.finditer(text):
-        command, words = str(found[1]), str(found[2])
-        wants = _WANTS.get(command.upper(), 0)
+    for command, words in _COMMANDS.findall(text):
+        wants = _WANTS.get(command, 0)
         if command in "Aa":
             given = [float(word) for arc in _ARCS.findall(words) for word in arc]
         else:
@@ -112,10 +114,10 @@ def _commands(text: str) -> Iterator[tuple[str, list[float]]]:
             raise ValueError(
                 f"a path has {command!r} with {len(given)} numbers; want {wants}, or more of them"
             )
-        for place in range(0, len(given), wants):
+        yield command, given[:wants]
+        for place in range(wants, len(given), wants):
             # What follows a first point without a command of its own are lines.
-            again = {"M": "L", "m": "l"}.get(command, command) if place else command
-            yield again, given[place : place + wants]
+            yield {"M": "L", "m": "l"}.get(command, command), given[place : place + wants]
 
 
 def _path(text: str) -> Iterator[Polyline]:
@@ -135,17 +137,23 @@ def _path(text: str) -> Iterator[Polyline]:
             here = complex(*given) + (here if command == "m" else 0j)
             start, points, control = here, [here], None
             continue
-        added, control = _part(command, given, here, control)
+        if len(points) > MOST_POINTS:
+            raise ValueError(f"a path has more than {MOST_POINTS:,} points; want a plan, or a picture of it")
         if not points:
             points = [here]
-        points += added
+        if command in "Ll":  # most are
+            points.append(complex(*given) + (here if command == "l" else 0j))
+            control = None
+        else:
+            added, control = _part(command, given, here, control)
+            points += added
         here = points[-1]
     if len(points) > 1:
         yield _points(points)
 
 
 def _points(points: list[complex]) -> Polyline:
-    return np.array([(point.real, point.imag) for point in points])
+    return np.array(points, np.complex128).view(np.float64).reshape(-1, 2)
 
 
 def _part(
@@ -160,8 +168,6 @@ def _part(
     if kind == "A":
         return _arc(here, given, complex(given[5], given[6]) + base), None
     ends = [complex(*given[k : k + 2]) + base for k in range(0, len(given), 2)]
-    if kind == "L":
-        return ends, None
     if kind in "ST":
         ends = [here if control is None else 2.0 * here - control, *ends]
     return _bezier([here, *ends]), ends[-2]

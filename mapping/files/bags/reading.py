@@ -20,10 +20,10 @@ from lidarium.mapping.files.trajectories import interpolated
 _WANTED = "want a whole MCAP file of ROS 2 messages (ros2msg, CDR)"
 _RECORD_BYTES = 1 << 28
 _LEAST_BYTES = 64
+"""A bag has its magic bytes twice, a header and a footer."""
+
 _MAP_RATIO = 2
 """Chunks hold maps, too, which pack better than what is read of them."""
-
-"""A bag has its magic bytes twice, a header and a footer."""
 
 _TF, _STATIC = "/tf", "/tf_static"
 
@@ -105,16 +105,13 @@ def read_mcap_log(path: Path, topic: str | None = None) -> LaserLog:
 
 def _messages(path: Path, topic: str | None) -> Messages:
     from mcap.reader import SeekingReader
-    from mcap_ros2.decoder import DecoderFactory
 
     found = Messages()
     with open_guarded(path) as file:
         if file.seek(0, os.SEEK_END) < _LEAST_BYTES:
             raise ValueError(f"{path} is not a whole bag, it is cut off; {_WANTED}")
         file.seek(0)
-        reader = SeekingReader(
-            file, validate_crcs=True, decoder_factories=[DecoderFactory()], record_size_limit=_RECORD_BYTES
-        )
+        reader = SeekingReader(file, validate_crcs=True, record_size_limit=_RECORD_BYTES)
         summary = reader.get_summary()
         if summary is None:
             raise ValueError(f"{path} has no index at its end, it is cut off; {_WANTED}")
@@ -127,20 +124,40 @@ def _messages(path: Path, topic: str | None) -> Messages:
         scans = _chosen(path, topics.get(schemas.LASER_SCAN, set()), topic)
         odometry = _most_alike(scans, topics.get(schemas.ODOMETRY, set()))
         wanted = [name for name in (scans, odometry, _TF, _STATIC) if name is not None]
-        for _, channel, message, content in reader.iter_decoded_messages(wanted):
-            allowed -= len(message.data)
-            if allowed < 0:
-                raise ValueError(f"{path} packs its scans too well; want a bag of a robot")
-            if channel.topic == scans:
+        for name, content in _decoded(path, reader, wanted, allowed):
+            if name == scans:
                 found.scans.append(content)
-            elif channel.topic == odometry:
+            elif name == odometry:
                 found.odometry_stamps.append(_seconds(content.header.stamp))
                 pose = content.pose.pose
                 found.odometry.append(_in_plane(pose.position, pose.orientation))
                 found.base = content.child_frame_id
             else:
-                _note_transforms(found, content, is_static=channel.topic == _STATIC)
+                _note_transforms(found, content, is_static=name == _STATIC)
     return found
+
+
+def _decoded(path: Path, reader: Any, wanted: list[str], allowed: int) -> Iterator[tuple[str, Any]]:  # noqa: ANN401
+    """Yield topic and content of messages in the order in which they were logged."""
+    from mcap.exceptions import DecoderNotFoundError
+    from mcap_ros2.decoder import DecoderFactory
+
+    # Sorted here: the reader's own queue takes half as long as decoding.
+    messages = []
+    for each in reader.iter_messages(wanted, log_time_order=False):
+        allowed -= len(each[2].data)
+        if allowed < 0:
+            raise ValueError(f"{path} packs its scans too well; want a bag of a robot")
+        messages.append(each)
+    messages.sort(key=lambda each: each[2].log_time)
+    factory, decoders = DecoderFactory(), {}
+    for schema, channel, message in messages:
+        if channel.id not in decoders:
+            decoders[channel.id] = factory.decoder_for(channel.message_encoding, schema)
+        decode = decoders[channel.id]
+        if decode is None:
+            raise DecoderNotFoundError(f"{channel.message_encoding}, {schema and schema.name}")
+        yield channel.topic, decode(message.data)
 
 
 def _check_chunks(path: Path, file: BinaryIO, summary: Any, allowed: int) -> None:  # noqa: ANN401

@@ -2,6 +2,7 @@
 
 import math
 from collections import Counter
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,11 +27,12 @@ def give_directions(content: Content, field_of_view: float | None) -> None:
         None if fov is None or not 0.0 < fov <= 360.0 else math.radians(fov),
         None if step is None else math.radians(step),
     )
+    assumed = cache(view.beams)
     for scan, _ in content.scans:
-        stated = scan.beams or view.beams(len(scan.ranges))
+        stated = scan.beams or assumed(len(scan.ranges))
         scan.ranges, beams = from_right_to_left(scan.ranges, stated)
-        scan.beams = Beams(beams.angle_min, beams.increment)
-        for remark in {stated.remark, beams.remark} - {""}:
+        scan.beams = beams._replace(remark="") if beams.remark else beams
+        for remark in {stated.remark, beams.remark} - {""} if stated.remark or beams.remark else ():
             content.remarks[remark] += 1
 
 
@@ -48,19 +50,25 @@ def on_one_grid(content: Content) -> tuple[list[tuple[Scan, int]], Beams, NDArra
         content.skipped[f"scans that have not {count} beams as most"] = len(content.scans) - len(kept)
     highest = _max_range(kept)
     ranges = np.empty((len(kept), count), np.float32)
-    others = 0
-    for row, (scan, _) in zip(ranges, kept, strict=True):
-        own = np.array(scan.ranges, np.float32)
-        own[~(own > 0.0)] = np.nan
-        with np.errstate(invalid="ignore"):
-            own[own >= highest * (1.0 - 1e-6)] = np.inf
+    is_other = np.array([(len(scan.ranges), scan.beams) != (count, beams) for scan, _ in kept])
+    same = [scan.ranges for (scan, _), other in zip(kept, is_other, strict=True) if not other]
+    ranges[~is_other] = _marked(np.array(same, np.float32), highest)
+    for place in np.flatnonzero(is_other):
+        scan = kept[place][0]
         assert scan.beams is not None
-        is_other = (len(own), scan.beams) != (count, beams)
-        row[:] = resampled(own, scan.beams, beams, count) if is_other else own
-        others += is_other
-    if others:
-        content.remarks[f"scans whose beams are not {count} as of most are resampled"] = others
+        own = _marked(np.array(scan.ranges, np.float32), highest)
+        ranges[place] = resampled(own, scan.beams, beams, count)
+    if is_other.any():
+        content.remarks[f"scans whose beams are not {count} as of most are resampled"] = int(is_other.sum())
     return kept, beams, ranges, highest
+
+
+def _marked(ranges: NDArray[np.float32], highest: float) -> NDArray[np.float32]:
+    """Mark what is no range: nan where the beam is invalid, inf where nothing returned."""
+    ranges[~(ranges > 0.0)] = np.nan
+    with np.errstate(invalid="ignore"):
+        ranges[ranges >= highest * (1.0 - 1e-6)] = np.inf
+    return ranges
 
 
 def _max_range(scans: list[tuple[Scan, int]]) -> float:

@@ -64,8 +64,8 @@ def read_line(line: str, content: Content) -> None:
 
 
 def _numbers(words: list[str], count: int) -> list[float]:
-    values = [float(word) for word in words]
-    if len(values) != count or not all(math.isfinite(value) for value in values):
+    values = list(map(float, words))
+    if len(values) != count or not all(map(math.isfinite, values)):
         raise ValueError(f"{words} are not {count} numbers")
     return values
 
@@ -76,7 +76,7 @@ def _flaser(words: list[str]) -> Scan:
     It is ``FLASER n ranges laser_pose robot_pose stamp host logger_stamp``.
     """
     beams = int(words[1])
-    ranges, tail = [float(word) for word in words[2 : 2 + beams]], words[2 + beams :]
+    ranges, tail = list(map(float, words[2 : 2 + beams])), words[2 + beams :]
     if beams < 1 or len(ranges) != beams:
         raise ValueError("too few ranges")
     laser_pose, robot_pose = _numbers(tail[:3], 3), _numbers(tail[3:6], 3)
@@ -93,7 +93,7 @@ def _robotlaser(words: list[str]) -> Scan:
     """
     start, view, step, max_range = _numbers(words[2:6], 4)
     beams = int(words[8])
-    ranges = [float(word) for word in words[9 : 9 + beams]]
+    ranges = list(map(float, words[9 : 9 + beams]))
     remissions = int(words[9 + beams])
     tail = words[10 + beams + remissions :]
     if beams < 1 or len(ranges) != beams:

@@ -28,7 +28,7 @@ def without_jumps(
     """
     if len(odometry) < 4 or not np.isfinite(odometry).all():
         return odometry, 0
-    motions = np.array([relative(odometry[k], odometry[k + 1]) for k in range(len(odometry) - 1)])
+    motions = relative(odometry[:-1], odometry[1:])
     steps = np.diff(stamps)
     # Stamps of scans that came in a bundle say nothing of the speed between them.
     steps = np.maximum(steps, np.median(steps))

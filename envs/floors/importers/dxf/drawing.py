@@ -1,4 +1,4 @@
-"""Plans as DXF drawings: lines, polylines and curves are walls.
+"""Reads DXF drawings as floors: lines, polylines and curves are walls.
 
 Blocks are taken apart where they are inserted. The drawing's unit says how large it is.
 """
@@ -6,7 +6,7 @@ Blocks are taken apart where they are inserted. The drawing's unit says how larg
 import io
 import logging
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 
 from lidarium.envs.floors.extent import MOST_COORDINATE_M
 from lidarium.envs.floors.floor import Floor
-from lidarium.envs.floors.importers.common import MOST_TEXT_BYTES, few_enough, floor_of_lines
+from lidarium.envs.floors.importers.common import MOST_POINTS, MOST_TEXT_BYTES, floor_of_lines
+from lidarium.envs.floors.importers.dxf.sifting import COMPOUND, KINDS, Sifted, sift
 from lidarium.mapping.files.guarded_reading import READING_ERRORS, read_bytes
 
 logging.getLogger("ezdxf").addHandler(logging.NullHandler())  # else it writes each repair to the console
@@ -32,14 +33,11 @@ _METRES = {1: 0.0254, 2: 0.3048, 4: 0.001, 5: 0.01, 6: 1.0, 10: 0.9144, 14: 0.1}
 
 _UNIT = re.compile(rb"\$INSUNITS\s+70\s+(\d{1,3})\s")
 
-_KINDS = frozenset(("LINE", "LWPOLYLINE", "POLYLINE", "ARC", "CIRCLE", "ELLIPSE", "SPLINE"))
-"""Entities that are walls; texts, dimensions, hatches and the like are none."""
+_LEAST_ALLOWED, _BYTES = {"wall": 25_000, "parsed": 4_000}, {"wall": 40, "parsed": 200}
+"""How many straight walls and parsed entities any drawing may have, and of how many bytes one more.
 
-_COMPOUND = frozenset(("INSERT", "MLINE"))
-"""Entities that are made of others."""
-
-MOST_FROM_BLOCKS = 30_000
-"""Most entities that are put where blocks are inserted."""
+Those of CAD programs take more bytes; what has so many in so few takes long, and is no plan.
+"""
 
 _DEEPEST = 16
 
@@ -55,7 +53,14 @@ def load(path: Path, resolution: float | None) -> Floor:
 
     Entities on layers that are off or frozen are left out, and so is what lies in paper space.
     """
-    document = _document(path)
+    content = read_bytes(path, MOST_TEXT_BYTES)
+    if not content.rstrip(b"\r\n\0 ").endswith(b"EOF"):
+        raise ValueError(f"{path} has no EOF at its end; want a whole DXF drawing")
+    most = {part: max(least, len(content) // _BYTES[part]) for part, least in _LEAST_ALLOWED.items()}
+    sifted = sift(content.decode("utf-8", "surrogateescape").replace("\r\n", "\n"))
+    if sifted.entities > most["parsed"]:
+        raise ValueError(_too_dense(path, most["parsed"], "entities beside straight walls"))
+    document = _document(path, sifted)
     unit = _unit(document)
     if unit is not None and resolution is not None:
         raise ValueError(
@@ -66,34 +71,45 @@ def load(path: Path, resolution: float | None) -> Floor:
     scale = resolution if unit is None else unit
     assert scale is not None
     with _damage(path):
-        walls = few_enough(path, _lines(path, document, CURVE_ERROR_M / scale), len)
-        lines = [line for line in walls if len(line) > 1]
-    if not lines:
-        raise ValueError(f"{path} has no lines in model space; want a plan of {', '.join(sorted(_KINDS))}")
-    segments = np.concatenate([np.hstack([line[:-1], line[1:]]) for line in lines]) * scale
+        walls = _walls(path, document, sifted, CURVE_ERROR_M / scale, most["parsed"])
+        limited = _limited(path, walls, min(most["wall"], MOST_POINTS))
+        segments = np.concatenate([np.zeros((0, 4)), *limited]) * scale
+    if not len(segments):
+        raise ValueError(f"{path} has no lines in model space; want a plan of {', '.join(sorted(KINDS))}")
     if not np.isfinite(segments).all():
         raise ValueError(f"{path} has lines that lead nowhere; want finite coordinates")
     return floor_of_lines(path, segments, np.zeros((0, 4)))
 
 
-def _document(path: Path) -> Any:  # noqa: ANN401
-    """Return the drawing; ezdxf is imported here, since few need it."""
+def _limited(path: Path, lines: Iterable[NDArray[np.float64]], most: int) -> Iterator[NDArray[np.float64]]:
+    """Yield the segments x1, y1, x2, y2 (n, 4) of polylines, as long as they are not too many."""
+    count = 0
+    for line in lines:
+        count += len(line) - 1
+        if count > most:
+            raise ValueError(_too_dense(path, most, "straight walls"))
+        yield np.hstack([line[:-1], line[1:]])
+
+
+def _too_dense(path: Path, most: int, parts: str) -> str:
+    return f"{path} has more than {most:,} {parts}, too many for its size; want a plan"
+
+
+def _document(path: Path, sifted: Sifted) -> Any:  # noqa: ANN401
+    """Return the rest of a drawing; ezdxf is imported here, since few need it."""
     try:
         import ezdxf
         from ezdxf import recover
         from ezdxf.lldxf.const import DXFError
     except ImportError as error:
         raise ValueError('DXF drawings need ezdxf; pip install "lidarium[dxf]"') from error
-    content = read_bytes(path, MOST_TEXT_BYTES)
-    if not content.rstrip(b"\r\n\0 ").endswith(b"EOF"):
-        raise ValueError(f"{path} has no EOF at its end; want a whole DXF drawing")
     try:
         # Repairs take twice as long as reading what is whole.
-        return ezdxf.read(io.StringIO(content.decode("utf-8", "surrogateescape").replace("\r\n", "\n")))
+        return ezdxf.read(io.StringIO(sifted.text))
     except (AssertionError, DXFError, *READING_ERRORS):
         pass
     with _damage(path):
-        return recover.read(io.BytesIO(content))[0]
+        return recover.read(io.BytesIO(sifted.text.encode("utf-8", "surrogateescape")))[0]
 
 
 @contextmanager
@@ -111,17 +127,27 @@ def _unit(document: Any) -> float | None:  # noqa: ANN401
     return _METRES.get(int(document.header.get("$INSUNITS", 0)))
 
 
-def _lines(path: Path, document: Any, error: float) -> Iterator[NDArray[np.float64]]:  # noqa: ANN401
+def _walls(
+    path: Path,
+    document: Any,  # noqa: ANN401
+    sifted: Sifted,
+    error: float,
+    most: int,
+) -> Iterator[NDArray[np.float64]]:
     """Yield the walls as polylines (n, 2) in the drawing's units."""
     from ezdxf.path import make_path
 
-    for entity in _entities(path, document):
-        if entity.dxftype() == "LINE":  # most are, and paths of them cost ten times as much
+    hidden = {layer for layer in {layer for layer, _ in sifted.walls} if not _shows(document, layer)}
+    yield from (wall for layer, wall in sifted.walls if layer not in hidden)
+    for entity in _entities(path, document, most):
+        if entity.dxftype() == "LINE":  # paths of them cost ten times as much
             start, end = entity.dxf.start, entity.dxf.end
             yield np.array([(start.x, start.y), (end.x, end.y)])
             continue
         for part in make_path(entity).sub_paths():
-            yield _flattened(path, part, error)
+            line = _flattened(path, part, error)
+            if len(line) > 1:
+                yield line
 
 
 def _flattened(path: Path, part: Any, error: float) -> NDArray[np.float64]:  # noqa: ANN401
@@ -136,7 +162,7 @@ def _flattened(path: Path, part: Any, error: float) -> NDArray[np.float64]:  # n
     return np.array([(point.x, point.y) for point in points]).reshape(-1, 2)
 
 
-def _entities(path: Path, document: Any) -> Iterator[Any]:  # noqa: ANN401
+def _entities(path: Path, document: Any, most: int) -> Iterator[Any]:  # noqa: ANN401
     """Yield what is a wall, blocks taken apart.
 
     A few blocks that hold each other a few times make more entities than there is time for; all are counted.
@@ -148,24 +174,24 @@ def _entities(path: Path, document: Any) -> Iterator[Any]:  # noqa: ANN401
             waiting.pop()
             continue
         count += len(waiting) > 1
-        if count > MOST_FROM_BLOCKS:
-            raise ValueError(f"{path} has blocks of more than {MOST_FROM_BLOCKS:,} entities; want a plan")
+        if count > most:
+            raise ValueError(f"{path} has blocks of more than {most:,} entities; want a plan")
         kind = entity.dxftype()
-        if not _is_shown(document, entity):
+        if not _shows(document, entity.dxf.layer, is_insert=kind == "INSERT"):
             continue
-        if kind in _COMPOUND:
+        if kind in COMPOUND:
             if len(waiting) > _DEEPEST:
                 raise ValueError(f"{path} has blocks nested more than {_DEEPEST} deep; want a plan")
             has_rows = kind == "INSERT" and entity.mcount > 1
             waiting.append(iter(entity.multi_insert() if has_rows else entity.virtual_entities()))
-        elif kind in _KINDS:
+        elif kind in KINDS:
             yield entity
 
 
-def _is_shown(document: Any, entity: Any) -> bool:  # noqa: ANN401
-    name = entity.dxf.layer
+def _shows(document: Any, name: str, *, is_insert: bool = False) -> bool:  # noqa: ANN401
+    """Return whether a layer shows its entities; what a block holds has layers of its own."""
     if name not in document.layers:
         return True
     layer = document.layers.get(name)
-    is_off = entity.dxftype() != "INSERT" and layer.is_off()  # what a block holds has layers of its own
+    is_off = not is_insert and layer.is_off()
     return not (is_off or layer.is_frozen())
