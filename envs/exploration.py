@@ -92,6 +92,7 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
         if render_mode not in (None, *self.metadata["render_modes"]):
             raise ValueError(f"render_mode is {render_mode!r}; want human, rgb_array or None")
         self.settings = settings or ExplorationSettings()
+        self.metadata = {**type(self).metadata, "render_fps": 1.0 / self.settings.time_step}
         self.render_mode = render_mode
         self.possible_agents = self.settings.agents
         self.agents: list[str] = []

@@ -89,6 +89,8 @@ class ExplorationVectorEnv(VectorEnv[Any, NDArray[Any], NDArray[Any]]):
         self.batch = EpisodeBatch(episodes, floor, settings, level, image_resolution, copy, curriculum)
         self.conventions = RowConventions(self.batch, conventions, merging)
         self.settings, self.render_mode = settings, render_mode
+        period = settings.time_step if level == "velocity" else settings.decision_period_s
+        self.metadata = {**type(self).metadata, "render_fps": 1.0 / period}
         self.num_envs = self.batch.rows
         self.single_observation_space, self.single_action_space = (
             self.conventions.space,

@@ -183,6 +183,16 @@ def test_spaces_are_the_same_objects_at_each_call_and_metadata_is_complete(level
     assert env.metadata["render_fps"] == pytest.approx(10 if level == "velocity" else 0.5)
 
 
+@pytest.mark.parametrize("level", LEVELS.values())
+def test_pictures_follow_each_other_as_simulated_time_goes_alone_and_in_batches(level):
+    options = {"robots": 1, "time_step": 0.05, "decision_period_s": 0.5}
+    alone = lidarium.parallel_env(level=level, **options)
+    batch = lidarium.vector_env(1, level=level, **options)
+    for env in (alone, batch):
+        assert env.metadata["render_fps"] == pytest.approx(20 if level == "velocity" else 2)
+    assert type(batch).metadata["render_fps"] == 10
+
+
 @pytest.mark.usefixtures("no_display")
 def test_frames_are_images_that_change_as_robots_drive():
     env = lidarium.parallel_env("scene_room", robots=2, render_mode="rgb_array", map_cells=64)
