@@ -26,6 +26,7 @@ from lidarium.benchmarks.speed.cases import (
     ray_casting,
     waypoint_decision,
 )
+from lidarium.benchmarks.speed.cases.learners import first_reset, frontier_threads, masked_training
 from lidarium.benchmarks.speed.cases.three_dimensions import (
     bullet_world,
     depth_image,
@@ -48,6 +49,9 @@ _MODULES: tuple[ModuleType, ...] = (
     learning_preset,
     waypoint_decision,
     frontier_decision,
+    frontier_threads,
+    masked_training,
+    first_reset,
     bullet_world,
     cached_start,
     depth_image,

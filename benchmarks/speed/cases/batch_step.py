@@ -7,7 +7,7 @@ two threads, one on one thread, and of the third the kernel alone runs on two th
 """
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
@@ -34,7 +34,7 @@ NOTES = (
 )
 
 
-def run_in_turn(steps: dict[str, Callable[[], None]], seconds: float) -> dict[str, float]:
+def run_in_turn(steps: Mapping[str, Callable[[], object]], seconds: float) -> dict[str, float]:
     """Run the same number of steps of each, alternately, and time them.
 
     Blocks of ``HOLD`` steps alternate, for about so long each; returned are the seconds per step of each.

@@ -38,24 +38,26 @@ class Choosers:
     ----------
     robots : int
         Robots of each episode.
+    threads : int
+        How many the kernels use.
     """
 
-    def __init__(self, robots: int) -> None:
+    def __init__(self, robots: int, threads: int = 1) -> None:
         self._env = lidarium.vector_env(
             EPISODES,
             FLOORS,
             level="frontier",
             robots=robots,
             resolution=RESOLUTION,
-            threads=1,
+            threads=threads,
             copy=False,
         )
         self._generator = np.random.default_rng(0)
         self._masks: NDArray[np.int8] = self._env.reset(seed=0)[0]["action_mask"]
         for _ in range(WARM_DECISIONS):
-            self._decide()
+            self.decide()
 
-    def _decide(self) -> int:
+    def decide(self) -> int:
         """Take a decision of all robots; return how many took part."""
         chances = self._generator.random(self._masks.shape) * self._masks
         chances[:, -1] *= 1e-6  # to stay only where nothing is offered
@@ -67,7 +69,7 @@ class Choosers:
         """Decide for about so many seconds; return the processor's seconds a row."""
         rows, began = 0, time.process_time()
         while rows == 0 or time.process_time() - began < seconds:
-            rows += self._decide()
+            rows += self.decide()
         return (time.process_time() - began) / rows
 
 

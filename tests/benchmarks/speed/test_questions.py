@@ -60,7 +60,7 @@ def test_decisions_by_frontiers_are_counted_by_robot(monkeypatch):
     monkeypatch.setattr(frontier_decision, "FLOORS", "apartment")
     monkeypatch.setattr(frontier_decision, "WARM_DECISIONS", 1)
     choosers = frontier_decision.Choosers(3)
-    assert choosers._decide() == 6
+    assert choosers.decide() == 6
     assert choosers.run(0.0) > 0.0
     lines = frontier_decision.measure(LEAST)
     assert [line.to_reach for line in lines] == [6000.0, 3000.0]

@@ -1,0 +1,59 @@
+"""What learners feel is measured as it says, at the least effort."""
+
+import pytest
+
+from lidarium.benchmarks.speed.cases import frontier_decision
+from lidarium.benchmarks.speed.cases.learners import first_reset, frontier_threads, masked_training
+from lidarium.benchmarks.speed.harness.timing import Effort
+
+LEAST = Effort(rounds=1, block_s=0.0)
+
+
+@pytest.fixture(autouse=True)
+def small(monkeypatch):
+    monkeypatch.setattr(frontier_decision, "EPISODES", 2)
+    monkeypatch.setattr(frontier_decision, "FLOORS", "apartment")
+    monkeypatch.setattr(frontier_decision, "WARM_DECISIONS", 1)
+
+
+def test_two_threads_are_compared_idle_and_beside_a_busy_core(monkeypatch):
+    monkeypatch.setattr(frontier_threads, "can_use", lambda cores: True)
+    idle, busy = frontier_threads.measure(LEAST)
+    assert (idle.to_reach, busy.to_reach) == (1.7, 0.95)
+    assert idle.ratio.median > 0.0
+    assert busy.name.endswith("beside a busy core")
+
+
+def test_where_there_is_one_core_two_threads_are_not_compared(monkeypatch):
+    monkeypatch.setattr(frontier_threads, "can_use", lambda cores: False)
+    (line,) = frontier_threads.measure(LEAST)
+    assert line.ratio is None
+
+
+def test_a_training_is_measured_by_its_steps(monkeypatch):
+    pytest.importorskip("sb3_contrib", reason='sb3-contrib is not installed: extra "rl"')
+    for name, value in {"FLOORS": "apartment", "EPISODES": 2, "ROLLOUT": 4, "EPOCHS": 1}.items():
+        monkeypatch.setattr(masked_training, name, value)
+    (line,) = masked_training.measure(LEAST)
+    assert line.figure > 0.0
+    assert line.ours.endswith("steps/s")
+
+
+def test_without_the_extra_a_training_is_not_measured(monkeypatch):
+    monkeypatch.setattr(masked_training, "_is_there", lambda: False)
+    (line,) = masked_training.measure(LEAST)
+    assert line.figure is None
+    assert "lidarium[rl]" in line.peer
+
+
+def test_a_first_reset_begins_with_empty_caches(monkeypatch):
+    seen = []
+
+    def start(environment):
+        seen.append(environment)
+        return type("Start", (), {"seconds": 1.5})
+
+    monkeypatch.setattr(first_reset, "start", start)
+    (line,) = first_reset.measure(LEAST)
+    assert (line.figure, line.is_upper_bound, line.to_reach) == (1.5, True, 25.0)
+    assert seen[0]["NUMBA_CACHE_DIR"] != seen[0]["XDG_CACHE_HOME"]
