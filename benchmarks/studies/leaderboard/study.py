@@ -2,12 +2,10 @@
 
 import json
 import platform
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from datetime import date
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 import lidarium
 from lidarium.benchmarks.studies.leaderboard.pairs import merges_text, pairs_table
@@ -26,6 +24,7 @@ from lidarium.benchmarks.studies.leaderboard.worlds import (
 from lidarium.benchmarks.studies.shared.bounded import Bounded, measure_bound
 from lidarium.benchmarks.studies.shared.kept import Progress, do_missing, kept_lines
 from lidarium.benchmarks.studies.shared.study import Study
+from lidarium.evaluation.analysis.multiples import over_bound
 from lidarium.evaluation.episodes.output import write_text
 from lidarium.evaluation.report import write_report
 from lidarium.evaluation.suites.campaign import EPISODES_FILE
@@ -170,23 +169,30 @@ def _bounds_in(folder: Path) -> dict[tuple[str, int], float]:
 
 
 def _multiples(path: Path, bounds: Mapping[tuple[str, int], float]) -> Multiples:
-    """Return medians of multiples of the bound; who did not get to 99 % took the whole time."""
-    found: dict[tuple[str, int], list[float]] = {}
-    for episode in read_episodes(path / EPISODES_FILE):
+    """Return medians of multiples of the bound."""
+    found: dict[tuple[str, int], list[dict[str, Any]]] = {}
+    for episode in _bounded(read_episodes(path / EPISODES_FILE), bounds):
+        found.setdefault((episode["policy"], episode["robots"]), []).append(episode)
+    multiples = {key: over_bound(rows, HORIZON_S) for key, rows in found.items()}
+    return {key: multiple for key, multiple in multiples.items() if multiple is not None}
+
+
+def _bounded(
+    episodes: Iterable[dict[str, Any]], bounds: Mapping[tuple[str, int], float]
+) -> Iterator[dict[str, Any]]:
+    """Yield episodes with the bound of their floor and team, where it is known."""
+    for episode in episodes:
         # Floors by the names that were asked for; `building:3000000` calls itself by its kind.
         team = episode[KEY].split(" | ")[1], episode["robots"]
-        if team in bounds:
-            time_s = HORIZON_S if episode["t99_s"] is None else float(episode["t99_s"])
-            found.setdefault((episode["policy"], team[1]), []).append(time_s / bounds[team])
-    return {key: float(np.median(multiples)) for key, multiples in found.items()}
+        yield {**episode, **({"bound_s": bounds[team]} if team in bounds else {})}
 
 
 def _browser_page(folder: Path) -> Path:
     """Return the report page of all episodes, each with its kind of floor and world as its settings."""
-    lines = []
+    lines, bounds = [], _bounds_in(folder)
     for kind, name, world in parts():
         variant = f"{world.about}: {KINDS[kind].partition(',')[0]}"
-        for episode in _episodes(folder, kind, name):
+        for episode in _bounded(_episodes(folder, kind, name), bounds):
             key = " | ".join([variant, *episode[KEY].split(" | ")[1:]])
             lines.append(json.dumps({**episode, KEY: key, "variant": variant}))
     write_text(folder / ALL / EPISODES_FILE, "\n".join(lines) + "\n")

@@ -6,6 +6,7 @@ from typing import Any
 from lidarium.evaluation.analysis.episodes import Row, pair_key_of, variant_of
 from lidarium.evaluation.analysis.figures import TIMES, VALUES
 from lidarium.evaluation.analysis.groups import Group
+from lidarium.evaluation.analysis.multiples import over_bound
 from lidarium.evaluation.analysis.records import Entry, Key, record_key
 from lidarium.evaluation.drawing.style import colours
 from lidarium.evaluation.report.plain_text import as_text
@@ -56,6 +57,7 @@ def _group(section: Section) -> dict[str, Any]:
         "floor_set": group.floor_set,
         "floors": group.floors,
         "horizon_s": group.horizon_s,
+        "over_bound": {policy: over_bound(rows, group.horizon_s) for policy, rows in group.runs.items()},
         **{name: section.numbers[name] for name in _OF_GROUP},
     }
 

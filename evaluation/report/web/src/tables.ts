@@ -28,6 +28,10 @@ export function leaderboard(report: Report): Shown {
       value: (line) => medianOf(line, key).estimate,
       show: (line) => timeCell(medianOf(line, key), line.group.horizon_s),
     })),
+    ...(isBounded(report) ? [{
+      title: "Over the bound", isNumber: true,
+      value: multipleOf, show: (line: Standing): string => number(multipleOf(line), 2),
+    }] : []),
     {
       title: "Against the baseline [s]", isNumber: true,
       value: (line) => comparisonOf(line, timeKeys)?.difference?.estimate ?? null,
@@ -56,7 +60,9 @@ export function leaderboard(report: Report): Shown {
     root: section("leaderboard", "Leaderboard", element("p", { class: "note" },
       "Times are medians with 95 % intervals; path and overlap are medians, coverage is the mean. "
       + "The difference is that of the restricted mean of the last time to the baseline's, bold where it is beyond "
-      + "chance (Holm). Of a single floor there are no intervals."), table.root),
+      + "chance (Holm). Of a single floor there are no intervals."
+      + (isBounded(report) ? " Multiples are of the time that a team needs that knows the floor: medians of the last time." : "")),
+      table.root),
     update: repainted(update),
   };
 }
@@ -180,6 +186,13 @@ function valueOf(line: Standing, key: string): number | null {
 function comparisonOf(line: Standing, keys: readonly string[]): Comparison | undefined {
   return line.floor !== null ? undefined
     : line.group.comparisons.find(({ policy, key }) => policy === line.policy && key === keys.at(-1));
+}
+
+const isBounded = (report: Report): boolean =>
+  report.groups.some((group) => Object.values(group.over_bound).some((found) => found !== null));
+
+function multipleOf(line: Standing): number | null {
+  return line.floor !== null ? null : line.group.over_bound[line.policy] ?? null;
 }
 
 function percent(found: Interval | null): string {

@@ -87,6 +87,19 @@ def scrub(page, share):
     ).release().perform()
 
 
+def test_multiples_of_the_bound_have_a_column_where_there_are_any(driver, report, rows, tmp_path):
+    page = Browser(driver)
+    page.open(report)
+    assert "Over the bound" not in [each.text for each in page.find_all("#leaderboard .sort")]
+    text = "".join(json.dumps({**row, "bound_s": 20.0, "t99_s": 50.0}) + "\n" for row in rows)
+    (tmp_path / "episodes.jsonl").write_text(text)
+    write_report(tmp_path, tmp_path / "report")
+    page.open(tmp_path / "report" / "report.html")
+    place = [each.text for each in page.find_all("#leaderboard .sort")].index("Over the bound")
+    assert set(page.column("leaderboard", place)) == {"2.50"}
+    assert page.complaints() == []
+
+
 def test_the_leaderboard_is_sorted_by_a_press_and_back_by_another(page):
     coverage = next(each for each in page.find_all("#leaderboard .sort") if "Coverage" in each.text)
     place = [each.text for each in page.find_all("#leaderboard .sort")].index(coverage.text)

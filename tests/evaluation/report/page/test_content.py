@@ -40,6 +40,16 @@ def test_the_page_has_all_episodes_and_the_figures_of_the_report(report_folder, 
     assert (group["robots"], group["floors"], group["settings"]) == (2, ["apartment"], rows[0]["realism"])
 
 
+def test_multiples_of_the_bound_are_on_the_page_where_there_are_any(rows, tmp_path):
+    bounded = [{**row, "bound_s": 2.0 * row["horizon_s"], "t99_s": None} for row in rows[:1]] + rows[1:]
+    text = "".join(json.dumps(row) + "\n" for row in bounded)
+    (tmp_path / "episodes.jsonl").write_text(text)
+    write_report(tmp_path, tmp_path / "report")
+    (group,) = page_data(tmp_path / "report" / "report.html")["groups"]
+    expected = dict.fromkeys(row["policy"] for row in rows) | {rows[0]["policy"]: 0.5}
+    assert group["over_bound"] == expected
+
+
 def test_replays_are_those_of_the_episodes_that_name_them(report_folder):
     out, result = report_folder
     data = page_data(out / "report.html")
