@@ -69,7 +69,8 @@ def kills(count: int) -> tuple[int, int]:
         Where an episode was lost, doubled or changed.
     """
     generator = np.random.default_rng(0)
-    with tempfile.TemporaryDirectory() as name:
+    # Workers outlive a killed program for a moment, and may write into the folder while it is removed.
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as name:
         folder = Path(name)
         command = [sys.executable, "-c", PROGRAM, *OPTIONS, "--out", str(folder)]
         before: list[dict[str, Any]] = []
