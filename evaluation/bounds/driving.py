@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,12 @@ from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.evaluation.bounds.tours import TourPlan
 from lidarium.evaluation.bounds.view_graph import ViewGraph
 from lidarium.evaluation.episodes.runner import run_episode
+
+PATIENCE, LEAST_PATIENCE_S = 4.0, 60.0
+"""How many times as long as its walks take at cruising speed a drive may last, and more [s].
+
+Robots that block each other would stand until the end of days.
+"""
 
 Looks = Mapping[tuple[int, int], float]
 """Headings to turn to, by the robot and the number of the place on its walk [rad]."""
@@ -124,9 +130,10 @@ def drive(
     -------
     (float, float, (n, 3) float64)
         Time at which that share was seen [s], inf where it never was; the share that was seen; poses that the
-        robots had in the floor's frame [m, rad].
+        robots had in the floor's frame [m, rad]. A drive ends where robots block each other for long.
     """
-    env = ExplorationEnv(floor, settings)  # type: ignore[arg-type]
+    allowed_s = PATIENCE * max(_seconds_of(walk, settings) for walk in walks) + LEAST_PATIENCE_S
+    env = ExplorationEnv(floor, replace(settings, horizon_s=allowed_s))  # type: ignore[arg-type]
     options = {"starts": [list(start) for start in starts]}
     env.reset(seed=0, options=options)
     offsets = np.array([env.perception.poses.offset(row)[:2] for row in range(settings.robots)])
@@ -136,3 +143,10 @@ def drive(
     is_reached = wanted is not None and share >= wanted
     poses = np.concatenate([at.reshape(-1, 3) for _, at in env.scorer.track])
     return (float(env.scorer.time) if is_reached else math.inf), share, poses
+
+
+def _seconds_of(walk: Walk, settings: ExplorationSettings) -> float:
+    """Return what a walk takes at cruising speed, with a whole turn where it has a heading [s]."""
+    metres = float(np.hypot(*np.diff(walk.points, axis=0).T).sum())
+    turns = int(np.isfinite(walk.headings).sum())
+    return metres / settings.robot.cruise_speed + turns * 2.0 * math.pi / settings.robot.max_turn_rate

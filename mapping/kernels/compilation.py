@@ -12,6 +12,7 @@ else.
 import hashlib
 import os
 import re
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -173,6 +174,18 @@ def available_threads() -> int:
 _process_of_threads = 0
 
 
+def _start_threads() -> None:
+    """Start the threads of parallel kernels, and leave PyTorch as many as it had.
+
+    Where PyTorch came first, OpenMP is one for both, and numba sets its number of threads.
+    """
+    torch = sys.modules.get("torch")
+    threads = torch.get_num_threads() if hasattr(torch, "get_num_threads") else None
+    numba.get_num_threads()
+    if torch is not None and threads is not None:
+        torch.set_num_threads(threads)
+
+
 def use_threads(threads: int) -> int:
     """Let parallel kernels run on so many threads, and return how many they may use.
 
@@ -195,6 +208,7 @@ def use_threads(threads: int) -> int:
         return 1
     if _process_of_threads == 0:
         _process_of_threads = process
+        _start_threads()
     if _process_of_threads != process:
         return 1
     if numba.get_num_threads() != threads:

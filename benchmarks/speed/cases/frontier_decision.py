@@ -40,12 +40,14 @@ class Choosers:
         Robots of each episode.
     threads : int
         How many the kernels use.
+    floors : str or None
+        Where episodes take place; `FLOORS` where None.
     """
 
-    def __init__(self, robots: int, threads: int = 1) -> None:
+    def __init__(self, robots: int, threads: int = 1, floors: str | None = None) -> None:
         self._env = lidarium.vector_env(
             EPISODES,
-            FLOORS,
+            floors or FLOORS,
             level="frontier",
             robots=robots,
             resolution=RESOLUTION,

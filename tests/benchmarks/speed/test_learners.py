@@ -1,5 +1,7 @@
 """What learners feel is measured as it says, at the least effort."""
 
+import os
+
 import pytest
 
 from lidarium.benchmarks.speed.cases import frontier_decision
@@ -14,6 +16,7 @@ def small(monkeypatch):
     monkeypatch.setattr(frontier_decision, "EPISODES", 2)
     monkeypatch.setattr(frontier_decision, "FLOORS", "apartment")
     monkeypatch.setattr(frontier_decision, "WARM_DECISIONS", 1)
+    monkeypatch.setattr(frontier_threads, "FLOORS", "apartment")
 
 
 def test_two_threads_are_compared_idle_and_beside_a_busy_core(monkeypatch):
@@ -32,11 +35,27 @@ def test_where_there_is_one_core_two_threads_are_not_compared(monkeypatch):
 
 def test_a_training_is_measured_by_its_steps(monkeypatch):
     pytest.importorskip("sb3_contrib", reason='sb3-contrib is not installed: extra "rl"')
-    for name, value in {"FLOORS": "apartment", "EPISODES": 2, "ROLLOUT": 4, "EPOCHS": 1}.items():
+    for name, value in {
+        "FLOORS": "apartment",
+        "EPISODES": 2,
+        "ROLLOUT": 4,
+        "EPOCHS": 1,
+        "WARM_ROLLOUTS": 1,
+    }.items():
         monkeypatch.setattr(masked_training, name, value)
-    (line,) = masked_training.measure(LEAST)
-    assert line.figure > 0.0
-    assert line.ours.endswith("steps/s")
+    limits = []
+    measured = masked_training._rates
+
+    def rates(rounds):
+        limits.append(os.environ.get(masked_training.SIZE_VARIABLE))
+        return measured(rounds)
+
+    monkeypatch.setattr(masked_training, "_rates", rates)
+    monkeypatch.setenv(masked_training.SIZE_VARIABLE, "100")
+    lines = masked_training.measure(LEAST)
+    assert all(line.figure > 0.0 and line.ours.endswith("steps/s") for line in lines)
+    assert limits == ["100", str(masked_training.ALL_MIB)]
+    assert os.environ[masked_training.SIZE_VARIABLE] == "100"
 
 
 def test_without_the_extra_a_training_is_not_measured(monkeypatch):

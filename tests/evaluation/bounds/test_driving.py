@@ -7,6 +7,7 @@ import pytest
 from linked_places import STAR, graph_of
 from linked_rooms import ROOM, TWO_ROOMS, settings_of
 
+from lidarium.envs.floors.floor import Floor
 from lidarium.envs.radio.messages import MOST_POINTS
 from lidarium.evaluation.bounds.driving import Walk, _pieces, drive, walks_of
 from lidarium.evaluation.bounds.tours import TourPlan
@@ -43,6 +44,16 @@ def test_a_long_walk_is_parted_without_a_gap():
     assert max(len(piece.points) for piece in pieces) <= MOST_POINTS
     joined = np.concatenate([pieces[0].points, *(piece.points[1:] for piece in pieces[1:])])
     assert np.array_equal(joined, points)
+
+
+def test_robots_that_block_each_other_come_to_an_end():
+    starts = [[3.0, 0.3, 0.0], [1.0, 0.3, 0.0]]
+    corridor = Floor("corridor", (0.0, 0.0, 20.0, 0.6), (), starts=np.array(starts))
+    stands, passes = walk_along([(3.0, 0.3)]), walk_along([(1.0, 0.3), (17.0, 0.3)])
+    late, share, poses = drive(corridor, settings_of(robots=2), starts, [stands, passes])
+    assert late == math.inf
+    assert share < 0.7
+    assert poses[:, 0].max() < 3.5
 
 
 def test_a_robot_that_drives_on_sees_the_second_room_and_one_that_stays_does_not():
