@@ -91,7 +91,7 @@ def test_a_face_covers_the_pixels_whose_rays_meet_it(seed):
         if (expected > 1.0 / CAMERA.depth_max).any():
             assert np.array_equal(covered(corners), expected > 0.0)
             total += int((expected > 0.0).sum())
-    assert total > 1000
+    assert total > 500
 
 
 @pytest.mark.parametrize("seed", range(5))
