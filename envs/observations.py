@@ -3,7 +3,6 @@
 The kernel writes the observations of all rows where the caller wants them.
 """
 
-import os
 from collections.abc import Mapping
 from itertools import starmap
 from operator import itemgetter
@@ -16,7 +15,7 @@ from lidarium.envs.observation_kernels import Arrays, write_parallel, write_seri
 from lidarium.envs.observation_spaces import KEYS, boxes_of, observed_keys
 from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.simulation.simulation import ROWS_FOR_THREADS, Simulation
-from lidarium.mapping.kernels.compilation import Array, use_threads
+from lidarium.mapping.kernels.compilation import Array, available_threads, use_threads
 from lidarium.mapping.kernels.views import table_of
 
 
@@ -96,7 +95,7 @@ class ObservationWriter:
         self._sources: NDArray[np.int64] | None = None
         self._everyone = np.ones(self.rows, np.bool_)
         self._threads = (
-            min(settings.threads, int(os.cpu_count() or 1)) if self.rows >= ROWS_FOR_THREADS else 1
+            min(settings.threads, available_threads()) if self.rows >= ROWS_FOR_THREADS else 1
         )
 
     def buffers(self) -> dict[str, NDArray[Any]]:

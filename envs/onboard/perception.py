@@ -7,7 +7,6 @@ that does not know its start can be sent what others know, overlaid on its own m
 planning needs (clearance and frontiers), brought up to date only where the map has changed.
 """
 
-import os
 from typing import Any
 
 import numpy as np
@@ -31,7 +30,7 @@ from lidarium.envs.onboard.team_maps import TeamMaps, refresh_team, sum_team
 from lidarium.envs.radio.exchange import Exchange
 from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.simulation.simulation import Simulation
-from lidarium.mapping.kernels.compilation import use_threads
+from lidarium.mapping.kernels.compilation import available_threads, use_threads
 from lidarium.mapping.planning.clearance import limit_of, stamp_of
 from lidarium.mapping.planning.search.path_search import SearchMemory
 
@@ -81,7 +80,7 @@ class Perception:
         self._shared_records = np.zeros((self._episodes, RECORD), np.int64)
         self._known = np.zeros((rows, 4), np.int64)
         self._fresh_at = np.full(self._episodes, STALE, np.int64)
-        self._threads = min(settings.threads, int(os.cpu_count() or 1))
+        self._threads = min(settings.threads, available_threads())
         self.memory = SearchMemory(self._threads)
         self._shares = settings.known_starts and settings.robots > 1 and settings.radio.is_ideal
         self.exchanges = (

@@ -1,7 +1,6 @@
 """The simulation of teams: a world moves and senses, beliefs follow, the score counts."""
 
 import math
-import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -36,7 +35,7 @@ from lidarium.envs.simulation.kernels.stepping import (
 )
 from lidarium.mapping.grids.occupancy import OccupancySettings
 from lidarium.mapping.grids.scan_integration import WORD
-from lidarium.mapping.kernels.compilation import use_threads
+from lidarium.mapping.kernels.compilation import available_threads, use_threads
 from lidarium.mapping.kernels.huge_pages import ArrayPool
 from lidarium.moved import renamed_method
 
@@ -135,7 +134,7 @@ class Simulation:
         self.floor_rows, self.frames = np.zeros((self.episodes, 10), np.int64), np.zeros((self.episodes, 3))
         self._everywhere = np.ones(self.episodes, np.bool_)
         self._pool: ArrayPool | None = None
-        self._threads = min(threads, int(os.cpu_count() or 1))
+        self._threads = min(threads, available_threads())
         self._is_parallel = self.threads > 1
         self._table = table_of_owners(self, world, self.beliefs, self.score)
         self.camera: DepthSensor | None = None
