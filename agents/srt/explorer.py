@@ -238,6 +238,7 @@ class Explorer:
             self._return_to(leg.node, senses, memory)
         elif leg.is_goal:
             # The environment ends a robot that truly is there; this one only takes itself to be.
+            self._growth.add_if_apart(senses, memory)
             self._go_home("goal_missed", senses, memory)
         else:
             place = leg.place if self._settings.places_nodes_at_targets else senses.pose[:2]
