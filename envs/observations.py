@@ -94,9 +94,7 @@ class ObservationWriter:
         )
         self._sources: NDArray[np.int64] | None = None
         self._everyone = np.ones(self.rows, np.bool_)
-        self._threads = (
-            min(settings.threads, available_threads()) if self.rows >= ROWS_FOR_THREADS else 1
-        )
+        self._threads = min(settings.threads, available_threads()) if self.rows >= ROWS_FOR_THREADS else 1
 
     def buffers(self) -> dict[str, NDArray[Any]]:
         """Return new arrays for the observations, by key.
