@@ -141,7 +141,7 @@ def test_where_a_teammate_takes_all_the_room_the_path_leads_through_it_unless_it
 
 @pytest.mark.parametrize(("run", "threads"), [(prepare_teams_serial, 1), (prepare_teams_parallel, 2)])
 def test_teams_are_prepared_but_for_who_has_ended_and_say_who_is_blocked(run, threads):
-    teams = Teams((OPEN, HALL, PASSAGE), (1, 2, 3))
+    teams = Teams((OPEN, HALL, PASSAGE), (1, 2, 3), threads=threads)
     drives = teams.driver.drives
     places = np.array([(5.0, 2.0), (1.0, 1.0), (5.0, 4.0), (5.0, 1.0), (2.0, 0.35), (5.0, 0.35)])
     drives.is_ordered[:], drives.targets[:] = True, places - teams.offsets
@@ -149,7 +149,8 @@ def test_teams_are_prepared_but_for_who_has_ended_and_say_who_is_blocked(run, th
     teams.simulation.world.flags[3] |= ENDED
     is_blocked = np.zeros(3, np.bool_)
     planning = teams.driver.planning(np.arange(teams.rows))
-    run(planning, drives, teams.perception.maps, new_work(np.arange(3), threads), is_blocked)
+    work = new_work(np.arange(3), teams.perception.threads_for(3))
+    run(planning, drives, teams.perception.maps, work, is_blocked)
     assert is_blocked.tolist() == [False, False, True]
     assert drives.has_path.tolist() == [True, True, True, False, True, False]
     for row in np.flatnonzero(drives.has_path):

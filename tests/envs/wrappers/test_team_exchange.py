@@ -52,7 +52,7 @@ def test_an_event_is_noted_when_two_robots_are_joined_and_again_after_they_parte
     for _ in range(4):
         events.append(exchange.exchange())
         step(env, 5)
-    assert [len(news) for news in events] == [1, 0, 1, 0]
+    assert [len(joined) for joined in events] == [1, 0, 1, 0]
     assert exchange.events == [*events[0], *events[2]]
     first = exchange.events[0]
     assert (first.a, first.b, first.time_s) == ("robot_0", "robot_1", 0.0)
