@@ -92,6 +92,7 @@ def test_step_by_step_comes_to_what_the_kernel_does(level, mode):
                 targets = Orders.of([Target(3.0, 2.0), Target(3.0, 2.0)])
                 batch.level.carry_out(targets, batch.rules.live, np.full(2, STEPS, np.int8))
             batch.run((mode, mode))
+            assert batch.modes.tolist() == [mode, mode]
     fused, staged = batches
     assert np.array_equal(fused.simulation.world.steps, staged.simulation.world.steps)
     assert np.array_equal(fused.simulation.world.poses, staged.simulation.world.poses)

@@ -35,6 +35,9 @@ def test_episodes_begin_one_by_one_and_step_from_then_on():
     assert batch.rewards[:2].tolist() == [0.0, 0.0]
     assert batch.floors[0].name == batch.floors[1].name == "two_rooms"
     assert len({frame.shape for frame in batch.frames()}) == 1
+    batch.run(AHEAD, np.array([1]), [5])
+    assert batch.acted.tolist() == [True, True, False, False]
+    assert batch.world.steps.tolist() == [1, 0]
 
 
 def test_a_batch_that_cannot_begin_runs_nothing():

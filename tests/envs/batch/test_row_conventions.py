@@ -77,6 +77,11 @@ def test_messages_are_split_off_and_heard_by_teammates_alone():
     forms.exchange()
     heard = forms.observations(batch.observations)["messages"]
     assert heard[:, 0, 0].tolist() == [-0.5, 0.5, 1.0, 0.25]
+    batch.run(actions, np.array([0]), [9])
+    forms.exchange()
+    heard = forms.observations(batch.observations)["messages"]
+    assert not heard[:2].any()
+    assert heard[2:, 0, 0].tolist() == [1.0, 0.25]
     with pytest.raises(ValueError, match=r"messages have shape \(3, 1\); want \(4, 1\)"):
         forms.actions(sent[:3])
 

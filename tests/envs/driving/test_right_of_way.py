@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from driven_teams import CORRIDOR, Teams
 
-from lidarium.envs.driving.path_following import BLOCKED, DRIVING
+from lidarium.envs.driving.path_following import ARRIVED, BLOCKED, DRIVING
 from lidarium.envs.driving.right_of_way import BACKING_STEPS, REFUGE_STAY_S, RightOfWay
 from lidarium.envs.driving.traffic import obstructing
 from lidarium.envs.floors.floor import Floor
@@ -65,6 +65,10 @@ def test_who_has_nothing_to_do_gives_way_whatever_its_place():
     right_of_way.settle_team(0)
     assert drives.passing.tolist() == [-1, 0]
     _, drives, right_of_way = met(targets=(None, (1.9, 1.5)))
+    right_of_way.settle_team(0)
+    assert drives.passing.tolist() == [1, -1]
+    _, drives, right_of_way = met()
+    drives.states[0] = ARRIVED
     right_of_way.settle_team(0)
     assert drives.passing.tolist() == [1, -1]
 

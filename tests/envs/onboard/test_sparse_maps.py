@@ -1,19 +1,22 @@
 """Sparse maps are made from when they are asked for, together by robots that share what they know."""
 
+import math
+
 import numpy as np
 import pytest
 
 import lidarium
-from lidarium.envs.floors.floor import Floor
+from lidarium.envs.floors.floor import Floor, Solid
 from lidarium.envs.simulation.kernels.arrays import ENDED
+from lidarium.mapping.geometry.rigid import Transform
 
 HALL = Floor("hall", (0.0, 0.0, 6.0, 4.0), starts=np.array([[1.0, 2.0, 0.3], [1.0, 0.8, -0.2]]))
 CAMERA = {"columns": 32, "rows": 24, "pitch": 0.35}
 
 
-def team(**options):
+def team(floor=HALL, **options):
     env = lidarium.parallel_env(
-        HALL, **{"robots": 2, "camera": CAMERA, "stop_coverage": None, "map_cells": 32, **options}
+        floor, **{"robots": 2, "camera": CAMERA, "stop_coverage": None, "map_cells": 32, **options}
     )
     env.reset(seed=0)
     return env, env.perception.sparse_maps
@@ -47,6 +50,19 @@ def test_robots_that_share_their_maps_have_common_axes_and_ground():
     # Each is answered in a frame of its own.
     gap = shared.frame.apply([0.0, 0.0]) - maps.belief(1).frame.apply([0.0, 0.0])
     assert gap == pytest.approx(env.perception.poses.offset(1) - env.perception.poses.offset(0))
+
+
+def test_axes_are_those_of_the_walls_that_the_first_robot_saw():
+    turned = Transform(3.0, 2.2, math.radians(30.0)).apply([[0.0, -2.0], [0.3, -2.0], [0.3, 2.0], [0.0, 2.0]])
+    starts = np.array([[4.6, 2.0, 0.0], [1.6, 1.4, math.radians(30.0)]])
+    slanted = Floor("slanted", HALL.bounds, (Solid(turned),), starts=starts)
+    axes = []
+    for order in ((0, 1), (1, 0)):
+        maps = team(slanted)[1]
+        first, second = (maps.of(row).axes for row in order)
+        assert first == second
+        axes.append(first)
+    assert axes == pytest.approx([0.0, math.radians(30.0)], abs=0.03)
 
 
 def test_robots_that_do_not_know_each_other_share_nothing():

@@ -8,6 +8,7 @@ import pytest
 from linked_rooms import TWO_ROOMS
 from scored_halls import hall, tables_of
 
+from lidarium.envs.floors.floor import Raster
 from lidarium.envs.settings.lidar import Lidar
 from lidarium.envs.settings.robots import ROBOTS
 from lidarium.envs.settings.sensors.cameras import DepthCamera
@@ -19,6 +20,7 @@ from lidarium.envs.simulation.kernels.arrays import (
     TRUE_POSE,
 )
 from lidarium.envs.simulation.kernels.floor_tables import FloorTables
+from lidarium.envs.simulation.kernels.ray_tables import RayTables
 from lidarium.envs.simulation.kinematic_world import KinematicWorld
 from lidarium.envs.simulation.simulation import PoseSources, Simulation, within_half_turns
 from lidarium.mapping.grids.occupancy import OccupancySettings
@@ -99,13 +101,14 @@ def test_a_step_moves_counts_scores_and_maps_the_episodes_that_run():
 def test_the_floor_that_counts_is_shared_by_episodes_on_it():
     simulation = made(2)
     assert simulation.score.counted_masks[0] is simulation.score.counted_masks[1]
-    # What the laser cannot look into does not count.
+    # What the laser cannot look into does not count, even where bodies pass below it.
     blocked = hall()
     blocked[:, 160:] = 1
-    other = tables_of(blocked)
-    starts = np.array([[1.0, 2.0, 0.0], [2.0, 2.0, 0.0]])
-    simulation.place(1, other, starts, 5)
-    assert simulation.score.counted[1] < 0.8 * simulation.score.counted[0]
+    laser = Raster(blocked, (0.0, 0.0), 0.025)
+    low = FloorTables(laser, HALL.body, RayTables(blocked), HALL.bound)
+    simulation.place(1, low, np.array([[1.0, 2.0, 0.0], [2.0, 2.0, 0.0]]), 5)
+    counted = [np.bitwise_count(mask).sum() for mask in simulation.score.counted_masks]
+    assert counted[1] == pytest.approx(counted[0] * 159.0 / 238.0, rel=0.02)
 
 
 def test_sensors_have_depth_where_cameras_are_mounted():

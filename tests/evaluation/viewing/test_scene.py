@@ -1,12 +1,14 @@
 """What a page draws of a run: floor, ground, frontiers and robots, as far as their layers are shown."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from linked_rooms import TWO_ROOMS
 from recorded_scene import RecordedServer
 
+from lidarium.envs.floors.floor import Solid
 from lidarium.envs.settings.making import make_settings
 from lidarium.evaluation.episodes.watching import WatchedExploration
 from lidarium.evaluation.viewing.controls import Layer
@@ -58,6 +60,20 @@ def test_walls_are_cut_at_a_height_and_drawn_again_only_at_another(shown):
     second = walls_of(server)
     assert not set(map(id, first.values())) & set(map(id, second.values()))
     assert max(np.asarray(wall.given[0])[:, 2].max() for wall in second.values()) == pytest.approx(0.4)
+
+
+def test_of_what_hangs_above_the_cut_nothing_is_left():
+    board = Solid(np.array([[1.0, 3.0], [2.0, 3.0], [2.0, 3.4], [1.0, 3.4]]), 1.0, 1.2)
+    env = WatchedExploration(replace(TWO_ROOMS, solids=(*TWO_ROOMS.solids, board)), make_settings(robots=1))
+    env.reset(seed=0)
+    server = RecordedServer()
+    scene = TeamScene(server, env, TeamMaps(env))
+    counts = []
+    for height in (1.5, 0.5):
+        scene.cut_walls(height)
+        counts.append(len(walls_of(server)))
+    # Walls and their cut tops, and the board.
+    assert counts == [3, 2]
 
 
 def test_each_robot_is_drawn_at_its_place(shown, env):

@@ -42,6 +42,15 @@ def test_robots_begin_upright_and_at_rest_where_they_are_put(bodies):
     assert heading(bodies.motion(0)) == pytest.approx(-1.0)
 
 
+def test_who_is_put_elsewhere_begins_to_turn_its_wheels_there(bodies):
+    for _ in range(10):
+        bodies.step(np.full((2, 2), 0.3))
+    bodies.put(0, STARTS[0])
+    turned = bodies.step(np.zeros((2, 2)))
+    assert turned[0] == pytest.approx(0.0, abs=0.02)
+    assert np.linalg.norm(bodies.motion(0).velocity) < 0.02
+
+
 def test_wheels_turn_as_wanted_and_carry_the_robot_along(bodies):
     for _ in range(20):
         turned = bodies.step(np.array([[0.3, 0.3], [-0.1, 0.1]]))
