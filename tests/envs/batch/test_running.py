@@ -110,8 +110,11 @@ def test_each_episode_runs_by_its_mode(run, teams):
     moved = np.abs(teams.simulation.world.poses - before).max(axis=1) > 1e-3
     assert moved.tolist() == [True, True, False, False]
     assert [bool(scan.any()) for scan in observed["scan"]] == [True, False, False, False]
+    before = teams.simulation.world.poses.copy()
     run_all(teams, run, (SENSES, STEPS))
     assert teams.simulation.world.steps.tolist() == [8, 1]
+    moved = (teams.simulation.world.poses != before).any(axis=1)
+    assert moved.tolist() == [False, False, True, True]
 
 
 def test_threads_change_nothing():
