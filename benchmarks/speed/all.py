@@ -26,7 +26,12 @@ from lidarium.benchmarks.speed.cases import (
     ray_casting,
     waypoint_decision,
 )
-from lidarium.benchmarks.speed.cases.learners import first_reset, frontier_threads, masked_training
+from lidarium.benchmarks.speed.cases.learners import (
+    first_reset,
+    frontier_threads,
+    learned_training,
+    masked_training,
+)
 from lidarium.benchmarks.speed.cases.three_dimensions import (
     bullet_world,
     depth_image,
@@ -51,6 +56,7 @@ _MODULES: tuple[ModuleType, ...] = (
     frontier_decision,
     frontier_threads,
     masked_training,
+    learned_training,
     first_reset,
     bullet_world,
     cached_start,

@@ -62,10 +62,10 @@ def learn(
     if checkpoint.decisions >= total:
         return
     yield Progress("rewards", checkpoint.decisions, total)
-    environment = _environments(training, workers)
+    environment = environments_of(training, workers)
     is_whole = False
     try:
-        model = _model(settings, environment, training.seed)
+        model = model_of(settings, environment, training.seed)
         model.set_logger(configure(str(log), ["tensorboard"]))
         policy = model.policy
         assert isinstance(policy, ExplorerPolicy)
@@ -109,7 +109,8 @@ def _close(environment: VecEnv, is_whole: bool) -> None:
     environment.closed = True
 
 
-def _environments(training: TrainingSettings, workers: int) -> VecEnv:
+def environments_of(training: TrainingSettings, workers: int) -> VecEnv:
+    """Return the environments of a training, in this process for one worker, else each in its own."""
     makers: list[Callable[[], Env[Any, Any]]] = [
         partial(_environment, training, k, training.ppo.environments)
         for k in range(training.ppo.environments)
@@ -126,7 +127,8 @@ def _place(training: TrainingSettings, number: int) -> Place:
     return place_of(training, training.rounds[-1], begin + number)
 
 
-def _model(settings: PpoSettings, environment: VecEnv, seed: int) -> MaskablePPO:
+def model_of(settings: PpoSettings, environment: VecEnv, seed: int) -> MaskablePPO:
+    """Return a learner whose network is that of classic tours."""
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="You have specified a mini-batch size")
         return MaskablePPO(

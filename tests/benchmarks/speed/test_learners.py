@@ -5,7 +5,12 @@ import os
 import pytest
 
 from lidarium.benchmarks.speed.cases import frontier_decision
-from lidarium.benchmarks.speed.cases.learners import first_reset, frontier_threads, masked_training
+from lidarium.benchmarks.speed.cases.learners import (
+    first_reset,
+    frontier_threads,
+    learned_training,
+    masked_training,
+)
 from lidarium.benchmarks.speed.harness.timing import Effort
 
 LEAST = Effort(rounds=1, block_s=0.0)
@@ -76,3 +81,22 @@ def test_a_first_reset_begins_with_empty_caches(monkeypatch):
     (line,) = first_reset.measure(LEAST)
     assert (line.figure, line.is_upper_bound, line.to_reach) == (1.5, True, 25.0)
     assert seen[0]["NUMBA_CACHE_DIR"] != seen[0]["XDG_CACHE_HOME"]
+
+
+def test_a_training_by_rewards_is_measured_with_the_simulators_share(monkeypatch):
+    pytest.importorskip("sb3_contrib", reason='sb3-contrib is not installed: extra "rl"')
+    small = learned_training.TRAINING.replace(str(learned_training.STEPS), "4")
+    small = small.replace("256", "8")
+    monkeypatch.setattr(learned_training, "TRAINING", small)
+    monkeypatch.setattr(learned_training, "STEPS", 4)
+    asked = learned_training._decisions
+    monkeypatch.setattr(learned_training, "_decisions", lambda rounds, workers: asked(rounds, 1))
+    rate, share = learned_training.measure(LEAST)
+    assert rate.figure > 0.0
+    assert 0.0 < share.figure < 1.0
+    assert share.is_upper_bound
+
+
+def test_without_the_extra_a_training_by_rewards_is_not_measured(monkeypatch):
+    monkeypatch.setattr(learned_training.importlib.util, "find_spec", lambda name: None)
+    assert ["lidarium[rl]" in line.peer for line in learned_training.measure(LEAST)] == [True, True]
