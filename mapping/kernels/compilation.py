@@ -179,10 +179,10 @@ def _start_threads() -> None:
 
     Where PyTorch came first, OpenMP is one for both, and numba sets its number of threads.
     """
-    torch = sys.modules.get("torch")
+    torch: Any = sys.modules.get("torch")
     threads = torch.get_num_threads() if hasattr(torch, "get_num_threads") else None
     numba.get_num_threads()
-    if torch is not None and threads is not None:
+    if threads is not None:
         torch.set_num_threads(threads)
 
 

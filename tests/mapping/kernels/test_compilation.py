@@ -325,3 +325,14 @@ def test_threads_wait_without_spinning_where_nobody_has_said_otherwise(given, wa
         pytest.skip("numba has no OpenMP here")
     assert result.returncode == 0, result.stderr
     assert f"OMP_WAIT_POLICY = '{wanted.upper()}'" in result.stderr
+
+
+def test_threads_that_start_leave_pytorch_as_many_as_it_had():
+    pytest.importorskip("torch", reason="PyTorch is not installed")
+    program = (
+        "import torch; torch.set_num_threads(1); import lidarium\n"
+        "from lidarium.mapping.kernels.compilation import use_threads\n"
+        "use_threads(2); print(torch.get_num_threads())"
+    )
+    found = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert found.stdout.split() == ["1"]
