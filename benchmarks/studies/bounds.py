@@ -33,6 +33,8 @@ GOAL, HORIZON_S = 0.99, 1800.0
 ROUNDS = 300
 PLAN_ROUNDS = 2000
 EXACT_S = 60.0
+FLOORS_EVERY = 20
+"""Of the set ``validation`` every so many-th floor is bounded."""
 
 TIGHT_FILE, FLOORS_FILE = "tight.jsonl", "floors.jsonl"
 
@@ -143,7 +145,7 @@ def work(folder: Path, _data: Path | None, every: int, workers: int) -> Progress
     """Do the small floors, then the set `validation`."""
     small = [Small(floor) for floor in SMALL_FLOORS[::every]]
     yield from do_missing(folder / TIGHT_FILE, "small floors", small, measure_small, workers)
-    floors = set_floors("validation")[::every]
+    floors = set_floors("validation")[:: FLOORS_EVERY * every]
     teams = [Team(floor, robots) for floor in floors for robots in TEAMS]
     yield from do_missing(folder / FLOORS_FILE, "teams", teams, measure_team, workers)
 
