@@ -13,6 +13,11 @@ STUDIES.register(
     "what a team that knows the floor needs, how tight that is, and explorers beside it",
 )
 STUDIES.register(
+    "dungeons",
+    f"{_PACKAGE}.dungeons:STUDY",
+    "ways on public dungeon maps, beside those of other planners there",
+)
+STUDIES.register(
     "evaluation",
     f"{_PACKAGE}.evaluation.study:STUDY",
     "what an evaluation costs beside its episodes, what two workers gain, what survives kills",

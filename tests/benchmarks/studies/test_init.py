@@ -9,6 +9,7 @@ from lidarium.scripts.main import main
 NAMES = (
     *(
         "bounds",
+        "dungeons",
         "evaluation",
         "floor_cache",
         "floors",

@@ -1,0 +1,213 @@
+"""Ways on public dungeon maps, beside those of the planners of the project that they are from.
+
+The project's code halves the pictures, so that a cell of 0.4 m is two pixels. Here floors have half of its
+lengths, 0.1 m a pixel as all dungeons; ways are shown in its metres.
+
+J. Cao et al., "DARE: diffusion policy for autonomous robot exploration", ICRA 2025; Y. Cao et al., "ARiADNE",
+ICRA 2023.
+"""
+
+import csv
+import platform
+from collections.abc import Mapping, Sequence
+from datetime import date
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import lidarium
+from lidarium.benchmarks.studies.shared.study import Study
+from lidarium.evaluation.episodes.output import write_text
+from lidarium.evaluation.statistics.means import paired_ratio
+from lidarium.evaluation.suites.campaign import EPISODES_FILE
+from lidarium.evaluation.suites.episodes_file import KEY, read_episodes
+from lidarium.evaluation.suites.suite import Suite
+from lidarium.evaluation.suites.trial import DEFAULT_VARIANT
+
+POLICIES = ("nearest_frontier", "utility_frontier", "explore_lite", "srt", "tour_frontier", "learned")
+MAPS, WAYS, WAYS_FILE = "dungeon_test", "dungeon_test_ways.csv", "ways.csv"
+SCALE = 2.0
+"""Metres of the project in one of ours."""
+
+SENSOR_M, CELL_M = 20.0, 0.4
+"""Range of the project's sensor, and its cells [m]."""
+
+SETTINGS: dict[str, Any] = {
+    "robot": "point",
+    "lidar": {
+        "beams": 720,
+        "field_of_view": 2.0 * np.pi,
+        "range_min": 0.0,
+        "range_max": SENSOR_M / SCALE,
+        "noise_floor": 0.0,
+        "noise_share": 0.0,
+    },
+    "resolution": CELL_M / SCALE,
+    "stop_coverage": 0.999,
+    "horizon_s": 3600.0,
+}
+
+PLANNERS = {
+    "nearest": "nearest frontier node",
+    "utility": "nodes by utility and distance",
+    "tare": "a tour planner after TARE",
+    "gt0": "a tour on the known map",
+}
+
+PAGE = """# Dungeons
+
+Ways of one robot on public dungeon maps, the test maps of
+[DARE](https://github.com/marmotlab/DARE) (MIT), beside those of four planners of that project on the first
+{printed} maps of its listing.
+
+Made with `{command}` on {date}: lidarium {version}, Python {python}.
+
+The sensor sees 20 m all around, cells have 0.4 m, starts are the maps' marks: as in the project. A robot of
+1 cm drives freely at 2 m/s and sees while it drives. The project's moves between the nodes of a graph, 4 m
+apart, sees at these, and ends where no node shows anything new; so its planners are beside ours, not in a
+race with them.
+
+## The same maps
+
+Means over {printed} maps [m]. *Over the known map's tour* are geometric means of ratios, map by map, with
+their 95 % interval, of ways to 99.9 % where a policy is ours.
+
+| planner | way to 99 % | to 99.9 %, or its end | over the known map's tour | over the tours after TARE |
+|---|---:|---:|---:|---:|
+{same}
+
+## All maps
+
+Policies on all {count} maps: ways to 99 %, and over that of `nearest_frontier`.
+
+| policy | reached 99 % | way to 99 % [m] | over `nearest_frontier` | time over `nearest_frontier` |
+|---|---:|---:|---:|---:|
+{all_maps}
+"""
+
+
+def suites(data: Path | None, every: int = 1) -> dict[str, Suite]:
+    """Return the suite; none without the folder of data, or where it has no such maps."""
+    maps = maps_of(data)[::every] if data is not None else []
+    if not maps:
+        return {}
+    floors = tuple(str(path) for path in maps)
+    return {
+        "maps": Suite(
+            policies=POLICIES,
+            floors=floors,
+            robots=(1,),
+            seeds=(0,),
+            draws_starts=False,
+            variants={DEFAULT_VARIANT: SETTINGS},
+        )
+    }
+
+
+def maps_of(data: Path) -> list[Path]:
+    """Return the maps in the order of the project's listing, that of their names as text."""
+    return sorted((Path(data) / "floorplans" / MAPS).glob("*.png"))
+
+
+def work(folder: Path, data: Path | None, _every: int, _workers: int) -> Any:  # noqa: ANN401
+    """Keep the planners' ways beside the episodes."""
+    if data is not None and (Path(data) / "floorplans" / WAYS).is_file():
+        write_text(folder / WAYS_FILE, (Path(data) / "floorplans" / WAYS).read_text(encoding="utf-8"))
+    yield "ways of planners", 1, 1
+
+
+def page(folder: Path, command: str) -> str:
+    """Return the results as markdown."""
+    ours = ways_of(read_episodes(folder / "maps" / EPISODES_FILE))
+    names = sorted({name for of_policy in ours.values() for name in of_policy})
+    theirs = printed_ways(folder / WAYS_FILE, names)
+    return PAGE.format(
+        command=command,
+        date=date.today().isoformat(),
+        version=lidarium.__version__,
+        python=platform.python_version(),
+        printed=len(next(iter(theirs.values()), {})),
+        same=_same_maps(ours, theirs),
+        count=len(names),
+        all_maps=_all_maps(ours),
+    )
+
+
+Ways = Mapping[str, Mapping[str, Any]]
+"""Episodes of a policy by the name of the map."""
+
+
+def ways_of(episodes: Sequence[Mapping[str, Any]]) -> dict[str, dict[str, Mapping[str, Any]]]:
+    """Return the episodes by policy and name of the map."""
+    found: dict[str, dict[str, Mapping[str, Any]]] = {}
+    for episode in episodes:
+        name = Path(episode[KEY].split(" | ")[1]).name
+        found.setdefault(episode["policy"], {})[name] = episode
+    return found
+
+
+def printed_ways(path: Path, names: Sequence[str]) -> dict[str, dict[str, float]]:
+    """Return the planners' ways by the names of the maps [m]; those that have not run are left out."""
+    found: dict[str, dict[str, float]] = {}
+    if not path.is_file():
+        return found
+    listing = sorted(f"{number}.png" for number in range(1, 101))
+    for row in csv.DictReader(path.read_text(encoding="utf-8").splitlines()):
+        name = listing[int(row["map"])]
+        if name in names:
+            found.setdefault(row["method"], {})[name] = float(row["way_m"])
+    return found
+
+
+def _same_maps(ours: Ways, theirs: Mapping[str, Mapping[str, float]]) -> str:
+    names = list(theirs.get("gt0", {}))
+    rows = []
+    for planner, ways in theirs.items():
+        values = [ways[name] for name in names]
+        cells = [_ratio(values, theirs, "gt0", names), _ratio(values, theirs, "tare", names)]
+        rows.append(f"| {PLANNERS[planner]} | - | {np.mean(values):.0f} | {' | '.join(cells)} |")
+    for policy, episodes in ours.items():
+        to_goal, to_end = ([way(episodes[name], key) for name in names] for key in ("d99_m", "path_m"))
+        cells = [_ratio(to_end, theirs, "gt0", names), _ratio(to_end, theirs, "tare", names)]
+        rows.append(f"| `{policy}` | {np.mean(to_goal):.0f} | {np.mean(to_end):.0f} | {' | '.join(cells)} |")
+    return "\n".join(rows)
+
+
+def way(episode: Mapping[str, Any], key: str) -> float:
+    """Return a way in the project's metres; the whole one where 99 % were not reached."""
+    metres = episode[key] if key == "d99_m" and episode[key] is not None else sum(episode["path_m"])
+    return SCALE * float(metres)
+
+
+def _ratio(
+    values: Sequence[float], theirs: Mapping[str, Mapping[str, float]], planner: str, names: Sequence[str]
+) -> str:
+    others = [theirs[planner][name] for name in names]
+    if np.array_equal(values, others):
+        return "1"
+    return _interval(values, others)
+
+
+def _interval(ours: Sequence[float], theirs: Sequence[float]) -> str:
+    found = paired_ratio(ours, theirs)
+    return f"{found.estimate:.3f} ({found.low:.3f} to {found.high:.3f})"
+
+
+def _all_maps(ours: Ways) -> str:
+    baseline, rows = ours[POLICIES[0]], []
+    for policy, episodes in ours.items():
+        names = sorted(episodes)
+        ways, others = ([way(found[name], "d99_m") for name in names] for found in (episodes, baseline))
+        times, base = (
+            [float(found[name]["t99_s"] or SETTINGS["horizon_s"]) for name in names]
+            for found in (episodes, baseline)
+        )
+        reached = sum(episodes[name]["t99_s"] is not None for name in names)
+        ratios = ["1", "1"] if policy == POLICIES[0] else [_interval(ways, others), _interval(times, base)]
+        cells = f"{reached} of {len(names)} | {np.mean(ways):.0f} | {' | '.join(ratios)}"
+        rows.append(f"| `{policy}` | {cells} |")
+    return "\n".join(rows)
+
+
+STUDY = Study(page, suites, work)

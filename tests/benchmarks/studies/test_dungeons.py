@@ -1,0 +1,74 @@
+"""Ways on dungeon maps stand beside those of other planners, map by map."""
+
+import json
+
+import pytest
+
+from lidarium.benchmarks.studies import STUDIES, dungeons
+
+PRINTED = "map,method,way_m,decisions,explored_share\n" + "".join(
+    f"{number},{method},{way},9,1.0\n"
+    for method, way in (("nearest", 80.0), ("tare", 50.0), ("gt0", 40.0))
+    for number in range(3)
+)
+
+
+def episode(policy, name, d99_m, path_m, t99_s=20.0):
+    return {
+        "key": f"default | maps/{name} | 1 | seed 0 | {policy}",
+        "policy": policy,
+        "d99_m": d99_m,
+        "path_m": [path_m],
+        "t99_s": t99_s,
+    }
+
+
+@pytest.fixture
+def folder(tmp_path):
+    # The project's listing is by text: map 1 is 10.png, not 2.png.
+    names = ("1.png", "10.png", "100.png", "2.png")
+    ways = {"nearest_frontier": (15.0, 20.0), "learned": (10.0, 15.0)}
+    lines = [episode(policy, name, *way) for policy, way in ways.items() for name in names]
+    lines[-1] = episode("learned", "2.png", None, 30.0, None)
+    (tmp_path / "maps").mkdir()
+    text = "".join(json.dumps(line) + "\n" for line in lines)
+    (tmp_path / "maps" / "episodes.jsonl").write_text(text)
+    (tmp_path / "ways.csv").write_text(PRINTED)
+    return tmp_path
+
+
+def row_of(page, begin, place=0):
+    rows = [line for line in page.splitlines() if line.startswith(f"| {begin} |")]
+    return [cell.strip() for cell in rows[place].strip("|").split("|")]
+
+
+def test_maps_are_paired_in_the_order_of_the_projects_listing(folder):
+    ways = dungeons.printed_ways(folder / "ways.csv", ["1.png", "10.png", "100.png", "2.png"])
+    assert list(ways["tare"]) == ["1.png", "10.png", "100.png"]
+    assert dungeons.printed_ways(folder / "ways.csv", ["2.png"]) == {}
+    assert dungeons.printed_ways(folder / "missing.csv", ["1.png"]) == {}
+
+
+def test_ways_are_in_the_projects_metres_and_those_that_missed_count_whole(folder):
+    page = dungeons.page(folder, "lidarium reproduce dungeons")
+    assert row_of(page, "`learned`")[1:3] == ["20", "30"]
+    assert row_of(page, "`learned`")[3].startswith("0.750 (")
+    assert row_of(page, "a tour on the known map")[2:4] == ["40", "1"]
+    assert row_of(page, "nearest frontier node")[4].startswith("1.600 (")
+    assert row_of(page, "`learned`", 1)[1:3] == ["3 of 4", "30"]
+    assert row_of(page, "`nearest_frontier`", 1)[3:] == ["1", "1"]
+
+
+def test_without_data_there_is_nothing_to_run():
+    assert STUDIES["dungeons"].suites(None, 1) == {}
+
+
+def test_the_maps_at_hand_are_run_from_their_marks(shared_data, tmp_path):
+    suite = dungeons.suites(shared_data, 10)["maps"]
+    assert len(suite.floors) == 10
+    assert not suite.draws_starts
+    assert list(dungeons.work(tmp_path, shared_data, 1, 1)) == [("ways of planners", 1, 1)]
+    assert (
+        len(dungeons.printed_ways(tmp_path / "ways.csv", [p.name for p in dungeons.maps_of(shared_data)]))
+        == 4
+    )
