@@ -32,7 +32,7 @@ CLASSICS = ("nearest_frontier", "utility_frontier", "explore_lite")
 TEAMS = (1, 2, 3)
 HORIZON_S = 1800.0
 SETTINGS: dict[str, Any] = {"resolution": 0.05, "stop_coverage": 0.99, "horizon_s": HORIZON_S}
-CLASSICS_EVERY, REAL_EVERY, BOUNDS_EVERY = 4, 4, 8
+CLASSICS_EVERY, REAL_EVERY, BOUNDS_EVERY = 4, 12, 8
 """Classic explorers run on every so many-th floor; so are real floors taken, and floors with a bound."""
 
 KINDS = {
