@@ -20,6 +20,7 @@ from lidarium.benchmarks.studies.shared.kept import Progress, do_missing, kept_l
 from lidarium.benchmarks.studies.shared.real_floors import real_floors
 from lidarium.benchmarks.studies.shared.study import Study
 from lidarium.envs.floors.catalogue.names import set_floors
+from lidarium.evaluation.statistics import Interval
 from lidarium.evaluation.statistics.means import paired_ratio
 from lidarium.evaluation.statistics.medians import median_interval
 from lidarium.evaluation.suites.campaign import EPISODES_FILE
@@ -193,13 +194,20 @@ def _row(episodes: Times, ours: str, theirs: str, robots: int) -> str:
         f"`{ours}`",
         f"`{theirs}`",
         len(pairs),
-        f"{median.estimate:.3f} ({median.low:.3f} to {median.high:.3f})",
-        f"{mean.estimate:.3f} ({mean.low:.3f} to {mean.high:.3f})",
+        _with_interval(median),
+        _with_interval(mean),
         f"{100 * np.mean(ratios < 1.0):.0f} %",
         f"{reached[0]}, {reached[1]}",
         f"{paths.estimate:.3f}",
     )
     return "| " + " | ".join(str(cell) for cell in cells) + " |"
+
+
+def _with_interval(found: Interval) -> str:
+    """Return an estimate with its interval, where so few pairs have one."""
+    is_bounded = np.isfinite(found.low) and np.isfinite(found.high)
+    interval = f"{found.low:.3f} to {found.high:.3f}" if is_bounded else "too few for an interval"
+    return f"{found.estimate:.3f} ({interval})"
 
 
 def _time(episode: Mapping[str, Any]) -> float:

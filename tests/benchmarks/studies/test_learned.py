@@ -39,6 +39,13 @@ def test_a_row_compares_pairs(episodes):
     assert learned._row(episodes, "learned", "tour_frontier", 2) == ""
 
 
+def test_two_pairs_are_too_few_for_an_interval(episodes):
+    few = {policy: dict(list(of_policy.items())[:2]) for policy, of_policy in episodes.items()}
+    cells = [cell.strip() for cell in learned._row(few, "learned", "tour_frontier", 1).strip("|").split("|")]
+    assert cells[4] == "0.805 (too few for an interval)"
+    assert "inf" not in " ".join(cells)
+
+
 def test_the_best_classic_has_the_least_mean_and_the_horizon_counts(episodes):
     assert learned.best_classic(episodes, 1) == "utility_frontier"
     assert learned.best_classic(episodes, 3) is None
