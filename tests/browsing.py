@@ -78,10 +78,12 @@ class Browser:
         ActionChains(self.driver).send_keys(*keys).perform()
 
     def wait(self, condition, seconds=10.0):
-        """Wait until something is so, and return it."""
+        """Wait until something is so, and return it; what the page replaces meanwhile is looked for again."""
+        from selenium.common.exceptions import NoSuchElementException, StaleElementReferenceException
         from selenium.webdriver.support.ui import WebDriverWait
 
-        return WebDriverWait(self.driver, seconds, poll_frequency=0.05).until(lambda _: condition())
+        passing = (NoSuchElementException, StaleElementReferenceException)
+        return WebDriverWait(self.driver, seconds, 0.05, passing).until(lambda _: condition())
 
     def column(self, section, place):
         """Return the cells of a column of a section's table as text, from above."""

@@ -72,7 +72,8 @@ def canvas_of(page, place=0):
 
 
 def ready(page):
-    page.wait(lambda: page.find_all("#replay canvas") and page.find("#replay output").text)
+    """Wait until the episodes that were picked are shown."""
+    page.wait(lambda: page.find_all("#replay [aria-busy=false] canvas") and page.find("#replay output").text)
 
 
 def scrub(page, share):
@@ -150,10 +151,8 @@ def test_an_episode_is_picked_played_paused_and_scrubbed_by_mouse(page):
         if "utility_frontier" in each.text and each.find_elements("css selector", "td")[3].text == "1"
     )
     page.find("button", row).click()
-    title = page.wait(
-        lambda: [each for each in page.find_all("#replay h3") if "utility_frontier" in each.text]
-    )[0]
-    assert title.text == "utility_frontier on apartment, 2 robots, seed 1"
+    ready(page)
+    assert page.find("#replay h3").text == "utility_frontier on apartment, 2 robots, seed 1"
     before = canvas_of(page)
     page.button("Play").click()
     page.wait(lambda: shown_time(page) >= 3)
@@ -192,8 +191,10 @@ def test_layers_come_and_go_and_a_robot_is_followed(page):
 def test_two_episodes_run_side_by_side_in_step(page):
     ready(page)
     page.choose("Episode", "random_walk on apartment, 2 robots, seed 0", "#replay")
+    ready(page)
     page.choose("Beside it", "utility_frontier on apartment, 2 robots, seed 0", "#replay")
-    page.wait(lambda: len(page.find_all("#replay canvas")) == 2)
+    ready(page)
+    assert len(page.find_all("#replay canvas")) == 2
     scrub(page, 0.5)
     left, right = page.find_all("#replay canvas")
     assert left.location["y"] == right.location["y"]
@@ -204,7 +205,8 @@ def test_two_episodes_run_side_by_side_in_step(page):
     for text, share in zip(("random_walk", "utility_frontier"), explored, strict=True):
         assert 0.0 < share < 100.0, text
     page.choose("Beside it", "None", "#replay")
-    page.wait(lambda: len(page.find_all("#replay canvas")) == 1)
+    ready(page)
+    assert len(page.find_all("#replay canvas")) == 1
 
 
 def test_all_of_it_goes_by_keyboard(page):
@@ -326,7 +328,8 @@ def test_the_picture_of_a_replay_is_as_it_was(page, tmp_path):
     """The picture has no letters in it, which other machines draw otherwise."""
     ready(page)
     page.choose("Episode", "nearest_frontier on apartment, 2 robots, seed 0", "#replay")
-    page.wait(lambda: page.find("#replay h3").text.startswith("nearest_frontier"))
+    ready(page)
+    assert page.find("#replay h3").text.startswith("nearest_frontier")
     slider = page.find("#replay input[type=range]")
     page.run("arguments[0].value = 20; arguments[0].dispatchEvent(new Event('input'))", slider)
     found = cv2.resize(canvas_of(page).astype(np.uint8), (480, 270), interpolation=cv2.INTER_AREA)

@@ -84,6 +84,7 @@ export class Player {
     const asked = ++this.asked;
     const places = [this.first.select.value, this.second.select.value].filter((value) => value !== "").map(Number);
     this.pause();
+    this.stage.setAttribute("aria-busy", "true");
     try {
       const episodes = await Promise.all(places.map((place) => this.read(place)));
       if (asked !== this.asked) return;
@@ -99,9 +100,11 @@ export class Player {
       this.listLayers(episodes);
       this.rest();
     } catch (error) {
+      if (asked !== this.asked) return;
       this.problem.textContent = `This replay cannot be shown: ${error instanceof Error ? error.message : String(error)}`;
       this.problem.hidden = false;
     }
+    this.stage.setAttribute("aria-busy", "false");
   }
 
   private read(place: number): Promise<Episode> {
