@@ -2,23 +2,22 @@
 
 That is the space that the disc's footprint covers from its starts.
 
-What follows from the raster and the disc alone is kept with rasters that are read-only, for all episodes that
-share one.
+What follows from the raster and the disc alone is kept with rasters that are read-only, as runs, for all
+episodes that share one.
 """
 
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.envs.floors.floor import Raster
+from lidarium.envs.floors.runs import Runs
 from lidarium.mapping.kernels.compilation import kernel
-
-Made = TypeVar("Made")
 
 KEPT = 8
 """Most entries that a raster keeps.
@@ -41,11 +40,6 @@ class Components:
 
     labels: NDArray[np.unsignedinteger[Any]]
     areas: NDArray[np.int64]
-
-    @property
-    def nbytes(self) -> int:
-        """How much memory the arrays take."""
-        return self.labels.nbytes + self.areas.nbytes
 
 
 def configuration_space(raster: Raster, radius: float) -> NDArray[np.bool_]:
@@ -89,13 +83,13 @@ def components(raster: Raster, radius: float) -> Components:
     The disc has a radius [m]; ``ValueError`` is raised as by ``configuration_space``.
     """
 
-    def make() -> Components:
+    def make() -> NDArray[np.unsignedinteger[Any]]:
         space = configuration_space(raster, radius)
         count, labels = cv2.connectedComponents(space.view(np.uint8), connectivity=4, ltype=cv2.CV_32S)
-        smallest = np.asarray(labels, np.min_scalar_type(count - 1))
-        return Components(_frozen(smallest), _frozen(np.bincount(labels.ravel(), minlength=count)))
+        return np.asarray(labels, np.min_scalar_type(count - 1))
 
-    return _kept(raster, ("components", radius), make)
+    runs = _kept(raster, ("components", radius), make)
+    return Components(runs.grid(), _frozen(runs.counts()))
 
 
 def reachable_free_space(raster: Raster, radius: float, starts: NDArray[np.float64]) -> NDArray[np.bool_]:
@@ -139,9 +133,9 @@ def reachable_free_space(raster: Raster, radius: float, starts: NDArray[np.float
             steps = np.arange(math.floor(reach + 1e-9) + 2)
             disc = steps[:, None] ** 2 + steps[None, :] ** 2 <= reach**2 + 1e-9
             covered[box] = _dilated(chosen[found.labels[box]], disc) & (raster.solid[box] == 0)
-        return _frozen(covered)
+        return covered
 
-    return _kept(raster, ("swept", radius, *kept), make)
+    return _kept(raster, ("swept", radius, *kept), make).grid()
 
 
 def cell_of(raster: Raster, point: NDArray[np.float64]) -> tuple[int, int]:
@@ -187,41 +181,19 @@ def _frozen(array: NDArray[Any]) -> NDArray[Any]:
     return array
 
 
-class _Latest:
-    """What was made last, of which raster."""
-
-    def __init__(self) -> None:
-        self._made: tuple[Raster, tuple[Any, ...], Any] | None = None
-
-    def value(self, raster: Raster, key: tuple[Any, ...], make: Callable[[], Made]) -> Made:
-        """Return what was made last where it is what is asked for, or make it."""
-        made = self._made
-        if made is None or made[0] is not raster or made[1] != key:
-            made = self._made = (raster, key, make())
-        value: Made = made[2]
-        return value
-
-
-_LATEST = _Latest()
-
-
-def _kept(raster: Raster, key: tuple[Any, ...], make: Callable[[], Made]) -> Made:
+def _kept(raster: Raster, key: tuple[Any, ...], make: Callable[[], NDArray[Any]]) -> Runs:
     """Return what a raster keeps, or make it.
 
     A raster that can be written to keeps nothing.
-
-    It is kept from the second time on: many floors of large sets are drawn once, and would only fill the
-    memory. What was made last is at hand until something else is made: a beginning asks for it twice.
     """
     if raster.solid.flags.writeable:
-        return make()
-    value: Made | None = raster.kept.get(key)
-    if value is None:
-        value = _LATEST.value(raster, key, make)
-        raster.kept[key] = value if key in raster.kept else None
+        return Runs.of(make())
+    kept: Runs | None = raster.kept.get(key)
+    if kept is None:
+        kept = raster.kept[key] = Runs.of(make())
         while len(raster.kept) > KEPT:
             raster.kept.pop(next(iter(raster.kept)))
-    return value
+    return kept
 
 
 def _box_of_free_cells(raster: Raster) -> tuple[slice, slice] | None:

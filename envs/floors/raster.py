@@ -7,6 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from lidarium.envs.floors.runs import Runs
+
 # Origins of rasters are whole multiples of this [m], so that belief grids of every usual resolution line up
 # with them.
 LATTICE = 0.1
@@ -25,20 +27,19 @@ class Raster:
         Lower left corner of cell (0, 0) [m].
     resolution : float
         Side of a cell [m].
-    kept : dict
+    kept : dict of Runs
         What was made of the cells, where they are read-only, see ``free_space``.
     """
 
     solid: NDArray[np.uint8]
     origin: tuple[float, float]
     resolution: float
-    kept: dict[tuple[Any, ...], Any] = field(default_factory=dict, init=False, repr=False)
+    kept: dict[tuple[Any, ...], Runs] = field(default_factory=dict, init=False, repr=False)
 
     @property
     def nbytes(self) -> int:
         """How much memory the cells take, and what is kept of them."""
-        sizes: list[int] = [value.nbytes for value in list(self.kept.values()) if value is not None]
-        return self.solid.nbytes + sum(sizes)
+        return self.solid.nbytes + sum(runs.nbytes for runs in list(self.kept.values()))
 
 
 def frame_of(

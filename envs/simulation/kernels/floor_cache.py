@@ -11,10 +11,12 @@ from collections import OrderedDict
 from collections.abc import Callable
 from functools import lru_cache
 from threading import Lock
+from typing import Any, Generic, TypeVar
 from weakref import WeakValueDictionary
 
 from lidarium.envs.floors.catalogue.store import Store, floor_store, hash_of_code, mebibytes
 from lidarium.envs.floors.floor import Floor
+from lidarium.envs.floors.runs import Runs
 from lidarium.envs.simulation.kernels.floor_tables import FloorTables
 
 SIZE_VARIABLE = "LIDARIUM_FLOOR_CACHE_MIB"
@@ -25,6 +27,11 @@ Unused tables are those that no episode uses.
 
 DEFAULT_MIB = 256.0
 """The most that they take where nothing is said [MiB]."""
+
+REMEMBERED_SHARE = 0.125
+"""Share of it for what was made of floors whose tables had to go."""
+
+Value = TypeVar("Value")
 
 MADE_BY = (
     "envs/floors",
@@ -46,7 +53,8 @@ MADE_BY = (
 class TablesCache:
     """Tables used last, bounded in bytes.
 
-    Tables in use elsewhere are found, too, and never made twice.
+    Tables in use elsewhere are found, too, and never made twice. Of tables that had to go, what episodes have
+    made their rasters keep stays for longer: it is small, and takes longer to make than the tables.
 
     Tables grow by what episodes make their rasters keep: how large they are is asked whenever they are used.
 
@@ -62,10 +70,17 @@ class TablesCache:
     """
 
     def __init__(self, max_bytes: int) -> None:
-        self.max_bytes, self.nbytes = max_bytes, 0
-        self._kept: OrderedDict[str, tuple[FloorTables, int]] = OrderedDict()
+        self.max_bytes = max_bytes
+        room = int(REMEMBERED_SHARE * max_bytes)
+        self._kept: _UsedLast[FloorTables] = _UsedLast(max_bytes - room)
+        self._remembered: _UsedLast[dict[tuple[Any, ...], Runs]] = _UsedLast(room)
         self._alive: WeakValueDictionary[str, FloorTables] = WeakValueDictionary()
         self._lock = Lock()
+
+    @property
+    def nbytes(self) -> int:
+        """How much the cache keeps alive."""
+        return self._kept.nbytes + self._remembered.nbytes
 
     def get(self, key: str, make: Callable[[], FloorTables]) -> FloorTables:
         """Return the tables of a key; ``make`` is called where nobody has them."""
@@ -75,14 +90,37 @@ class TablesCache:
         with self._lock:
             # Of two threads that made the same, one wins.
             tables = self._alive.setdefault(key, tables)
-            size = tables.nbytes
-            self.nbytes += size - self._kept.get(key, (tables, 0))[1]
-            self._kept[key] = tables, size
-            self._kept.move_to_end(key)
-            while self.nbytes > self.max_bytes:
-                _, (_, size) = self._kept.popitem(last=False)
-                self.nbytes -= size
+            tables.body.kept.update(self._remembered.pop(key) or {})
+            for gone, old in self._kept.put(key, tables, tables.nbytes):
+                kept = dict(old.body.kept)
+                self._remembered.put(gone, kept, sum(runs.nbytes for runs in kept.values()))
         return tables
+
+
+class _UsedLast(Generic[Value]):
+    """Values used last, bounded in bytes."""
+
+    def __init__(self, max_bytes: int) -> None:
+        self.max_bytes, self.nbytes = max_bytes, 0
+        self._values: OrderedDict[str, tuple[Value, int]] = OrderedDict()
+
+    def pop(self, key: str) -> Value | None:
+        """Take a value out, None where it is not there."""
+        value, size = self._values.pop(key, (None, 0))
+        self.nbytes -= size
+        return value
+
+    def put(self, key: str, value: Value, size: int) -> list[tuple[str, Value]]:
+        """Keep a value of so many bytes; return what had to go, with its key."""
+        self.pop(key)
+        self._values[key] = value, size
+        self.nbytes += size
+        gone = []
+        while self.nbytes > self.max_bytes:
+            old, (former, length) = self._values.popitem(last=False)
+            self.nbytes -= length
+            gone.append((old, former))
+        return gone
 
 
 def floor_tables(

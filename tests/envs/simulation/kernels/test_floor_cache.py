@@ -3,6 +3,7 @@ makes twice."""
 
 import copy
 import gc
+import math
 import pickle
 import subprocess
 import sys
@@ -11,6 +12,7 @@ import numpy as np
 import pytest
 
 import lidarium
+from lidarium.envs.floors import free_space
 from lidarium.envs.floors.catalogue import names as catalogue
 from lidarium.envs.floors.catalogue.names import load_floor
 from lidarium.envs.floors.catalogue.store import FOLDER_VARIABLE, floor_store
@@ -19,6 +21,7 @@ from lidarium.envs.floors.free_space import reachable_free_space
 from lidarium.envs.floors.generation.buildings import generate_building
 from lidarium.envs.simulation.kernels import floor_cache
 from lidarium.envs.simulation.kernels.floor_cache import (
+    REMEMBERED_SHARE,
     SIZE_VARIABLE,
     TablesCache,
     floor_tables,
@@ -72,6 +75,11 @@ def assert_same(one, other):
         assert first.dtype == second.dtype
         assert np.array_equal(first, second)
     assert (one.laser is one.body) == (other.laser is other.body)
+
+
+def cache_for(tables):
+    """The size of a cache that has room for tables of so many bytes."""
+    return math.ceil(tables / (1.0 - REMEMBERED_SHARE))
 
 
 def refuse(*_):
@@ -128,7 +136,7 @@ def test_tables_cannot_be_written(own_store):
 def test_the_cache_keeps_no_more_bytes_than_it_may():
     floors = [box(3.0 + 0.1 * k) for k in range(30)]
     sizes = [FloorTables.of_floor(floor, *HEIGHTS).nbytes for floor in floors]
-    cache = TablesCache(sum(sizes[-5:]))
+    cache = TablesCache(cache_for(sum(sizes[-5:])))
     for k, floor in enumerate(floors):
         cache.get(str(k), lambda floor=floor: FloorTables.of_floor(floor, *HEIGHTS))
         assert cache.nbytes <= cache.max_bytes
@@ -145,7 +153,7 @@ def test_the_tables_used_last_stay_and_those_in_use_are_never_made_twice():
         return FloorTables.of_floor(box(3.0), *HEIGHTS)
 
     first = make()
-    cache = TablesCache(2 * first.nbytes)
+    cache = TablesCache(cache_for(2 * first.nbytes))
     cache.get("first", lambda: first)
     cache.get("second", make)
     cache.get("first", refuse)
@@ -162,16 +170,32 @@ def test_the_tables_used_last_stay_and_those_in_use_are_never_made_twice():
 
 def test_what_episodes_add_to_tables_counts():
     tables = FloorTables.of_floor(box(3.0), *HEIGHTS)
-    cache = TablesCache(3 * tables.nbytes)
+    cache = TablesCache(cache_for(3 * tables.nbytes))
     cache.get("first", lambda: tables)
     bare = cache.nbytes
-    for _ in range(2):
-        reachable_free_space(tables.body, 0.1, np.array([[2.5, 2.5]]))
+    reachable_free_space(tables.body, 0.1, np.array([[2.5, 2.5]]))
     assert cache.get("first", refuse) is tables
     assert cache.nbytes == tables.nbytes > bare
     cache.get("large", lambda: FloorTables.of_floor(box(6.0), *HEIGHTS))
     gc.collect()
-    assert cache.nbytes == 0
+    assert cache.nbytes == sum(runs.nbytes for runs in tables.body.kept.values())
+
+
+def test_what_was_made_of_a_floor_stays_when_its_tables_go(monkeypatch):
+    start = np.array([[2.5, 2.5]])
+    cache = TablesCache(cache_for(1.5 * FloorTables.of_floor(box(3.0), *HEIGHTS).nbytes))
+    tables = cache.get("first", lambda: FloorTables.of_floor(box(3.0), *HEIGHTS))
+    free = reachable_free_space(tables.body, 0.1, start)
+    del tables
+    cache.get("second", lambda: FloorTables.of_floor(box(3.1), *HEIGHTS))
+    gc.collect()
+    again = cache.get("first", lambda: FloorTables.of_floor(box(3.0), *HEIGHTS))
+    monkeypatch.setattr(free_space, "configuration_space", refuse)
+    monkeypatch.setattr(free_space, "_dilated", refuse)
+    np.testing.assert_array_equal(reachable_free_space(again.body, 0.1, start), free)
+    with pytest.raises(AssertionError, match="made anew"):
+        reachable_free_space(again.body, 0.2, start)
+    assert cache.nbytes <= cache.max_bytes
 
 
 def test_the_environment_bounds_the_cache(monkeypatch):
