@@ -20,7 +20,7 @@ from lidarium.mapping.planning.touring.coarse_distances import (
     distances_from,
     place_in,
 )
-from lidarium.mapping.planning.touring.frontier_views import ViewRules, Views, gain_at, views_of
+from lidarium.mapping.planning.touring.frontier_views import ViewRules, gain_at, views_of
 from lidarium.mapping.planning.touring.team_tours import team_tours
 
 AHEAD = 0.5
@@ -166,7 +166,9 @@ def tour_options(
     lengths = distances_from(grid, starts)
     groups = (clusters.cells, clusters.starts)
     views = views_of(navigation.log_odds, resolution, grid, lengths.min(axis=0), groups, rules)
-    chosen = _nearest(views, settings)
+    is_seen = views.lengths < UNREACHED
+    reached = np.where(is_seen, lengths[:, views.cells[:, 0], views.cells[:, 1]], UNREACHED)
+    chosen = _nearest(reached, views.gains, settings)
     if not len(chosen):
         return None
     places = views.cells[chosen]
@@ -221,11 +223,22 @@ def _cell_at(pose: NDArray[np.float64], resolution: float) -> Cell:
     return math.floor(pose[1] / resolution), math.floor(pose[0] / resolution)
 
 
-def _nearest(views: Views, settings: TourSettings) -> NDArray[np.int64]:
-    """Return the numbers of the frontiers to visit, the nearest first."""
-    order = np.argsort(views.lengths, kind="stable")
-    is_wanted = (views.lengths[order] < UNREACHED) & (views.gains[order] >= settings.least_gain)
-    return order[is_wanted][: settings.most]
+def _nearest(
+    lengths: NDArray[np.int32], gains: NDArray[np.float64], settings: TourSettings
+) -> NDArray[np.int64]:
+    """Return the numbers of the frontiers to visit, the nearest to any robot first.
+
+    Each robot in turn takes its nearest: a team that is spread out has something to visit everywhere.
+    ``lengths`` (robots, frontiers) are those of the paths there.
+    """
+    is_wanted = (lengths < UNREACHED) & (gains >= settings.least_gain)
+    robots = len(lengths)
+    ranks = np.where(is_wanted, lengths, UNREACHED).argsort(axis=1, kind="stable").argsort(axis=1)
+    turns = np.where(is_wanted, ranks * robots + np.arange(robots)[:, None], UNREACHED).min(axis=0)
+    chosen = turns.argsort(kind="stable")[: settings.most]
+    chosen = np.sort(chosen[turns[chosen] < UNREACHED])
+    nearest = lengths[:, chosen].min(axis=0)
+    return np.asarray(chosen[np.argsort(nearest, kind="stable")])
 
 
 def _metres(lengths: NDArray[np.int32], grid: CoarseGrid) -> NDArray[np.float64]:

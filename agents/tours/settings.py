@@ -21,7 +21,7 @@ class TourSettings:
     least_gain : float
         So are those that show less than this [m2].
     most : int
-        Tours pass so many frontiers at most, the nearest ones.
+        Tours pass so many frontiers at most: each robot in turn takes its nearest.
     kept_share : float
         A robot goes on to a frontier until less than this share of what it would show is left.
     kept : float
@@ -41,7 +41,7 @@ class TourSettings:
 
     minimum_size: Length = 0.3
     least_gain: Annotated[float, within(0.0, 1e6)] = 0.4
-    most: Annotated[int, within(1, 200)] = 14
+    most: Annotated[int, within(1, 200)] = 30
     kept_share: Annotated[float, share()] = 0.15
     kept: Length = 1.0
     turn_length: Length = 0.25

@@ -19,6 +19,15 @@ def corridor():
     return navigation
 
 
+def corridor_with_a_door():
+    """Return the corridor with a door at x = 3 m to what is unknown."""
+    log_odds = corridor().log_odds.copy()
+    log_odds[30, 50:70] = -20
+    navigation = NavigationMap(log_odds, RESOLUTION)
+    navigation.changed((0, 40, 0, 280))
+    return navigation
+
+
 def legs_of(navigation, robots, **settings):
     chosen = TourSettings(**settings)
     clusters = navigation.frontiers.clusters(minimum_cells=6)
@@ -62,6 +71,23 @@ def test_a_robot_keeps_to_what_it_drives_to():
     kept = (20, 20)
     (leg,) = legs_of(navigation, [robot(7.5, kept_cell=kept, kept=3.0)])
     assert leg.frontier_cell[1] < 140
+
+
+def test_each_robot_in_turn_has_its_nearest_frontier_on_the_tours():
+    navigation = corridor_with_a_door()
+    settings = TourSettings(most=2)
+    clusters = navigation.frontiers.clusters(minimum_cells=6)
+    assert len(clusters) == 3
+    for robots, columns in (
+        ([robot(2.0)], [20, 60]),
+        ([robot(2.0), robot(9.0)], [20, 259]),
+        ([robot(9.0), robot(2.0)], [20, 259]),
+    ):
+        options = tour_options(navigation, clusters, robots, 0.18, settings, settings.rules(5.6))
+        found = [float(options.cells_of(k)[:, 1].mean()) for k in range(len(options.numbers))]
+        np.testing.assert_allclose(found, columns, atol=10.0)
+        # The nearest to any robot comes first.
+        assert (np.diff(options.lengths.min(axis=0)) >= 0.0).all()
 
 
 def test_frontiers_that_show_little_are_left_to_the_end():
