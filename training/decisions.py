@@ -1,7 +1,7 @@
 """Many decisions as arrays, for networks."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,20 +13,23 @@ from lidarium.agents.tours.settings import TourSettings
 MOST_OPTIONS, MOST_TEAMMATES = TourSettings().most, 8
 """So many options and teammates of a decision are kept; there are no more of the first."""
 
+PER_OPTION = ("options", "crops", "scores", "mask")
+"""Arrays of decisions that have something for each option."""
+
 
 @dataclass(frozen=True, slots=True)
 class Decisions:
-    """N decisions as arrays; what a decision lacks is zero.
+    """N decisions of up to n options as arrays; what a decision lacks is zero.
 
     Attributes
     ----------
-    options : (N, MOST_OPTIONS, features) float32
+    options : (N, n, features) float32
         See ``Decision``, as all below.
-    crops : (N, MOST_OPTIONS, CROP_SIDE, CROP_SIDE) int8
+    crops : (N, n, CROP_SIDE, CROP_SIDE) int8
     teammates : (N, MOST_TEAMMATES, features) float32
     situation : (N, features) float32
-    scores : (N, MOST_OPTIONS) float32
-    mask : (N, MOST_OPTIONS) bool
+    scores : (N, n) float32
+    mask : (N, n) bool
     counts : (N, 2) int64
         Numbers of options and of teammates.
     """
@@ -46,9 +49,14 @@ class Decisions:
         """Return the decisions of some rows."""
         return Decisions(*(getattr(self, field.name)[rows] for field in fields(self)))
 
+    def narrowed(self, width: int) -> "Decisions":
+        """Return the same decisions, none of which has more than so many options, in less memory."""
+        parts = {name: np.ascontiguousarray(getattr(self, name)[:, :width]) for name in PER_OPTION}
+        return replace(self, **parts)
+
 
 def stacked(decisions: Sequence[Decision]) -> Decisions:
-    """Return decisions as arrays.
+    """Return decisions as arrays, with room for ``MOST_OPTIONS``.
 
     Of more teammates than ``MOST_TEAMMATES`` the first ones are kept.
     """

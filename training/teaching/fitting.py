@@ -1,19 +1,23 @@
 """Fits a network to lessons: what the teacher regrets less is preferred more."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
 
 from lidarium.agents.learned.features import OPTION_FEATURES, TEAMMATE_FEATURES
-from lidarium.training.decisions import Decisions
+from lidarium.training.decisions import MOST_OPTIONS, Decisions
 from lidarium.training.settings import FitSettings
-from lidarium.training.teaching.samples import Samples, joined
+from lidarium.training.teaching.samples import Samples, by_width
 from lidarium.training.torch_network import ExplorerNetwork, Seen
 
 _MIRRORED_OPTION = tuple(list(OPTION_FEATURES).index(name) for name in ("left",))
 _MIRRORED_TEAMMATE = tuple(list(TEAMMATE_FEATURES).index(name) for name in ("left", "sine", "target_left"))
+
+
+GROUPS = (6, 12, 20, MOST_OPTIONS)
+"""Decisions of up to so many options are fitted together."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,8 +64,8 @@ def fit(network: ExplorerNetwork, floors: list[Samples], settings: FitSettings, 
     generator = np.random.default_rng(seed)
     order = generator.permutation(len(floors))
     count = min(max(round(settings.held_out * len(floors)), 1), len(floors) - 1)
-    held_out = joined([floors[k] for k in order[:count]])
-    fitted = joined([floors[k] for k in order[count:]])
+    held_out = by_width([floors[k] for k in order[:count]], GROUPS)
+    fitted = by_width([floors[k] for k in order[count:]], GROUPS)
     optimizer = torch.optim.AdamW(
         network.parameters(), lr=settings.learning_rate, weight_decay=settings.weight_decay
     )
@@ -77,41 +81,52 @@ def fit(network: ExplorerNetwork, floors: list[Samples], settings: FitSettings, 
     network.set_weights(best)
 
 
-def evaluate(network: ExplorerNetwork, samples: Samples, settings: FitSettings) -> float:
+def evaluate(network: ExplorerNetwork, groups: Sequence[Samples], settings: FitSettings) -> float:
     """Return the mean regret of taking what the network prefers [m]."""
-    regrets = np.minimum(samples.regrets, settings.most_regret)
     found = []
     with torch.no_grad():
-        for start in range(0, len(samples), 1024):
-            rows = np.arange(start, min(start + 1024, len(samples)))
-            best = network(Seen(samples.decisions.take(rows)))[0].argmax(dim=1).numpy()
-            found.append(regrets[rows, best])
+        for samples in groups:
+            regrets = np.minimum(samples.regrets, settings.most_regret)
+            for start in range(0, len(samples), 1024):
+                rows = np.arange(start, min(start + 1024, len(samples)))
+                best = network(Seen(samples.decisions.take(rows)))[0].argmax(dim=1).numpy()
+                found.append(regrets[rows, best])
     return float(np.concatenate(found).mean())
 
 
 def _epoch(
     network: ExplorerNetwork,
-    samples: Samples,
+    groups: Sequence[Samples],
     settings: FitSettings,
     optimizer: torch.optim.Optimizer,
     generator: np.random.Generator,
 ) -> float:
     """See all samples once, half of them mirrored; return the mean regret [m]."""
-    regrets = torch.from_numpy(np.minimum(samples.regrets, settings.most_regret))
-    order, total = generator.permutation(len(samples)), 0.0
-    for start in range(0, len(order), settings.batch):
-        rows = order[start : start + settings.batch]
-        decisions = samples.decisions.take(rows)
+    total = 0.0
+    for samples in _batches(groups, settings.batch, generator):
+        regrets = torch.from_numpy(np.minimum(samples.regrets, settings.most_regret))
+        decisions = samples.decisions
         seen = Seen(mirrored(decisions) if generator.random() < 0.5 else decisions)
         preferences, _ = network(seen)
-        loss = (preferences.softmax(dim=1) * regrets[rows]).sum(dim=1).mean()
+        loss = (preferences.softmax(dim=1) * regrets).sum(dim=1).mean()
         corrections = (preferences - network.steepness * seen.scores)[seen.mask].square().mean()
         optimizer.zero_grad()
         (loss + settings.correction_cost * corrections).backward()
         torch.nn.utils.clip_grad_norm_(network.parameters(), 1.0)
         optimizer.step()
-        total += loss.item() * len(rows)
-    return total / len(order)
+        total += loss.item() * len(samples)
+    return total / sum(len(samples) for samples in groups)
+
+
+def _batches(groups: Sequence[Samples], size: int, generator: np.random.Generator) -> Iterator[Samples]:
+    """Yield all samples in batches, each of one group, in an order of chance."""
+    batches = []
+    for samples in groups:
+        order = generator.permutation(len(samples))
+        batches += [(samples, order[start : start + size]) for start in range(0, len(order), size)]
+    for k in generator.permutation(len(batches)):
+        samples, rows = batches[k]
+        yield samples.take(rows)
 
 
 def mirrored(decisions: Decisions) -> Decisions:

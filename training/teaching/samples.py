@@ -2,8 +2,9 @@
 
 import io
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 from lidarium.mapping.files.guarded_arrays import GuardedArchive
 from lidarium.mapping.files.guarded_reading import read_bytes, reading
 from lidarium.mapping.files.output import write_whole
-from lidarium.training.decisions import MOST_OPTIONS, MOST_TEAMMATES, Decisions, stacked
+from lidarium.training.decisions import MOST_OPTIONS, MOST_TEAMMATES, PER_OPTION, Decisions, stacked
 from lidarium.training.teaching.teacher import Lesson
 
 
@@ -23,8 +24,8 @@ class Samples:
     ----------
     decisions : Decisions
         What robots saw.
-    regrets : (N, MOST_OPTIONS) float32
-        By how much each option costs more than the best [m].
+    regrets : (N, n) float32
+        By how much each of up to n options costs more than the best [m].
     """
 
     decisions: Decisions
@@ -32,6 +33,14 @@ class Samples:
 
     def __len__(self) -> int:
         return len(self.regrets)
+
+    def take(self, rows: NDArray[np.int64]) -> "Samples":
+        """Return the samples of some rows."""
+        return Samples(self.decisions.take(rows), self.regrets[rows])
+
+    def narrowed(self, width: int) -> "Samples":
+        """Return the same samples, none of which has more than so many options, in less memory."""
+        return Samples(self.decisions.narrowed(width), np.ascontiguousarray(self.regrets[:, :width]))
 
 
 def samples_of(lessons: Sequence[Lesson]) -> Samples:
@@ -61,6 +70,45 @@ def joined(parts: Sequence[Samples]) -> Samples:
     return Samples(decisions, np.concatenate([part.regrets for part in parts]))
 
 
+def by_width(parts: Sequence[Samples], widths: Sequence[int]) -> list[Samples]:
+    """Return the samples of several parts, those of about as many options together.
+
+    Most decisions have few options, and memory and time go by the most of those that lie together.
+
+    Parameters
+    ----------
+    parts : sequence of Samples
+        With room for the largest width at most.
+    widths : sequence of int
+        How many options each group has room for, increasing. Groups without samples are left out.
+    """
+    groups = []
+    for low, high in zip((-1, *widths[:-1]), widths, strict=True):
+        found = []
+        for part in parts:
+            counts = part.decisions.counts[:, 0]
+            rows = np.flatnonzero((counts > low) & (counts <= high))
+            if len(rows):
+                found.append(widened(part.take(rows), high))
+        if found:
+            groups.append(joined(found))
+    return groups
+
+
+def widened(samples: Samples, width: int) -> Samples:
+    """Return the same samples with room for exactly so many options."""
+    room = width - samples.regrets.shape[1]
+    if room <= 0:
+        return samples.narrowed(width)
+    decisions = samples.decisions
+    parts = {name: _with_room(getattr(decisions, name), room) for name in PER_OPTION}
+    return Samples(replace(decisions, **parts), _with_room(samples.regrets, room))
+
+
+def _with_room(array: NDArray[Any], room: int) -> NDArray[Any]:
+    return np.pad(array, [(0, 0), (0, room), *[(0, 0)] * (array.ndim - 2)])
+
+
 def write_samples(path: Path, samples: Samples) -> None:
     """Write samples to a file, whole or not at all."""
     arrays = {field.name: getattr(samples.decisions, field.name) for field in fields(Decisions)}
@@ -71,7 +119,7 @@ def write_samples(path: Path, samples: Samples) -> None:
 
 
 def read_samples(path: Path) -> Samples:
-    """Read what ``write_samples`` has written.
+    """Read what ``write_samples`` has written, with room for as many options as there are.
 
     Raises
     ------
@@ -83,7 +131,7 @@ def read_samples(path: Path) -> Samples:
         decisions = Decisions(*(archive.array(field.name) for field in fields(Decisions)))
         samples = Samples(decisions, archive.array("regrets"))
         _check(samples)
-        return samples
+        return samples.narrowed(int(samples.decisions.counts[:, 0].max(initial=1)))
 
 
 def _check(samples: Samples) -> None:

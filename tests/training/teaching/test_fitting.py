@@ -31,10 +31,10 @@ def test_what_costs_less_is_learned_and_holds_on_other_floors():
     torch.manual_seed(0)
     network, settings = ExplorerNetwork(), FitSettings(epochs=25, batch=64, learning_rate=2e-3)
     unseen = floor_of(1000, 400)
-    assert evaluate(network, unseen, settings) == pytest.approx(4.0, abs=0.6)
+    assert evaluate(network, [unseen], settings) == pytest.approx(4.0, abs=0.6)
     course = list(fit(network, [floor_of(seed) for seed in range(20)], settings, 0))
     assert len(course) == 25
-    assert evaluate(network, unseen, settings) < 1.0
+    assert evaluate(network, [unseen], settings) < 1.0
 
 
 def test_the_best_epoch_on_what_is_held_out_is_kept():
@@ -43,8 +43,8 @@ def test_the_best_epoch_on_what_is_held_out_is_kept():
     floors = [floor_of(seed, 20) for seed in range(4)]
     course = list(fit(network, floors, settings, 3))
     order = np.random.default_rng(3).permutation(4)[:2]
-    held = [evaluate(network, floors[k], settings) for k in order]
-    before = np.mean([evaluate(ExplorerNetwork(), floors[k], settings) for k in order])
+    held = [evaluate(network, [floors[k]], settings) for k in order]
+    before = np.mean([evaluate(ExplorerNetwork(), [floors[k]], settings) for k in order])
     best = min(before, *(each.held_out for each in course))
     assert np.mean(held) == pytest.approx(best, abs=1e-6)
 
@@ -52,8 +52,8 @@ def test_the_best_epoch_on_what_is_held_out_is_kept():
 def test_great_regrets_are_all_alike():
     network, samples = ExplorerNetwork(), floor_of(0)
     samples.regrets[samples.regrets > 0.0] = 1e6
-    found = evaluate(network, samples, FitSettings(most_regret=5.0))
-    assert found == pytest.approx(evaluate(network, floor_of(0), FitSettings(most_regret=5.0)))
+    found = evaluate(network, [samples], FitSettings(most_regret=5.0))
+    assert found == pytest.approx(evaluate(network, [floor_of(0)], FitSettings(most_regret=5.0)))
 
 
 def test_the_same_seed_gives_the_same_weights():

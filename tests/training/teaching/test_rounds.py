@@ -117,9 +117,9 @@ def test_cloning_reaches_the_teacher_on_one_small_floor():
     settings = FitSettings(epochs=80, batch=16, learning_rate=2e-3, weight_decay=0.0, correction_cost=0.0)
     torch.manual_seed(0)
     network = ExplorerNetwork()
-    before = evaluate(network, lessons, settings)
+    before = evaluate(network, [lessons], settings)
     with torch.no_grad():
         network.steepness.fill_(0.05)  # else what tours rank last is hardly ever tried
     list(fit(network, [lessons, lessons], settings, 0))
     assert before > 0.5
-    assert evaluate(network, lessons, settings) < 0.1
+    assert evaluate(network, [lessons], settings) < 0.1

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from drawn_decisions import drawn_decision
 
-from lidarium.training.decisions import MOST_OPTIONS, MOST_TEAMMATES, stacked
-from lidarium.training.teaching.samples import joined, read_samples, samples_of, write_samples
+from lidarium.training.decisions import MOST_OPTIONS, MOST_TEAMMATES, PER_OPTION, stacked
+from lidarium.training.teaching.samples import by_width, joined, read_samples, samples_of, write_samples
 from lidarium.training.teaching.teacher import Lesson
 
 
@@ -21,13 +21,31 @@ def test_what_was_written_is_read(tmp_path):
     write_samples(path, samples)
     found = read_samples(path)
     for name in ("options", "crops", "teammates", "situation", "scores", "mask", "counts"):
-        first, second = getattr(samples.decisions, name), getattr(found.decisions, name)
+        first, second = getattr(samples.narrowed(4).decisions, name), getattr(found.decisions, name)
         np.testing.assert_array_equal(first, second)
         assert first.dtype == second.dtype
-    np.testing.assert_array_equal(found.regrets, samples.regrets)
+    np.testing.assert_array_equal(found.regrets, samples.regrets[:, :4])
     assert len(found) == 3
-    assert found.regrets.shape == (3, MOST_OPTIONS)
-    assert (found.regrets[:, 4:] == 0.0).all()
+    assert samples.regrets.shape == (3, MOST_OPTIONS)
+    assert (samples.regrets[:, 4:] == 0.0).all()
+
+
+def test_decisions_of_about_as_many_options_lie_together():
+    generator = np.random.default_rng(1)
+    counts = [2, 9, 4, 5, 2, 9, 2]
+    lessons = [Lesson(drawn_decision(generator, n, 1), generator.uniform(0, 9, n)) for n in counts]
+    parts = [samples_of(lessons[:4]), samples_of(lessons[4:]).narrowed(9)]
+    groups = by_width(parts, (2, 5, 7, MOST_OPTIONS))
+    assert [each.decisions.counts[:, 0].tolist() for each in groups] == [[2, 2, 2], [4, 5], [9, 9]]
+    assert [each.regrets.shape[1] for each in groups] == [2, 5, MOST_OPTIONS]
+    for k, group, row in ((2, 1, 0), (3, 1, 1), (5, 2, 1), (6, 0, 2)):
+        found, n = groups[group], counts[k]
+        np.testing.assert_array_equal(found.regrets[row, :n], lessons[k].regrets.astype(np.float32))
+        for name in PER_OPTION:
+            array = getattr(found.decisions, name)
+            np.testing.assert_array_equal(array[row, :n], getattr(lessons[k].decision, name))
+            assert not array[row, n:].any()
+            assert array.shape[1] == found.regrets.shape[1]
 
 
 @pytest.mark.parametrize("length", [0, 10, 1000])
