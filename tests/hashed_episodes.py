@@ -16,6 +16,7 @@ os.environ.setdefault("LIDARIUM_FLOOR_STORE", "off")
 import gymnasium
 import numpy as np
 import pytest
+from all_observed import ALL
 from episode_ledger import Ledger, named
 
 import lidarium
@@ -61,6 +62,7 @@ def built(options: Mapping[str, Any], level: str = "velocity") -> dict[str, Any]
     """Return options in which values that need a documented name have been made."""
     offers = OLD_OFFERS if level == "frontier" else {}
     return {
+        "observe": ALL,
         **SMALL,
         **offers,
         **{key: value() if callable(value) else value for key, value in options.items()},

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.envs.settings.exploration import ExplorationSettings
-from lidarium.envs.settings.making import make_settings
+from lidarium.envs.settings.making import makers_settings
 from lidarium.envs.settings.reset_options import (
     OPTIONS,
     ResetOptions,
@@ -37,8 +37,11 @@ def settings_of(options: dict[str, Any]) -> ExplorationSettings:
             f"randomize is {shown(options['randomize'])}; leave it out: the episodes here have "
             "the same settings; use lidarium.vector_env or lidarium.parallel_env"
         )
-    names_threads = "threads" in options or options.get("settings") is not None
-    return make_settings(**(options if names_threads else {**options, "threads": available_threads()}))
+    others = dict(options)
+    settings = others.pop("settings", None)
+    if settings is None:
+        others.setdefault("threads", available_threads())
+    return makers_settings(settings, others)
 
 
 def count_of_episodes(episodes: Any) -> int:  # noqa: ANN401

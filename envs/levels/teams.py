@@ -14,7 +14,7 @@ from lidarium.envs.levels.randomized_team import RandomizedTeam
 from lidarium.envs.levels.waypoints import WaypointExploration
 from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.settings.limits import check_level
-from lidarium.envs.settings.making import make_settings
+from lidarium.envs.settings.making import makers_settings
 from lidarium.envs.settings.reset_options import Curriculum
 
 
@@ -73,7 +73,7 @@ def make_team(plan: TeamPlan, options: Mapping[str, Any], settings: ExplorationS
     """
     conventions, others = split_options(options)
     randomize = others.pop("randomize", None)
-    chosen = make_settings(settings, **others)
+    chosen = makers_settings(settings, others)
     if randomize is None:
         return plan.environment(chosen, conventions)
     return RandomizedTeam(partial(_environment, plan, conventions), chosen, randomize)

@@ -123,7 +123,7 @@ class ExplorationSettings:
         Distance to the goal, where the floor has one, at which a robot ends as ``reached`` [m].
     observe : tuple of str
         What the robots observe: any of ``OBSERVABLES``, kept in that order, and of the registry
-        ``observable``.
+        ``observable``. The makers of environments leave out ``pose`` where it is not named.
     map_cells : int
         Side of the observed ``map`` [cells], a multiple of 2; half of it is how far a waypoint of the level
         of waypoints can lie.

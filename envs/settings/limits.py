@@ -20,6 +20,10 @@ OBSERVABLES = ("scan", "pose", "velocity", "bumper", "map", "egocentric_map")
 A goal is observed wherever the floor has one. What further sensors measure is in the registry ``observable``.
 """
 
+LEARNERS_SEE = ("scan", "velocity", "bumper", "map")
+"""What the makers of environments show where ``observe`` is not named: who sees the absolute pose may learn
+floors by heart."""
+
 GAINS = "frontier_gains"
 """What may be expected to be seen at each frontier on offer."""
 

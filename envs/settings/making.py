@@ -14,6 +14,7 @@ from lidarium.envs.settings.exploration import (
     with_parts,
 )
 from lidarium.envs.settings.lidar import NOISE, Lidar
+from lidarium.envs.settings.limits import LEARNERS_SEE
 from lidarium.envs.settings.realism import REALISM
 from lidarium.mapping.geometry.bounds import Rule, check_values, rules_of, shown, within
 from lidarium.mapping.grids.occupancy import OccupancySettings
@@ -87,6 +88,15 @@ def make_settings(settings: ExplorationSettings | None = None, **options: Any) -
         chosen = options.get("localization", base.localization)
         options["localizer"] = localizer_settings(chosen, options["localizer"])
     return assign(replace(base, **options), assigned)
+
+
+def makers_settings(settings: ExplorationSettings | None, options: Mapping[str, Any]) -> ExplorationSettings:
+    """Fill settings as ``make_settings``, for who makes an environment to learn in.
+
+    Robots observe ``LEARNERS_SEE`` where neither settings nor ``observe`` are given.
+    """
+    observe = {} if settings is not None or "observe" in options else {"observe": LEARNERS_SEE}
+    return make_settings(settings, **observe, **options)
 
 
 def _horizon(max_cycles: Any, options: Mapping[str, Any], base: ExplorationSettings) -> float:  # noqa: ANN401

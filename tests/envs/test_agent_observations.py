@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from all_observed import ALL
 from linked_rooms import TWO_ROOMS
 
 import lidarium
@@ -15,7 +16,7 @@ STARTS = np.array([[1.02, 2.03, 0.5], [1.51, 1.04, -1.0]])
 
 def team(goal=None, **options):
     """Return what observes robots that have just started, and their environment."""
-    env = lidarium.parallel_env(TWO_ROOMS, robots=2, resolution=0.05, **options)
+    env = lidarium.parallel_env(TWO_ROOMS, **{"robots": 2, "resolution": 0.05, "observe": ALL, **options})
     env.reset(seed=0, options={"starts": STARTS})
     settings = env.settings
     poses = KnownPoses(env.simulation, settings, np.zeros((2, 2)), [])

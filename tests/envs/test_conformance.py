@@ -254,7 +254,7 @@ def test_the_solo_form_has_one_robot_and_says_what_to_use_for_more():
 
 
 def test_random_actions_never_break_the_bounds_of_velocity_and_heading():
-    env = lidarium.parallel_env("scene_corner", robots=2, map_cells=32)
+    env = lidarium.parallel_env("scene_corner", robots=2, map_cells=32, observe=["scan", "pose", "velocity"])
     env.reset(seed=0)
     generator = np.random.default_rng(1)
     for _ in range(300):

@@ -9,6 +9,7 @@ from itertools import combinations
 import gymnasium
 import numpy as np
 import pytest
+from all_observed import ALL
 
 import lidarium
 from lidarium.agents.random_walk import RandomWalk
@@ -30,7 +31,8 @@ GOAL_FLOOR = Floor(
 def driven(steps=15, floor="building:5", **options):
     """An environment in mid-episode, and its last observations."""
     env = lidarium.parallel_env(
-        floor, **{"robots": 3, "stop_coverage": None, "noise": "datasheet", **SMALL, **options}
+        floor,
+        **{"robots": 3, "stop_coverage": None, "noise": "datasheet", "observe": ALL, **SMALL, **options},
     )
     observations, _ = env.reset(seed=2)
     generator = np.random.default_rng(0)
@@ -53,10 +55,22 @@ def writer_of(env, offsets=None, goals=None, **options):
 OFFSETS = np.zeros((9, 2))
 
 
-def test_the_default_is_all_but_the_egocentric_map():
-    env, observations = driven(1)
-    assert list(observations["robot_0"]) == ["scan", "pose", "velocity", "bumper", "map"]
-    assert set(env.observation_space("robot_0").spaces) == set(observations["robot_0"])
+@pytest.mark.parametrize("options", [{}, {"noise": "datasheet"}, {"level": "waypoint"}])
+def test_who_names_nothing_sees_all_but_the_pose_and_the_egocentric_map(options):
+    names = ["scan", "velocity", "bumper", "map"]
+    env = lidarium.parallel_env("scene_room", robots=2, **options)
+    observations, _ = env.reset(seed=0)
+    assert list(observations["robot_0"]) == names
+    assert set(env.observation_space("robot_0").spaces) == set(names)
+    batch = lidarium.vector_env(1, "scene_room", robots=2, **options)
+    assert list(batch.reset(seed=0)[0]) == names
+
+
+def test_settings_that_are_given_whole_show_what_they_name():
+    env = lidarium.parallel_env("scene_room", settings=make_settings(robots=1))
+    assert list(env.reset(seed=0)[0]["robot_0"]) == list(ALL)
+    batch = lidarium.vector_env(1, "scene_room", settings=make_settings(robots=1, observe=["pose"]))
+    assert list(batch.reset(seed=0)[0]) == ["pose"]
 
 
 @pytest.mark.parametrize("names", [*combinations(OBSERVABLES, 1), *combinations(OBSERVABLES, 2), OBSERVABLES])
