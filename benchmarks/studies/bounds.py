@@ -32,7 +32,9 @@ TEAMS = (1, 2, 3)
 GOAL, HORIZON_S = 0.99, 1800.0
 ROUNDS = 300
 PLAN_ROUNDS = 2000
-EXACT_S = 60.0
+EXACT_S, RELAX_S = 60.0, 240.0
+"""Time for the optimum of a small floor, and before that for the cuts of its lower bound [s]."""
+
 FLOORS_EVERY = 20
 """Of the set ``validation`` every so many-th floor is bounded."""
 
@@ -110,7 +112,7 @@ def measure_small(small: Small) -> dict[str, Any]:
     settings = settings_of(1)
     graph = graph_of(load_floor(small.floor), settings, starts_in(small.floor, settings, 0), SPACING)
     plan = min(float(plan_tours(graph, GOAL, PLAN_ROUNDS, seed).lengths[0]) for seed in range(4))
-    found = relax(graph, GOAL, exact_s=EXACT_S)
+    found = relax(graph, GOAL, exact_s=EXACT_S, limit_s=RELAX_S)
     optimum = found.optimum_m if math.isfinite(found.optimum_m) else None
     return {
         "floor": small.floor,

@@ -33,8 +33,11 @@ CLASSICS = ("nearest_frontier", "utility_frontier", "explore_lite")
 TEAMS = (1, 2, 3)
 HORIZON_S = 1800.0
 SETTINGS: dict[str, Any] = {"resolution": 0.05, "stop_coverage": 0.99, "horizon_s": HORIZON_S}
-CLASSICS_EVERY, REAL_EVERY, BOUNDS_EVERY = 4, 12, 8
-"""Classic explorers run on every so many-th floor; so are real floors taken, and floors with a bound."""
+CLASSICS_EVERY, BOUNDS_EVERY = 4, 8
+"""Classic explorers run on every so many-th floor of the set; every so many-th has a bound."""
+
+REAL_FLOORS = {"kth": slice(0, None, 4), "lifull": slice(1, None, 2), "slam": slice(0, None, 6)}
+"""Which real floors run; settings of tours were chosen on some of the others."""
 
 KINDS = {
     "test": "generated floors of the set `test`",
@@ -88,7 +91,9 @@ def suites(data: Path | None, every: int = 1) -> dict[str, Suite]:
     floors = {"test": list(set_floors("test"))[::every]}
     if data is not None:
         real = {kind: paths for kind, paths in real_floors(data).items() if kind in KINDS}
-        floors |= {kind: [str(path) for path in paths[:: REAL_EVERY * every]] for kind, paths in real.items()}
+        floors |= {
+            kind: [str(path) for path in paths[REAL_FLOORS[kind]][::every]] for kind, paths in real.items()
+        }
     found = {}
     for kind, names in floors.items():
         found[kind] = _suite((TOURS, LEARNED), names)

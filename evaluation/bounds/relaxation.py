@@ -64,7 +64,9 @@ class _Program:
     wanted: float
 
 
-def relax(graph: ViewGraph, share: float, rounds: int = 60, exact_s: float = 0.0) -> Relaxation:
+def relax(
+    graph: ViewGraph, share: float, rounds: int = 60, exact_s: float = 0.0, limit_s: float = math.inf
+) -> Relaxation:
     """Bound the length of the walks from which a share of what can be seen is seen.
 
     Parameters
@@ -78,6 +80,8 @@ def relax(graph: ViewGraph, share: float, rounds: int = 60, exact_s: float = 0.0
     exact_s : float
         Time to search for the optimum afterwards, with links crossed whole times, places left as often as
         entered and points seen or not [s].
+    limit_s : float
+        Cuts are added for about so long at most [s].
 
     Returns
     -------
@@ -87,12 +91,18 @@ def relax(graph: ViewGraph, share: float, rounds: int = 60, exact_s: float = 0.0
     program = _program(graph, share)
     cuts: list[Cut] = []
     lower = 0.0
+    until = time.monotonic() + limit_s
+    found = _solved(program, cuts, math.inf)
     for _ in range(max(rounds, 1)):
-        found = _solved(program, cuts)
         lower = max(lower, float(found.fun))
         broken = _broken(program, np.asarray(found.x))
-        if not broken:
+        left_s = until - time.monotonic()
+        if not broken or left_s <= 0.0:
             break
+        following = _solved(program, [*cuts, *broken], left_s)
+        if following.x is None or following.status != 0:
+            break  # it took too long; what was found before holds
+        found = following
         cuts += broken
     # Only the cuts that hold the bound up go into the slower program.
     used = list(cuts)
@@ -168,8 +178,8 @@ def _most(program: _Program) -> NDArray[np.float64]:
     return np.concatenate([*parts, np.ones(len(program.weights))])
 
 
-def _solved(program: _Program, cuts: list[Cut]) -> OptimizeResult:
-    """Return the best crossings under the cuts so far, whole or not."""
+def _solved(program: _Program, cuts: list[Cut], seconds: float) -> OptimizeResult:
+    """Return the best crossings under the cuts so far, whole or not, if they are found in time."""
     most = _most(program)
     matrix, low, high = _rows(program, cuts, len(most))
     is_equal = low == high
@@ -182,6 +192,7 @@ def _solved(program: _Program, cuts: list[Cut]) -> OptimizeResult:
         b_eq=low[is_equal],
         bounds=np.stack([np.zeros(len(most)), most], axis=1),
         method="highs",
+        options={"time_limit": seconds},
     )
     return found
 

@@ -24,6 +24,13 @@ def test_an_end_that_need_not_be_seen_is_left_out():
     assert plan_tours(graph, 0.6, 50).lengths[0] == pytest.approx(7.0)
 
 
+def test_a_bound_that_has_no_more_time_holds_and_is_looser():
+    graph = graph_of(STAR, [[2], [4], [6]])
+    whole, broken_off = relax(graph, 1.0), relax(graph, 1.0, limit_s=0.0)
+    assert 0.0 <= broken_off.lower_m < whole.lower_m
+    assert broken_off.cuts == 0 < whole.cuts
+
+
 def test_what_is_seen_from_the_start_costs_nothing():
     graph = graph_of(STAR, [[0, 2], [0, 4]])
     assert relax(graph, 1.0, exact_s=10.0).optimum_m == pytest.approx(0.0)
