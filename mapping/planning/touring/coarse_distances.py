@@ -22,17 +22,6 @@ NEAR_START = 0.2
 
 _BUCKETS = DIAGONAL + 1
 
-_STEPS = (
-    (0, 1, STRAIGHT),
-    (1, 0, STRAIGHT),
-    (0, -1, STRAIGHT),
-    (-1, 0, STRAIGHT),
-    (1, 1, DIAGONAL),
-    (1, -1, DIAGONAL),
-    (-1, 1, DIAGONAL),
-    (-1, -1, DIAGONAL),
-)
-
 UNREACHED = np.iinfo(np.int32).max
 
 
@@ -143,9 +132,9 @@ def distances_from(
         Lengths in fifths of the side of a coarse cell; ``UNREACHED`` where there is no path.
     """
     most = UNREACHED - _BUCKETS if math.isinf(maximum) else int(maximum / grid.side * STRAIGHT)
-    lengths = np.full((len(starts), *grid.is_open.shape), UNREACHED, np.int32)
-    no_targets = np.zeros((0, 2), np.int64)
-    _spread(grid.is_open, np.ascontiguousarray(starts, np.int64), no_targets, most, lengths)
+    lengths = np.empty((len(starts), *grid.is_open.shape), np.int32)
+    nowhere = np.zeros((0, 2), np.int64)
+    _spread(grid.is_open, np.ascontiguousarray(starts, np.int64), nowhere, False, most, lengths)
     return lengths
 
 
@@ -171,12 +160,9 @@ def distances_among(
         Lengths from each place, as far as they are no longer than those to ``others``; others may be
         ``UNREACHED``.
     """
-    lengths = np.full((len(places), *grid.is_open.shape), UNREACHED, np.int32)
+    lengths = np.empty((len(places), *grid.is_open.shape), np.int32)
     places, others = np.ascontiguousarray(places, np.int64), np.ascontiguousarray(others, np.int64)
-    # Paths are as long there as back: each place has to reach but those behind it.
-    for k in range(len(places)):
-        targets = np.concatenate([others, places[k + 1 :]])
-        _spread(grid.is_open, places[k : k + 1], targets, UNREACHED - _BUCKETS, lengths[k : k + 1])
+    _spread(grid.is_open, places, others, True, UNREACHED - _BUCKETS, lengths)
     between = lengths[:, places[:, 0], places[:, 1]]
     upper = np.triu(between)
     return upper + np.triu(between, 1).T, lengths
@@ -223,48 +209,74 @@ def _opened(log_odds: Array, fits: Array, factor: int) -> tuple[NDArray[np.bool_
 
 
 @kernel
-def _spread(is_open: Array, starts: Array, targets: Array, most: int, lengths: Array) -> None:
-    """Spread lengths from each start, the cells of equal length after each other.
+def _spread(is_open: Array, starts: Array, others: Array, is_among: bool, most: int, lengths: Array) -> None:
+    """Spread lengths from each start over open cells.
 
-    Where there are targets, it ends when all cells of the lengths up to the farthest target's are reached.
+    Where ``is_among``, it ends when all cells of the lengths up to the farthest target's are reached. Targets
+    are the others and the starts that follow: paths are as long there as back.
     """
     rows, columns = is_open.shape
-    # A bucket holds cells of one length, and none of them twice.
+    # A border and what is closed have length -1, so that no path is shorter.
+    width = columns + 2
+    fresh = np.full((rows + 2, width), -1, np.int32)
+    for row in range(rows):
+        for column in range(columns):
+            if is_open[row, column]:
+                fresh[row + 1, column + 1] = UNREACHED
     queues = np.empty((_BUCKETS, rows * columns), np.int32)
+    is_target = np.zeros(fresh.size, np.bool_)
+    for k in range(len(starts)):
+        spread = fresh.copy().reshape(-1)
+        wanted = 0
+        if is_among:
+            is_target[:] = False
+            for row, column in others:
+                is_target[(row + 1) * width + column + 1] = True
+            for row, column in starts[k + 1 :]:
+                is_target[(row + 1) * width + column + 1] = True
+            wanted = is_target.sum()
+        _spread_from(
+            (starts[k, 0] + 1) * width + starts[k, 1] + 1, width, is_target, wanted, most, queues, spread
+        )
+        for row in range(rows):
+            for column in range(columns):
+                length = spread[(row + 1) * width + column + 1]
+                lengths[k, row, column] = length if length >= 0 else UNREACHED
+
+
+@kernel
+def _spread_from(
+    start: int, width: int, is_target: Array, wanted: int, most: int, queues: Array, spread: Array
+) -> None:
+    """Spread lengths from a cell, the cells of equal length after each other.
+
+    Where targets are wanted, it ends when all cells of the lengths up to the farthest one's are reached.
+    """
+    steps = np.array([1, width, -1, -width, width + 1, width - 1, 1 - width, -1 - width])
+    # A bucket holds cells of one length, and none of them twice.
     counts = np.zeros(_BUCKETS, np.int64)
-    is_target = np.zeros(rows * columns if len(targets) else 0, np.bool_)
-    for row, column in targets:
-        is_target[row * columns + column] = True
-    wanted = is_target.sum()
-    for k in range(starts.shape[0]):
-        length_of = lengths[k].reshape(-1)
-        length_of[starts[k, 0] * columns + starts[k, 1]] = 0
-        counts[:] = 0
-        queues[0, 0] = starts[k, 0] * columns + starts[k, 1]
-        counts[0] = 1
-        length, empty, found = 0, 0, 0
-        while empty < _BUCKETS and length <= most and (wanted == 0 or found < wanted):
-            bucket = length % _BUCKETS
-            count = counts[bucket]
-            counts[bucket] = 0
-            empty = empty + 1 if count == 0 else 0
-            for i in range(count):
-                cell = queues[bucket, i]
-                if length_of[cell] != length:
-                    continue
-                if wanted > 0 and is_target[cell]:
-                    found += 1
-                row, column = cell // columns, cell % columns
-                for rise, run, step in _STEPS:
-                    at_row, at_column = row + rise, column + run
-                    if not (0 <= at_row < rows and 0 <= at_column < columns):
-                        continue
-                    if not is_open[at_row, at_column]:
-                        continue
-                    other = at_row * columns + at_column
-                    if length + step < length_of[other]:
-                        length_of[other] = length + step
-                        target = (length + step) % _BUCKETS
-                        queues[target, counts[target]] = other
-                        counts[target] += 1
-            length += 1
+    spread[start] = 0
+    queues[0, 0] = start
+    counts[0] = 1
+    length, empty, found = 0, 0, 0
+    while empty < _BUCKETS and length <= most and (wanted == 0 or found < wanted):
+        bucket = length % _BUCKETS
+        count = counts[bucket]
+        counts[bucket] = 0
+        empty = empty + 1 if count == 0 else 0
+        straight, diagonal = (length + STRAIGHT) % _BUCKETS, (length + DIAGONAL) % _BUCKETS
+        for i in range(count):
+            cell = queues[bucket, i]
+            if spread[cell] != length:
+                continue
+            if wanted > 0 and is_target[cell]:
+                found += 1
+            for k in range(8):
+                other = cell + steps[k]
+                further = length + (STRAIGHT if k < 4 else DIAGONAL)
+                if further < spread[other]:
+                    spread[other] = further
+                    target = straight if k < 4 else diagonal
+                    queues[target, counts[target]] = other
+                    counts[target] += 1
+        length += 1

@@ -50,25 +50,37 @@ def map_crops(
 
 @kernel
 def _crop(log_odds: Array, cells: Array, directions: Array, scale: tuple[float, int], crops: Array) -> None:
-    rows, columns = log_odds.shape
-    side = crops.shape[1]
-    step, samples = scale
+    side, (step, samples) = crops.shape[1], scale
+    # Places of the samples along a side, ahead and to the left [cells].
+    ahead, left = np.empty(side * samples), np.empty(side * samples)
+    for i in range(side):
+        for sample in range(samples):
+            ahead[i * samples + sample] = (i - side // 4 + (sample + 0.5) / samples) * step
+            left[i * samples + sample] = (i - side // 2 + (sample + 0.5) / samples) * step
     for k in range(len(cells)):
         ahead_column, ahead_row = math.cos(directions[k]), math.sin(directions[k])
+        rows, columns = cells[k, 0] + 0.5 + ahead * ahead_row, cells[k, 1] + 0.5 + ahead * ahead_column
+        rises, runs = left * ahead_column, left * ahead_row
         for i in range(side):
             for j in range(side):
-                level = UNKNOWN
-                for sample in range(samples * samples):
-                    ahead = (i - side // 4 + (sample // samples + 0.5) / samples) * step
-                    left = (j - side // 2 + (sample % samples + 0.5) / samples) * step
-                    row = int(math.floor(cells[k, 0] + 0.5 + ahead * ahead_row + left * ahead_column))
-                    column = int(math.floor(cells[k, 1] + 0.5 + ahead * ahead_column - left * ahead_row))
-                    if not (0 <= row < rows and 0 <= column < columns):
-                        continue
-                    value = log_odds[row, column]
-                    if value > 0:
-                        level = OCCUPIED
-                        break
-                    if value < 0:
-                        level = FREE
-                crops[k, i, j] = level
+                square = slice(i * samples, (i + 1) * samples), slice(j * samples, (j + 1) * samples)
+                crops[k, i, j] = _level(
+                    log_odds, rows[square[0]], columns[square[0]], rises[square[1]], runs[square[1]]
+                )
+
+
+@kernel
+def _level(log_odds: Array, rows: Array, columns: Array, rises: Array, runs: Array) -> int:
+    """Return what is in a square, by samples along its sides."""
+    level = UNKNOWN
+    for i in range(len(rows)):
+        for j in range(len(rises)):
+            row, column = int(math.floor(rows[i] + rises[j])), int(math.floor(columns[i] - runs[j]))
+            if not (0 <= row < log_odds.shape[0] and 0 <= column < log_odds.shape[1]):
+                continue
+            value = log_odds[row, column]
+            if value > 0:
+                return OCCUPIED
+            if value < 0:
+                level = FREE
+    return level
