@@ -27,7 +27,7 @@ KEPT_SHARE = 0.1
 VISIT_M = 0.5
 """What slowing down, turning and setting out at each stop costs [m]."""
 
-WEIGHTS = TourWeights(1.0, 0.1, 0.0)
+WEIGHTS = TourWeights(1.0, 0.4, 0.0)
 """What the teacher's tours are weighed by: the longest, the sum, and nothing for waiting."""
 
 
