@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 
 from lidarium.agents.learned.features import OPTION_FEATURES, TEAMMATE_FEATURES
 from lidarium.training.decisions import MOST_OPTIONS, Decisions
@@ -18,6 +19,10 @@ _MIRRORED_TEAMMATE = tuple(list(TEAMMATE_FEATURES).index(name) for name in ("lef
 
 GROUPS = (6, 12, 20, MOST_OPTIONS)
 """Decisions of up to so many options are fitted together."""
+
+
+SPLIT_SEED = 9
+"""Floors are held out by draws of this seed, whatever is trained."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +52,7 @@ def fit(network: ExplorerNetwork, floors: list[Samples], settings: FitSettings, 
     settings : FitSettings
         How.
     seed : int
-        Of the order, and of what is held out.
+        Of the order.
 
     Yields
     ------
@@ -62,15 +67,14 @@ def fit(network: ExplorerNetwork, floors: list[Samples], settings: FitSettings, 
     if len(floors) < 2:
         raise ValueError(f"there are lessons of {len(floors)} floors; want 2 at least: one is held out")
     generator = np.random.default_rng(seed)
-    order = generator.permutation(len(floors))
-    count = min(max(round(settings.held_out * len(floors)), 1), len(floors) - 1)
-    held_out = by_width([floors[k] for k in order[:count]], GROUPS)
-    fitted = by_width([floors[k] for k in order[count:]], GROUPS)
+    is_held_out = held_out_of(len(floors), settings.held_out)
+    held_out = by_width([floors[k] for k in np.flatnonzero(is_held_out)], GROUPS)
+    fitted = by_width([floors[k] for k in np.flatnonzero(~is_held_out)], GROUPS)
     optimizer = torch.optim.AdamW(
         network.parameters(), lr=settings.learning_rate, weight_decay=settings.weight_decay
     )
     schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimizer, settings.epochs)
-    best, least = network.weights(), evaluate(network, held_out, settings)
+    best, least = network.weights(), np.inf
     for _ in range(settings.epochs):
         loss = _epoch(network, fitted, settings, optimizer, generator)
         schedule.step()
@@ -79,6 +83,18 @@ def fit(network: ExplorerNetwork, floors: list[Samples], settings: FitSettings, 
             best, least = network.weights(), found.held_out
         yield found
     network.set_weights(best)
+
+
+def held_out_of(count: int, share: float) -> NDArray[np.bool_]:
+    """Return which of some floors are held out, (count,) bool: one at least, and not all.
+
+    A floor that is held out stays so when more follow: no round has fitted what a later one is judged by.
+    """
+    draws = np.random.default_rng(SPLIT_SEED).random(count)
+    is_held_out = draws < share
+    is_held_out[np.argmin(draws)] = True
+    is_held_out[np.argmax(draws)] = False
+    return is_held_out
 
 
 def evaluate(network: ExplorerNetwork, groups: Sequence[Samples], settings: FitSettings) -> float:

@@ -10,7 +10,7 @@ from drawn_decisions import drawn_decision
 from lidarium.agents.learned.features import OPTION_FEATURES, TEAMMATE_FEATURES
 from lidarium.training.decisions import MOST_OPTIONS, stacked
 from lidarium.training.settings import FitSettings
-from lidarium.training.teaching.fitting import evaluate, fit, mirrored
+from lidarium.training.teaching.fitting import evaluate, fit, held_out_of, mirrored
 from lidarium.training.teaching.samples import Samples
 from lidarium.training.torch_network import ExplorerNetwork
 
@@ -42,11 +42,23 @@ def test_the_best_epoch_on_what_is_held_out_is_kept():
     network, settings = ExplorerNetwork(), FitSettings(epochs=6, batch=16, learning_rate=1e-3, held_out=0.5)
     floors = [floor_of(seed, 20) for seed in range(4)]
     course = list(fit(network, floors, settings, 3))
-    order = np.random.default_rng(3).permutation(4)[:2]
-    held = [evaluate(network, [floors[k]], settings) for k in order]
-    before = np.mean([evaluate(ExplorerNetwork(), [floors[k]], settings) for k in order])
-    best = min(before, *(each.held_out for each in course))
+    held = [evaluate(network, [floors[k]], settings) for k in np.flatnonzero(held_out_of(4, 0.5))]
+    best = min(each.held_out for each in course)
     assert np.mean(held) == pytest.approx(best, abs=1e-6)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.1, 0.5, 1.0])
+def test_floors_that_are_held_out_stay_so_when_more_follow(share):
+    whole = held_out_of(1000, share)
+    assert 0 < whole.sum() < 1000
+    assert abs(whole.mean() - share) < 0.03
+    for count in (2, 3, 10, 500):
+        part = held_out_of(count, share)
+        assert 0 < part.sum() < count
+        # But for one that is added, and one that is left out, where there are few.
+        assert (part != whole[:count]).sum() <= 2
+    if share == 0.1:
+        np.testing.assert_array_equal(held_out_of(500, share), whole[:500])
 
 
 def test_great_regrets_are_all_alike():
