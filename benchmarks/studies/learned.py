@@ -79,7 +79,8 @@ bound that `learned` saves.
 ## What limits it
 
 The teacher knows the floor, and is what the network learns from. As a policy it takes 0.77 of the time of
-tours with one robot, 0.85 with two and 0.87 with three ([decision 22](../decisions/0022-learned-corrections.md)).
+tours with one robot, 0.85 with two and 0.87 with three
+([decision 22](../decisions/0022-learned-corrections.md)).
 Floors of the training are furnished, those of LIFULL are bare.
 """
 
