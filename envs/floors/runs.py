@@ -1,6 +1,6 @@
 """Grids of few values kept as runs of equal cells.
 
-A mask of a floor is some hundred times smaller so, and is unpacked in the time that its cells take to write.
+What is kept of a floor is some 17 times smaller so, and is unpacked in the time that its cells take to write.
 """
 
 from dataclasses import dataclass
