@@ -170,7 +170,11 @@ def _ended(arguments: Sequence[str] | None) -> int:
             "--map-resolution"
         )
         return BAD_INPUT
-    except Exception:
+    except Exception as error:
+        from lidarium.evaluation.episodes.interrupts import is_wrapped_interrupt
+
+        if is_wrapped_interrupt(error):
+            raise KeyboardInterrupt from error
         notify(
             "lidarium: this is a defect of lidarium, not of your input. Please report it with the command "
             "line and the lines below.\n"

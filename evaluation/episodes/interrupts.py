@@ -29,6 +29,22 @@ class Termination:
         raise KeyboardInterrupt
 
 
+def is_wrapped_interrupt(error: Exception) -> bool:
+    """Whether an error is an interrupt that compiled code has passed on as a ``SystemError``.
+
+    Numba calls the interpreter while a kernel returns; an interrupt that is raised there comes out so.
+
+    Parameters
+    ----------
+    error : Exception
+        Whatever was raised.
+    """
+    cause: BaseException | None = error
+    while isinstance(cause, SystemError):
+        cause = cause.__cause__ or cause.__context__
+    return isinstance(cause, KeyboardInterrupt)
+
+
 _entered: list["PatientInterrupt"] = []
 
 

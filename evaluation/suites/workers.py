@@ -16,7 +16,7 @@ from concurrent.futures.process import BrokenProcessPool
 from itertools import islice
 from typing import TypeVar
 
-from lidarium.evaluation.episodes.interrupts import PatientInterrupt
+from lidarium.evaluation.episodes.interrupts import PatientInterrupt, is_wrapped_interrupt
 from lidarium.evaluation.suites.processes import end_workers, interrupts_held, stopped_workers
 
 Task = TypeVar("Task")
@@ -167,6 +167,8 @@ def _attempted(work: Callable[[Task], Result], task: Task) -> Result | Exception
     try:
         return _done(work, task)
     except Exception as error:  # whatever it is, it is the task's result
+        if is_wrapped_interrupt(error):
+            raise KeyboardInterrupt from error
         return error
 
 

@@ -427,6 +427,15 @@ def test_a_defect_of_ours_asks_for_a_report(capsys, monkeypatch):
     assert "a wheel came off" in told.err
 
 
+def test_an_interrupt_out_of_compiled_code_is_no_defect(capsys, monkeypatch):
+    def interrupted(command):
+        raise SystemError("returned a result with an exception set") from KeyboardInterrupt()
+
+    monkeypatch.setitem(command_line._EXECUTE, command_line.Run, interrupted)
+    assert main(["run"]) == 130
+    assert capsys.readouterr().err.endswith("interrupted\n")
+
+
 def start_endless_run(folder: Path, *options: str) -> "subprocess.Popen[str]":
     arguments = [
         "run",

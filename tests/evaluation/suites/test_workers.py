@@ -19,6 +19,14 @@ def test_every_task_has_its_result_or_its_error(workers):
     assert results == {"1 * 1": 1, "2 * 2": 4, "4 * 4": 16, "5 * 5": 25}
 
 
+def test_an_interrupt_out_of_compiled_code_is_no_result():
+    def kernel(_task):
+        raise SystemError("returned a result with an exception set") from KeyboardInterrupt()
+
+    with pytest.raises(KeyboardInterrupt):
+        list(shared_out(kernel, [1, 2], 1))
+
+
 def test_a_process_that_dies_takes_no_other_task_with_it():
     tasks = [str(number) for number in range(12)]
     results = dict(shared_out(eval, [*tasks[:5], DIES, *tasks[5:]], 2))
