@@ -1,10 +1,12 @@
-"""Where the episodes of a training take place: floors of the training set alone."""
+"""Where the episodes of a training take place: floors of the training set, and the same without furniture."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
 from lidarium.envs.floors.catalogue.names import SETS
+from lidarium.envs.floors.floor import Floor
+from lidarium.envs.floors.generation.buildings import BuildingSettings, generate_building
 from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.training.settings import Round, TrainingSettings
 
@@ -15,17 +17,22 @@ class Place:
 
     Attributes
     ----------
-    floor : str
-        Name of the floor.
+    floor : str or Floor
+        Name of the floor, or a floor without furniture.
     settings : ExplorationSettings
         The team; it ends at ``stop_coverage``.
     seed : int
         Of the episode.
     """
 
-    floor: str
+    floor: str | Floor
     settings: ExplorationSettings
     seed: int
+
+    @property
+    def name(self) -> str:
+        """Name of the floor, for people."""
+        return self.floor if isinstance(self.floor, str) else f"{self.floor.name} without furniture"
 
 
 def place_of(training: TrainingSettings, stage: Round, number: int) -> Place:
@@ -48,7 +55,13 @@ def place_of(training: TrainingSettings, stage: Round, number: int) -> Place:
     often = np.array(list(stage.kinds.values()), np.float64)
     kind = generator.choice(list(stage.kinds), p=often / often.sum())
     robots = int(generator.choice(stage.robots))
-    return Place(f"{kind}:{first + number % count}", training.team(robots), number)
+    seed = first + number % count
+    is_bare = generator.random() < stage.bare_share
+    return Place(_bare(kind, seed) if is_bare else f"{kind}:{seed}", training.team(robots), number)
+
+
+def _bare(kind: str, seed: int) -> Floor:
+    return generate_building(seed, BuildingSettings(kind="any" if kind == "building" else kind, clutter=0.0))
 
 
 def first_number(training: TrainingSettings, number: int) -> int:

@@ -45,6 +45,8 @@ class Round:
         How many.
     kinds : dict of float
         How often each kind of floor comes, beside the others.
+    bare_share : float
+        So many of the floors have no furniture, as plans of real buildings.
     robots : tuple of int
         Sizes of teams; each comes as often as it stands here.
     teaching_share : float
@@ -53,6 +55,7 @@ class Round:
 
     floors: Annotated[int, within(2, 10_000)] = 400
     kinds: Mapping[str, float] = field(default_factory=lambda: {"building": 1.0})
+    bare_share: Annotated[float, share()] = 0.0
     robots: tuple[int, ...] = (1, 1, 2, 3)
     teaching_share: Annotated[float, share()] = 0.3
 

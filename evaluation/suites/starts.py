@@ -2,11 +2,12 @@
 
 import numpy as np
 
+from lidarium.envs.floors.floor import Floor
 from lidarium.envs.settings.exploration import ExplorationSettings
 
 
 def drawn_starts(
-    floor: str, settings: ExplorationSettings, seed: int, image_resolution: float | None = None
+    floor: str | Floor, settings: ExplorationSettings, seed: int, image_resolution: float | None = None
 ) -> list[list[float]] | None:
     """Draw where robots start on a floor that has starts of its own.
 

@@ -1,8 +1,10 @@
 """Where trainings take place."""
 
 from collections import Counter
+from dataclasses import replace
 
-from lidarium.envs.floors.catalogue.names import SETS
+from lidarium.envs.floors.catalogue.names import SETS, load_floor
+from lidarium.envs.floors.floor import Floor
 from lidarium.training.places import first_number, place_of
 from lidarium.training.settings import Round, TrainingSettings
 
@@ -28,6 +30,22 @@ def test_kinds_and_teams_come_as_often_as_is_asked():
     robots = Counter(place.settings.robots for place in places)
     assert 0.6 < robots[1] / 600 < 0.73
     assert set(robots) == {1, 3}
+
+
+def test_bare_floors_are_the_same_rooms_without_furniture():
+    stage = Round(kinds={"apartment": 1.0, "building": 1.0}, bare_share=0.4)
+    training = TrainingSettings(rounds=(stage,))
+    furnished = TrainingSettings(rounds=(replace(stage, bare_share=0.0),))
+    pairs = [(place_of(training, stage, n), place_of(furnished, furnished.rounds[0], n)) for n in range(60)]
+    bare = [pair for pair in pairs if isinstance(pair[0].floor, Floor)]
+    assert 12 <= len(bare) <= 36
+    assert all(place == usual for place, usual in pairs if isinstance(place.floor, str))
+    for place, usual in bare[:6]:
+        floor = load_floor(usual.floor)
+        assert place.floor.bounds == floor.bounds
+        assert len(place.floor.solids) < len(floor.solids)
+        assert place.name == f"{place.floor.name} without furniture"
+        assert (place.settings, place.seed) == (usual.settings, usual.seed)
 
 
 def test_a_place_depends_on_its_number_and_the_seed_alone():

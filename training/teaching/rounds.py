@@ -96,7 +96,7 @@ def run_round(
     for number, result in shared_out(partial(_teach, training, folder), missing, workers):
         if isinstance(result, Exception):
             place = place_of(training, stage, number)
-            raise_named(result, f"teaching on {place.floor} with {place.settings.robots} robots")
+            raise_named(result, f"teaching on {place.name} with {place.settings.robots} robots")
         done += 1
         yield Progress(name, done, stage.floors, {"floor": float(number), "samples": float(result)})
     yield from _fit(training, folder)
