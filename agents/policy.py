@@ -1,6 +1,7 @@
 """What a policy is: it sees observations and beliefs, and decides."""
 
 from abc import ABC, abstractmethod
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Protocol
@@ -125,9 +126,14 @@ class Policy(ABC):
         """What robots have left unexplored so far; nothing unless a policy overrides it."""
         return ()
 
+    @property
+    def decided_by(self) -> Mapping[str, int]:
+        """How often a robot set out, by the part of the policy that sent it; empty where it has one part."""
+        return {}
+
     def report(self) -> PolicyReport:
         """Return what there is to report of the episode."""
-        return PolicyReport(self.given_up)
+        return PolicyReport(self.given_up, decided_by=self.decided_by)
 
     def team_maps(self) -> TeamMaps | None:
         """Return how a station has joined the robots' maps; None where there is no station."""
@@ -194,6 +200,11 @@ class PerRobot(Policy):
     def given_up(self) -> list[GivenUp]:
         """What the robots' instances left unexplored, robot by robot."""
         return [entry for policy in self._policies.values() for entry in policy.given_up]
+
+    @property
+    def decided_by(self) -> Mapping[str, int]:
+        """How often the robots set out, by the part of their instances that sent them."""
+        return sum((Counter(policy.decided_by) for policy in self._policies.values()), Counter())
 
     def reset(self, team: Team, seed: int) -> None:
         """Begin an episode with a new instance for each robot.

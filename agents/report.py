@@ -177,7 +177,10 @@ class PolicyReport:
         What was left unexplored, with reasons.
     supervision : Supervision or None
         What its station did; None without a station.
+    decided_by : mapping of str to int
+        How often a robot set out, by the part of the policy that sent it; empty for policies of one part.
     """
 
     given_up: Sequence[GivenUp] = ()
     supervision: Supervision | None = None
+    decided_by: Mapping[str, int] = field(default_factory=dict)

@@ -17,6 +17,9 @@ from lidarium.agents.tours.policy import TourFrontier
 from lidarium.envs.onboard.navigation import NavigationMap
 from lidarium.mapping.planning.touring.team_tours import with_first
 
+CORRECTED = "corrected"
+"""Sent elsewhere than where tours begin."""
+
 RATE_S = 20.0
 """The rate of exploration is that of so long [s]."""
 
@@ -55,6 +58,8 @@ class ChosenTours(TourFrontier):
         for robot in range(len(agents)):
             decision = decision_of(scene, robot, sequence, picks)
             pick = None if decision is None else self._choose(scene, robot, decision, picks)
+            if decision is not None and pick != decision.classic:
+                self._sent_by[agents[robot]] = CORRECTED
             if pick is not None:
                 sequence = with_first(sequence, robot, pick, len(options.numbers))
             picks.append(pick)

@@ -97,6 +97,11 @@ class Supervised(Policy):
         """What the robots left unexplored."""
         return self.policy.given_up
 
+    @property
+    def decided_by(self) -> Mapping[str, int]:
+        """How often the robots set out, by the part of their policy that sent them."""
+        return self.policy.decided_by
+
     def report(self) -> PolicyReport:
         """Return what was left unexplored, with all that the station did."""
         if not self.has_begun:
@@ -110,6 +115,7 @@ class Supervised(Policy):
         return PolicyReport(
             self.given_up,
             Supervision(self.joins, orders, log, self._figures(), self.tick_seconds, self.merge_seconds),
+            self.decided_by,
         )
 
     def team_maps(self) -> TeamMaps | None:

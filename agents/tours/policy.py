@@ -14,6 +14,8 @@ rapid collaborative exploration with a decentralized multi-UAV system", 2023: to
 """
 
 import math
+from collections import Counter
+from collections.abc import Mapping
 from dataclasses import fields
 
 import numpy as np
@@ -41,6 +43,9 @@ SIGHT_MARGIN = 0.5
 
 FRESH_S = 60.0
 """Teammates of which a robot has not heard for this long have no part in its tours [s]."""
+
+TOURS, NEAREST = "tours", "nearest"
+"""By what robots are sent: by their tours, or to the nearest frontier."""
 
 ON_THE_SPOT = 0.2
 """A robot that is this near to where a leg ends arrives with the heading that it has [m]."""
@@ -82,6 +87,13 @@ class TourFrontier(FrontierExplorer):
         self._legs: dict[Choice, Leg] = {}
         self._intents = {agent: Intent() for agent in team.agents}
         self._in_vain: dict[int, NDArray[np.bool_]] = {}
+        self._sent_by = dict.fromkeys(team.agents, TOURS)
+        self._decided_by: Counter[str] = Counter()
+
+    @property
+    def decided_by(self) -> Mapping[str, int]:
+        """How often a robot set out on a tour, or to the nearest frontier when tours had nothing left."""
+        return self._decided_by
 
     def still_stands(self, navigation: NavigationMap, choice: Choice) -> bool:
         """Whether much is left to see from where a choice leads."""
@@ -114,6 +126,7 @@ class TourFrontier(FrontierExplorer):
             navigation, clusters, robots, self.footprint.radius, self.settings, self._rules
         )
         if options is not None:
+            self._sent_by |= dict.fromkeys(agents, TOURS)
             wanted = self.pick(agents, options)
             legs = [None if k is None else leg_to(k, options, navigation, self._rules) for k in wanted]
             chosen = {agent: self._begun(agent, leg) for agent, leg in zip(agents, legs, strict=True)}
@@ -177,7 +190,13 @@ class TourFrontier(FrontierExplorer):
             return None
         choice = Choice(found.cell, found.frontier_cell)
         self._legs.pop(choice, None)
+        self._sent_by[agent] = NEAREST
         return choice
+
+    def _begin(self, agent: str, choice: Choice | None) -> None:
+        super()._begin(agent, choice)
+        if choice is not None:
+            self._decided_by[self._sent_by[agent]] += 1
 
     def _without_vain(self, navigation: NavigationMap, least: int) -> Clusters:
         """Return the frontiers of at least so many cells that were not observed in vain."""

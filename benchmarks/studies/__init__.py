@@ -44,7 +44,7 @@ STUDIES.register(
 )
 STUDIES.register(
     "learned",
-    f"{_PACKAGE}.learned:STUDY",
+    f"{_PACKAGE}.learned.study:STUDY",
     "learned explorers beside classic ones and beside bounds, on floors that no training has seen",
 )
 STUDIES.register(

@@ -78,6 +78,7 @@ def result_of(episode: Episode, policy: str | None = None, history: History | No
         "collisions_per_km": _rounded(metrics.collisions_per_km(collisions, world.travelled), 6),
         "ended_because": {agent: scorer.ended_because.get(agent) for agent in env.possible_agents},
         "given_up": [_entry(env, given_up) for given_up in episode.given_up],
+        "decided_by": dict(report.decided_by) or None,
         **_pose_errors(env, history),
         **map_figures(env),
         "energy_j": [round(float(used), 6) for used in env.energy_j] if settings.battery.is_limited else None,

@@ -85,3 +85,16 @@ def test_unknown_settings_are_named():
         make_policy("learned", kepd=1.0)
     with pytest.raises(FileNotFoundError):
         make_policy("learned", weights="nowhere.safetensors")
+
+
+def test_it_counts_how_often_it_departs_from_tours():
+    def last(decision):
+        return int(np.flatnonzero(decision.mask)[-1])
+
+    counts = {}
+    for choose in (choose_classic, last):
+        policy = ChosenTours(choose)
+        episode(policy, 2, horizon_s=60.0)
+        counts[choose] = policy.report().decided_by
+    assert set(counts[choose_classic]) == {"tours"}
+    assert counts[last]["corrected"] > 0

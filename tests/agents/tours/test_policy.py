@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import lidarium
+from lidarium.agents import PerRobot
 from lidarium.agents.tours.policy import TourFrontier
 from lidarium.envs.floors.floor import Floor, Solid
 from lidarium.evaluation.episodes.runner import run_episode
@@ -65,3 +66,25 @@ def test_a_policy_may_decide_more_often_than_the_settings_say():
     policy = TourFrontier()
     episode = finished(policy, "apartment", horizon_s=20.0)
     assert len(episode.decision_seconds) >= 20.0 / policy.decision_period_s - 1
+
+
+def test_it_counts_what_sent_its_robots():
+    policy = TourFrontier()
+    finished(policy, "apartment", stop_coverage=None, horizon_s=None)
+    counts = policy.report().decided_by
+    assert set(counts) == {"tours", "nearest"}  # the last specks are no stops of tours
+    assert counts["tours"] > counts["nearest"] > 0
+    finished(policy, "apartment", stop_coverage=None, horizon_s=10.0)
+    assert set(policy.report().decided_by) == {"tours"}
+    without = TourFrontier(least_gain=1e6)
+    finished(without, "apartment", robots=2)
+    assert set(without.report().decided_by) == {"nearest"}
+
+
+def test_its_part_of_supervised_and_of_each_robot_alone_is_counted():
+    alone = PerRobot(TourFrontier)
+    finished(alone, "apartment", robots=2)
+    led = lidarium.policy("supervised_tours")
+    finished(led, "apartment", robots=2, known_starts=False, horizon_s=60.0)
+    for policy in (alone, led):
+        assert policy.report().decided_by["tours"] >= 2

@@ -57,6 +57,7 @@ OVER_TIME = ["overlap_eb", "overlap_mx_85", "overlap_mx_95", "overlap_mv", "rpe_
 MAY_BE_NONE = [
     "horizon_s",
     "energy_j",
+    "decided_by",
     "supervisor",
     "tick_ms",
     "c_others_final",
