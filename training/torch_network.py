@@ -33,7 +33,7 @@ class ExplorerNetwork(nn.Module):
         self.crop_out = nn.Linear(CROP_WIDTH, WIDTH)
         self.teammate = nn.Linear(len(TEAMMATE_FEATURES), WIDTH)
         self.situation = nn.Linear(len(SITUATION_FEATURES), WIDTH)
-        self.layers = nn.ModuleList(_Layer() for _ in range(LAYERS))
+        self.layers = nn.ModuleList(AttentionLayer() for _ in range(LAYERS))
         self.last = nn.LayerNorm(WIDTH)
         self.correction = nn.Linear(WIDTH, 1)
         self.steepness = nn.Parameter(torch.ones(1))
@@ -72,7 +72,7 @@ class ExplorerNetwork(nn.Module):
         self.load_state_dict({name: torch.from_numpy(array.copy()) for name, array in weights.items()})
 
 
-class _Layer(nn.Module):
+class AttentionLayer(nn.Module):
     """Attention among all tokens, then an inner layer for each."""
 
     def __init__(self) -> None:

@@ -27,6 +27,7 @@ from lidarium.benchmarks.speed.cases import (
     waypoint_decision,
 )
 from lidarium.benchmarks.speed.cases.learners import (
+    attention_training,
     first_reset,
     frontier_threads,
     learned_training,
@@ -56,6 +57,7 @@ _MODULES: tuple[ModuleType, ...] = (
     frontier_decision,
     frontier_threads,
     masked_training,
+    attention_training,
     learned_training,
     first_reset,
     bullet_world,

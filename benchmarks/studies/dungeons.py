@@ -19,14 +19,17 @@ import numpy as np
 import lidarium
 from lidarium.benchmarks.studies.shared.study import Study
 from lidarium.evaluation.episodes.output import write_text
+from lidarium.evaluation.episodes.stop_rules import STOP_REASON
 from lidarium.evaluation.statistics.means import paired_ratio
 from lidarium.evaluation.suites.campaign import EPISODES_FILE
 from lidarium.evaluation.suites.episodes_file import KEY, read_episodes
+from lidarium.evaluation.suites.presets import PRESETS
 from lidarium.evaluation.suites.suite import Suite
 from lidarium.evaluation.suites.trial import DEFAULT_VARIANT
 
 POLICIES = ("nearest_frontier", "utility_frontier", "explore_lite", "srt", "tour_frontier", "learned")
 MAPS, WAYS, WAYS_FILE = "dungeon_test", "dungeon_test_ways.csv", "ways.csv"
+SMALL_MAPS, ARIADNE = "synthetic_dungeon", "ariadne"
 SCALE = 2.0
 """Metres of the project in one of ours."""
 
@@ -84,6 +87,17 @@ Policies on all {count} maps: ways to 99 %, and over that of `nearest_frontier`.
 | policy | reached 99 % | way to 99 % [m] | over `nearest_frontier` | time over `nearest_frontier` |
 |---|---:|---:|---:|---:|
 {all_maps}
+
+## By ARiADNE's sensor and stop rule
+
+[ARiADNE](https://github.com/marmotlab/ARiADNE) sees 80 pixels around and ends when 250 free ones are left
+unseen; so does the preset [`ariadne`](../reference/presets.md#ariadne), with pixels of 0.1 m. Four of its
+maps are at hand, and {sisters} of the same kind from two projects beside it. Its paper prints means over a
+hundred maps, which are not at hand, nor is that table: nothing of ours stands beside it here.
+
+| policy | ended so | way [m] | over `nearest_frontier` | way on ARiADNE's four [m] |
+|---|---:|---:|---:|---:|
+{by_ariadne}
 """
 
 
@@ -92,17 +106,24 @@ def suites(data: Path | None, every: int = 1) -> dict[str, Suite]:
     maps = maps_of(data)[::every] if data is not None else []
     if not maps:
         return {}
-    floors = tuple(str(path) for path in maps)
-    return {
-        "maps": Suite(
-            policies=POLICIES,
-            floors=floors,
-            robots=(1,),
-            seeds=(0,),
-            draws_starts=False,
-            variants={DEFAULT_VARIANT: SETTINGS},
-        )
-    }
+    found = {"maps": _suite(maps, SETTINGS)}
+    small = sorted((Path(data) / "floorplans" / SMALL_MAPS).glob("*.png"))[::every] if data else []
+    if small:
+        preset = PRESETS[ARIADNE]
+        found[ARIADNE] = _suite(small, preset.settings, preset.stop)
+    return found
+
+
+def _suite(maps: Sequence[Path], settings: Mapping[str, Any], stop: Mapping[str, Any] | None = None) -> Suite:
+    return Suite(
+        policies=POLICIES,
+        floors=tuple(str(path) for path in maps),
+        robots=(1,),
+        seeds=(0,),
+        draws_starts=False,
+        variants={DEFAULT_VARIANT: settings},
+        stop=stop,
+    )
 
 
 def maps_of(data: Path) -> list[Path]:
@@ -122,6 +143,8 @@ def page(folder: Path, command: str) -> str:
     ours = ways_of(read_episodes(folder / "maps" / EPISODES_FILE))
     names = sorted({name for of_policy in ours.values() for name in of_policy})
     theirs = printed_ways(folder / WAYS_FILE, names)
+    path = folder / ARIADNE / EPISODES_FILE
+    small = ways_of(read_episodes(path)) if path.exists() else {}
     return PAGE.format(
         command=command,
         date=date.today().isoformat(),
@@ -131,6 +154,8 @@ def page(folder: Path, command: str) -> str:
         same=_same_maps(ours, theirs),
         count=len(names),
         all_maps=_all_maps(ours),
+        sisters=len(next(iter(small.values()))) - len(_of_ariadne(small)) if small else 0,
+        by_ariadne=_by_ariadne(small),
     )
 
 
@@ -207,6 +232,27 @@ def _all_maps(ours: Ways) -> str:
         ratios = ["1", "1"] if policy == POLICIES[0] else [_interval(ways, others), _interval(times, base)]
         cells = f"{reached} of {len(names)} | {np.mean(ways):.0f} | {' | '.join(ratios)}"
         rows.append(f"| `{policy}` | {cells} |")
+    return "\n".join(rows)
+
+
+def _of_ariadne(ours: Ways) -> list[str]:
+    """Return the names of ARiADNE's own maps."""
+    return sorted(name for name in next(iter(ours.values()), {}) if name.startswith("ARiADNE"))
+
+
+def _by_ariadne(ours: Ways) -> str:
+    """Return ways to the end by ARiADNE's stop rule, in our metres."""
+    if not ours:
+        return "| not run | - | - | - | - |"
+    baseline, own, rows = ours[POLICIES[0]], _of_ariadne(ours), []
+    for policy, episodes in ours.items():
+        ways, others = ([sum(found[name]["path_m"]) for name in episodes] for found in (episodes, baseline))
+        ended = sum(STOP_REASON in each["ended_because"].values() for each in episodes.values())
+        ratio = "1" if policy == POLICIES[0] else _interval(ways, others)
+        on_own = np.mean([sum(episodes[name]["path_m"]) for name in own]) if own else np.nan
+        rows.append(
+            f"| `{policy}` | {ended} of {len(episodes)} | {np.mean(ways):.1f} | {ratio} | {on_own:.1f} |"
+        )
     return "\n".join(rows)
 
 

@@ -28,6 +28,26 @@ def test_a_learning_run_compares_networks_and_policies_on_unseen_floors(tmp_path
     assert (tmp_path / "training.png").stat().st_size > 1000
 
 
+def test_networks_that_attend_are_compared_with_what_they_were(tmp_path):
+    module = script("attention", "sb3_contrib", "rl")
+    plan = module.Attention(
+        seeds=1,
+        updates=1,
+        train_floors="set:train:2",
+        floors="set:validation:2",
+        horizon_s=4.0,
+        workers=1,
+        out=tmp_path,
+    )
+    module.main(plan)
+    numbers = json.loads((tmp_path / "attention.json").read_text())
+    assert set(numbers["coverage"]) == {"random_walk", "nearest_frontier", "learned", "untrained network"}
+    assert all(0.0 < each <= 1.0 for reached in numbers["coverage"].values() for each in reached)
+    page = (tmp_path / "attention.md").read_text()
+    assert page.count("\n| `") == 4
+    assert "2,048 decisions" in page
+
+
 def test_curves_are_means_of_the_last_updates_that_had_an_end():
     module = script("learning_run", "torch", "rl")
     found = module.smoothed([np.nan, 1.0, 3.0, np.nan, 5.0, 7.0])

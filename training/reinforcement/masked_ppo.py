@@ -1,4 +1,4 @@
-"""The network as a policy of sb3-contrib's PPO with masks."""
+"""Networks that rank options as policies of sb3-contrib's PPO with masks."""
 
 from typing import Any
 
@@ -43,8 +43,16 @@ class _Columns(nn.Module):
         return table[:, self.first : self.last]
 
 
-class ExplorerPolicy(MaskableMultiInputActorCriticPolicy):
-    """Chooses by the network's preferences; nothing else is learned."""
+class RankingPolicy(MaskableMultiInputActorCriticPolicy):
+    """Chooses by the preferences that a network gives, one for each action.
+
+    Attributes
+    ----------
+    ranking : type of BaseFeaturesExtractor
+        Returns the preferences, then an estimate of what is still gained.
+    """
+
+    ranking: type[BaseFeaturesExtractor]
 
     def __init__(
         self, observation_space: spaces.Dict, action_space: spaces.Discrete, lr_schedule: Schedule
@@ -55,9 +63,23 @@ class ExplorerPolicy(MaskableMultiInputActorCriticPolicy):
             lr_schedule,
             net_arch=[],
             ortho_init=False,
-            features_extractor_class=_PreferencesAndValue,
+            features_extractor_class=self.ranking,
             normalize_images=False,
         )
+
+    def _build(self, lr_schedule: Schedule) -> None:
+        assert isinstance(self.action_space, spaces.Discrete)
+        actions = int(self.action_space.n)
+        self._build_mlp_extractor()
+        self.action_net: nn.Module = _Columns(0, actions)
+        self.value_net: nn.Module = _Columns(actions, actions + 1)  # type: ignore[assignment]
+        self.optimizer = torch.optim.Adam(self.parameters(), lr=lr_schedule(1), eps=1e-5)
+
+
+class ExplorerPolicy(RankingPolicy):
+    """Chooses by the explorer's preferences; nothing else is learned."""
+
+    ranking = _PreferencesAndValue
 
     @property
     def critic(self) -> nn.Module:
@@ -70,9 +92,3 @@ class ExplorerPolicy(MaskableMultiInputActorCriticPolicy):
         """The network."""
         assert isinstance(self.features_extractor, _PreferencesAndValue)
         return self.features_extractor.network
-
-    def _build(self, lr_schedule: Schedule) -> None:
-        self._build_mlp_extractor()
-        self.action_net: nn.Module = _Columns(0, MOST_OPTIONS)
-        self.value_net: nn.Module = _Columns(MOST_OPTIONS, MOST_OPTIONS + 1)  # type: ignore[assignment]
-        self.optimizer = torch.optim.Adam(self.parameters(), lr=lr_schedule(1), eps=1e-5)

@@ -1,17 +1,21 @@
 """What learners feel is measured as it says, at the least effort."""
 
 import os
+from dataclasses import replace
 
 import pytest
 
 from lidarium.benchmarks.speed.cases import frontier_decision
 from lidarium.benchmarks.speed.cases.learners import (
+    attention_training,
     first_reset,
+    frontier_learner,
     frontier_threads,
     learned_training,
     masked_training,
 )
 from lidarium.benchmarks.speed.harness.timing import Effort
+from lidarium.envs.simulation.kernels.floor_cache import SIZE_VARIABLE
 
 LEAST = Effort(rounds=1, block_s=0.0)
 
@@ -38,36 +42,50 @@ def test_where_there_is_one_core_two_threads_are_not_compared(monkeypatch):
     assert line.ratio is None
 
 
-def test_a_training_is_measured_by_its_steps(monkeypatch):
+@pytest.fixture
+def short(monkeypatch):
+    """A short training, and what memory floors may take in each."""
+    monkeypatch.setattr(frontier_learner, "FLOORS", "apartment")
+    monkeypatch.setattr(frontier_learner, "WARM_DECISIONS", 8)
+    monkeypatch.setattr(frontier_learner, "TIMED_ROLLOUTS", 1)
+    monkeypatch.setenv(SIZE_VARIABLE, "100")
+    limits, measured = [], frontier_learner.timed
+
+    def timed(environments):
+        limits.append(os.environ.get(SIZE_VARIABLE))
+        return measured(environments)
+
+    monkeypatch.setattr(frontier_learner, "timed", timed)
+    return limits
+
+
+def test_a_training_is_measured_by_its_steps(monkeypatch, short):
     pytest.importorskip("sb3_contrib", reason='sb3-contrib is not installed: extra "rl"')
-    for name, value in {
-        "FLOORS": "apartment",
-        "EPISODES": 2,
-        "ROLLOUT": 4,
-        "EPOCHS": 1,
-        "WARM_ROLLOUTS": 1,
-    }.items():
-        monkeypatch.setattr(masked_training, name, value)
-    limits = []
-    measured = masked_training._rates
-
-    def rates(rounds):
-        limits.append(os.environ.get(masked_training.SIZE_VARIABLE))
-        return measured(rounds)
-
-    monkeypatch.setattr(masked_training, "_rates", rates)
-    monkeypatch.setenv(masked_training.SIZE_VARIABLE, "100")
+    few = replace(masked_training.LEARNER, episodes=2, rollout=4, epochs=1)
+    monkeypatch.setattr(masked_training, "LEARNER", few)
     lines = masked_training.measure(LEAST)
     assert all(line.figure > 0.0 and line.ours.endswith("steps/s") for line in lines)
-    assert limits == ["100", str(masked_training.ALL_MIB)]
-    assert os.environ[masked_training.SIZE_VARIABLE] == "100"
+    assert short == ["100", str(frontier_learner.ALL_MIB)]
+    assert os.environ[SIZE_VARIABLE] == "100"
+
+
+def test_attention_is_measured_with_the_simulators_share(monkeypatch, short):
+    pytest.importorskip("sb3_contrib", reason='sb3-contrib is not installed: extra "rl"')
+    for name, value in {"EPISODES": 2, "ROLLOUT": 4, "BATCH": 8, "EPOCHS": 1}.items():
+        monkeypatch.setattr(attention_training, name, value)
+    lines = attention_training.measure(LEAST)
+    assert [line.is_upper_bound for line in lines] == [False, True, False, True]
+    assert all(line.figure > 0.0 for line in lines)
+    assert all(line.figure < 1.0 for line in lines if line.is_upper_bound)
+    assert short == ["100", str(frontier_learner.ALL_MIB)]
 
 
 def test_without_the_extra_a_training_is_not_measured(monkeypatch):
-    monkeypatch.setattr(masked_training, "_is_there", lambda: False)
-    (line,) = masked_training.measure(LEAST)
-    assert line.figure is None
-    assert "lidarium[rl]" in line.peer
+    for case in (masked_training, attention_training):
+        monkeypatch.setattr(case, "is_there", lambda: False)
+        (line,) = case.measure(LEAST)
+        assert line.figure is None
+        assert "lidarium[rl]" in line.peer
 
 
 def test_a_first_reset_begins_with_empty_caches(monkeypatch):

@@ -8,8 +8,8 @@ import statistics
 import tempfile
 import time
 from pathlib import Path
-from typing import Any
 
+from lidarium.benchmarks.speed.cases.learners.frontier_learner import timed
 from lidarium.benchmarks.speed.harness.lines import Line, shown
 from lidarium.benchmarks.speed.harness.report import run_alone
 from lidarium.benchmarks.speed.harness.timing import Effort
@@ -66,7 +66,7 @@ def _decisions(rounds: int, workers: int) -> list[tuple[float, float]]:
         path.write_text(TRAINING)
         training = read_training(path)
     environments = environments_of(training, workers)
-    inside = _timed(environments)
+    inside = timed(environments)
     try:
         model = model_of(training.ppo, environments, training.seed)
         count = ENVIRONMENTS * STEPS
@@ -79,20 +79,6 @@ def _decisions(rounds: int, workers: int) -> list[tuple[float, float]]:
     finally:
         environments.close()
     return found
-
-
-def _timed(environments: Any) -> list[float]:  # noqa: ANN401
-    """Add up the seconds of steps of environments."""
-    seconds, step_wait = [0.0], environments.step_wait
-
-    def step() -> Any:  # noqa: ANN401
-        began = time.perf_counter()
-        result = step_wait()
-        seconds[0] += time.perf_counter() - began
-        return result
-
-    environments.step_wait = step
-    return seconds
 
 
 if __name__ == "__main__":

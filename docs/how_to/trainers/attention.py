@@ -1,0 +1,127 @@
+"""Train networks that attend to frontiers, and compare them on floors that they have not seen.
+
+Usage: python docs/how_to/trainers/attention.py --out docs/results
+"""
+
+import time
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from functools import partial
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+import tyro
+from learning_run import CLASSIC, LEARNED, SEEDS_APART, UNTRAINED, Plan, run_classic, table
+from numpy.typing import NDArray
+from sb3_contrib import MaskablePPO
+from stable_baselines3.common.vec_env import VecMonitor
+
+import lidarium
+from lidarium.envs.floors.catalogue.names import set_floors
+from lidarium.evaluation.episodes.output import write_json, write_text
+from lidarium.training.reinforcement.frontier_policy import FrontierPolicy
+
+ROBOT = {
+    "level": "frontier",
+    "observe": ["frontiers", "frontier_gains", "time_left"],
+    "robots": 1,
+    "threads": 1,
+}
+EPISODES, ROLLOUT = 32, 64
+
+PAGE = """# Attention to frontiers
+
+{seeds} networks learn by MaskablePPO and `FrontierPolicy` to choose frontiers, each from a seed of its own:
+{decisions:,} decisions on `{train_floors}`. They are compared on {floors} floors that none of them has seen,
+by the share of the floor that one robot has seen after {horizon_s:.0f} s. Networks choose what they prefer;
+before the first update that is the frontier of least cost, as in explore_lite.
+
+| | coverage after {horizon_s:.0f} s, mean and 95 % interval | learned less this, on the same floors |
+|---|---:|---:|
+{table}
+
+The coverage of networks on a floor is the mean over the seeds; intervals are over floors. By seed the learned
+ones reach {by_seed}. A training took {minutes:.0f} minutes on one core.
+
+Networks of [a run that learns](training.md) score each frontier by itself, and draw their choices.
+
+Made with `python docs/how_to/trainers/attention.py`, lidarium {version}, PyTorch {torch}.
+"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Attention(Plan):
+    """Train networks that attend to frontiers and compare them on unseen floors."""
+
+    seeds: int = 4
+    """how many networks"""
+    updates: int = 100
+    """updates of each, of 2,048 decisions"""
+
+
+def final_coverage(model: MaskablePPO, floors: tuple[str, ...], horizon_s: float) -> NDArray[np.float64]:
+    """Return the coverage that a network reaches on each floor, by what it prefers."""
+    env = lidarium.vector_env(len(floors), floors[0], horizon_s=horizon_s, **ROBOT)
+    seen, infos = env.reset(seed=0, options={"floor": list(floors)})
+    reached, is_over = infos["truth"]["coverage"].copy(), np.zeros(len(floors), np.bool_)
+    while not is_over.all():
+        actions, _ = model.predict(seen, action_masks=seen["action_mask"], deterministic=True)
+        seen, _, terminated, truncated, infos = env.step(actions)
+        reached[~is_over] = infos["truth"]["coverage"][~is_over]
+        is_over |= terminated | truncated
+    return np.asarray(reached, np.float64)
+
+
+def learn(plan: Attention, seed: int, episodes: int = EPISODES) -> dict[str, Any]:
+    """Train a network; return what it reached on the unseen floors before and after, and how long it took."""
+    torch.set_num_threads(1)
+    env = VecMonitor(lidarium.sb3_vec_env(episodes, plan.train_floors, horizon_s=plan.horizon_s, **ROBOT))
+    model = MaskablePPO(
+        FrontierPolicy,
+        env,
+        n_steps=ROLLOUT,
+        batch_size=min(512, episodes * ROLLOUT),
+        n_epochs=3,
+        learning_rate=5e-4,
+        gamma=0.98,
+        ent_coef=0.005,
+        seed=SEEDS_APART * seed,
+    )
+    floors = set_floors(plan.floors)
+    untrained, began = final_coverage(model, floors, plan.horizon_s), time.perf_counter()
+    model.learn(plan.updates * episodes * ROLLOUT)
+    minutes = (time.perf_counter() - began) / 60.0
+    learned = final_coverage(model, floors, plan.horizon_s)
+    return {UNTRAINED: untrained.tolist(), LEARNED: learned.tolist(), "minutes": minutes}
+
+
+def main(plan: Attention) -> None:
+    """Run all seeds and policies; write the page and its numbers."""
+    with ProcessPoolExecutor(plan.workers, get_context("spawn")) as pool:
+        seeds = list(pool.map(partial(learn, plan), range(plan.seeds)))
+        coverage = dict(zip(CLASSIC, pool.map(partial(run_classic, plan), CLASSIC), strict=True))
+    for name in (UNTRAINED, LEARNED):
+        coverage[name] = np.mean([each[name] for each in seeds], axis=0).tolist()
+    page = PAGE.format(
+        seeds=plan.seeds,
+        decisions=plan.updates * EPISODES * ROLLOUT,
+        train_floors=plan.train_floors,
+        floors=len(set_floors(plan.floors)),
+        horizon_s=plan.horizon_s,
+        table=table(coverage),
+        by_seed=", ".join(f"{100 * np.mean(each[LEARNED]):.1f} %" for each in seeds),
+        minutes=np.mean([each["minutes"] for each in seeds]),
+        version=lidarium.__version__,
+        torch=torch.__version__,
+    )
+    plan.out.mkdir(parents=True, exist_ok=True)
+    write_json(plan.out / "attention.json", {"coverage": coverage, "seeds": seeds})
+    write_text(plan.out / "attention.md", page)
+    print(page)
+
+
+if __name__ == "__main__":
+    main(tyro.cli(Attention, description=__doc__))

@@ -1,0 +1,155 @@
+"""A policy for sb3-contrib's PPO with masks that attends to the frontiers on offer.
+
+Its network takes any number of frontiers and teammates in any order. It begins with the ranking of
+explore_lite, to which it adds a correction that is zero until it is trained.
+
+References
+----------
+A. Vaswani et al., "Attention is all you need", 2017. J. Horner, "Map-merging for multi-robot system", 2016:
+the ranking of explore_lite, three times the path less the size.
+"""
+
+from collections.abc import Mapping
+
+import torch
+from gymnasium import spaces
+from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
+from torch import Tensor, nn
+
+from lidarium.agents.learned.network import LAYERS, WIDTH
+from lidarium.training.reinforcement.masked_ppo import RankingPolicy
+from lidarium.training.torch_network import AttentionLayer
+
+FRONTIERS, MASK, GAINS, TEAMMATES = "frontiers", "action_mask", "frontier_gains", "teammates"
+SITUATION = ("time_left", "coverage", "velocity", "bumper")
+"""Observables that are seen of the situation."""
+
+METRES, SQUARE_METRES, SECONDS = 10.0, 10.0, 60.0
+"""What lengths, areas and ages are divided by."""
+
+PATH_FACTOR = 3.0
+"""A metre of path counts as so many of size, as in explore_lite."""
+
+LEAST_GROUP = 32
+"""Decisions are ranked in groups of like numbers of frontiers, of at least so many decisions."""
+
+MOST_GROUPS = 4
+
+
+class FrontierRanking(BaseFeaturesExtractor):
+    """Ranks the frontiers on offer, and estimates what is still gained.
+
+    Parameters
+    ----------
+    observation_space : Dict
+        Of an environment at the level of frontiers: ``frontiers`` and ``action_mask``, and any of
+        ``frontier_gains``, ``teammates`` and those of ``SITUATION``.
+
+    Raises
+    ------
+    ValueError
+        Where it has no frontiers, or something that the network does not see.
+    """
+
+    def __init__(self, observation_space: spaces.Space[dict[str, object]]) -> None:
+        check_observed(observation_space)
+        assert isinstance(observation_space, spaces.Dict)
+        shapes = {name: space.shape or () for name, space in observation_space.spaces.items()}
+        super().__init__(observation_space, shapes[MASK][0] + 1)
+        numbers = shapes[FRONTIERS][1] + 2 + (GAINS in shapes)
+        self.situation_names = [name for name in SITUATION if name in shapes]
+        self.frontier = nn.Linear(numbers, WIDTH)
+        self.teammate = nn.Linear(shapes[TEAMMATES][1], WIDTH) if TEAMMATES in shapes else None
+        self.situation = nn.Linear(1 + sum(shapes[name][0] for name in self.situation_names), WIDTH)
+        self.layers = nn.ModuleList(AttentionLayer() for _ in range(LAYERS))
+        self.last = nn.LayerNorm(WIDTH)
+        self.correction = nn.Linear(WIDTH, 1)
+        self.stay = nn.Linear(WIDTH, 1)
+        self.critic = nn.Sequential(nn.Linear(WIDTH, WIDTH), nn.ReLU(), nn.Linear(WIDTH, 1))
+        self.steepness = nn.Parameter(torch.ones(1))
+        for zero in (self.correction, self.stay, self.critic[2]):
+            nn.init.zeros_(zero.weight)  # type: ignore[arg-type]
+            nn.init.zeros_(zero.bias)  # type: ignore[arg-type]
+
+    def forward(self, observations: Mapping[str, Tensor]) -> Tensor:
+        """Return the preferences (N, actions), then the estimate, (N, actions + 1)."""
+        offered = observations[MASK][:, :-1] > 0
+        counts = offered.sum(dim=1)
+        groups = max(min(len(counts) // LEAST_GROUP, MOST_GROUPS), 1)
+        order = counts.argsort()
+        found = [self._ranked(observations, offered, rows) for rows in order.chunk(groups)]
+        return torch.cat(found)[order.argsort()]
+
+    def _ranked(self, observations: Mapping[str, Tensor], offered: Tensor, rows: Tensor) -> Tensor:
+        """Rank the frontiers of some decisions; no more of them are taken than the widest one has."""
+        actions = offered.shape[1]
+        offered = offered[rows]
+        width = max(int(offered.sum(dim=1).max()), 1)  # offers come first
+        offered = offered[:, :width]
+        frontiers = observations[FRONTIERS][rows, :width]
+        tokens, is_there = [self._situation(observations, rows)[:, None]], [torch.ones_like(offered[:, :1])]
+        if self.teammate is not None:
+            teammates = observations[TEAMMATES][rows]
+            tokens.append(self.teammate(_teammate_numbers(teammates)))
+            is_there.append(teammates[..., -1] > 0)
+        numbers = [_frontier_numbers(frontiers)]
+        if GAINS in observations:
+            numbers.append(observations[GAINS][rows, :width, None] / SQUARE_METRES)
+        tokens.append(self.frontier(torch.cat(numbers, dim=2)))
+        mixed, seen = torch.cat(tokens, dim=1), torch.cat([*is_there, offered], dim=1)
+        for layer in self.layers:
+            mixed = layer(mixed, seen)
+        mixed = self.last(mixed)
+        classic = frontiers[..., 3] / PATH_FACTOR - frontiers[..., 2]
+        ranked = self.steepness * classic + self.correction(mixed[:, -width:])[..., 0]
+        ranked = nn.functional.pad(ranked.masked_fill(~offered, 0.0), (0, actions - width))
+        stay = self.stay(mixed[:, 0]) + ranked.min(dim=1, keepdim=True).values  # behind all, at the start
+        return torch.cat([ranked, stay, self.critic(mixed[:, 0])], dim=1)
+
+    def _situation(self, observations: Mapping[str, Tensor], rows: Tensor) -> Tensor:
+        parts = [observations[name][rows].to(torch.float32) for name in self.situation_names]
+        count = observations[MASK][rows, :-1].to(torch.float32).mean(dim=1, keepdim=True)
+        tokens: Tensor = self.situation(torch.cat([count, *parts], dim=1))
+        return tokens
+
+
+class FrontierPolicy(RankingPolicy):
+    """Attends to frontiers and teammates; for ``MaskablePPO`` at the level of frontiers.
+
+    ``MaskablePPO(FrontierPolicy, lidarium.sb3_vec_env(16, "set:train", level="frontier", ...))``, whose
+    ``observe`` has ``frontiers`` and any of ``frontier_gains``, ``teammates``, ``time_left``, ``coverage``,
+    ``velocity`` and ``bumper``.
+    """
+
+    ranking = FrontierRanking
+
+
+def check_observed(space: spaces.Space[dict[str, object]]) -> None:
+    """Check that a network can see what there is to observe.
+
+    Raises
+    ------
+    ValueError
+        Where it cannot; the message says what to observe.
+    """
+    seen = (FRONTIERS, GAINS, TEAMMATES, *SITUATION)
+    names = list(space.spaces) if isinstance(space, spaces.Dict) else []
+    if FRONTIERS not in names or MASK not in names:
+        raise ValueError(
+            "FrontierPolicy attends to frontiers, and there are none to observe; make the environment with "
+            'level="frontier" and observe=["frontiers", "time_left"], its observations as a dict'
+        )
+    for name in names:
+        if name not in (*seen, MASK):
+            raise ValueError(f"FrontierPolicy does not see {name!r}; observe some of {', '.join(seen)}")
+
+
+def _frontier_numbers(frontiers: Tensor) -> Tensor:
+    """Return place, path and size of frontiers near 1, and path and size as logarithms."""
+    return torch.cat([frontiers / METRES, torch.log1p(frontiers[..., 2:])], dim=2)
+
+
+def _teammate_numbers(teammates: Tensor) -> Tensor:
+    """Return rows of teammates near 1."""
+    units = teammates.new_tensor([METRES, METRES, torch.pi, METRES, METRES, 1.0, SECONDS, 1.0])
+    return teammates / units
