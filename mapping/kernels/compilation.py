@@ -26,9 +26,12 @@ from lidarium.mapping.kernels.in_python.interpreted import IS_INTERPRETED, inter
 from lidarium.mapping.kernels.kept_code import keep
 
 # OpenMP's threads spin where they wait for each other, by default. Where others use the cores as well, as a
-# learner does, two threads then take longer than one. Who has said otherwise is left alone. It has to be said
-# before numba loads OpenMP, which it does when the first threads start.
-os.environ.setdefault("OMP_WAIT_POLICY", "passive")
+# learner does, two threads then take longer than one. Threads that sleep at once make the short operations of
+# a network a third slower, so they spin for some microseconds. Who has said otherwise is left alone. It has
+# to be said before numba loads OpenMP, which it does when the first threads start.
+if "OMP_WAIT_POLICY" not in os.environ:
+    os.environ["OMP_WAIT_POLICY"] = "passive"
+    os.environ.setdefault("GOMP_SPINCOUNT", "2000")
 
 Array = NDArray[Any]
 """An array in the signature of a kernel; its docstring gives shape and type."""

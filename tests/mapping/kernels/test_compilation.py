@@ -299,8 +299,10 @@ def test_kernels_that_borrow_arrays_leave_their_count_as_it_was():
     assert sys.getrefcount(values) == before
 
 
-@pytest.mark.parametrize(("given", "wanted"), [(None, "passive"), ("active", "active")])
-def test_threads_wait_without_spinning_where_nobody_has_said_otherwise(given, wanted):
+@pytest.mark.parametrize(
+    ("given", "wanted", "spins"), [(None, "passive", "2000"), ("active", "active", None)]
+)
+def test_threads_hardly_spin_where_nobody_has_said_otherwise(given, wanted, spins):
     """OpenMP says what it was given when it is loaded, with the first threads."""
     code = "\n".join(
         [
@@ -312,9 +314,11 @@ def test_threads_wait_without_spinning_where_nobody_has_said_otherwise(given, wa
             "from numba.np.ufunc import omppool",
             "numba.np.ufunc.parallel._launch_threads()",
             "assert numba.threading_layer() == 'omp'",
+            f"import os; assert os.environ.get('GOMP_SPINCOUNT') == {spins!r}",
         ]
     )
-    environment = {name: value for name, value in os.environ.items() if name != "OMP_WAIT_POLICY"}
+    ours = ("OMP_WAIT_POLICY", "GOMP_SPINCOUNT")
+    environment = {name: value for name, value in os.environ.items() if name not in ours}
     if given is not None:
         environment["OMP_WAIT_POLICY"] = given
     environment["OMP_DISPLAY_ENV"] = "true"
