@@ -67,7 +67,7 @@ def test_the_explorer_of_the_tutorial_is_trained_and_compared(capsys):
     code = code_of("train_an_explorer.md").replace("set:train:64", "scene_room").replace("2_000", "100")
     exec(compile(code.replace('"validation:8"', '"validation:2"'), "train_an_explorer.md", "exec"), {})
     lines = capsys.readouterr().out.splitlines()
-    assert [line.split(":")[0] for line in lines] == ["untrained", "after a minute"]
+    assert [line.split(":")[0] for line in lines] == ["untrained", "after a minute", "attentive"]
     assert all(0.0 < float(line.split(": ")[1].split()[0]) < 100.0 for line in lines)
 
 

@@ -79,6 +79,7 @@ class TourFrontier(FrontierExplorer):
             if name not in known:
                 raise ValueError(unknown("setting of tours", name, known))
         self.settings = TourSettings(**settings)  # type: ignore[arg-type]
+        self._decided_by: Counter[str] = Counter()
 
     def reset(self, team: Team, seed: int) -> None:
         """Begin an episode."""
@@ -88,7 +89,7 @@ class TourFrontier(FrontierExplorer):
         self._intents = {agent: Intent() for agent in team.agents}
         self._in_vain: dict[int, NDArray[np.bool_]] = {}
         self._sent_by = dict.fromkeys(team.agents, TOURS)
-        self._decided_by: Counter[str] = Counter()
+        self._decided_by = Counter()
 
     @property
     def decided_by(self) -> Mapping[str, int]:

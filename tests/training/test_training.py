@@ -109,7 +109,7 @@ def test_a_folder_that_was_moved_goes_on(whole, tmp_path):
     [
         ({"seed": 2}, "seed = 1, this one has 2"),
         ({"fit": {"epochs": 3, "batch": 8}}, "fit.epochs = 2, this one has 3"),
-        ({"rounds": SMALL["rounds"][:1]}, "rounds.1.floors = 2, this one has 'nothing'"),
+        ({"rounds": SMALL["rounds"][:1]}, "rounds.1.bare_share = 0.0, this one has 'nothing'"),
         ({"settings": {"resolution": 0.1}}, "settings.resolution = 0.05, this one has 0.1"),
     ],
 )

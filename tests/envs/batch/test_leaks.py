@@ -44,10 +44,14 @@ def test_memory_does_not_grow_with_the_number_of_resets(level):
             batch.reset()
             batch.step(action)
 
+    def grown():
+        before = memory()
+        reset(1_000)
+        return memory() - before
+
     reset(200)
-    before = memory()
-    reset(1_000)
-    blocks, pages = memory() - before
+    # A leak grows each time; what else the process takes now and then does not.
+    blocks, pages = np.minimum(grown(), grown())
     # Fewer than one for every twenty resets.
     assert blocks < 50
     # Less than a map of the closet for each reset.
