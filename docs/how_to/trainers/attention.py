@@ -4,6 +4,7 @@ Usage: python docs/how_to/trainers/attention.py --out docs/results
 """
 
 import time
+from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from functools import partial
@@ -13,7 +14,7 @@ from typing import Any
 import numpy as np
 import torch
 import tyro
-from learning_run import CLASSIC, LEARNED, SEEDS_APART, UNTRAINED, Plan, run_classic, table
+from learning_run import CLASSIC, LEARNED, SEEDS_APART, UNTRAINED, Plan, final_coverage, run_classic, table
 from numpy.typing import NDArray
 from sb3_contrib import MaskablePPO
 from stable_baselines3.common.vec_env import VecMonitor
@@ -61,17 +62,11 @@ class Attention(Plan):
     """updates of each, of 2,048 decisions"""
 
 
-def final_coverage(model: MaskablePPO, floors: tuple[str, ...], horizon_s: float) -> NDArray[np.float64]:
-    """Return the coverage that a network reaches on each floor, by what it prefers."""
-    env = lidarium.vector_env(len(floors), floors[0], horizon_s=horizon_s, **ROBOT)
-    seen, infos = env.reset(seed=0, options={"floor": list(floors)})
-    reached, is_over = infos["truth"]["coverage"].copy(), np.zeros(len(floors), np.bool_)
-    while not is_over.all():
-        actions, _ = model.predict(seen, action_masks=seen["action_mask"], deterministic=True)
-        seen, _, terminated, truncated, infos = env.step(actions)
-        reached[~is_over] = infos["truth"]["coverage"][~is_over]
-        is_over |= terminated | truncated
-    return np.asarray(reached, np.float64)
+def preferred_by(model: MaskablePPO) -> Callable[[dict[str, NDArray[Any]]], NDArray[Any]]:
+    """Return what chooses as a model prefers."""
+    return lambda seen: np.asarray(
+        model.predict(seen, action_masks=seen["action_mask"], deterministic=True)[0]
+    )
 
 
 def learn(plan: Attention, seed: int, episodes: int = EPISODES) -> dict[str, Any]:
@@ -89,11 +84,11 @@ def learn(plan: Attention, seed: int, episodes: int = EPISODES) -> dict[str, Any
         ent_coef=0.005,
         seed=SEEDS_APART * seed,
     )
-    floors = set_floors(plan.floors)
-    untrained, began = final_coverage(model, floors, plan.horizon_s), time.perf_counter()
+    floors, options = set_floors(plan.floors), {**ROBOT, "horizon_s": plan.horizon_s}
+    untrained, began = final_coverage(preferred_by(model), floors, options), time.perf_counter()
     model.learn(plan.updates * episodes * ROLLOUT)
     minutes = (time.perf_counter() - began) / 60.0
-    learned = final_coverage(model, floors, plan.horizon_s)
+    learned = final_coverage(preferred_by(model), floors, options)
     return {UNTRAINED: untrained.tolist(), LEARNED: learned.tolist(), "minutes": minutes}
 
 

@@ -4,6 +4,7 @@ Usage: python docs/how_to/trainers/learning_run.py --out docs/results
 """
 
 import time
+from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from functools import partial
@@ -74,19 +75,32 @@ class Plan:
     """folder for the page, its picture and its numbers"""
 
 
-def final_coverage(network: Scorer, floors: tuple[str, ...], options: dict[str, Any]) -> NDArray[np.float64]:
-    """Return the coverage that a network reaches on each floor, by choices that it draws."""
-    torch.manual_seed(0)
-    env = lidarium.vector_env(len(floors), **{**ROBOT, **options, "floor": floors[0]}, copy=False)
+def final_coverage(
+    choose: Callable[[dict[str, NDArray[Any]]], NDArray[Any]],
+    floors: tuple[str, ...],
+    options: dict[str, Any],
+) -> NDArray[np.float64]:
+    """Return the coverage that is reached on each floor, where a callable chooses for all rows at once."""
+    env = lidarium.vector_env(len(floors), **{**options, "floor": floors[0]}, copy=False)
     observations, infos = env.reset(seed=0, options={"floor": list(floors)})
     reached, is_over = infos["truth"]["coverage"].copy(), np.zeros(len(floors), np.bool_)
     while not is_over.all():
-        with torch.no_grad():
-            choices, _ = network(*as_tensors(observations))
-        observations, _, terminated, truncated, infos = env.step(choices.sample().numpy())
+        observations, _, terminated, truncated, infos = env.step(choose(observations))
         reached[~is_over] = infos["truth"]["coverage"][~is_over]
         is_over |= terminated | truncated
     return np.asarray(reached, np.float64)
+
+
+def drawn_by(network: Scorer) -> Callable[[dict[str, NDArray[Any]]], NDArray[Any]]:
+    """Return what draws choices by a network's preferences."""
+    torch.manual_seed(0)
+
+    def draw(observations: dict[str, NDArray[Any]]) -> NDArray[Any]:
+        with torch.no_grad():
+            choices, _ = network(*as_tensors(observations))
+        return np.asarray(choices.sample().numpy())
+
+    return draw
 
 
 def run_seed(plan: Plan, seed: int) -> dict[str, Any]:
@@ -95,7 +109,7 @@ def run_seed(plan: Plan, seed: int) -> dict[str, Any]:
     options = {"robots": 1, "horizon_s": plan.horizon_s, "threads": 1}
     floors = set_floors(plan.floors)
     torch.manual_seed(seed)
-    untrained = final_coverage(Scorer(), floors, options)
+    untrained = final_coverage(drawn_by(Scorer()), floors, {**ROBOT, **options})
     curve: list[Report] = []
     network = Scorer()
     for report, trained in train(
@@ -106,7 +120,7 @@ def run_seed(plan: Plan, seed: int) -> dict[str, Any]:
     return {
         "curve": [report.coverage for report in curve],
         UNTRAINED: untrained.tolist(),
-        LEARNED: final_coverage(network, floors, options).tolist(),
+        LEARNED: final_coverage(drawn_by(network), floors, {**ROBOT, **options}).tolist(),
     }
 
 
