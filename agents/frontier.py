@@ -9,17 +9,16 @@ import math
 from abc import abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from lidarium.agents.frontier_reach import Choice
 from lidarium.agents.policy import Action, Policy, Stop, Team
 from lidarium.agents.report import GivenUp
-from lidarium.envs.driving.path_planner import footprint_of
-from lidarium.envs.exploration import Observation
+from lidarium.envs.faces.parallel import Observation
+from lidarium.envs.onboard.driving.path_planner import footprint_of
 from lidarium.envs.onboard.navigation import NavigationMap
-from lidarium.envs.radio.messages import DriveState, Target
+from lidarium.envs.onboard.radio.messages import DriveState, Target
 from lidarium.mapping.planning.footprint import Footprint
 from lidarium.mapping.planning.frontier_approach import approach, default_reach
 from lidarium.mapping.planning.frontier_kernels import FRONTIER, IGNORED
@@ -217,10 +216,3 @@ class FrontierExplorer(Policy):
                 x, y = (float(value) for value in clusters.centroids[k])
                 self._unreached.append(GivenUp(agent, x, y, float(clusters.sizes[k]), reason or "blocked"))
         return "frontier_unreachable"
-
-
-def __getattr__(name: str) -> Any:  # noqa: ANN401
-    """Return a name that has moved; it warns."""
-    from lidarium.moved import moved_name
-
-    return moved_name(__name__, name)

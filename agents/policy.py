@@ -4,17 +4,17 @@ from abc import ABC, abstractmethod
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.agents.report import GivenUp, PolicyReport, TeamMaps
-from lidarium.envs.exploration import Observation
+from lidarium.envs.faces.parallel import Observation
 from lidarium.envs.onboard.belief import Belief
-from lidarium.envs.radio.messages import DriveState, OperatingState, Order, Route, Target
+from lidarium.envs.onboard.radio.messages import DriveState, OperatingState, Order, Route, Target
+from lidarium.envs.onboard.station.reports import Report
 from lidarium.envs.settings.exploration import ExplorationSettings
-from lidarium.envs.station.reports import Report
 from lidarium.mapping.merging.fusion import FusedMap
 
 
@@ -270,10 +270,3 @@ class _Alone:
         raise ValueError(
             f"{self._agent} would send {agent} where others drove; a decentralised policy has no station"
         )
-
-
-def __getattr__(name: str) -> Any:  # noqa: ANN401
-    """Return a name that has moved; it warns."""
-    from lidarium.moved import moved_name
-
-    return moved_name(__name__, name)

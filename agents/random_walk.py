@@ -9,7 +9,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from lidarium.agents.policy import Action, Policy, Team
-from lidarium.envs.exploration import Observation
+from lidarium.envs.faces.parallel import Observation
 
 NEAR = 0.35
 """A robot turns when something ahead is nearer than its radius and this [m]."""

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
-from lidarium.envs.radio.messages import OrderKind
+from lidarium.envs.onboard.radio.messages import OrderKind
 from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.merging.fusion import FusedMap
 from lidarium.mapping.merging.pair_result import PairResult

@@ -22,10 +22,10 @@ from lidarium.agents.policy import Action, Policy, Stop, Team
 from lidarium.agents.report import GivenUp
 from lidarium.agents.sparse_views import ViewSettings, apart_from, discs_around, joined
 from lidarium.agents.sparse_work import OBSTACLE_M, Work
-from lidarium.envs.exploration import Observation
+from lidarium.envs.faces.parallel import Observation
 from lidarium.envs.onboard.belief import Belief
+from lidarium.envs.onboard.radio.messages import DriveState, Route
 from lidarium.envs.onboard.sparse_belief import SparseBelief
-from lidarium.envs.radio.messages import DriveState, Route
 from lidarium.mapping.sparse.exploring.views import View
 
 KEPT_SHARE = 0.5

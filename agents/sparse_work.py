@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.agents.sparse_views import discs_around
-from lidarium.envs.radio.messages import DriveState, Route
+from lidarium.envs.onboard.radio.messages import DriveState, Route
 from lidarium.mapping.sparse.exploring.views import View
 
 PATIENCE_S = 20.0

@@ -13,7 +13,7 @@ from lidarium.scripts.output.run_films import RunFilms
 from lidarium.scripts.run import STOP_COVERAGE, TEAM_POLICY, TEAM_WORLD
 
 if TYPE_CHECKING:
-    from lidarium.envs.exploration import ExplorationEnv
+    from lidarium.envs.faces.parallel import ExplorationEnv
 
 NAME = "merging.webp"
 

@@ -257,10 +257,3 @@ def _prepare(prepare: Callable[[str], bool], specs: Sequence[str], command: Prep
         except KeyboardInterrupt:
             return prepared, made, True
     return prepared, made, False
-
-
-def __getattr__(name: str) -> Any:  # noqa: ANN401
-    """Return a name that has moved; it warns."""
-    from lidarium.moved import moved_name
-
-    return moved_name(__name__, name)

@@ -13,7 +13,7 @@ from lidarium.scripts.common import DONE, NO, Answer, Command, notify, table
 from lidarium.scripts.options.film import FilmFiles
 
 if TYPE_CHECKING:
-    from lidarium.envs.exploration import ExplorationEnv
+    from lidarium.envs.faces.parallel import ExplorationEnv
     from lidarium.envs.floors.floor import Floor
     from lidarium.evaluation.record import EpisodeRecord
 
@@ -177,7 +177,7 @@ def _run_again(command: Replay, record: "EpisodeRecord") -> Answer:
 
 def _figures(env: "ExplorationEnv") -> dict[str, Any]:
     """Return the main figures of an episode, as ``result.json`` has them."""
-    from lidarium.envs.outcome.scorer import THRESHOLDS
+    from lidarium.envs.engine.tally import THRESHOLDS
     from lidarium.evaluation.episodes.result import map_figures
     from lidarium.evaluation.metrics import overlap
 

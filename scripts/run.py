@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from lidarium.agents.policy import Policy
-    from lidarium.envs.exploration import ExplorationEnv
+    from lidarium.envs.faces.parallel import ExplorationEnv
     from lidarium.envs.settings.exploration import ExplorationSettings
     from lidarium.evaluation.episodes.history import History
     from lidarium.evaluation.episodes.runner import Episode
@@ -267,10 +267,3 @@ def _explore(
 
 def _folder(command: Run, floor: str) -> Path:
     return command.out or DEFAULT_FOLDER / file_name(f"{floor}-{command.chosen_policy}-{command.seed}")
-
-
-def __getattr__(name: str) -> Any:  # noqa: ANN401
-    """Return a name that has moved; it warns."""
-    from lidarium.moved import moved_name
-
-    return moved_name(__name__, name)

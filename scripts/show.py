@@ -203,7 +203,7 @@ def _localizers() -> tuple[dict[str, Any], str]:
 
 
 def _observables() -> tuple[dict[str, Any], str]:
-    from lidarium.envs.observation_spaces import KERNEL_SUMMARIES
+    from lidarium.envs.observing.spaces import KERNEL_SUMMARIES
     from lidarium.envs.settings.sensors.observables import SENSED
 
     summaries = {**KERNEL_SUMMARIES, **SENSED.summaries}
@@ -211,7 +211,7 @@ def _observables() -> tuple[dict[str, Any], str]:
 
 
 def _rewards() -> tuple[dict[str, Any], str]:
-    from lidarium.envs.outcome.reward_terms import REWARD_TERMS
+    from lidarium.envs.engine.reward_terms import REWARD_TERMS
 
     return {"rewards": REWARD_TERMS.summaries}, table(REWARD_TERMS.summaries.items(), indent="")
 

@@ -223,6 +223,82 @@ def learner_rows(floor: str, steps: int, **options: Any) -> Case:
     return Case(run, 50, False)
 
 
+def formed(face: str, level: str, seed: int, steps: int, solves: bool = False, **options: Any) -> Case:
+    """Return episodes with conventions, merged maps, drawn settings or another backend, through one face.
+
+    ``face`` is ``parallel``, ``rows`` or ``learner``. Actions are drawn for each row, masks are taken from
+    where the conventions put them.
+    """
+
+    def run(ledger: Ledger) -> None:
+        values = built(options, level)
+        floats = values.get("comm", 0)
+        if level == "frontier" and (floats or "observation" in values):
+            values.setdefault("action_mask", "infos")
+        if values.get("backend") == "bullet":
+            pytest.importorskip("pybullet")
+        draws, held = np.random.default_rng(seed), dict[Any, Any]()
+
+        def drawn(row: Any, step: int, mask: Any) -> Any:
+            held[row] = choose(level, draws, step, mask, held.get(row, np.zeros(2)))
+            message = draws.uniform(-1.0, 1.0, floats).astype(np.float32)
+            if not floats:
+                return held[row]
+            return (
+                {"action": held[row], "message": message}
+                if level == "frontier"
+                else np.concatenate([np.asarray(held[row], np.float32), message])
+            )
+
+        if face == "parallel":
+            env = lidarium.parallel_env(level=level, **values)
+            outcome: Any = env.reset(seed=seed)
+            ledger.told(outcome)
+            for step in range(steps):
+                if not env.agents:
+                    outcome = env.reset()
+                    ledger.told(outcome)
+                masks = {
+                    agent: mask_in(outcome[0][agent], outcome[-1].get(agent, {})) for agent in env.agents
+                }
+                outcome = env.step({agent: drawn(agent, step, masks[agent]) for agent in env.agents})
+                ledger.told(outcome)
+            env.close()
+            return
+        if face == "learner":
+            pytest.importorskip("stable_baselines3")
+            env = lidarium.sb3_vec_env(3, level=level, **values)
+            env.seed(seed)
+            observations, infos = env.reset(), env.reset_infos
+        else:
+            env = lidarium.vector_env(3, level=level, **values)
+            observations, infos = env.reset(seed=seed)
+        ledger.told((observations, {"rows": infos}))
+        for step in range(steps):
+            actions = [drawn(row, step, mask_in(observations, infos, row)) for row in range(env.num_envs)]
+            whole: Any = (
+                {name: np.array([each[name] for each in actions]) for name in actions[0]}
+                if isinstance(actions[0], dict)
+                else np.array(actions)
+            )
+            outcome = env.step(whole)
+            observations, infos = outcome[0], outcome[-1]
+            ledger.told((*outcome, None, {})[:5] if face == "rows" else (*outcome[:3], None, {"rows": infos}))
+        env.close()
+
+    return Case(run, 20 if level == "velocity" else 4, solves)
+
+
+def mask_in(observation: Any, infos: Any, row: int | None = None) -> Any:
+    """Return the mask of actions of an agent or a row, from observations or infos; None if there is none."""
+    told = infos[row] if isinstance(infos, list | tuple) else infos
+    for place in (observation, told):
+        if isinstance(place, Mapping) and "action_mask" in place:
+            mask = np.asarray(place["action_mask"])
+            return mask if row is None or mask.ndim == 1 else mask[row]
+    return None
+
+
 def true_motion(env: Any) -> np.ndarray:
     """Return x, y, theta, speed and turn rate of each robot, (robots * 5,)."""
     return np.concatenate([env.world.poses, env.world.velocities], axis=1).ravel()

@@ -5,7 +5,7 @@ from reported_halls import RADIUS, RESOLUTION
 from lidarium.agents.supervisor.knowledge.station import MergeStation
 from lidarium.agents.supervisor.settings import SupervisorSettings
 from lidarium.agents.supervisor.supervisor import Supervisor
-from lidarium.envs.driving.path_planner import footprint_of
+from lidarium.envs.onboard.driving.path_planner import footprint_of
 
 WEST, EAST, NORTH = (0.0, 2.0), (7.95, 2.0), (4.0, 3.95)
 """Openings of the hall [m]."""

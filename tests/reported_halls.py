@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 
-from lidarium.envs.radio.messages import DriveState, OperatingState, Target
-from lidarium.envs.station.reports import Report
+from lidarium.envs.onboard.radio.messages import DriveState, OperatingState, Target
+from lidarium.envs.onboard.station.reports import Report
 from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.merging.growing_maps import GrowingMap
 

@@ -5,8 +5,8 @@ import math
 import numpy as np
 
 from lidarium.envs.floors.floor import Raster
-from lidarium.envs.outcome.scorer import Scorer
-from lidarium.envs.scoring.rewards import reward_weights
+from lidarium.envs.engine.tally import Scorer
+from lidarium.envs.simulation.rewards import reward_weights
 from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.settings.lidar import Lidar
 from lidarium.envs.settings.robots import ROBOTS

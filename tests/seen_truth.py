@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from lidarium.envs.exploration import ExplorationEnv
+from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.settings.making import make_settings
 
 NEAR = np.array([(2.5, 4.0, 0.0), (2.5, 4.6, 1.0)])

@@ -140,7 +140,7 @@ def test_editors_find_every_module_below_the_source_folder():
     """An editable install links the root folders below ``src/lidarium``."""
     for folder in FOLDERS:
         assert (ROOT / "src" / "lidarium" / folder).resolve() == (ROOT / folder).resolve()
-    found = importlib.util.find_spec("lidarium.envs.exploration")
+    found = importlib.util.find_spec("lidarium.envs.faces.parallel")
     assert Path(found.origin) == ROOT / "src" / "lidarium" / "envs" / "exploration.py"
 
 
@@ -222,6 +222,6 @@ def test_policies_are_made_by_name_from_the_top():
 
 def test_without_stable_baselines_the_error_says_how_to_install_it(monkeypatch):
     monkeypatch.setitem(sys.modules, "stable_baselines3.common.vec_env", None)
-    monkeypatch.delitem(sys.modules, "lidarium.envs.batch.stable_baselines", raising=False)
+    monkeypatch.delitem(sys.modules, "lidarium.envs.faces.stable_baselines", raising=False)
     with pytest.raises(ImportError, match=r'pip install "lidarium\[rl\]"'):
         lidarium.sb3_vec_env(1)

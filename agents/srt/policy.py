@@ -14,7 +14,7 @@ from lidarium.agents.srt.explorer import Explorer
 from lidarium.agents.srt.senses import CONTACT_AGE_S, memory_of, senses_of
 from lidarium.agents.srt.settings import make_srt_settings
 from lidarium.agents.srt.tree import Tree
-from lidarium.envs.exploration import Observation
+from lidarium.envs.faces.parallel import Observation
 
 
 class SensorBasedRandomTree(Policy):

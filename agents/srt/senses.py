@@ -6,7 +6,6 @@ They are pose, scan and goal in the frame of the team's graph, and what it remem
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +15,7 @@ from lidarium.agents.srt.memories.memory import Memory
 from lidarium.agents.srt.memories.region_memory import RegionMemory
 from lidarium.agents.srt.settings import SrtSettings
 from lidarium.agents.srt.tree import Node
-from lidarium.envs.exploration import Observation
+from lidarium.envs.faces.parallel import Observation
 from lidarium.envs.onboard.belief import Belief
 from lidarium.mapping.grids.scan_geometry import ScanGeometry
 
@@ -89,10 +88,3 @@ def memory_of(belief: Belief, known: Iterable[Node], settings: SrtSettings) -> M
         return RegionMemory(known)
     shared = belief.shared_map
     return MapMemory(belief.map if shared is None else shared, belief.radius)
-
-
-def __getattr__(name: str) -> Any:  # noqa: ANN401
-    """Return a name that has moved; it warns."""
-    from lidarium.moved import moved_name
-
-    return moved_name(__name__, name)

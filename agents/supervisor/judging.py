@@ -12,7 +12,7 @@ from lidarium.agents.supervisor.assignment import NOBODY, best_goal
 from lidarium.agents.supervisor.knowledge.station import MergeStation
 from lidarium.agents.supervisor.knowledge.survey import Survey
 from lidarium.agents.supervisor.tree import OTHER, RICH, Case, Leaf, RobotInputs, decide, decision_tree
-from lidarium.envs.radio.messages import Target
+from lidarium.envs.onboard.radio.messages import Target
 
 LEAST_WAY_M = 1.0
 """What a metre costs a battery is estimated after a path of this length [m]."""

@@ -7,10 +7,9 @@ from numpy.typing import NDArray
 
 from lidarium.agents.policy import Team
 from lidarium.envs.onboard.belief import Belief
-from lidarium.envs.radio.messages import DriveState, OperatingState, Order
-from lidarium.envs.station.reports import Report
+from lidarium.envs.onboard.radio.messages import DriveState, OperatingState, Order
+from lidarium.envs.onboard.station.reports import Report
 from lidarium.mapping.merging.fusion import FusedMap
-from lidarium.moved import renamed_method
 
 
 class LedTeam:
@@ -55,8 +54,6 @@ class LedTeam:
     def send_map(self, agent: str, others: FusedMap | None) -> bool:
         """Send it what others know."""
         return self._team.send_map(agent, others)
-
-    tell = renamed_method("tell", "send_map")
 
     def forget_walls(self, agent: str, trail: NDArray[np.float64]) -> bool:
         """Let it forget walls where another robot drove."""

@@ -20,9 +20,9 @@ from lidarium.agents.supervisor.led_team import LedTeam
 from lidarium.agents.supervisor.log import Decision, StationEvent
 from lidarium.agents.supervisor.settings import SupervisorSettings
 from lidarium.agents.supervisor.supervisor import Command, Supervisor
-from lidarium.envs.driving.path_planner import footprint_of
-from lidarium.envs.exploration import Observation
-from lidarium.envs.radio.messages import Order, OrderKind
+from lidarium.envs.faces.parallel import Observation
+from lidarium.envs.onboard.driving.path_planner import footprint_of
+from lidarium.envs.onboard.radio.messages import Order, OrderKind
 
 
 class Supervised(Policy):

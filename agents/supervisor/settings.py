@@ -6,7 +6,7 @@ They are its periods, what the thesis leaves open, and what goes beyond it.
 from dataclasses import dataclass
 from typing import Annotated, Literal, get_args
 
-from lidarium.envs.station.joining import GROWTH_M2, OWN_M2, WALL_M
+from lidarium.envs.onboard.station.joining import GROWTH_M2, OWN_M2, WALL_M
 from lidarium.mapping.geometry.bounds import Count, Distance, FromZero, Length, above, check_settings
 
 Assignment = Literal["pairs", "hungarian", "utility"]

@@ -23,7 +23,7 @@ from lidarium.agents.supervisor.tree import (
     Leaf,
     idle_leaf,
 )
-from lidarium.envs.radio.messages import OperatingState, OrderKind, Target
+from lidarium.envs.onboard.radio.messages import OperatingState, OrderKind, Target
 from lidarium.mapping.planning.footprint import Footprint
 
 STICKINESS_M = 1.0

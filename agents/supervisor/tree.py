@@ -23,7 +23,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 from lidarium.agents.supervisor.settings import SupervisorSettings
-from lidarium.envs.radio.messages import OperatingState, OrderKind
+from lidarium.envs.onboard.radio.messages import OperatingState, OrderKind
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,8 +11,8 @@ import numpy as np
 from lidarium.benchmarks.speed.harness.batches import OBSERVED
 from lidarium.benchmarks.speed.scenes.floors import BenchFloor
 from lidarium.benchmarks.speed.scenes.teams import DrivenTeam
-from lidarium.envs.observations import ObservationWriter
-from lidarium.envs.scoring.coverage import mark_seen
+from lidarium.envs.observing.writer import ObservationWriter
+from lidarium.envs.simulation.coverage import mark_seen
 from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.settings.making import make_settings
 from lidarium.envs.simulation.disturbances.noise import GAUSSIAN_TABLE, fill_gaussian

@@ -21,7 +21,7 @@ import numpy as np
 import lidarium
 from lidarium.benchmarks.studies.shared.kept import Progress
 from lidarium.benchmarks.studies.shared.study import Study
-from lidarium.envs.exploration import ExplorationEnv
+from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.floors.catalogue.names import load_floor, set_floors
 from lidarium.envs.floors.catalogue.store import FOLDER_VARIABLE, SIZE_VARIABLE, Store
 from lidarium.envs.settings.exploration import ExplorationSettings

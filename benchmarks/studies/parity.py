@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 import lidarium
 from lidarium.benchmarks.studies.shared.kept import Progress, do_missing, kept_lines
 from lidarium.benchmarks.studies.shared.study import Study
-from lidarium.envs.exploration import ExplorationEnv
+from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.settings.making import make_settings
 from lidarium.envs.simulation.bullet.bullet_world import BulletWorld
 from lidarium.envs.simulation.bullet.leaning_scans import LEAN

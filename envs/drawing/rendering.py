@@ -5,7 +5,6 @@ They show what is explored, the robots and what their lasers see.
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import cv2
 import numpy as np
@@ -29,8 +28,8 @@ from lidarium.envs.drawing.frame_parts import (
     view_around,
     with_header,
 )
-from lidarium.envs.scoring.coverage import unpack_bits
 from lidarium.envs.settings.exploration import ExplorationSettings
+from lidarium.envs.simulation.coverage import unpack_bits
 from lidarium.envs.simulation.kernels.floor_tables import FloorTables
 from lidarium.envs.simulation.simulation import Simulation
 
@@ -234,10 +233,3 @@ def _draw_fans(frame: Frame, scene: Scene, view: View, colours: list[Colour]) ->
             ends = np.concatenate([[(x, y)], ends])
         cv2.fillPoly(tinted, [view.pixels(ends)], colour, cv2.LINE_AA, SHIFT)
     cv2.addWeighted(tinted, _FAN_OPACITY, frame, 1.0 - _FAN_OPACITY, 0.0, dst=frame)
-
-
-def __getattr__(name: str) -> Any:  # noqa: ANN401
-    """Return a name that has moved; it warns."""
-    from lidarium.moved import moved_name
-
-    return moved_name(__name__, name)

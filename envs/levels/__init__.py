@@ -1,1 +1,34 @@
-"""What an action is: a command, a waypoint, a frontier."""
+"""Levels of decision: what an action of a robot is, and how it becomes motion."""
+
+from collections.abc import Callable
+from typing import TypeVar
+
+from lidarium.envs.levels.level import Level
+from lidarium.registry import Registry
+
+LEVELS: Registry[type[Level]] = Registry("level")
+"""The levels of decision by name."""
+
+LEVELS.register("velocity", "lidarium.envs.levels.velocity:VelocityLevel", "speed and turn rate, for a step")
+LEVELS.register("waypoint", "lidarium.envs.levels.waypoint:WaypointLevel", "a point to drive to")
+LEVELS.register("frontier", "lidarium.envs.levels.frontier:FrontierLevel", "one of the frontiers in reach")
+
+L = TypeVar("L", bound=type[Level])
+
+
+def level(name: str, summary: str = "") -> Callable[[L], L]:
+    """Register a level of decision, a subclass of `Level`; environments then take its name.
+
+    Parameters
+    ----------
+    name : str
+        The name of the level.
+    summary : str, optional
+        One line that says what an action is. The first line of the docstring by default.
+    """
+
+    def register(kind: L) -> L:
+        LEVELS.register(name, kind, summary or (kind.__doc__ or name).strip().splitlines()[0])
+        return kind
+
+    return register

@@ -1,16 +1,22 @@
 """Which frontiers are offered to robots, one kernel for a whole batch."""
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.envs.driving.drives import STATE_ARRIVED, STATE_GIVING_WAY, STATE_NO_PATH, Drives, drive_state
-from lidarium.envs.driving.planning import Planning, passage_in
 from lidarium.envs.levels.frontier_gains import expected_gain
 from lidarium.envs.levels.frontier_ranking import choose_offers
+from lidarium.envs.onboard.driving.drives import (
+    STATE_ARRIVED,
+    STATE_GIVING_WAY,
+    STATE_NO_PATH,
+    Drives,
+    drive_state,
+)
+from lidarium.envs.onboard.driving.planning import Planning, passage_in
 from lidarium.envs.onboard.navigation import (
     COLUMNS,
     ROW_LOW,
@@ -324,10 +330,3 @@ def renew_teams(
                     swept = _prepared(planning, record, renewal.memory[piece])
                 _offer(planning, view, swept, offers, row, cells, starts, piece)
             k = take_next(work.taken)
-
-
-def __getattr__(name: str) -> Any:  # noqa: ANN401
-    """Return a name that has moved; it warns."""
-    from lidarium.moved import moved_name
-
-    return moved_name(__name__, name)

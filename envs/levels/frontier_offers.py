@@ -13,11 +13,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.envs.driving.team_driver import TeamDriver, footprint_of
 from lidarium.envs.levels.frontier_choices import Choices, Offers, Renewal, ViewReach, renew_teams
 from lidarium.envs.levels.frontier_gains import ray_directions
+from lidarium.envs.onboard.driving.team_driver import TeamDriver, footprint_of
 from lidarium.envs.onboard.perception import Perception
-from lidarium.envs.radio.messages import Orders, Target
+from lidarium.envs.onboard.radio.messages import Orders, Target
 from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.settings.limits import GAINS
 from lidarium.mapping.kernels.compilation import kernel

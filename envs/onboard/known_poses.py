@@ -3,8 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from lidarium.envs.onboard.radio.exchange import NEVER, Exchange
 from lidarium.envs.onboard.teammate import Teammate
-from lidarium.envs.radio.exchange import NEVER, Exchange
 from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.simulation.kernels.arrays import ENDED
 from lidarium.envs.simulation.simulation import Simulation

@@ -1,6 +1,6 @@
-"""Meters on board: distance by wheels, and battery use, of an episode's robots.
+"""Meters on board: distance by wheels and battery use of all robots, row = episode * robots + robot.
 
-Nothing is done in a step where wheels measure exactly and batteries have no limit.
+Nothing is done in a step if wheels measure exactly and batteries have no limit.
 """
 
 import math
@@ -19,7 +19,7 @@ class Meters:
     Parameters
     ----------
     world : World
-        Whose robots; of one episode.
+        Whose robots.
     settings : ExplorationSettings
         Their wheels and batteries.
 
@@ -27,63 +27,74 @@ class Meters:
     ----------
     is_active : bool
         Whether anything has to be done in a step.
-    used_j : (robots,) float64
-        Energy used since the beginning [J]; 0 where batteries have no limit.
+    used_j : (rows,) float64
+        Energy used since the beginning of the episode [J]; 0 if batteries have no limit.
     """
 
     def __init__(self, world: World, settings: ExplorationSettings) -> None:
-        self._world, self._battery, self._time_step = world, settings.battery, settings.time_step
-        self._measures_path, self._measures_energy = (
-            not settings.odometry.is_ideal,
-            settings.battery.is_limited,
-        )
+        self._world = world
+        self._battery = settings.battery
+        self._time_step = settings.time_step
+        self._robots = settings.robots
+        self._measures_path = not settings.odometry.is_ideal
+        self._measures_energy = settings.battery.is_limited
         self.is_active = self._measures_path or self._measures_energy
-        self.used_j, self._path = np.zeros(settings.robots), np.zeros(settings.robots)
-        self.start()
+        rows = settings.robots * world.episodes
+        self.used_j = np.zeros(rows)
+        self._path = np.zeros(rows)
+        self._headings = np.zeros(rows)
+        self._travelled = np.zeros(rows)
+        self._taken_in = np.zeros(world.episodes, np.int64)
 
-    def start(self) -> None:
+    def start(self, episode: int = 0) -> None:
         """Begin an episode, after its robots were placed, with full batteries."""
-        self.used_j[:], self._path[:], self._taken_in = 0.0, 0.0, 0
-        self._remember()
-
-    def _remember(self) -> None:
-        self._headings, self._travelled = self._world.poses[:, 2].copy(), self._world.travelled.copy()
+        rows = slice(episode * self._robots, (episode + 1) * self._robots)
+        self.used_j[rows] = 0.0
+        self._path[rows] = 0.0
+        self._taken_in[episode] = 0
+        self._headings[rows] = self._world.poses[rows, 2]
+        self._travelled[rows] = self._world.travelled[rows]
 
     def advance(self) -> None:
-        """Take in the last step of the world, if that has not been done."""
-        step = int(self._world.steps[0])
-        if not self.is_active or step == self._taken_in:
+        """Take in the last step of each episode, if that has not been done."""
+        if not self.is_active:
             return
-        self._taken_in = step
+        steps = np.maximum(self._world.steps, 0)
+        is_new = steps != self._taken_in
+        if not is_new.any():
+            return
+        self._taken_in = steps
+        rows = np.flatnonzero(np.repeat(is_new, self._robots))
         if self._measures_path:
-            self._path += np.abs(self._world.sensors["velocity"][:, 0]) * self._time_step
+            self._path[rows] += np.abs(self._world.sensors["velocity"][rows, 0]) * self._time_step
         if self._measures_energy:
-            self._use_energy()
+            self._use_energy(rows)
 
-    def _use_energy(self) -> None:
+    def _use_energy(self, rows: NDArray[np.int64]) -> None:
         world, battery = self._world, self._battery
-        turning = np.abs((world.poses[:, 2] - self._headings + math.pi) % (2.0 * math.pi) - math.pi)
-        driven = world.travelled - self._travelled
+        headings, travelled = world.poses[rows, 2], world.travelled[rows]
+        turning = np.abs((headings - self._headings[rows] + math.pi) % (2.0 * math.pi) - math.pi)
+        driven = travelled - self._travelled[rows]
         used = (
             battery.idle_w * self._time_step + battery.per_metre_j * driven + battery.per_radian_j * turning
         )
         # Who has ended is switched off.
-        self.used_j += np.where(world.flags & ENDED, 0.0, used)
-        self._remember()
+        self.used_j[rows] += np.where(world.flags[rows] & ENDED, 0.0, used)
+        self._headings[rows], self._travelled[rows] = headings, travelled
 
     def travelled_m(self, row: int) -> float:
-        """Return how far a robot has come as its wheels measure [m]."""
+        """Return the length of a robot's path as its wheels measure it [m]."""
         return float(self._path[row] if self._measures_path else self._world.travelled[row])
 
     def left_j(self, row: int) -> float | None:
-        """Return what is left in a robot's battery [J], None where it has no limit."""
+        """Return the energy that is left in a robot's battery [J], None if it has no limit."""
         capacity = self._battery.capacity_j
         return None if capacity is None else max(capacity - float(self.used_j[row]), 0.0)
 
     @property
     def is_empty(self) -> NDArray[np.bool_]:
-        """Which robots have no energy left, (robots,)."""
+        """Which robots have no energy left, (rows,)."""
         capacity = self._battery.capacity_j
-        return (
-            np.zeros(len(self.used_j), np.bool_) if capacity is None else np.asarray(self.used_j >= capacity)
-        )
+        if capacity is None:
+            return np.zeros(len(self.used_j), np.bool_)
+        return np.asarray(self.used_j >= capacity)

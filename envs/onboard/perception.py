@@ -24,10 +24,10 @@ from lidarium.envs.onboard.navigation import (
     extend_window,
     refresh_map,
 )
+from lidarium.envs.onboard.radio.exchange import Exchange
 from lidarium.envs.onboard.received_maps import ReceivedMaps
 from lidarium.envs.onboard.sparse_maps import SparseMaps
 from lidarium.envs.onboard.team_maps import TeamMaps, refresh_team, sum_team
-from lidarium.envs.radio.exchange import Exchange
 from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.simulation.simulation import Simulation
 from lidarium.mapping.kernels.compilation import available_threads, use_threads
@@ -268,10 +268,3 @@ class Perception:
             for navigation, record in zip(maps, records, strict=True):
                 if navigation is not None:
                     navigation.keep_record_in(record)
-
-
-def __getattr__(name: str) -> Any:  # noqa: ANN401
-    """Return a name that has moved; it warns."""
-    from lidarium.moved import moved_name
-
-    return moved_name(__name__, name)

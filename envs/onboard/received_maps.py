@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from lidarium.envs.onboard.known_poses import KnownPoses
 from lidarium.envs.onboard.navigation import CLEARANCE_LIMIT, FLAGS, RECORD, NavigationMap
+from lidarium.envs.onboard.radio.exchange import Exchange
 from lidarium.envs.onboard.team_maps import sum_maps
-from lidarium.envs.radio.exchange import Exchange
 from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.simulation.simulation import Simulation
 from lidarium.mapping.merging.fusion import FusedMap, overlay

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.envs.onboard.perception import Perception
-from lidarium.envs.radio.exchange import CONTACT_S, NEVER
+from lidarium.envs.onboard.radio.exchange import CONTACT_S, NEVER
 from lidarium.envs.settings.exploration import KERNEL_LOCALIZATIONS, ExplorationSettings
 from lidarium.envs.simulation.kernels.arrays import ENDED
 from lidarium.envs.simulation.kernels.stepping import ranges_without_teammates

@@ -9,10 +9,3 @@ from lidarium.envs.settings.rewards import RewardSettings
 from lidarium.envs.settings.robots import Robot
 
 __all__ = ["ExplorationSettings", "Lidar", "RewardSettings", "Robot", "make_settings"]
-
-
-def __getattr__(name: str) -> Any:  # noqa: ANN401
-    """Return a name that has moved; it warns."""
-    from lidarium.moved import moved_name
-
-    return moved_name(__name__, name)

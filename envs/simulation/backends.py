@@ -2,11 +2,11 @@
 
 from collections.abc import Callable
 
-from lidarium.envs.scoring.rewards import reward_weights
 from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.simulation.backend import World
 from lidarium.envs.simulation.kinematic_simulation import KinematicSimulation
 from lidarium.envs.simulation.kinematic_world import KinematicWorld
+from lidarium.envs.simulation.rewards import reward_weights
 from lidarium.envs.simulation.simulation import PoseSources, Simulation
 from lidarium.registry import Registry
 

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.envs.floors.free_space import reachable_free_space
-from lidarium.envs.scoring.score import Score
 from lidarium.envs.settings.lidar import Lidar
 from lidarium.envs.settings.sensors.cameras import DepthCamera
 from lidarium.envs.simulation.backend import World
@@ -33,11 +32,11 @@ from lidarium.envs.simulation.kernels.stepping import (
     render_row,
     score_and_localize,
 )
+from lidarium.envs.simulation.score import Score
 from lidarium.mapping.grids.occupancy import OccupancySettings
 from lidarium.mapping.grids.scan_integration import WORD
 from lidarium.mapping.kernels.compilation import available_threads, use_threads
 from lidarium.mapping.kernels.huge_pages import ArrayPool
-from lidarium.moved import renamed_method
 
 ROWS_FOR_THREADS = 8
 """Threads pay only for batches of at least this many rows."""
@@ -284,8 +283,6 @@ class Simulation:
         """
         self.beliefs.wipe(row)
         render_row(self._table, row, self.robots, np.ascontiguousarray(poses), np.ascontiguousarray(ranges))
-
-    render_anew = renamed_method("render_anew", "render_again")
 
     def __getstate__(self) -> dict[str, Any]:
         return {name: value for name, value in self.__dict__.items() if name not in ("_table", "_pool")}

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.agents.policy import Action, Policy, Stop, Team
-from lidarium.envs.exploration import ExplorationEnv, Observation
-from lidarium.envs.radio.messages import MOST_POINTS, DriveState, Route
+from lidarium.envs.faces.parallel import ExplorationEnv, Observation
+from lidarium.envs.onboard.radio.messages import MOST_POINTS, DriveState, Route
 from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.evaluation.bounds.tours import TourPlan
 from lidarium.evaluation.bounds.view_graph import ViewGraph

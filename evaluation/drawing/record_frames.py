@@ -31,8 +31,8 @@ from lidarium.envs.drawing.frame_parts import (
     with_header,
 )
 from lidarium.envs.drawing.views import camera_panel, views_of
+from lidarium.envs.engine.tally import THRESHOLDS
 from lidarium.envs.floors.floor import Floor
-from lidarium.envs.outcome.scorer import THRESHOLDS
 from lidarium.envs.settings.robots import Robot
 from lidarium.envs.settings.sensors.cameras import DepthCamera
 from lidarium.evaluation.drawing.picture_parts import (
@@ -250,10 +250,3 @@ def _draw_legend(figure: Figure) -> None:
         labelcolor=INK,
         handlelength=1.2,
     )
-
-
-def __getattr__(name: str) -> Any:  # noqa: ANN401
-    """Return a name that has moved; it warns."""
-    from lidarium.moved import moved_name
-
-    return moved_name(__name__, name)

@@ -17,7 +17,7 @@ from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
 from lidarium.envs.floors.floor import Floor
-from lidarium.envs.scoring.coverage import unpack_bits
+from lidarium.envs.simulation.coverage import unpack_bits
 from lidarium.evaluation.drawing.picture_parts import (
     INK,
     SOLID,

@@ -10,8 +10,8 @@ from matplotlib.lines import Line2D
 from lidarium.agents.policy import Policy
 from lidarium.agents.report import GivenOrder
 from lidarium.envs.drawing.frame_parts import SHIFT, Frame, View, team_colours
-from lidarium.envs.exploration import ExplorationEnv
-from lidarium.envs.radio.messages import OrderKind
+from lidarium.envs.faces.parallel import ExplorationEnv
+from lidarium.envs.onboard.radio.messages import OrderKind
 from lidarium.evaluation.drawing.films.film import DrawOver
 from lidarium.evaluation.drawing.picture_parts import INK, hex_colours
 from lidarium.evaluation.episodes.events import in_floor_frame

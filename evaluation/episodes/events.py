@@ -6,9 +6,9 @@ Positions are in the floor's frame.
 import math
 from typing import Any
 
-from lidarium.envs.exploration import ExplorationEnv
-from lidarium.envs.station.operating import OperatingEvent
-from lidarium.envs.wrappers.merged_maps import MergeEvent
+from lidarium.envs.faces.merged_maps import MergeEvent
+from lidarium.envs.faces.parallel import ExplorationEnv
+from lidarium.envs.onboard.station.operating import OperatingEvent
 from lidarium.evaluation.metrics.merges import transform_error
 
 
@@ -38,7 +38,7 @@ def place_of(env: ExplorationEnv, agent: str, place: tuple[float, float] | None)
 
 def operating_events(env: ExplorationEnv) -> list[dict[str, Any]]:
     """Return the events of the robots' operating states and orders, by time."""
-    return [_operating_event(env, event) for event in env.operating.events]
+    return [_operating_event(env, event) for event in env.operating.events[0]]
 
 
 def _operating_event(env: ExplorationEnv, event: OperatingEvent) -> dict[str, Any]:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.envs.exploration import ExplorationEnv
+from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.evaluation.episodes.watching import Watcher
 from lidarium.evaluation.metrics import overlap
 from lidarium.evaluation.truth.footprints import Footprints

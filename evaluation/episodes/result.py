@@ -9,9 +9,9 @@ import numpy as np
 
 import lidarium
 from lidarium.agents.report import GivenUp
-from lidarium.envs.exploration import ExplorationEnv
-from lidarium.envs.outcome.scorer import THRESHOLDS
-from lidarium.envs.scoring.coverage import unpack_bits
+from lidarium.envs.engine.tally import THRESHOLDS
+from lidarium.envs.faces.parallel import ExplorationEnv
+from lidarium.envs.simulation.coverage import unpack_bits
 from lidarium.evaluation import metrics
 from lidarium.evaluation.episodes.events import in_floor_frame, operating_events
 from lidarium.evaluation.episodes.history import WHOLE, History

@@ -11,26 +11,19 @@ from numpy.typing import NDArray
 
 from lidarium.agents.policy import Policy, Stop, check_observed
 from lidarium.agents.report import GivenUp
-from lidarium.envs.exploration import ExplorationEnv, Observation
-from lidarium.envs.levels.frontiers import FrontierExploration
-from lidarium.envs.levels.teams import at_level
-from lidarium.envs.levels.waypoints import WaypointExploration
-from lidarium.envs.onboard.belief import Belief
-from lidarium.envs.radio.messages import DriveState, OperatingState, Order
-from lidarium.envs.station.reports import Report
-from lidarium.envs.wrappers.merged_maps import MergedMaps, MergeEvent, MergingSettings, true_frames
-from lidarium.envs.wrappers.sparse_planning import SparsePlanning
+from lidarium.envs.faces.merged_maps import MergedMaps, true_frames
+from lidarium.envs.faces.parallel import ExplorationEnv, Observation
+from lidarium.envs.faces.sparse_planning import SparsePlanning
+from lidarium.envs.faces.team import EpisodeTeam
+from lidarium.envs.faces.team_exchange import MergeEvent, MergingSettings
+from lidarium.envs.onboard.radio.messages import Order
 from lidarium.evaluation.episodes.events import merge_event
 from lidarium.evaluation.episodes.interrupts import PatientInterrupt
 from lidarium.evaluation.episodes.watching import WatchedExploration
-from lidarium.mapping.merging.fusion import FusedMap
-from lidarium.moved import renamed_method
 
 Progress = Callable[[ExplorationEnv], None]
 
-Level = ExplorationEnv | WaypointExploration | FrontierExploration
-
-World = Level | SparsePlanning | MergedMaps
+World = ExplorationEnv | SparsePlanning | MergedMaps
 
 
 @dataclass(slots=True)
@@ -68,62 +61,6 @@ class Episode:
     merges: list[MergeEvent] = field(default_factory=list)
 
 
-class RunningTeam:
-    """What a policy may ask about its team in a running episode."""
-
-    def __init__(self, env: ExplorationEnv, driver: WaypointExploration | None) -> None:
-        self._env, self._driver = env, driver
-
-    @property
-    def agents(self) -> list[str]:
-        """Live agents."""
-        return list(self._env.agents)
-
-    @property
-    def time_s(self) -> float:
-        """Simulated time [s]."""
-        return self._env.scorer.time
-
-    def belief(self, agent: str) -> Belief:
-        """Return what an agent's onboard software knows."""
-        return self._env.belief(agent)
-
-    def drive_state(self, agent: str) -> DriveState:
-        """Return what its driving is about."""
-        return DriveState.IDLE if self._driver is None else self._driver.drive_state(agent)
-
-    def operating_state(self, agent: str) -> OperatingState:
-        """Return whether it takes part in the work, as it knows itself."""
-        return self._env.operating.states[self._env.possible_agents.index(agent)]
-
-    def report(self, agent: str) -> Report | None:
-        """Return what last reached the station of an agent, an ended one too.
-
-        None where nothing ever did.
-        """
-        return self._env.station.report(self._env.possible_agents.index(agent))
-
-    def last_order(self, agent: str) -> Order | None:
-        """Return the last order that an agent took, None where it took none."""
-        return self._env.operating.orders[self._env.possible_agents.index(agent)]
-
-    def send_map(self, agent: str, others: FusedMap | None) -> bool:
-        """Send an agent that does not know its start what others know, in its map frame.
-
-        Return whether that reached it.
-        """
-        return self._env.station.send_map(self._env.possible_agents.index(agent), others)
-
-    tell = renamed_method("tell", "send_map")
-
-    def forget_walls(self, agent: str, trail: NDArray[np.float64]) -> bool:
-        """Send an agent where another robot drove, in its map frame.
-
-        Return whether that reached it.
-        """
-        return self._env.station.forget_walls(self._env.possible_agents.index(agent), trail)
-
-
 def run_episode(
     policy: Policy,
     env: ExplorationEnv,
@@ -141,7 +78,7 @@ def run_episode(
     policy : Policy
         What decides; its ``Stop`` ends a robot at its next step.
     env : ExplorationEnv
-        Where; the wrapper of the policy's level is put around it.
+        Where; it takes the policy's level.
     seed : int
         Where all draws come from: of the environment, and of the policy.
     options : mapping or None
@@ -164,16 +101,15 @@ def run_episode(
         What it left.
     """
     check_observed(policy, type(policy).__name__, env.settings.observe)
-    level = at_level(env, policy.level, policy.shares_map, policy.decision_period_s)
-    driver = _driver_of(level)
-    if isinstance(env, WatchedExploration):
-        env.driver = None if driver is None else driver.driver
-    world: World = _planning_sparsely(level, policy.shares_map) if plans_sparsely else level
+    env.use_level(policy.level, policy.shares_map, policy.decision_period_s)
+    if plans_sparsely and env.driver is None:
+        raise ValueError("plans_sparsely is set, but the policy decides speeds; want waypoints or frontiers")
+    world: World = SparsePlanning(env, policy.shares_map) if plans_sparsely else env
     world = world if merging is None else MergedMaps(world, merging)
     episode = Episode(env, policy, seed)
     began = time.perf_counter()
     observations, _ = world.reset(seed=seed, options=None if options is None else dict(options))
-    policy.reset(RunningTeam(env, driver), seed)
+    policy.reset(EpisodeTeam(env.engine), seed)
     with nullcontext() if raise_interrupt else PatientInterrupt() as interrupt:
         try:
             if on_decision is not None:
@@ -184,7 +120,7 @@ def run_episode(
                 episode.decision_seconds.append(time.perf_counter() - decided)
                 observations = world.step(actions)[0]
                 observations = {agent: observations[agent] for agent in env.agents}
-                _show_decision(env, policy, driver, on_decision)
+                _show_decision(env, policy, on_decision)
         except KeyboardInterrupt:
             if interrupt is None or interrupt.is_asked:
                 raise
@@ -204,27 +140,14 @@ def _note_merges(episode: Episode, merges: list[MergeEvent]) -> None:
             env.note_event(merge_event(env, merge))
 
 
-def _planning_sparsely(level: Level, shares_map: bool) -> SparsePlanning:
-    if isinstance(level, ExplorationEnv):
-        raise ValueError("plans_sparsely is set, but the policy decides speeds; want waypoints or frontiers")
-    return SparsePlanning(level, shares_map)
-
-
-def _driver_of(level: Level) -> WaypointExploration | None:
-    """Return what drives the robots to their targets, None where a policy decides speeds."""
-    below = level.waypoints if isinstance(level, FrontierExploration) else level
-    return below if isinstance(below, WaypointExploration) else None
-
-
 def _show_decision(
     env: ExplorationEnv,
     policy: Policy,
-    driver: WaypointExploration | None,
     on_decision: Progress | None,
 ) -> None:
     """Let who watches, and who is to be called, know of a decision that has been carried out."""
     if isinstance(env, WatchedExploration):
-        env.decided(None if driver is None else driver.driver.orders(), policy.given_up)
+        env.decided(None if env.driver is None else env.driver.orders(), policy.given_up)
     if on_decision is not None:
         on_decision(env)
 

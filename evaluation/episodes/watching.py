@@ -10,11 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.agents.report import GivenUp
-from lidarium.envs.driving.team_driver import TeamDriver
-from lidarium.envs.episode_start import EpisodeStart
-from lidarium.envs.exploration import ExplorationEnv, Observation
+from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.floors.floor_choice import Floors
-from lidarium.envs.radio.messages import Orders
+from lidarium.envs.onboard.radio.messages import Orders
 from lidarium.envs.settings.exploration import ExplorationSettings
 
 
@@ -71,12 +69,6 @@ class WatchedExploration(ExplorationEnv):
         As for ``ExplorationEnv``.
     watchers : iterable of Watcher
         Who watches, in this order; the list ``watchers`` may change between steps.
-
-    Attributes
-    ----------
-    driver : TeamDriver or None
-        What drives the robots to their targets; None where a policy decides speeds, and before
-        `run_episode`.
     """
 
     def __init__(
@@ -88,31 +80,21 @@ class WatchedExploration(ExplorationEnv):
     ) -> None:
         super().__init__(floor, settings, image_resolution=image_resolution)
         self.watchers: list[Watcher] = list(watchers)
-        self.driver: TeamDriver | None = None
 
-    def start(self, beginning: EpisodeStart) -> tuple[dict[str, Observation], dict[str, dict[str, Any]]]:
-        """Start an episode, as ``ExplorationEnv.start``."""
-        found = super().start(beginning)
+    def on_begin(self) -> None:
+        """Show the watchers an episode after its reset."""
         for watcher in self.watchers:
             watcher.begin(self)
-        return found
 
-    def drive_at(self, commands: NDArray[np.float64]) -> None:
-        """Run one time step, as ``ExplorationEnv.drive_at``."""
-        super().drive_at(commands)
+    def on_step(self, commands: NDArray[np.float64]) -> None:
+        """Show the watchers a time step."""
         for watcher in self.watchers:
             watcher.step(self, commands)
 
-    def outcome(
-        self,
-    ) -> tuple[
-        dict[str, Observation], dict[str, float], dict[str, bool], dict[str, bool], dict[str, dict[str, Any]]
-    ]:
-        """Return what ``step`` returns, as ``ExplorationEnv.outcome``."""
-        found = super().outcome()
+    def on_outcome(self) -> None:
+        """Show the watchers rewards and endings."""
         for watcher in self.watchers:
             watcher.outcome(self)
-        return found
 
     def decided(self, orders: Orders | None, given_up: Sequence[GivenUp]) -> None:
         """Show the watchers a decision that has been carried out."""

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from lidarium.envs.wrappers.merged_maps import MergeEvent
+from lidarium.envs.faces.merged_maps import MergeEvent
 from lidarium.mapping.geometry.rigid import Transform
 
 ROTATION_TOLERANCE = 1e-2

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.envs.exploration import ExplorationEnv
+from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.floors.floor import Floor
 from lidarium.evaluation.episodes.watching import Watcher
 from lidarium.evaluation.record.episode_record import EpisodeRecord

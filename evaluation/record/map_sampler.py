@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.envs.exploration import ExplorationEnv
+from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.evaluation.record.display import MapChanges
 from lidarium.evaluation.truth.beliefs import cells_beyond
 from lidarium.mapping.grids.map_deltas import note_changes

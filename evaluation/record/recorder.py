@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 import lidarium
 from lidarium.agents.report import GivenUp
-from lidarium.envs.exploration import ExplorationEnv
-from lidarium.envs.radio.messages import Orders
+from lidarium.envs.faces.parallel import ExplorationEnv
+from lidarium.envs.onboard.radio.messages import Orders
 from lidarium.evaluation.episodes.events import operating_events, place_of
 from lidarium.evaluation.episodes.settings_identity import settings_sha256
 from lidarium.evaluation.episodes.watching import Watcher

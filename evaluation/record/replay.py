@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 import lidarium
-from lidarium.envs.episode_start import EpisodeStart
-from lidarium.envs.exploration import ExplorationEnv
+from lidarium.envs.engine.episode_start import EpisodeStart
+from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.floors.areas import around
 from lidarium.envs.floors.catalogue.names import is_file_name, load_floor
 from lidarium.envs.floors.floor import Floor

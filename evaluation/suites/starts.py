@@ -34,7 +34,7 @@ def starts_in(
     floor: str, settings: ExplorationSettings, seed: int, image_resolution: float | None = None
 ) -> list[list[float]]:
     """Return where a reset with a seed lets robots start on a floor, x, y, theta of each [m, rad]."""
-    from lidarium.envs.exploration import ExplorationEnv
+    from lidarium.envs.faces.parallel import ExplorationEnv
 
     env = ExplorationEnv(floor, settings, image_resolution=image_resolution)
     env.reset(seed=seed)

@@ -5,8 +5,8 @@ The robots see it from where they stand.
 
 import numpy as np
 
-from lidarium.envs.exploration import ExplorationEnv
-from lidarium.envs.scoring.coverage import count_bits
+from lidarium.envs.faces.parallel import ExplorationEnv
+from lidarium.envs.simulation.coverage import count_bits
 from lidarium.envs.simulation.kernels.arrays import (
     COUNTED_MASK,
     ENDED,

@@ -1,11 +1,11 @@
 """Kernels that count which cells of maps are right."""
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from lidarium.envs.scoring.coverage import count_bits
+from lidarium.envs.simulation.coverage import count_bits
 from lidarium.envs.simulation.kernels.arrays import (
     MAP,
     MAP_COLUMNS,
@@ -224,10 +224,3 @@ def note_changes(windows: Array, changes: Array) -> None:
             min(changes[row, 2], windows[row, 2]),
             max(changes[row, 3], windows[row, 3]),
         )
-
-
-def __getattr__(name: str) -> Any:  # noqa: ANN401
-    """Return a name that has moved; it warns."""
-    from lidarium.moved import moved_name
-
-    return moved_name(__name__, name)

@@ -6,8 +6,8 @@ Only what lies within reach of where a robot has been since is examined.
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.envs.exploration import ExplorationEnv
-from lidarium.envs.scoring.coverage import pack_bits
+from lidarium.envs.faces.parallel import ExplorationEnv
+from lidarium.envs.simulation.coverage import pack_bits
 from lidarium.evaluation.truth.beliefs import held_maps, shares_one_map
 from lidarium.evaluation.truth.map_counts import LastVisit, count_maps, note_changes
 from lidarium.evaluation.truth.team_counts import COUNTED, KNOWABLE, KNOWN, CountedMaps

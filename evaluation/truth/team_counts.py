@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lidarium.envs.scoring.coverage import count_bits
+from lidarium.envs.simulation.coverage import count_bits
 from lidarium.envs.simulation.kernels.arrays import MAP_RESOLUTION, WorldArrays
 from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.kernels.views import int8_grid_at

@@ -9,12 +9,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.envs.exploration import ExplorationEnv
+from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.floors.floor import Raster
 from lidarium.envs.floors.free_space import reachable_free_space
-from lidarium.envs.scoring.coverage import unpack_bits
-from lidarium.envs.scoring.score import counted_cells
+from lidarium.envs.simulation.coverage import unpack_bits
 from lidarium.envs.simulation.disturbances.odometry import RADIUS
+from lidarium.envs.simulation.score import counted_cells
 from lidarium.evaluation.metrics import surface
 from lidarium.evaluation.metrics.shares import Mask
 

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from lidarium.agents.policy import Policy
 from lidarium.agents.report import GivenUp
 from lidarium.envs.drawing.views import CUT_M, false_colours
-from lidarium.envs.exploration import ExplorationEnv
-from lidarium.envs.radio.messages import Orders
+from lidarium.envs.faces.parallel import ExplorationEnv
+from lidarium.envs.onboard.radio.messages import Orders
 from lidarium.evaluation.episodes.interrupts import is_end_asked
 from lidarium.evaluation.episodes.supervision import joined_groups
 from lidarium.evaluation.episodes.watching import WatchedExploration, Watcher

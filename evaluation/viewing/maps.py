@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.envs.drawing.frame_parts import UNEXPLORED, Colour, Frame, team_colours
-from lidarium.envs.exploration import ExplorationEnv
+from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.evaluation.drawing.maps.joined_maps import overlaid, shades_of
 from lidarium.evaluation.report.page.map_layers import FREE, OCCUPIED, UNKNOWN, coarse, grid_around
 from lidarium.evaluation.truth.beliefs import map_within

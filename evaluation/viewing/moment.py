@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from lidarium.envs.exploration import ExplorationEnv
+from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.simulation.depth.point_cloud import point_cloud
 from lidarium.evaluation.episodes.watching import WatchedExploration
 from lidarium.evaluation.truth.beliefs import believed_on_floor

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.envs.drawing.frame_parts import UNEXPLORED, Colour, Frame, team_colours
-from lidarium.envs.exploration import ExplorationEnv
+from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.evaluation.viewing import meshes
 from lidarium.evaluation.viewing.controls import Layer
 from lidarium.evaluation.viewing.maps import TeamMaps

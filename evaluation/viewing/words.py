@@ -32,7 +32,7 @@ def events_text(env: WatchedExploration, report: PolicyReport) -> str:
     """Return the latest joins, orders and changes of state, the last one first."""
     events = [
         (event.time_s, f"{event.agent}: {event.what}{f' ({event.reason})' if event.reason else ''}")
-        for event in env.operating.events
+        for event in env.operating.events[0]
     ]
     if report.supervision is not None:
         joins = report.supervision.joins

@@ -2,7 +2,6 @@
 
 import math
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -216,10 +215,3 @@ def symmetric_scans(
 def _axis(angle: float, increment: float) -> float:
     """Return the angle of the laser's axis [rad]; 0 where it is a rounded zero."""
     return angle if abs(angle) > 1e-2 * increment else 0.0
-
-
-def __getattr__(name: str) -> Any:  # noqa: ANN401
-    """Return a name that has moved; it warns."""
-    from lidarium.moved import moved_name
-
-    return moved_name(__name__, name)

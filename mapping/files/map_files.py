@@ -289,10 +289,3 @@ def _origin(path: Path, header: dict[str, Any]) -> tuple[float, float, float]:
             f"{MOST_COORDINATE_M:,.0f} at most"
         )
     return x, y, yaw
-
-
-def __getattr__(name: str) -> Any:  # noqa: ANN401
-    """Return a name that has moved; it warns."""
-    from lidarium.moved import moved_name
-
-    return moved_name(__name__, name)

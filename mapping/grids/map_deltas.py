@@ -7,7 +7,6 @@ flips bits of one plane only. Only what the robots can have seen since the last 
 """
 
 import math
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -147,10 +146,3 @@ def levels_of_planes(known: NDArray[np.uint64], occupied: NDArray[np.uint64]) ->
         for plane in (known, occupied)
     )
     return np.asarray(np.array([UNKNOWN, FREE, UNKNOWN, OCCUPIED], np.uint8)[is_known + 2 * is_occupied])
-
-
-def __getattr__(name: str) -> Any:  # noqa: ANN401
-    """Return a name that has moved; it warns."""
-    from lidarium.moved import moved_name
-
-    return moved_name(__name__, name)

@@ -1,6 +1,5 @@
 """What a body covers of a grid while it drives along a trail."""
 
-from typing import Any
 
 import cv2
 import numpy as np
@@ -89,10 +88,3 @@ def _pixels(points: NDArray[np.float64], origin: tuple[float, float], resolution
     Pixels are addressed by their centres.
     """
     return np.rint(((points - origin) / resolution - 0.5) * _CELL).astype(np.int32)
-
-
-def __getattr__(name: str) -> Any:  # noqa: ANN401
-    """Return a name that has moved; it warns."""
-    from lidarium.moved import moved_name
-
-    return moved_name(__name__, name)

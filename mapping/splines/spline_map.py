@@ -1,7 +1,6 @@
 """The map of curves, corners and peaks, and how scans from known poses improve it."""
 
 import math
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -214,10 +213,3 @@ class SplineMap:
             Way(way.points[first : last + 1], way.weights[first : last + 1])
             for first, last in cut.pieces.tolist()
         ]
-
-
-def __getattr__(name: str) -> Any:  # noqa: ANN401
-    """Return a name that has moved; it warns."""
-    from lidarium.moved import moved_name
-
-    return moved_name(__name__, name)

@@ -13,7 +13,7 @@ import tempfile
 import time
 from typing import Any
 
-from lidarium.envs.starting.first_reset import LIST
+from lidarium.envs.engine.first_reset import LIST
 from lidarium.mapping.kernels.first_start.listed_kernels import encode_type
 from lidarium.mapping.kernels.first_start.side_by_side import SWITCH
 

@@ -7,7 +7,7 @@ from lidarium.scripts.output.transforms import PlacedMaps, transforms
 
 if TYPE_CHECKING:
     from lidarium.agents.report import TeamMaps
-    from lidarium.envs.exploration import ExplorationEnv
+    from lidarium.envs.faces.parallel import ExplorationEnv
     from lidarium.evaluation.episodes.runner import Episode
 
 
@@ -57,7 +57,7 @@ def _write_own_map(folder: Path, env: "ExplorationEnv", robot: int) -> None:
     """Write what a robot's own map knows, in that robot's map frame."""
     import numpy as np
 
-    from lidarium.envs.station.reports import known_map
+    from lidarium.envs.onboard.station.reports import known_map
     from lidarium.mapping.files.map_files import write_ros_map
     from lidarium.mapping.grids.occupancy import UNKNOWN
 
@@ -72,7 +72,7 @@ def _write_own_map(folder: Path, env: "ExplorationEnv", robot: int) -> None:
 def _team_maps(episode: "Episode") -> "TeamMaps":
     """Return how the robots' maps lie: as a station knows, else as the robots do."""
     from lidarium.agents.report import JoinedGroup, TeamMaps
-    from lidarium.envs.wrappers.merged_maps import true_frames
+    from lidarium.envs.faces.merged_maps import true_frames
     from lidarium.mapping.geometry.rigid import Transform
 
     known, env = episode.policy.team_maps(), episode.env

@@ -1,12 +1,12 @@
-"""lidarium: teams of lidar robots explore unknown floors.
+"""lidarium: teams of lidar robots explore unknown floors, in PettingZoo and Gymnasium environments.
 
-``parallel_env`` makes the PettingZoo environment, ``env`` its turn-based form, ``vector_env`` and
-``sb3_vec_env`` many episodes at once, and after ``import lidarium`` Gymnasium knows
-``lidarium/Exploration-v1``, ``lidarium/WaypointExploration-v1``, ``lidarium/FrontierExploration-v1`` and
-``lidarium/Exploration3D-v1``.
+Everything that users need is here, and is imported when it is first used. All other modules are internal and may move.
+After ``import lidarium`` Gymnasium and PettingZoo know ``lidarium/Exploration-v1``,
+``lidarium/WaypointExploration-v1``, ``lidarium/FrontierExploration-v1`` and ``lidarium/Exploration3D-v1``.
 """
 
 import sys
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 import gymnasium
@@ -15,29 +15,108 @@ import pettingzoo
 if TYPE_CHECKING:
     from importlib.machinery import ModuleSpec
 
-    from pettingzoo import AECEnv, ParallelEnv
-
-    from lidarium.agents.policy import Policy
-    from lidarium.envs.batch.stable_baselines import ExplorationVecEnv
-    from lidarium.envs.batch.vector_env import ExplorationVectorEnv
-    from lidarium.envs.floors.floor_choice import Floors
+    from lidarium.agents.catalogue import make_policy as policy
+    from lidarium.agents.catalogue import register_policy
+    from lidarium.agents.policy import PerRobot, Policy, Stop
+    from lidarium.envs.engine.reward_terms import reward_term
+    from lidarium.envs.faces.makers import env, parallel_env, sb3_vec_env, vector_env
+    from lidarium.envs.faces.merged_maps import MergedMaps
+    from lidarium.envs.faces.parallel import ExplorationEnv
+    from lidarium.envs.faces.sparse_planning import SparsePlanning
+    from lidarium.envs.faces.team_exchange import MergingSettings
+    from lidarium.envs.floors.catalogue.names import load_floor
+    from lidarium.envs.floors.floor import Floor, Solid
+    from lidarium.envs.levels import level
+    from lidarium.envs.observing.observables import observable
+    from lidarium.envs.onboard.radio.messages import Order, OrderKind, Route, Target
+    from lidarium.envs.settings.battery import Battery
     from lidarium.envs.settings.exploration import ExplorationSettings
-    from lidarium.envs.settings.reset_options import Curriculum
+    from lidarium.envs.settings.faults import Fault, FaultSettings
+    from lidarium.envs.settings.lidar import Lidar
+    from lidarium.envs.settings.making import make_settings
+    from lidarium.envs.settings.odometry import OdometrySettings
+    from lidarium.envs.settings.radio import RadioSettings
+    from lidarium.envs.settings.rewards import RewardSettings
+    from lidarium.envs.settings.robots import Robot
+    from lidarium.envs.settings.sensors.cameras import DepthCamera
+    from lidarium.evaluation.episodes.runner import run_episode
+    from lidarium.mapping.merging.merger import merge_maps
+    from lidarium.mapping.merging.settings import MergeSettings
+    from lidarium.registry import registry
 
-__version__ = "0.2.0"
+__version__ = "0.3.0"
+
+_FACE: dict[str, str] = {
+    "Battery": "lidarium.envs.settings.battery",
+    "DepthCamera": "lidarium.envs.settings.sensors.cameras",
+    "ExplorationEnv": "lidarium.envs.faces.parallel",
+    "ExplorationSettings": "lidarium.envs.settings.exploration",
+    "Fault": "lidarium.envs.settings.faults",
+    "FaultSettings": "lidarium.envs.settings.faults",
+    "Floor": "lidarium.envs.floors.floor",
+    "Lidar": "lidarium.envs.settings.lidar",
+    "MergeSettings": "lidarium.mapping.merging.settings",
+    "MergedMaps": "lidarium.envs.faces.merged_maps",
+    "MergingSettings": "lidarium.envs.faces.team_exchange",
+    "OdometrySettings": "lidarium.envs.settings.odometry",
+    "Order": "lidarium.envs.onboard.radio.messages",
+    "OrderKind": "lidarium.envs.onboard.radio.messages",
+    "PerRobot": "lidarium.agents.policy",
+    "Policy": "lidarium.agents.policy",
+    "RadioSettings": "lidarium.envs.settings.radio",
+    "RewardSettings": "lidarium.envs.settings.rewards",
+    "Robot": "lidarium.envs.settings.robots",
+    "Route": "lidarium.envs.onboard.radio.messages",
+    "Solid": "lidarium.envs.floors.floor",
+    "SparsePlanning": "lidarium.envs.faces.sparse_planning",
+    "Stop": "lidarium.agents.policy",
+    "Target": "lidarium.envs.onboard.radio.messages",
+    "env": "lidarium.envs.faces.makers",
+    "level": "lidarium.envs.levels",
+    "load_floor": "lidarium.envs.floors.catalogue.names",
+    "make_settings": "lidarium.envs.settings.making",
+    "merge_maps": "lidarium.mapping.merging.merger",
+    "observable": "lidarium.envs.observing.observables",
+    "parallel_env": "lidarium.envs.faces.makers",
+    "policy": "lidarium.agents.catalogue:make_policy",
+    "register_policy": "lidarium.agents.catalogue",
+    "registry": "lidarium.registry",
+    "reward_term": "lidarium.envs.engine.reward_terms",
+    "run_episode": "lidarium.evaluation.episodes.runner",
+    "sb3_vec_env": "lidarium.envs.faces.makers",
+    "vector_env": "lidarium.envs.faces.makers",
+}
+"""The module of each public name; ``module:name`` if it is called otherwise there."""
+
+__all__ = [*_FACE, "__version__"]  # pyright: ignore[reportUnsupportedDunderAll]
+
+
+def __getattr__(name: str) -> Any:  # noqa: ANN401
+    """Import a public name when it is first used."""
+    if name not in _FACE:
+        raise AttributeError(f"module 'lidarium' has no attribute {name!r}")
+    module, _, attribute = _FACE[name].partition(":")
+    found = getattr(import_module(module), attribute or name)
+    globals()[name] = found
+    return found
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})
 
 
 class _MovedModules:
-    """Asks ``lidarium.moved`` for modules of the package that no other finder has."""
+    """Names the new module when a path of release 0.2 is imported."""
 
     @staticmethod
     def find_spec(name: str, path: object = None, target: object = None) -> "ModuleSpec | None":
-        """Return the spec of a module by its old name, None for any other."""
+        """Raise ImportError for a module that has moved; return None for any other."""
         if not name.startswith("lidarium.") or name == "lidarium.moved":
             return None
-        from lidarium.moved import MovedModules
+        from lidarium.moved import check_moved
 
-        return MovedModules().find_spec(name, path, target)
+        check_moved(name)
+        return None
 
 
 if not any(getattr(finder, "__name__", "") == _MovedModules.__name__ for finder in sys.meta_path):
@@ -51,16 +130,16 @@ _IDS: dict[str, dict[str, Any]] = {
     "FrontierExploration": {"level": "frontier", "observe": _SEES},
     "Exploration3D": {"level": "velocity", "camera": "xtion", "observe": (*_SEES, "depth")},
 }
-"""What each id means; options of the maker go before."""
+"""The options of each id; options of the maker go before."""
 
 _VERSIONS: dict[int, dict[str, Any]] = {
     0: {"starts": "fixed", "frontiers": 16, "least_frontier": 0.1, "frontiers_by_size": 0.0},
     1: {"starts": "drawn"},
 }
-"""Options of each version of the ids: those whose defaults have changed since, or that a seed needs."""
+"""Options of each version of the ids: those that have other defaults since, or that a seed needs."""
 
 _UNSEEN: dict[int, tuple[str, ...]] = {0: (), 1: ("pose",)}
-"""What each version shows only where ``observe`` asks for it: learners overfit to places."""
+"""What each version shows only if ``observe`` asks for it: learners overfit to positions."""
 
 
 def _register(name: str, version: int, options: dict[str, Any]) -> None:
@@ -70,8 +149,8 @@ def _register(name: str, version: int, options: dict[str, Any]) -> None:
         return
     gymnasium.register(
         id=registered,
-        entry_point="lidarium.envs.levels.gymnasium_env:SoloExploration",
-        vector_entry_point="lidarium.envs.batch.vector_env:make_vector_env",
+        entry_point="lidarium.envs.faces.gymnasium_env:SoloExploration",
+        vector_entry_point="lidarium.envs.faces.vector_env:make_vector_env",
         kwargs=options,
     )
     # Versions of PettingZoo before 1.27 have no register of environments.
@@ -85,136 +164,3 @@ for _name, _options in _IDS.items():
     for _version, _more in _VERSIONS.items():
         _sees = tuple(each for each in _options["observe"] if each not in _UNSEEN[_version])
         _register(_name, _version, {**_options, **_more, "observe": _sees})
-
-
-def parallel_env(
-    floor: "Floors" = "apartment",
-    *,
-    level: str = "velocity",
-    settings: "ExplorationSettings | None" = None,
-    render_mode: str | None = None,
-    image_resolution: float | None = None,
-    curriculum: "Curriculum | None" = None,
-    **options: Any,  # noqa: ANN401
-) -> "ParallelEnv[str, Any, Any]":
-    """Make a team's environment (PettingZoo parallel API).
-
-    Parameters
-    ----------
-    floor : str, Path, Floor, sequence, mapping or callable
-        A catalogue name, ``building:SEED``, ``set:NAME``, a file that the importers know, or a floor; many
-        of them as a list, a folder, a mapping to weights, or a callable of a generator.
-    level : str
-        What an action is: ``velocity`` (shares of the greatest speed and turn rate), ``waypoint`` (a point of
-        the observed map) or ``frontier`` (one of the frontiers in reach).
-    settings : ExplorationSettings or None
-        Where the options start from.
-    render_mode : str or None
-        ``human``, ``rgb_array`` or None.
-    image_resolution : float or None
-        Side of a pixel [m] where the floor is a plain image.
-    curriculum : callable or None
-        Takes the number of an episode, from 0 on, and returns options of ``reset`` for it.
-    **options
-        Any attribute of ``ExplorationSettings``, such as ``robots=3`` or ``horizon_s=None``; ``robot`` and
-        ``lidar`` by name; ``noise`` (none, datasheet, thesis), ``resolution`` of the maps [m], ``max_cycles``
-        [steps]; and ``Conventions``: ``observation``, ``action_mask``, ``infos``, ``ended_agents``,
-        ``team_reward``, ``comm``; ``randomize``: distributions of settings by name, drawn for each episode.
-
-    Returns
-    -------
-    ParallelEnv
-        The environment.
-
-    Raises
-    ------
-    ValueError, TypeError, FileNotFoundError
-        Where an option or the floor cannot be used.
-    """
-    from lidarium.envs.levels.teams import TeamPlan, make_team
-
-    plan = TeamPlan(floor, level, render_mode, image_resolution, curriculum)
-    made: ParallelEnv[str, Any, Any] = make_team(plan, options, settings)
-    return made
-
-
-def env(floor: "Floors" = "apartment", **options: Any) -> "AECEnv[str, Any, Any]":  # noqa: ANN401
-    """Make a team's environment in PettingZoo's turn-based form.
-
-    Options as for ``parallel_env``.
-    """
-    from pettingzoo.utils.conversions import parallel_to_aec
-
-    converted: AECEnv[str, Any, Any] = parallel_to_aec(parallel_env(floor, **options))
-    return converted
-
-
-def vector_env(
-    episodes: int,
-    floor: "Floors" = "apartment",
-    **options: Any,  # noqa: ANN401
-) -> "ExplorationVectorEnv":
-    """Make many episodes as one Gymnasium vector environment.
-
-    It is stepped by one kernel call and has a row for every robot.
-
-    Parameters
-    ----------
-    episodes : int
-        How many; ``num_envs`` is episodes x robots.
-    floor : Floors
-        As for ``parallel_env``; of a set such as ``set:train``, each beginning draws one.
-    **options
-        ``level``, ``image_resolution`` and the options of ``parallel_env``; ``copy=False`` for observations
-        in two sets of arrays that take turns; with ``randomize`` each episode is a batch of its own.
-
-    Raises
-    ------
-    ValueError, TypeError, FileNotFoundError
-        Where an option or the floor cannot be used.
-    """
-    if options.get("randomize") is not None:
-        from lidarium.envs.batch.randomized_rows import RandomizedVectorEnv
-
-        # It has the same rows, and a batch for each episode.
-        randomized: Any = RandomizedVectorEnv(episodes, floor=floor, **options)
-        return randomized  # type: ignore[no-any-return]
-    from lidarium.envs.batch.vector_env import ExplorationVectorEnv
-
-    return ExplorationVectorEnv(episodes, floor, **options)
-
-
-def sb3_vec_env(
-    episodes: int,
-    floor: "Floors" = "apartment",
-    **options: Any,  # noqa: ANN401
-) -> "ExplorationVecEnv":
-    """Make the same rows as ``vector_env`` for stable-baselines3.
-
-    It resets in the step that ends an episode, and needs ``lidarium[rl]``.
-
-    Raises
-    ------
-    ImportError
-        Where stable-baselines3 is not installed.
-    ValueError, TypeError, FileNotFoundError
-        Where an option or the floor cannot be used.
-    """
-    from lidarium.envs.batch.stable_baselines import ExplorationVecEnv
-
-    return ExplorationVecEnv(episodes, floor, **options)
-
-
-def policy(name: str, **settings: Any) -> "Policy":  # noqa: ANN401
-    """Make a policy by name, such as ``nearest_frontier``, or your own by ``module:Class``.
-
-    ``lidarium show policies`` lists them.
-
-    Raises
-    ------
-    ValueError
-        Where the name is unknown; the message suggests the nearest one.
-    """
-    from lidarium.agents import make_policy
-
-    return make_policy(name, **settings)

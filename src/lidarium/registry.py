@@ -26,7 +26,7 @@ REGISTRIES: dict[str, str] = {
     "localizer": "lidarium.mapping.localization.registry:LOCALIZERS",
     "floor_format": "lidarium.envs.floors.importers:FORMATS",
     "study": "lidarium.benchmarks.studies:STUDIES",
-    "reward_term": "lidarium.envs.outcome.reward_terms:REWARD_TERMS",
+    "reward_term": "lidarium.envs.engine.reward_terms:REWARD_TERMS",
     "backend": "lidarium.envs.simulation.backends:BACKENDS",
 }
 """All registries by kind, and where each is."""

@@ -11,7 +11,7 @@ from all_observed import ALL
 
 import lidarium
 from lidarium.agents import GivenUp, PerRobot, Policy, Stop, policy_names
-from lidarium.envs.radio.messages import Target
+from lidarium.envs.onboard.radio.messages import Target
 from lidarium.evaluation.episodes.runner import run_episode
 
 FRONTIER_POLICIES = (

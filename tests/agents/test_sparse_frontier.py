@@ -13,7 +13,7 @@ from lidarium.agents.sparse_frontier import SparseFrontier
 from lidarium.agents.sparse_work import PATIENCE_S
 from lidarium.envs.floors.floor import Floor, Solid
 from lidarium.envs.floors.free_space import reachable_free_space
-from lidarium.envs.radio.messages import DriveState
+from lidarium.envs.onboard.radio.messages import DriveState
 from lidarium.envs.settings.making import make_settings
 from lidarium.evaluation.episodes.runner import run_episode
 from lidarium.evaluation.suites.suite import Suite

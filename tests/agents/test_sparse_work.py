@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from lidarium.agents.sparse_work import BLOCKED_S, CLAIMED_M, OBSTACLE_S, PATIENCE_S, STUCK_S, Work
-from lidarium.envs.radio.messages import DriveState
+from lidarium.envs.onboard.radio.messages import DriveState
 from lidarium.mapping.sparse.exploring.views import View
 
 HERE = np.array([1.0, 2.0, 3.0])

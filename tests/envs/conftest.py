@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import lidarium
-from lidarium.envs.batch.vector_env import ExplorationVectorEnv
+from lidarium.envs.faces.vector_env import ExplorationVectorEnv
 
 SMALL = {
     "lidar": "lidar_360_6m",

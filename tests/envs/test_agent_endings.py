@@ -8,7 +8,7 @@ from linked_rooms import TWO_ROOMS
 import lidarium
 from lidarium.envs.agent_endings import AgentEndings
 from lidarium.envs.onboard.meters import Meters
-from lidarium.envs.radio.messages import OperatingState
+from lidarium.envs.onboard.radio.messages import OperatingState
 from lidarium.envs.simulation.kernels.arrays import ENDED
 
 

@@ -6,7 +6,7 @@ from linked_rooms import TWO_ROOMS
 import lidarium
 from lidarium.envs.agent_infos import AgentInfos
 from lidarium.envs.onboard.meters import Meters
-from lidarium.envs.radio.messages import Order, OrderKind
+from lidarium.envs.onboard.radio.messages import Order, OrderKind
 
 
 def team(**options):

@@ -7,7 +7,7 @@ from linked_rooms import TWO_ROOMS
 
 import lidarium
 from lidarium.envs.agent_observations import AgentObservations
-from lidarium.envs.episode_start import EpisodeStart
+from lidarium.envs.engine.episode_start import EpisodeStart
 from lidarium.envs.onboard.known_poses import KnownPoses
 from lidarium.envs.simulation.kernels.floor_cache import floor_tables
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from lidarium.envs.episode_start import begin, goal_of_robots, map_frames
+from lidarium.envs.engine.episode_start import begin, goal_of_robots, map_frames
 from lidarium.envs.floors.floor import Floor
 from lidarium.envs.floors.floor_choice import FloorChoice
 from lidarium.envs.settings.making import make_settings

@@ -7,7 +7,7 @@ import weakref
 import pytest
 
 import lidarium
-from lidarium.envs.exploration import ExplorationEnv
+from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.settings.making import make_settings
 from lidarium.evaluation.episodes.history import History
 from lidarium.evaluation.episodes.result import result_of

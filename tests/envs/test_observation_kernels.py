@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from linked_rooms import TWO_ROOMS
 
-from lidarium.envs.episode_start import make_simulation
-from lidarium.envs.observation_kernels import write_parallel, write_serial
-from lidarium.envs.observation_spaces import FARTHEST
-from lidarium.envs.observations import ObservationWriter
+from lidarium.envs.engine.episode_start import make_simulation
+from lidarium.envs.observing.kernels import write_parallel, write_serial
+from lidarium.envs.observing.spaces import FARTHEST
+from lidarium.envs.observing.writer import ObservationWriter
 from lidarium.envs.settings.making import make_settings
 from lidarium.envs.simulation.kernels.floor_cache import floor_tables
 from lidarium.envs.simulation.kernels.scanning import RANGE_GAP

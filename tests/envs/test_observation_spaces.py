@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from lidarium.envs.observation_spaces import (
+from lidarium.envs.observing.spaces import (
     KERNEL_SUMMARIES,
     action_space,
     boxes_of,

@@ -13,10 +13,10 @@ from all_observed import ALL
 
 import lidarium
 from lidarium.agents.random_walk import RandomWalk
-from lidarium.envs.exploration import ExplorationEnv
+from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.floors.floor import Floor
-from lidarium.envs.observation_spaces import observation_space
-from lidarium.envs.observations import ObservationWriter
+from lidarium.envs.observing.spaces import observation_space
+from lidarium.envs.observing.writer import ObservationWriter
 from lidarium.envs.settings.exploration import OBSERVABLES
 from lidarium.envs.settings.making import make_settings
 from lidarium.evaluation.episodes.runner import run_episode

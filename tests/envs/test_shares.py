@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from lidarium.envs.shares import scale_shares
+from lidarium.envs.levels.shares import scale_shares
 
 
 def test_shares_are_cut_to_1_and_scaled_by_the_limits_of_their_robot():

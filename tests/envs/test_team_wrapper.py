@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import lidarium
-from lidarium.envs.radio.messages import Order
-from lidarium.envs.team_wrapper import TeamWrapper
+from lidarium.envs.onboard.radio.messages import Order
+from lidarium.envs.faces.wrapper import TeamWrapper
 
 SMALL = {"robots": 2, "map_cells": 32, "lidar": "lidar_360_6m"}
 

@@ -8,7 +8,7 @@ import pytest
 
 from lidarium.agents.srt.settings import SrtSettings
 from lidarium.agents.supervisor.settings import SupervisorSettings
-from lidarium.envs.wrappers.merged_maps import MergingSettings
+from lidarium.envs.faces.merged_maps import MergingSettings
 from lidarium.mapping.geometry.bounds import UNBOUNDED, rules_of
 from lidarium.mapping.grids.occupancy import OccupancySettings
 from lidarium.mapping.grids.scan_geometry import ScanGeometry

@@ -489,7 +489,7 @@ def test_a_run_interrupted_before_it_begins_writes_nothing(tmp_path, capsys, mon
     def interrupt(*_, **__):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("lidarium.envs.exploration.ExplorationEnv.reset", interrupt)
+    monkeypatch.setattr("lidarium.envs.faces.parallel.ExplorationEnv.reset", interrupt)
     assert main(["run", "--json", "--out", str(tmp_path / "out")]) == 130
     assert capsys.readouterr().out == ""
     assert not (tmp_path / "out").exists()

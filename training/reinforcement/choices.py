@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from lidarium.agents.learned.decision import Decision
 from lidarium.agents.learned.policy import ChosenTours
 from lidarium.agents.tours.policy import TourFrontier
-from lidarium.envs.exploration import ExplorationEnv
+from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.evaluation.episodes.runner import run_episode
 from lidarium.evaluation.suites.starts import drawn_starts
 from lidarium.training.places import Place

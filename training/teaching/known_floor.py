@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.envs.exploration import ExplorationEnv
+from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.simulation.kernels.floor_cache import floor_tables
 from lidarium.evaluation.bounds.view_graph import ViewGraph, bits_of, count, view_graph
 

@@ -10,7 +10,7 @@ import torch
 from lidarium.agents.learned.decision import Chooser, choose_classic
 from lidarium.agents.learned.network import Network
 from lidarium.agents.learned.weights import load_weights, save_weights
-from lidarium.envs.exploration import ExplorationEnv
+from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.evaluation.episodes.output import write_json
 from lidarium.evaluation.episodes.runner import run_episode
 from lidarium.evaluation.suites.starts import drawn_starts

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from lidarium.agents.learned.decision import Chooser, Decision, Scene
 from lidarium.agents.learned.policy import ChosenTours
 from lidarium.agents.tours.planning import NO_PATH, TourOptions
-from lidarium.envs.exploration import ExplorationEnv
+from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.evaluation.bounds.view_graph import count
 from lidarium.mapping.planning.touring.team_tours import TourWeights, team_tours, tours_cost
 from lidarium.training.teaching.known_floor import KnownFloor, known_floor

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from lidarium.agents.srt.memories.memory import Frontiers, Legs, Place
 from lidarium.agents.srt.tree import Node
-from lidarium.envs.driving.path_planner import footprint_of
+from lidarium.envs.onboard.driving.path_planner import footprint_of
 from lidarium.envs.onboard.navigation import NavigationMap
 from lidarium.mapping.planning.frontier_approach import approach, default_reach
 from lidarium.mapping.planning.frontier_kernels import FRONTIER

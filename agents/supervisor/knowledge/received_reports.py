@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.agents.supervisor.settings import SupervisorSettings
-from lidarium.envs.radio.messages import OperatingState
-from lidarium.envs.station.reports import Report
+from lidarium.envs.onboard.radio.messages import OperatingState
+from lidarium.envs.onboard.station.reports import Report
 from lidarium.mapping.grids.occupancy import UNKNOWN
 
 

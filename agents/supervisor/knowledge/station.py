@@ -10,10 +10,10 @@ from lidarium.agents.report import Join, JoinedGroup, TeamMaps
 from lidarium.agents.supervisor.knowledge.received_reports import ReceivedReports
 from lidarium.agents.supervisor.log import StationEvent
 from lidarium.agents.supervisor.settings import SupervisorSettings
-from lidarium.envs.radio.messages import OperatingState
-from lidarium.envs.station.joining import TEAM_CONFIRMATION, team_confirmation
-from lidarium.envs.station.reports import Report
-from lidarium.envs.station.trails import without_bodies, without_own_trail
+from lidarium.envs.onboard.radio.messages import OperatingState
+from lidarium.envs.onboard.station.joining import TEAM_CONFIRMATION, team_confirmation
+from lidarium.envs.onboard.station.reports import Report
+from lidarium.envs.onboard.station.trails import without_bodies, without_own_trail
 from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.merging.agreement.validation import ValidationSettings
 from lidarium.mapping.merging.description.resampling import resampled

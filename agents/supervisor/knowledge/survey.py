@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from lidarium.agents.supervisor.knowledge.goals import NONE, find_goals
 from lidarium.agents.supervisor.settings import SupervisorSettings
 from lidarium.envs.onboard.navigation import NavigationMap
-from lidarium.envs.station.reports import Report
+from lidarium.envs.onboard.station.reports import Report
 from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.grids.grid_lines import visible
 from lidarium.mapping.grids.occupancy import FREE, OCCUPIED

@@ -13,7 +13,7 @@ from lidarium.benchmarks.speed.harness.report import run_alone
 from lidarium.benchmarks.speed.harness.timing import Effort
 from lidarium.benchmarks.speed.scenes.floors import BenchFloor, straight_floor, turned_floor
 from lidarium.benchmarks.speed.scenes.teams import LIDAR
-from lidarium.envs.exploration import ExplorationEnv
+from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.settings.making import make_settings
 
 ROBOTS = 3

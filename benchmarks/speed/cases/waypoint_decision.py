@@ -20,7 +20,7 @@ from lidarium.benchmarks.speed.harness.report import run_alone
 from lidarium.benchmarks.speed.harness.timing import Effort
 from lidarium.benchmarks.speed.scenes.floors import straight_floor
 from lidarium.benchmarks.speed.scenes.teams import LIDAR
-from lidarium.envs.radio.messages import DriveState
+from lidarium.envs.onboard.radio.messages import DriveState
 from lidarium.mapping.grids.occupancy import three_levels
 
 CORES = 2

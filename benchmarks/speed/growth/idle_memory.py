@@ -14,7 +14,7 @@ import numpy as np
 from lidarium.benchmarks.speed.harness.batches import OBSERVED, ROBOTS
 from lidarium.benchmarks.speed.scenes.floors import straight_floor
 from lidarium.benchmarks.speed.scenes.teams import LIDAR
-from lidarium.envs.batch.vector_env import ExplorationVectorEnv
+from lidarium.envs.faces.vector_env import ExplorationVectorEnv
 from lidarium.envs.simulation.simulation import Simulation
 
 

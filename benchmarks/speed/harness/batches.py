@@ -12,7 +12,7 @@ import lidarium
 from lidarium.benchmarks.speed.harness.timing import cores
 from lidarium.benchmarks.speed.scenes.floors import BenchFloor
 from lidarium.benchmarks.speed.scenes.teams import DRAWS, HOLD, drawn_commands
-from lidarium.envs.batch.running import STEPS
+from lidarium.envs.engine.running import STEPS
 from lidarium.mapping.kernels.compilation import available_threads
 
 EPISODES, ROBOTS = 64, 2

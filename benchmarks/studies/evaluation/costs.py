@@ -16,7 +16,7 @@ from typing import Any
 from unittest import mock
 
 import lidarium
-from lidarium.envs.exploration import ExplorationEnv
+from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.evaluation.episodes.history import History
 from lidarium.evaluation.episodes.result import result_of
 from lidarium.evaluation.episodes.runner import run_episode

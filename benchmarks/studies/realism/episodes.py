@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 import lidarium
-from lidarium.envs.exploration import ExplorationEnv
-from lidarium.envs.scoring.coverage import unpack_bits
+from lidarium.envs.faces.parallel import ExplorationEnv
+from lidarium.envs.simulation.coverage import unpack_bits
 from lidarium.envs.settings.making import make_settings
 from lidarium.evaluation.episodes.history import History
 from lidarium.evaluation.episodes.result import result_of

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from lidarium.agents import make_policy
-from lidarium.envs.exploration import ExplorationEnv
+from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.settings.making import make_settings
 from lidarium.evaluation.episodes.result import map_figures
 from lidarium.evaluation.episodes.runner import run_episode

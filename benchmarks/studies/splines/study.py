@@ -27,7 +27,7 @@ from lidarium.benchmarks.studies.shared.kept import Progress, do_missing, kept_l
 from lidarium.benchmarks.studies.shared.map_figures import MapFigures, map_figures
 from lidarium.benchmarks.studies.shared.study import Study
 from lidarium.benchmarks.studies.splines import buildings
-from lidarium.envs.exploration import ExplorationEnv
+from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.floors.catalogue.names import load_floor
 from lidarium.envs.floors.floor import Floor
 from lidarium.envs.settings.making import make_settings

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from lidarium.agents.srt.policy import SensorBasedRandomTree
 from lidarium.benchmarks.studies.shared.map_figures import MapFigures, map_figures
 from lidarium.benchmarks.studies.srt.shortest_path import shortest_path
-from lidarium.envs.exploration import ExplorationEnv
+from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.settings.making import make_settings
 from lidarium.evaluation.episodes.runner import Episode, run_episode
 from lidarium.evaluation.episodes.watching import WatchedExploration, Watcher

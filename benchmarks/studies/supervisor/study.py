@@ -31,7 +31,7 @@ from lidarium.benchmarks.studies.supervisor.suites import (
     five_floors,
     suites,
 )
-from lidarium.envs.exploration import ExplorationEnv
+from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.evaluation.episodes.output import write_json
 from lidarium.evaluation.episodes.runner import run_episode
 from lidarium.evaluation.episodes.supervision import decision_lines

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from ppo import ROBOT, Report, Scorer, Settings, as_tensors, train
 
 import lidarium
-from lidarium.envs.exploration import ExplorationEnv
+from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.floors.catalogue.names import set_floors
 from lidarium.envs.settings.making import make_settings
 from lidarium.evaluation.episodes.output import write_json, write_text

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from lidarium.envs.scoring.coverage import mark_seen
+from lidarium.envs.simulation.coverage import mark_seen
 from lidarium.envs.simulation.kernels.arrays import (
     ANGLE_INCREMENT,
     COUNTED_MASK,

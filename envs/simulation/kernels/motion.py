@@ -6,7 +6,6 @@ ever ends a step inside a solid cell or another robot.
 """
 
 import math
-from typing import Any
 
 from lidarium.envs.simulation.disturbances.odometry import (
     MAX_ACCELERATION,
@@ -138,10 +137,3 @@ def move_robots(grids: BodyGrids, team: TeamBodies, commands: Array, duration: f
         team.travelled[robot] += math.hypot(x - start_x, y - start_y)
         poses[robot, 0], poses[robot, 1], poses[robot, 2] = x, y, wrapped(heading)
         velocities[robot, 0], velocities[robot, 1] = speed, turn_rate
-
-
-def __getattr__(name: str) -> Any:  # noqa: ANN401
-    """Return a name that has moved; it warns."""
-    from lidarium.moved import moved_name
-
-    return moved_name(__name__, name)

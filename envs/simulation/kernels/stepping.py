@@ -9,8 +9,7 @@ import math
 
 import numba
 
-from lidarium.envs.scoring.coverage import share_new_cells
-from lidarium.envs.scoring.rewards import add_rewards
+from lidarium.envs.simulation.coverage import share_new_cells
 from lidarium.envs.simulation.disturbances.faults import DEAD_ROBOT, has_fault, kidnap, stick_wheels
 from lidarium.envs.simulation.disturbances.noise import stream_key
 from lidarium.envs.simulation.disturbances.odometry import (
@@ -43,6 +42,7 @@ from lidarium.envs.simulation.kernels.map_updates import (
 from lidarium.envs.simulation.kernels.masks import score_robot
 from lidarium.envs.simulation.kernels.motion import body_grids, move_robots, team_of
 from lidarium.envs.simulation.kernels.scanning import disturb_robot, scan_scratch, sense_robot
+from lidarium.envs.simulation.rewards import add_rewards
 from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.kernels.views import word_grid_at
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from lidarium.envs.drawing.frame_parts import BORDER, Frame, View
 from lidarium.envs.drawing.rendering import draw_frame
-from lidarium.envs.exploration import ExplorationEnv
+from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.evaluation.drawing.films.formats import FilmSettings
 from lidarium.evaluation.drawing.films.writing import FilmWriter, film_writer
 from lidarium.evaluation.episodes.watching import Watcher

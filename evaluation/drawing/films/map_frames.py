@@ -29,7 +29,7 @@ from lidarium.envs.drawing.frame_parts import (
     with_header,
 )
 from lidarium.envs.drawing.rendering import view_of
-from lidarium.envs.exploration import ExplorationEnv
+from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.evaluation.drawing.films.own_maps import JOINED, OwnMaps
 from lidarium.evaluation.drawing.maps.joined_maps import overlaid, shades_of
 from lidarium.evaluation.episodes.supervision import joined_groups

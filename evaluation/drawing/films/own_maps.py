@@ -21,7 +21,7 @@ from lidarium.envs.drawing.frame_parts import (
     team_colours,
     view_around,
 )
-from lidarium.envs.exploration import ExplorationEnv
+from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.mapping.grids.occupancy import FREE, OCCUPIED, UNKNOWN, three_levels
 
 JOINED: Colour = (13, 148, 136)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.envs.drawing.frame_parts import team_colours
-from lidarium.envs.exploration import ExplorationEnv
+from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.floors.floor import Floor
 from lidarium.evaluation.drawing.record_frames import radius_of
 from lidarium.evaluation.record.episode_record import EpisodeRecord

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.envs.exploration import ExplorationEnv
+from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.evaluation.episodes.watching import Watcher
 from lidarium.evaluation.report.page.map_layers import Grid, Layer, coarse, grid_around
 from lidarium.evaluation.truth.beliefs import believed_on_floor, map_within

@@ -8,7 +8,7 @@ from lidarium.agents.learned.decision import choose_classic
 from lidarium.agents.learned.features import OPTION_FEATURES, SITUATION_FEATURES, TEAMMATE_FEATURES
 from lidarium.agents.learned.policy import ChosenTours
 from lidarium.agents.tours.policy import TourFrontier
-from lidarium.envs.exploration import ExplorationEnv
+from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.settings.making import make_settings
 from lidarium.evaluation.episodes.runner import run_episode
 

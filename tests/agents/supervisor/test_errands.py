@@ -9,7 +9,7 @@ from lidarium.agents.policy import Stop
 from lidarium.agents.supervisor.errands import LOST_S, PATIENCE_S, Errands
 from lidarium.agents.supervisor.supervisor import Command
 from lidarium.envs.onboard.navigation import NavigationMap
-from lidarium.envs.radio.messages import DriveState, OrderKind, Target
+from lidarium.envs.onboard.radio.messages import DriveState, OrderKind, Target
 
 
 def known_up_to(column):

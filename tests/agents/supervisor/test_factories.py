@@ -6,7 +6,7 @@ import pytest
 from lidarium.agents import make_policy
 from lidarium.agents.learned.network import shapes
 from lidarium.agents.learned.weights import save_weights
-from lidarium.envs.exploration import ExplorationEnv
+from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.settings.making import make_settings
 from lidarium.evaluation.episodes.runner import run_episode
 

@@ -7,8 +7,8 @@ from reported_halls import RADIUS, RESOLUTION, hall, report
 from lidarium.agents.supervisor.knowledge.station import MergeStation
 from lidarium.agents.supervisor.settings import SupervisorSettings
 from lidarium.agents.supervisor.supervisor import Supervisor
-from lidarium.envs.driving.path_planner import footprint_of
-from lidarium.envs.radio.messages import OrderKind
+from lidarium.envs.onboard.driving.path_planner import footprint_of
+from lidarium.envs.onboard.radio.messages import OrderKind
 from lidarium.mapping.merging.growing_maps import GrowingMap
 
 

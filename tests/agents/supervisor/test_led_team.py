@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import pytest
 
 from lidarium.agents.supervisor.led_team import LedTeam
-from lidarium.envs.radio.messages import DriveState
+from lidarium.envs.onboard.radio.messages import DriveState
 
 
 def led(exploring):

@@ -5,7 +5,7 @@ import math
 
 from lidarium.agents.supervisor.log import Decision, StationEvent
 from lidarium.agents.supervisor.tree import RobotInputs
-from lidarium.envs.radio.messages import OperatingState
+from lidarium.envs.onboard.radio.messages import OperatingState
 
 
 def inputs(agent, remaining_m):

@@ -8,7 +8,7 @@ from reported_halls import RADIUS, RESOLUTION, hall, report
 
 from lidarium.agents.supervisor.knowledge.station import MergeStation
 from lidarium.agents.supervisor.settings import SupervisorSettings
-from lidarium.envs.radio.messages import OperatingState, OrderKind
+from lidarium.envs.onboard.radio.messages import OperatingState, OrderKind
 from lidarium.mapping.merging.growing_maps import GrowingMap
 
 

@@ -21,7 +21,7 @@ from lidarium.agents.supervisor.tree import (
     tree_data,
     tree_text,
 )
-from lidarium.envs.radio.messages import OperatingState, OrderKind
+from lidarium.envs.onboard.radio.messages import OperatingState, OrderKind
 
 TREE = decision_tree(SupervisorSettings())
 WHOLE = decision_tree(SupervisorSettings(avoids_rendezvous=True, returns_home=True, battery_margin=1.5))

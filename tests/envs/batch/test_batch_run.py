@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 from linked_rooms import ROOM, TWO_ROOMS
 
-from lidarium.envs.batch.batch_run import BatchRun
-from lidarium.envs.batch.levels import make_level
-from lidarium.envs.batch.running import DECIDES, SENSES, STEPS, WAITS
-from lidarium.envs.episode_start import make_simulation
-from lidarium.envs.observations import ObservationWriter
+from lidarium.envs.engine.batch_run import BatchRun
+from lidarium.envs.levels.row_levels import make_level
+from lidarium.envs.engine.running import DECIDES, SENSES, STEPS, WAITS
+from lidarium.envs.engine.episode_start import make_simulation
+from lidarium.envs.observing.writer import ObservationWriter
 from lidarium.envs.onboard.perception import Perception
 from lidarium.envs.onboard.software import Software
-from lidarium.envs.outcome.endings import make_rules
-from lidarium.envs.radio.messages import Orders, Target
+from lidarium.envs.simulation.endings import make_rules
+from lidarium.envs.onboard.radio.messages import Orders, Target
 from lidarium.envs.settings.making import make_settings
 from lidarium.envs.simulation.kernels.floor_cache import floor_tables
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from lidarium.envs.batch.beginnings import Beginnings
+from lidarium.envs.engine.beginnings import Beginnings
 from lidarium.envs.floors.floor import Floor
 from lidarium.envs.floors.floor_choice import FloorChoice
 from lidarium.envs.settings.making import make_settings

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from linked_rooms import TWO_ROOMS
 
-from lidarium.envs.batch.episodes import EpisodeBatch
-from lidarium.envs.outcome.endings import HORIZON, NO_FRONTIER, REASONS
+from lidarium.envs.engine.engine import EpisodeBatch
+from lidarium.envs.simulation.endings import HORIZON, NO_FRONTIER, REASONS
 from lidarium.envs.settings.making import make_settings
 from lidarium.envs.settings.reset_options import ResetOptions
 

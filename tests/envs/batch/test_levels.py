@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from driven_teams import HALL, ROOMS, Teams
 
-from lidarium.envs.batch.levels import FrontierLevel, VelocityLevel, WaypointLevel, check_actions, make_level
-from lidarium.envs.batch.running import DECIDES, STEPS, WAITS
-from lidarium.envs.outcome.endings import FRONTIER_UNREACHABLE, NO_FRONTIER
+from lidarium.envs.levels.row_levels import FrontierLevel, VelocityLevel, WaypointLevel, check_actions, make_level
+from lidarium.envs.engine.running import DECIDES, STEPS, WAITS
+from lidarium.envs.simulation.endings import FRONTIER_UNREACHABLE, NO_FRONTIER
 
 ALL = np.ones(4, np.bool_)
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import lidarium
-from lidarium.envs.wrappers.merged_maps import MergedMaps, MergingSettings
+from lidarium.envs.faces.merged_maps import MergedMaps, MergingSettings
 
 OPTIONS = {"robots": 2, "map_cells": 64, "lidar": "lidar_360_6m", "observe": ["pose"], "horizon_s": 8.0}
 FLOORS = ["scene_room", "apartment"]

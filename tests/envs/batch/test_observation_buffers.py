@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from gymnasium import spaces
 
-from lidarium.envs.batch.observation_buffers import ObservationBuffers
+from lidarium.envs.engine.observation_buffers import ObservationBuffers
 
 
 def buffers(copy):

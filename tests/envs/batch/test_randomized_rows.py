@@ -5,7 +5,7 @@ import pytest
 from gymnasium.vector import AutoresetMode
 
 import lidarium
-from lidarium.envs.batch.randomized_rows import together_infos
+from lidarium.envs.faces.randomized_rows import together_infos
 
 SMALL = {
     "robots": 2,

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from lidarium.envs.batch.requests import (
+from lidarium.envs.faces.requests import (
     count_of_episodes,
     episodes_of,
     option_of,

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from linked_rooms import TWO_ROOMS
 
-from lidarium.envs.batch.episodes import EpisodeBatch
-from lidarium.envs.batch.row_conventions import RowConventions
-from lidarium.envs.conventions.conventions import Conventions
+from lidarium.envs.engine.engine import EpisodeBatch
+from lidarium.envs.faces.row_conventions import RowConventions
+from lidarium.envs.faces.conventions import Conventions
 from lidarium.envs.settings.making import make_settings
-from lidarium.envs.wrappers.team_exchange import MergingSettings
+from lidarium.envs.faces.team_exchange import MergingSettings
 
 OPTIONS = {"robots": 2, "observe": ["pose", "velocity"], "map_cells": 32, "lidar": "lidar_360_6m"}
 

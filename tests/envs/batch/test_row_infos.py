@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from lidarium.envs.batch.row_infos import RowInfos
-from lidarium.envs.outcome.endings import REASONS
+from lidarium.envs.engine.infos import RowInfos
+from lidarium.envs.simulation.endings import REASONS
 from lidarium.envs.settings.making import make_settings
 from lidarium.envs.simulation.backends import make_kinematic
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from driven_teams import HALL, ROBOTS, ROOMS, Teams
 
-from lidarium.envs.batch.running import (
+from lidarium.envs.engine.running import (
     DECIDES,
     SENSES,
     STEPS,
@@ -16,10 +16,10 @@ from lidarium.envs.batch.running import (
     run_parallel,
     run_serial,
 )
-from lidarium.envs.driving.path_following import ARRIVED, DRIVING
-from lidarium.envs.observations import ObservationWriter
-from lidarium.envs.outcome.endings import make_rules
-from lidarium.envs.radio.messages import Orders, Target
+from lidarium.envs.onboard.driving.path_following import ARRIVED, DRIVING
+from lidarium.envs.observing.writer import ObservationWriter
+from lidarium.envs.simulation.endings import make_rules
+from lidarium.envs.onboard.radio.messages import Orders, Target
 from lidarium.mapping.kernels.work_queue import new_work
 
 FIRST = np.array([True, False])

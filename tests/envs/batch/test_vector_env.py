@@ -13,7 +13,7 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.wrappers.vector import DictInfoToList, RecordEpisodeStatistics
 
 import lidarium
-from lidarium.envs.batch.vector_env import ExplorationVectorEnv
+from lidarium.envs.faces.vector_env import ExplorationVectorEnv
 from lidarium.envs.floors.catalogue import names as catalogue
 from lidarium.envs.floors.catalogue.names import load_floor
 from lidarium.envs.floors.floor import Floor, Solid

@@ -8,8 +8,8 @@ from conventional_teams import AHEAD, CLOSET, OPTIONS, make, step
 from pettingzoo.test import parallel_api_test
 
 import lidarium
-from lidarium.envs.conventions.conventional_env import ConventionalEnv
-from lidarium.envs.exploration import ExplorationEnv
+from lidarium.envs.faces.conventional_env import ConventionalEnv
+from lidarium.envs.faces.parallel import ExplorationEnv
 
 
 def test_without_conventions_nothing_is_wrapped():

@@ -4,8 +4,8 @@ from enum import Enum
 
 import numpy as np
 
-from lidarium.envs.conventions.number_infos import ending_number, flat_infos, flat_row_infos
-from lidarium.envs.outcome.endings import REASONS
+from lidarium.envs.faces.number_infos import ending_number, flat_infos, flat_row_infos
+from lidarium.envs.simulation.endings import REASONS
 
 
 class Kind(Enum):

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from gymnasium import spaces
 
-from lidarium.envs.conventions.conventions import Conventions
-from lidarium.envs.conventions.observation_forms import (
+from lidarium.envs.faces.conventions import Conventions
+from lidarium.envs.faces.observation_forms import (
     MASK,
     REST,
     ObservationForm,

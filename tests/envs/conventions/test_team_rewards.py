@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from lidarium.envs.conventions.team_rewards import shared_among, shared_rewards
+from lidarium.envs.faces.team_rewards import shared_among, shared_rewards
 
 
 def test_a_share_of_each_reward_is_the_mean_of_those_who_acted():

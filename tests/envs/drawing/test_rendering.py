@@ -5,7 +5,7 @@ import pytest
 
 import lidarium
 from lidarium.envs.drawing.rendering import EXPLORED, PALETTE, classify, draw_frame, team_colours
-from lidarium.envs.exploration import ExplorationEnv
+from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.floors.floor import Floor, Solid
 from lidarium.envs.settings.making import make_settings
 

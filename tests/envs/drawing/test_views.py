@@ -5,7 +5,7 @@ import pytest
 
 from lidarium.envs.drawing.frame_parts import INK, team_colours
 from lidarium.envs.drawing.views import FloorViews, camera_panel, false_colours
-from lidarium.envs.exploration import ExplorationEnv
+from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.floors.faces import SECTION, section_of
 from lidarium.envs.floors.floor import Floor, Solid
 from lidarium.envs.floors.raster import Raster

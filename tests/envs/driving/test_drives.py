@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from lidarium.envs.driving.drives import (
+from lidarium.envs.onboard.driving.drives import (
     DRIVE_STATES,
     any_newly_done,
     drive_state,
@@ -13,8 +13,8 @@ from lidarium.envs.driving.drives import (
     mark_waiting,
     no_drives,
 )
-from lidarium.envs.driving.path_following import ARRIVED, BLOCKED, DRIVING, IDLE
-from lidarium.envs.radio.messages import DriveState
+from lidarium.envs.onboard.driving.path_following import ARRIVED, BLOCKED, DRIVING, IDLE
+from lidarium.envs.onboard.radio.messages import DriveState
 
 
 def drive(**given):

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import lidarium
-from lidarium.envs.driving.path_following import (
+from lidarium.envs.onboard.driving.path_following import (
     ARRIVED,
     BLOCKED,
     DRIVING,
@@ -16,9 +16,9 @@ from lidarium.envs.driving.path_following import (
     Courses,
     follow_paths,
 )
-from lidarium.envs.driving.safety_stop import FORESIGHT_TIMES, Bodies, Sensed
+from lidarium.envs.onboard.driving.safety_stop import FORESIGHT_TIMES, Bodies, Sensed
 from lidarium.envs.floors.floor import Floor, Raster, Solid
-from lidarium.envs.radio.messages import DriveState, Target
+from lidarium.envs.onboard.radio.messages import DriveState, Target
 from lidarium.envs.settings.lidar import Lidar
 from lidarium.envs.settings.robots import ROBOTS
 from lidarium.envs.simulation.kernels.contact import distance_bound

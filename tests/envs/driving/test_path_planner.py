@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from driven_teams import Teams
 
-from lidarium.envs.driving.path_following import DRIVING
-from lidarium.envs.driving.path_planner import footprint_of
-from lidarium.envs.driving.planning import TEAMMATE_DISTANCE
+from lidarium.envs.onboard.driving.path_following import DRIVING
+from lidarium.envs.onboard.driving.path_planner import footprint_of
+from lidarium.envs.onboard.driving.planning import TEAMMATE_DISTANCE
 from lidarium.envs.floors.floor import Floor
 from lidarium.envs.simulation.kernels.arrays import ENDED
 

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from driven_teams import HALL, Teams
 
-from lidarium.envs.driving.path_following import BLOCKED, DRIVING, IDLE
-from lidarium.envs.driving.planning import (
+from lidarium.envs.onboard.driving.path_following import BLOCKED, DRIVING, IDLE
+from lidarium.envs.onboard.driving.planning import (
     TEAMMATE_DISTANCE,
     prepare_robot,
     prepare_teams_parallel,

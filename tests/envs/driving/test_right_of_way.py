@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from driven_teams import CORRIDOR, Teams
 
-from lidarium.envs.driving.path_following import ARRIVED, BLOCKED, DRIVING
-from lidarium.envs.driving.right_of_way import BACKING_STEPS, REFUGE_STAY_S, RightOfWay
-from lidarium.envs.driving.traffic import obstructing
+from lidarium.envs.onboard.driving.path_following import ARRIVED, BLOCKED, DRIVING
+from lidarium.envs.onboard.driving.right_of_way import BACKING_STEPS, REFUGE_STAY_S, RightOfWay
+from lidarium.envs.onboard.driving.traffic import obstructing
 from lidarium.envs.floors.floor import Floor
-from lidarium.envs.radio.messages import Orders, Target
+from lidarium.envs.onboard.radio.messages import Orders, Target
 from lidarium.envs.simulation.kernels.arrays import ENDED
 
 OPEN = Floor("open", (0.0, 0.0, 6.0, 4.0), (), starts=np.array([[1.0, 2.0, 0.0], [1.7, 2.0, 0.0]]))

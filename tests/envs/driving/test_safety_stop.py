@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from lidarium.envs.driving.safety_stop import (
+from lidarium.envs.onboard.driving.safety_stop import (
     FORESIGHT_TIMES,
     LEAST_TEAMMATE_GAP,
     STANDSTILL,

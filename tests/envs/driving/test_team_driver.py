@@ -3,13 +3,13 @@
 import numpy as np
 from driven_teams import FLOORS, HALL, ROBOTS, SEEDS, Teams
 
-from lidarium.envs.driving.drives import (
+from lidarium.envs.onboard.driving.drives import (
     any_newly_done,
     is_done,
     mark_waiting,
 )
 from lidarium.envs.onboard.navigation import FLAGS
-from lidarium.envs.radio.messages import Orders, Target
+from lidarium.envs.onboard.radio.messages import Orders, Target
 from lidarium.envs.simulation.kernels.arrays import ENDED
 
 

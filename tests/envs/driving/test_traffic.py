@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lidarium.envs.driving.path_planner import footprint_of
-from lidarium.envs.driving.traffic import find_refuge, obstructing
+from lidarium.envs.onboard.driving.path_planner import footprint_of
+from lidarium.envs.onboard.driving.traffic import find_refuge, obstructing
 from lidarium.envs.onboard.navigation import NavigationMap
 from lidarium.mapping.planning.grid_planning import Until, centres_of, search
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import lidarium
-from lidarium.envs.exploration import ExplorationEnv
+from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.floors.areas import around, floor_of_area
 from lidarium.envs.settings.making import make_settings
 

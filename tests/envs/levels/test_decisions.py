@@ -4,7 +4,7 @@ import pytest
 
 import lidarium
 from lidarium.envs.levels.frontiers import FrontierExploration
-from lidarium.envs.wrappers.merged_maps import MergedMaps
+from lidarium.envs.faces.merged_maps import MergedMaps
 
 
 @pytest.mark.parametrize("wrapper", [FrontierExploration, MergedMaps])

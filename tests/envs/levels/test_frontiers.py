@@ -159,7 +159,7 @@ def test_a_robot_that_is_stopped_ends_and_the_other_goes_on():
 
 
 def test_on_their_own_maps_robots_explore_twice():
-    from lidarium.envs.exploration import ExplorationEnv
+    from lidarium.envs.faces.parallel import ExplorationEnv
     from lidarium.envs.levels.frontiers import FrontierExploration
     from lidarium.envs.settings.making import make_settings
 

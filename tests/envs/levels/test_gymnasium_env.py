@@ -5,8 +5,8 @@ import pytest
 from linked_rooms import TWO_ROOMS
 
 import lidarium
-from lidarium.envs.levels.gymnasium_env import AGENT, SoloExploration
-from lidarium.envs.radio.messages import Order, OrderKind
+from lidarium.envs.faces.gymnasium_env import AGENT, SoloExploration
+from lidarium.envs.onboard.radio.messages import Order, OrderKind
 
 SMALL = {"map_cells": 32, "lidar": "lidar_360_6m", "stop_coverage": None}
 

@@ -7,7 +7,7 @@ import pytest
 
 import lidarium
 from lidarium.envs.floors.floor import Floor, Solid
-from lidarium.envs.radio.messages import MOST_POINTS, DriveState, Route, Target
+from lidarium.envs.onboard.radio.messages import MOST_POINTS, DriveState, Route, Target
 
 HALL = Floor("hall", (0.0, 0.0, 8.0, 4.0), starts=np.array([[1.0, 2.0, 0.0], [7.0, 2.0, math.pi]]))
 

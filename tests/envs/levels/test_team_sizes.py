@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from gymnasium import spaces
 
-from lidarium.envs.levels.team_sizes import fits_into, largest_team, padded
+from lidarium.envs.faces.team_sizes import fits_into, largest_team, padded
 
 
 def space(robots, beams=5):

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from lidarium.envs.conventions.conventions import Conventions
-from lidarium.envs.exploration import ExplorationEnv
+from lidarium.envs.faces.conventions import Conventions
+from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.levels.frontiers import FrontierExploration
-from lidarium.envs.levels.randomized_team import RandomizedTeam
-from lidarium.envs.levels.teams import TeamPlan, at_level, make_team
+from lidarium.envs.faces.randomized_team import RandomizedTeam
+from lidarium.envs.faces.teams import TeamPlan, at_level, make_team
 from lidarium.envs.levels.waypoints import WaypointExploration
 from lidarium.envs.settings.making import make_settings
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import lidarium
-from lidarium.envs.exploration import ExplorationEnv
+from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.floors.floor import Floor, Solid
 from lidarium.envs.levels.waypoints import WaypointExploration
-from lidarium.envs.radio.messages import DriveState, Target
+from lidarium.envs.onboard.radio.messages import DriveState, Target
 from lidarium.envs.settings.making import make_settings
 
 HALL = Floor("hall", (0.0, 0.0, 6.0, 4.0), starts=np.array([[1.0, 2.0, 0.0], [1.0, 3.0, 0.0]]), goal=None)

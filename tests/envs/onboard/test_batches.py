@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from driven_teams import FLOORS, HALL, ROBOTS, SEEDS, Teams
 
-from lidarium.envs.driving.drives import (
+from lidarium.envs.onboard.driving.drives import (
     STATE_ARRIVED,
     STATE_GIVING_WAY,
 )
-from lidarium.envs.radio.messages import Orders, Target
+from lidarium.envs.onboard.radio.messages import Orders, Target
 from lidarium.envs.simulation.kernels.floor_tables import FloorTables
 
 

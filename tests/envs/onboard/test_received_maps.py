@@ -4,9 +4,9 @@ their own map."""
 import numpy as np
 import pytest
 
-from lidarium.envs.exploration import ExplorationEnv
+from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.levels.waypoints import WaypointExploration
-from lidarium.envs.radio.messages import DriveState, Target
+from lidarium.envs.onboard.radio.messages import DriveState, Target
 from lidarium.envs.settings.making import make_settings
 from lidarium.mapping.merging.fusion import FusedMap
 from lidarium.mapping.planning.frontier_kernels import FRONTIER, IGNORED

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import lidarium
-from lidarium.envs.outcome.endings import REASONS, make_rules, note_endings
+from lidarium.envs.simulation.endings import REASONS, make_rules, note_endings
 from lidarium.mapping.kernels.views import table_of
 
 

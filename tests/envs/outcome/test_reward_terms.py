@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import lidarium
-from lidarium.envs.outcome.reward_terms import REWARD_TERMS, reward_term
-from lidarium.envs.scoring.rewards import TERMS
+from lidarium.envs.engine.reward_terms import REWARD_TERMS, reward_term
+from lidarium.envs.simulation.rewards import TERMS
 
 DRIVE = np.array([0.6, 0.5], np.float32)
 

@@ -3,7 +3,7 @@
 import numpy as np
 from scored_halls import scored
 
-from lidarium.envs.outcome.scorer import THRESHOLDS
+from lidarium.envs.engine.tally import THRESHOLDS
 from lidarium.envs.settings.rewards import RewardSettings
 
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import lidarium
-from lidarium.envs.outcome.team_state import ROBOT_NUMBERS, TEAM_NUMBERS
-from lidarium.envs.scoring.coverage import unpack_bits
+from lidarium.envs.engine.team_state import ROBOT_NUMBERS, TEAM_NUMBERS
+from lidarium.envs.simulation.coverage import unpack_bits
 
 OPTIONS = {"robots": 2, "map_cells": 64, "lidar": "lidar_360_6m", "state_cells": 24}
 HEAD = 2 * len(ROBOT_NUMBERS) + len(TEAM_NUMBERS)

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from lidarium.envs.radio.messages import MOST_POINTS, OperatingState, Order, OrderKind, Orders, Route, Target
+from lidarium.envs.onboard.radio.messages import MOST_POINTS, OperatingState, Order, OrderKind, Orders, Route, Target
 
 
 def test_orders_of_a_list_are_arrays_over_rows():

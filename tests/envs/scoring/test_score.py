@@ -4,8 +4,8 @@ import pickle
 
 import numpy as np
 
-from lidarium.envs.scoring.coverage import pack_bits
-from lidarium.envs.scoring.score import Score, counted_cells
+from lidarium.envs.simulation.coverage import pack_bits
+from lidarium.envs.simulation.score import Score, counted_cells
 from lidarium.mapping.kernels.huge_pages import ArrayPool
 
 

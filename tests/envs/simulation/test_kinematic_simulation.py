@@ -5,7 +5,7 @@ import pytest
 from linked_rooms import TWO_ROOMS
 from scored_halls import hall, tables_of
 
-from lidarium.envs.scoring.rewards import TERMS
+from lidarium.envs.simulation.rewards import TERMS
 from lidarium.envs.settings.faults import Fault, FaultSettings
 from lidarium.envs.settings.lidar import Lidar
 from lidarium.envs.settings.odometry import ODOMETRY

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from plain_world import PlainWorld
 
-from lidarium.envs.exploration import ExplorationEnv
+from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.floors.floor import Floor, Raster
-from lidarium.envs.scoring.coverage import unpack_bits
+from lidarium.envs.simulation.coverage import unpack_bits
 from lidarium.envs.settings.lidar import Lidar
 from lidarium.envs.settings.making import make_settings
 from lidarium.envs.settings.robots import ROBOTS

@@ -7,14 +7,14 @@ import sys
 
 import pytest
 
-from lidarium.envs.starting import first_reset
-from lidarium.envs.starting.first_reset import LIST
+from lidarium.envs.engine import first_reset
+from lidarium.envs.engine.first_reset import LIST
 from lidarium.mapping.kernels.first_start.listed_kernels import decode_type
 from lidarium.mapping.kernels.first_start.side_by_side import SWITCH
 
 SCRIPT = """
 import json, sys
-from lidarium.envs.starting import first_reset
+from lidarium.envs.engine import first_reset
 first_reset._cores = lambda: 2
 first_reset.LIST = first_reset.Path(sys.argv[1])
 first_reset.compile_first_reset()

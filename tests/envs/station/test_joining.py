@@ -1,6 +1,6 @@
 """What convinces a team that maps are of one place."""
 
-from lidarium.envs.station.joining import OWN_M2, TEAM_CONFIRMATION, WALL_M, team_confirmation
+from lidarium.envs.onboard.station.joining import OWN_M2, TEAM_CONFIRMATION, WALL_M, team_confirmation
 from lidarium.mapping.merging.agreement.validation import ValidationSettings
 
 

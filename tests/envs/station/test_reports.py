@@ -8,8 +8,8 @@ import lidarium
 from lidarium.agents import Policy
 from lidarium.agents.policy import PerRobot
 from lidarium.envs.floors.floor import Floor, Solid
-from lidarium.envs.radio.map_blocks import BLOCK_BYTES, HEADER_BYTES, STATUS_BYTES
-from lidarium.envs.radio.messages import DriveState, OperatingState, Order, OrderKind, Target
+from lidarium.envs.onboard.radio.map_blocks import BLOCK_BYTES, HEADER_BYTES, STATUS_BYTES
+from lidarium.envs.onboard.radio.messages import DriveState, OperatingState, Order, OrderKind, Target
 from lidarium.envs.settings.faults import Fault, FaultSettings
 from lidarium.envs.settings.radio import RadioSettings
 from lidarium.envs.simulation.disturbances.radio import links, links_to
@@ -175,7 +175,7 @@ def test_a_station_changes_nothing_of_what_robots_tell_each_other(monkeypatch):
 
     with_station = traffic()
     nobody = property(lambda _exchange: None, lambda _exchange, _tells: None)
-    monkeypatch.setattr("lidarium.envs.radio.exchange.Exchange.report_of", nobody, raising=False)
+    monkeypatch.setattr("lidarium.envs.onboard.radio.exchange.Exchange.report_of", nobody, raising=False)
     assert traffic() == with_station
 
 

@@ -7,8 +7,8 @@ import pytest
 
 import lidarium
 from lidarium.envs.floors.floor import Floor, Solid
-from lidarium.envs.station.reports import known_map
-from lidarium.envs.station.team_mapping import TeamMapping, crop_around
+from lidarium.envs.onboard.station.reports import known_map
+from lidarium.envs.onboard.station.team_mapping import TeamMapping, crop_around
 from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.grids.occupancy import FREE, OCCUPIED, UNKNOWN
 from lidarium.mapping.merging.fusion import FusedMap

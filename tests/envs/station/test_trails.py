@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from lidarium.envs.station.trails import without_bodies, without_own_trail
+from lidarium.envs.onboard.station.trails import without_bodies, without_own_trail
 from lidarium.mapping.grids.occupancy import FREE, OCCUPIED, UNKNOWN
 from lidarium.mapping.merging.growing_maps import GrowingMap
 from lidarium.mapping.planning.footprint_masks import MARGIN_M

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from lidarium.envs.wrappers.contacts import check_links, clusters_of
+from lidarium.envs.faces.contacts import check_links, clusters_of
 
 
 def plain_clusters(agents, links):

@@ -5,13 +5,13 @@ import pytest
 from pettingzoo.test import parallel_api_test
 
 import lidarium
-from lidarium.envs.exploration import ExplorationEnv
+from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.floors.floor import Floor, Solid
-from lidarium.envs.levels.teams import at_level
-from lidarium.envs.radio.messages import DriveState, Order, OrderKind, Target
+from lidarium.envs.faces.teams import at_level
+from lidarium.envs.onboard.radio.messages import DriveState, Order, OrderKind, Target
 from lidarium.envs.settings.making import make_settings
-from lidarium.envs.wrappers.merged_maps import MergedMaps
-from lidarium.envs.wrappers.sparse_planning import SparsePlanning
+from lidarium.envs.faces.merged_maps import MergedMaps
+from lidarium.envs.faces.sparse_planning import SparsePlanning
 from lidarium.evaluation.episodes.runner import run_episode
 
 

@@ -7,7 +7,7 @@ import pytest
 
 import lidarium
 from lidarium.envs.floors.floor import Floor
-from lidarium.envs.wrappers.team_exchange import (
+from lidarium.envs.faces.team_exchange import (
     MergeEvent,
     MergingSettings,
     TeamExchange,

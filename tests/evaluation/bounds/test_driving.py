@@ -8,7 +8,7 @@ from linked_places import STAR, graph_of
 from linked_rooms import ROOM, TWO_ROOMS, settings_of
 
 from lidarium.envs.floors.floor import Floor
-from lidarium.envs.radio.messages import MOST_POINTS
+from lidarium.envs.onboard.radio.messages import MOST_POINTS
 from lidarium.evaluation.bounds.driving import Walk, _pieces, drive, walks_of
 from lidarium.evaluation.bounds.tours import TourPlan
 

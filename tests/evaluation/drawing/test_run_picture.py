@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 
 import lidarium
-from lidarium.envs.exploration import ExplorationEnv
+from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.floors.catalogue.names import load_floor
 from lidarium.envs.settings.making import make_settings
 from lidarium.evaluation.drawing.run_picture import frontiers_left, save_floor_picture, save_run_picture

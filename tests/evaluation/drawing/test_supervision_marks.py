@@ -8,7 +8,7 @@ from seen_truth import NEAR, begun
 from lidarium.agents import Policy
 from lidarium.agents.report import GivenOrder, Join, PolicyReport, Supervision
 from lidarium.envs.drawing.frame_parts import view_around
-from lidarium.envs.radio.messages import OrderKind
+from lidarium.envs.onboard.radio.messages import OrderKind
 from lidarium.evaluation.drawing.supervision_marks import draw_supervision, recent_supervision
 from lidarium.mapping.geometry.rigid import Transform
 

@@ -7,9 +7,9 @@ import pytest
 
 from lidarium.agents import Policy
 from lidarium.envs.floors.floor import Floor
-from lidarium.envs.radio.messages import Order, OrderKind, Target
+from lidarium.envs.onboard.radio.messages import Order, OrderKind, Target
 from lidarium.envs.settings.making import make_settings
-from lidarium.envs.wrappers.merged_maps import MergingSettings
+from lidarium.envs.faces.merged_maps import MergingSettings
 from lidarium.evaluation.episodes.result import result_of
 from lidarium.evaluation.episodes.runner import run_episode
 from lidarium.evaluation.episodes.watching import WatchedExploration

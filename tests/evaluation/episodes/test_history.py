@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 import lidarium
-from lidarium.envs.exploration import ExplorationEnv
+from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.floors.floor import Floor, Raster
-from lidarium.envs.scoring.coverage import unpack_bits
+from lidarium.envs.simulation.coverage import unpack_bits
 from lidarium.envs.settings.making import make_settings
 from lidarium.evaluation import metrics
 from lidarium.evaluation.episodes.history import History

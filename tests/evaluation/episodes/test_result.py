@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import lidarium
-from lidarium.envs.exploration import ExplorationEnv
+from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.settings.making import make_settings
 from lidarium.evaluation.episodes.events import in_floor_frame
 from lidarium.evaluation.episodes.history import History

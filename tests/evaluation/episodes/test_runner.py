@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from lidarium.agents import Policy, Stop
-from lidarium.envs.exploration import ExplorationEnv
+from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.settings.making import make_settings
 from lidarium.evaluation.episodes.runner import run_episode
 

@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from lidarium.envs.wrappers.merged_maps import MergeEvent
+from lidarium.envs.faces.merged_maps import MergeEvent
 from lidarium.evaluation.metrics import merges
 
 

@@ -6,7 +6,7 @@ from drawn_masks import mask, masks
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lidarium.envs.scoring.coverage import pack_bits
+from lidarium.envs.simulation.coverage import pack_bits
 from lidarium.evaluation import metrics
 
 

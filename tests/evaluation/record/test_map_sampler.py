@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from lidarium.envs.exploration import ExplorationEnv
+from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.settings.making import make_settings
 from lidarium.evaluation.record.map_sampler import MapSampler
 from lidarium.evaluation.truth.beliefs import team_log_odds

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from lidarium.envs.exploration import ExplorationEnv
+from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.settings.making import make_settings
 from lidarium.evaluation.record.state import state_sha256
 

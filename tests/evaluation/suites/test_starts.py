@@ -3,7 +3,7 @@
 import numpy as np
 from small_pictures import RESOLUTION, save_room
 
-from lidarium.envs.exploration import ExplorationEnv
+from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.settings.making import make_settings
 from lidarium.evaluation.suites.starts import drawn_starts, starts_in
 

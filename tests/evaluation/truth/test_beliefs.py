@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from seen_truth import NEAR, begun
 
-from lidarium.envs.exploration import ExplorationEnv
+from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.settings.making import make_settings
 from lidarium.evaluation.truth.beliefs import (
     believed_on_floor,

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from seen_truth import begun, scribbled
 
-from lidarium.envs.scoring.coverage import pack_bits
+from lidarium.envs.simulation.coverage import pack_bits
 from lidarium.envs.simulation.kernels.arrays import world_at
 from lidarium.evaluation.truth import beliefs
 from lidarium.evaluation.truth.team_counts import (

@@ -10,7 +10,7 @@ from recorded_scene import RecordedServer
 
 import lidarium
 from lidarium.agents.policy import settings_for
-from lidarium.envs.exploration import ExplorationEnv
+from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.settings.making import make_settings
 from lidarium.evaluation.episodes.runner import run_episode
 from lidarium.evaluation.episodes.watching import WatchedExploration, Watcher

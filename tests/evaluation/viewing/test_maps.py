@@ -6,7 +6,7 @@ import pytest
 
 import lidarium
 from lidarium.envs.drawing.frame_parts import EXPLORED, UNEXPLORED, WALL, pale, team_colours
-from lidarium.envs.exploration import ExplorationEnv
+from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.settings.making import make_settings
 from lidarium.evaluation.episodes.runner import run_episode
 from lidarium.evaluation.truth.true_map import truth_of

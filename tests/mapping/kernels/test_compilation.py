@@ -308,7 +308,7 @@ def test_threads_hardly_spin_where_nobody_has_said_otherwise(given, wanted, spin
         [
             "import numba, numpy as np",
             "numba.config.THREADING_LAYER = 'omp'",
-            "from lidarium.envs.observation_kernels import write_parallel",
+            "from lidarium.envs.observing.kernels import write_parallel",
             "from lidarium.mapping.kernels.compilation import use_threads",
             "use_threads(2)",
             "from numba.np.ufunc import omppool",

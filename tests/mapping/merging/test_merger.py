@@ -7,7 +7,7 @@ import pytest
 from drawn_maps import RESOLUTION, about_middle, apartment, blank, bowed, hall, kept, moved, noisy, room
 
 import lidarium
-from lidarium.envs.exploration import ExplorationEnv
+from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.settings.making import make_settings
 from lidarium.evaluation.episodes.runner import run_episode
 from lidarium.mapping.files.map_files import FREE, UNKNOWN

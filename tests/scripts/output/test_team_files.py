@@ -5,7 +5,7 @@ import json
 import pytest
 from short_runs import short_run
 
-from lidarium.envs.wrappers.merged_maps import true_frames
+from lidarium.envs.faces.merged_maps import true_frames
 from lidarium.mapping.files.map_files import read_ros_map
 from lidarium.scripts.output.team_files import write_team
 

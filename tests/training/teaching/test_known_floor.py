@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from lidarium.envs.exploration import ExplorationEnv
+from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.evaluation.bounds.view_graph import count, numbers_of
 from lidarium.training.settings import TrainingSettings
 from lidarium.training.teaching.known_floor import known_floor

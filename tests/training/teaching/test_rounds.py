@@ -9,7 +9,7 @@ import torch
 from lidarium.agents import make_policy
 from lidarium.agents.learned.decision import choose_classic
 from lidarium.agents.learned.weights import load_weights
-from lidarium.envs.exploration import ExplorationEnv
+from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.evaluation.episodes.runner import run_episode
 from lidarium.evaluation.suites.starts import drawn_starts
 from lidarium.training.settings import FitSettings, TrainingSettings, training_of

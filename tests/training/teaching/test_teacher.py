@@ -5,7 +5,7 @@ import pytest
 
 from lidarium.agents.learned.decision import choose_classic
 from lidarium.agents.tours.policy import TourFrontier
-from lidarium.envs.exploration import ExplorationEnv
+from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.evaluation.episodes.runner import run_episode
 from lidarium.training.settings import TrainingSettings
 from lidarium.training.teaching.teacher import TaughtTours

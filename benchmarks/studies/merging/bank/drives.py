@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.agents import make_policy
-from lidarium.envs.exploration import ExplorationEnv
+from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.floors.floor import Floor
 from lidarium.envs.floors.starts import draw_starts
 from lidarium.envs.settings.exploration import ExplorationSettings

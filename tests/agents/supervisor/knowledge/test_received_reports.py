@@ -6,7 +6,7 @@ from reported_halls import RESOLUTION, hall, report
 
 from lidarium.agents.supervisor.knowledge.received_reports import ReceivedReports
 from lidarium.agents.supervisor.settings import SupervisorSettings
-from lidarium.envs.radio.messages import OperatingState
+from lidarium.envs.onboard.radio.messages import OperatingState
 from lidarium.mapping.merging.growing_maps import GrowingMap
 
 SETTINGS = SupervisorSettings()

@@ -10,8 +10,8 @@ from reported_halls import RADIUS, hall, report
 
 from lidarium.agents.supervisor.knowledge.station import MergeStation
 from lidarium.agents.supervisor.settings import SupervisorSettings
-from lidarium.envs.radio.messages import OperatingState
-from lidarium.envs.station.trails import without_bodies, without_own_trail
+from lidarium.envs.onboard.radio.messages import OperatingState
+from lidarium.envs.onboard.station.trails import without_bodies, without_own_trail
 from lidarium.mapping.merging.growing_maps import GrowingMap
 
 FIRST, SECOND = about_middle(0.4, apartment()), about_middle(-1.3, apartment())

@@ -8,7 +8,7 @@ from reported_halls import RADIUS, RESOLUTION, hall, report
 
 from lidarium.agents.supervisor.knowledge.survey import Survey
 from lidarium.agents.supervisor.settings import SupervisorSettings
-from lidarium.envs.driving.path_planner import footprint_of
+from lidarium.envs.onboard.driving.path_planner import footprint_of
 from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.merging.fusion import fuse
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import lidarium
-from lidarium.envs.exploration import ExplorationEnv
+from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.settings.faults import Fault, FaultSettings
 from lidarium.envs.settings.making import make_settings
 from lidarium.envs.settings.robots import ROBOTS

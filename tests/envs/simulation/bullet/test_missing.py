@@ -4,7 +4,7 @@ import sys
 
 import pytest
 
-from lidarium.envs.exploration import ExplorationEnv
+from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.settings.making import make_settings
 from lidarium.envs.simulation.backends import BACKENDS
 from lidarium.scripts.run import Run

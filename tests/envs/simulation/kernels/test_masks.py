@@ -7,7 +7,7 @@ import pytest
 from matplotlib.path import Path
 from scored_halls import hall, tables_of, team
 
-from lidarium.envs.scoring.coverage import unpack_bits
+from lidarium.envs.simulation.coverage import unpack_bits
 from lidarium.envs.simulation.kernels.arrays import MAP_RESOLUTION, RANGE_MAX, world_at
 from lidarium.envs.simulation.kernels.masks import footprint, true_lengths, window_corner
 from lidarium.mapping.grids.scan_polygon import window_rows, window_words

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scored_halls import hall, tables_of
 
-from lidarium.envs.scoring.rewards import TERMS
+from lidarium.envs.simulation.rewards import TERMS
 from lidarium.envs.settings.faults import Fault, FaultSettings
 from lidarium.envs.settings.lidar import Lidar
 from lidarium.envs.settings.odometry import ODOMETRY, OdometrySettings

@@ -1,1 +1,0 @@
-"""The forms in which trainers take observations, rewards, infos, ends of agents."""

@@ -1,0 +1,200 @@
+"""How episodes begin: floor, starts, seed and goal, drawn alike for one episode and for many."""
+
+import copy
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.envs.engine.first_reset import compile_first_reset
+from lidarium.envs.floors.areas import around
+from lidarium.envs.floors.floor import Floor
+from lidarium.envs.floors.floor_choice import FloorChoice
+from lidarium.envs.floors.starts import check_goal, check_starts, draw_starts
+from lidarium.envs.settings.exploration import ExplorationSettings
+from lidarium.envs.settings.reset_options import Curriculum, ResetOptions, of_curriculum
+from lidarium.envs.simulation.backends import BACKENDS
+from lidarium.envs.simulation.kernels.floor_cache import floor_tables
+from lidarium.envs.simulation.kernels.floor_tables import FloorTables
+from lidarium.envs.simulation.simulation import Simulation
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class EpisodeStart:
+    """What an episode begins with.
+
+    Attributes
+    ----------
+    floor : Floor
+        Where it takes place.
+    tables : FloorTables
+        What kernels look up for the floor.
+    starts : (robots, 3) float64
+        x, y, theta of each robot in the floor's frame [m, rad].
+    seed : int
+        Where the noise comes from.
+    goal : (x, y) or None
+        In the floor's frame [m].
+    """
+
+    floor: Floor
+    tables: FloorTables
+    starts: NDArray[np.float64]
+    seed: int
+    goal: tuple[float, float] | None
+
+
+def begin(
+    generator: np.random.Generator, choice: FloorChoice, chosen: ResetOptions, settings: ExplorationSettings
+) -> EpisodeStart:
+    """Draw how an episode begins.
+
+    Parameters
+    ----------
+    generator : numpy.random.Generator
+        Where all draws come from.
+    choice : FloorChoice
+        The floor, or a set of which one is drawn.
+    chosen : ResetOptions
+        Floor, starts and goal where the caller names them.
+    settings : ExplorationSettings
+        The team.
+
+    Raises
+    ------
+    ValueError, FileNotFoundError
+        Where the floor or an option cannot be used.
+    """
+    compile_first_reset()
+    choice_here = choice if chosen.floor is None else choice.instead(chosen.floor)
+    floor = choice_here.load(generator)
+    if isinstance(chosen.starts, np.ndarray):
+        floor = around(floor, chosen.starts)
+    radius = settings.robot.radius
+    _check_height(floor, settings.robot.height)
+    tables = floor_tables(floor, settings.raster_resolution, settings.lidar.height, settings.robot.height)
+    starts = chosen.starts
+    if isinstance(starts, np.ndarray):
+        check_starts(tables.body, radius, starts)
+    else:
+        how = starts or settings.starts or ("drawn" if choice_here.is_set else "fixed")
+        proposed = floor.starts[:0] if how == "drawn" else floor.starts
+        starts = draw_starts(tables.body, radius, settings.robots, generator, proposed)
+    goal = (chosen.goal or floor.goal) if choice.has_goal else None
+    if goal is not None:
+        check_goal(tables.body, goal)
+    seed = int(generator.integers(2**63))
+    return EpisodeStart(floor, tables, starts, seed, goal)
+
+
+def _check_height(floor: Floor, height: float) -> None:
+    """Refuse robots that would not fit below the ceiling.
+
+    Raises
+    ------
+    ValueError
+        Where the robot is as high as the ceiling, or higher.
+    """
+    if height >= floor.ceiling:
+        raise ValueError(
+            f"floor {floor.name!r} has its ceiling at {floor.ceiling:g} m, the robot is {height:g} m high; "
+            "want a lower robot (robot.height) or a floor with a higher ceiling"
+        )
+
+
+def make_simulation(settings: ExplorationSettings, episodes: int = 1) -> Simulation:
+    """Return the simulation of so many episodes, by the backend of the settings."""
+    return BACKENDS[settings.backend](settings, episodes)
+
+
+def map_frames(beginning: EpisodeStart, settings: ExplorationSettings) -> NDArray[np.float64]:
+    """Return the origin of each robot's map frame, shape (robots, 2) [m].
+
+    It is in the frame of the robot's believed pose.
+    """
+    if not settings.known_starts:
+        return np.zeros((settings.robots, 2))
+    # The map frame begins at the corner of the cell in which the robot starts.
+    cell = settings.occupancy.resolution
+    origin = np.asarray(beginning.tables.laser.origin)
+    return np.asarray(origin + np.floor((beginning.starts[:, :2] - origin) / cell) * cell)
+
+
+def goal_of_robots(beginning: EpisodeStart, settings: ExplorationSettings) -> tuple[float, float]:
+    """Return the goal as the robots know it, in the frame of their believed poses [m].
+
+    Nan where they know none.
+
+    A robot that does not know where it starts does not know where the goal is either.
+    """
+    return beginning.goal if beginning.goal is not None and settings.known_starts else (np.nan, np.nan)
+
+
+class Beginnings:
+    """The draws of all episodes, a generator for each.
+
+    Parameters
+    ----------
+    choice : FloorChoice
+        The floor, or a set of which one is drawn.
+    settings : ExplorationSettings
+        Of every episode.
+    episodes : int
+        How many.
+    curriculum : callable or None
+        Options of ``reset`` by the number of an episode, counted over all as they begin.
+    """
+
+    def __init__(
+        self,
+        choice: FloorChoice,
+        settings: ExplorationSettings,
+        episodes: int,
+        curriculum: Curriculum | None = None,
+    ) -> None:
+        self._choice, self._settings, self._curriculum = choice, settings, curriculum
+        self._begun = 0
+        self._generators: list[np.random.Generator | None] = [None] * episodes
+
+    def draw(
+        self,
+        beginning: NDArray[np.int64],
+        seeds: Sequence[int | None] | None,
+        options: Mapping[int, ResetOptions],
+    ) -> dict[int, EpisodeStart]:
+        """Draw how episodes begin, before anything of them is changed.
+
+        Parameters
+        ----------
+        beginning : (K,) int64
+            Which episodes.
+        seeds : sequence of int or None
+            A seed for each of them; None goes on with the episode's own generator.
+        options : mapping
+            Options by episode.
+
+        Raises
+        ------
+        ValueError, FileNotFoundError
+            Where the floor or an option cannot be used; the generators are as they were then.
+        """
+        drawn: dict[int, EpisodeStart] = {}
+        generators = self._generators.copy()
+        for k, episode in enumerate(int(episode) for episode in beginning):
+            seed = None if seeds is None else seeds[k]
+            # Drawn from a copy: where a later episode cannot begin, nothing has been drawn.
+            generator = copy.deepcopy(generators[episode])
+            if seed is not None or generator is None:
+                generator = np.random.default_rng(seed)
+            chosen = of_curriculum(
+                self._curriculum,
+                self._begun + k,
+                options.get(episode, ResetOptions()),
+                self._settings.robots,
+            )
+            drawn[episode] = begin(generator, self._choice, chosen, self._settings)
+            generators[episode] = generator
+        self._generators = generators
+        self._begun += len(drawn)
+        return drawn

@@ -1,0 +1,563 @@
+"""The engine of all environments: episodes of a team, in arrays over rows = episodes x robots.
+
+It has their beginnings, steps, endings, rewards, observations and infos. A single environment is an engine of one
+episode; every face (PettingZoo, Gymnasium, stable-baselines3) hands actions to it and reads its arrays.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+
+from lidarium.envs.engine.beginnings import (
+    Beginnings,
+    EpisodeStart,
+    goal_of_robots,
+    make_simulation,
+    map_frames,
+)
+from lidarium.envs.engine.reward_terms import ExtraTerms
+from lidarium.envs.engine.running import (
+    Run,
+    begin_decisions,
+    follow_some,
+    note_ends,
+    run_parallel,
+    run_serial,
+)
+from lidarium.envs.floors.floor import Floor
+from lidarium.envs.floors.floor_choice import FloorChoice, Floors
+from lidarium.envs.levels import LEVELS
+from lidarium.envs.levels.level import DECIDES, SENSES, STEPS, WAITS, Level, Turn
+from lidarium.envs.observing.observables import ComputedObservations
+from lidarium.envs.observing.rows import Rows
+from lidarium.envs.observing.spaces import observation_space
+from lidarium.envs.observing.writer import ObservationWriter
+from lidarium.envs.onboard.meters import Meters
+from lidarium.envs.onboard.perception import Perception
+from lidarium.envs.onboard.software import Software
+from lidarium.envs.onboard.station.operating import Operating, frozen
+from lidarium.envs.onboard.station.reports import Station
+from lidarium.envs.settings.exploration import ExplorationSettings
+from lidarium.envs.settings.limits import check_level
+from lidarium.envs.settings.reset_options import Curriculum, ResetOptions
+from lidarium.envs.simulation.endings import HORIZON, REASONS, make_rules, note_endings
+from lidarium.envs.simulation.kernels.arrays import ENDED
+from lidarium.envs.simulation.rewards import TERMS
+from lidarium.mapping.kernels.views import table_of
+from lidarium.mapping.kernels.work_queue import new_work
+
+if TYPE_CHECKING:
+    from lidarium.envs.drawing.rendering import Scene
+
+Arrays = dict[str, NDArray[Any]]
+
+AfterStep = Callable[[NDArray[np.float64]], None]
+"""Called after each time step with the commands (rows, 2) [m/s, rad/s]."""
+
+NO_EPISODES = np.zeros(0, np.int64)
+
+
+class Engine:
+    """Episodes of one team and one choice of settings; floors may differ.
+
+    Parameters
+    ----------
+    episodes : int
+        Number of episodes.
+    floor : Floors
+        The floor, or floors of which each beginning draws one; see `FloorChoice`.
+    settings : ExplorationSettings
+        Of every episode.
+    level : str, optional
+        What an action is: a name in the registry ``level``. ``velocity`` by default.
+    image_resolution : float, optional
+        Side of a pixel [m] if the floor is a plain image.
+    copy : bool, optional
+        Whether observations are new arrays at each step, the default; otherwise two sets of arrays take turns.
+    curriculum : callable, optional
+        Takes the number of an episode, counted over all as they begin, and returns options of its beginning.
+    reports : bool, optional
+        Whether robots report to a station. False by default: it costs time in each step if odometry is not ideal.
+
+    Attributes
+    ----------
+    rows : int
+        Episodes x robots.
+    observation_space, action_space : Space
+        Of one row.
+    level : Level
+        How actions become motion.
+    operating : Operating
+        The robots' operating states and orders.
+    stations : list of Station
+        The station of each episode; empty without ``reports``.
+    live, acted : (rows,) bool
+        Which robots have not ended, and which took part in the last step.
+    reasons : (rows,) int8
+        Why robots ended in the last step, by number in ``endings.REASONS``, one beyond them for a policy's own words;
+        0 if they did not.
+    is_whole, has_endings : bool
+        Whether all robots of all episodes are live, and whether one ended in the last step.
+    infos : dict
+        What the last step reports besides, in arrays over rows.
+    observations : dict of arrays
+        The observations of the last step, one a row; rows that were not observed repeat their last one.
+    floors : list of Floor
+        The floor of each episode.
+    starts : list of EpisodeStart
+        How each episode began.
+
+    Raises
+    ------
+    ValueError
+        If there are no episodes, or the level, the floor or a setting cannot be used.
+    """
+
+    def __init__(
+        self,
+        episodes: int,
+        floor: Floors,
+        settings: ExplorationSettings,
+        level: str = "velocity",
+        image_resolution: float | None = None,
+        copy: bool = True,
+        curriculum: Curriculum | None = None,
+        reports: bool = False,
+    ) -> None:
+        if isinstance(episodes, bool) or not isinstance(episodes, int | np.integer) or episodes < 1:
+            raise ValueError(f"the number of episodes is {episodes!r}; want a whole number of at least 1")
+        self.episodes = int(episodes)
+        self.settings = settings
+        self.robots = settings.robots
+        self.rows = self.episodes * self.robots
+        choice = FloorChoice(floor, image_resolution)
+        self.has_goal = choice.has_goal
+        self._beginnings = Beginnings(choice, settings, self.episodes, curriculum)
+        self.simulation = make_simulation(settings, self.episodes)
+        self.world = self.simulation.world
+        self.score = self.simulation.score
+        self._offsets = np.zeros((self.rows, 2))
+        self._goals = np.full((self.rows, 2), np.nan)
+        self.perception = Perception(self.simulation, settings, self._offsets)
+        self._software = Software(self.perception, settings)
+        self.operating = Operating(self.perception, settings)
+        self._meters = Meters(self.world, settings) if reports or settings.battery.is_limited else None
+        self.perception.meters = self._meters
+        self.stations: list[Station] = []
+        if reports:
+            meters = self._meters
+            assert meters is not None
+            self.stations = [
+                Station(self.perception, meters, self.operating, episode) for episode in range(self.episodes)
+            ]
+        self._writer = ObservationWriter(
+            self.simulation, settings, self._offsets, self._goals if choice.has_goal else None
+        )
+        named = Rows(self.simulation, settings, self.perception.poses)
+        self._computed = ComputedObservations(named)
+        self._extra = ExtraTerms(settings.reward.more, named)
+        self._rules = make_rules(self.simulation, settings)
+        self._rules_table: NDArray[np.int64] | None = None
+        self.live = self._rules.live
+        self.acted = np.zeros(self.rows, np.bool_)
+        self.reasons = np.zeros(self.rows, np.int8)
+        self.infos: dict[str, Any] = {}
+        self.is_whole = False
+        self.has_endings = False
+        self.ended_because: dict[int, str] = {}
+        self.floors: list[Floor | None] = [None] * self.episodes
+        self.starts: list[EpisodeStart | None] = [None] * self.episodes
+        self.everyone = frozen(np.ones(self.rows, np.bool_))
+        self._commands = np.zeros((self.rows, 2))
+        self._waiting = np.zeros(self.rows, np.bool_)
+        self._all_step = bytes([STEPS]) * self.episodes
+        order = np.arange(self.episodes)
+        self._orders = [order, order[::-1].copy()]
+        self._copies = copy
+        self._calibration = self._calibration_rows()
+        self.use_level(level)
+
+    def use_level(self, name: str, shares_map: bool = True, decision_period_s: float | None = None) -> None:
+        """Let actions be those of another level of decision; episodes have to begin anew.
+
+        ``shares_map`` and ``decision_period_s`` are those of `Level`.
+        """
+        check_level(self.settings.observe, name)
+        self.level: Level = LEVELS[name](self.perception, self.settings, shares_map, decision_period_s)
+        self.level_name = name
+        self.operating.attach(self.level.driver)
+        known = observation_space(self.settings, self.has_goal).spaces
+        self.observation_space = spaces.Dict({**known, **self.level.boxes})
+        self.action_space = self.level.action_space
+        self._boxes = {**self._computed.boxes, **self.level.boxes}
+        self._buffers = [self._new_buffers(), self._new_buffers()]
+        self.observations: Arrays = self._buffers[0]
+
+    @property
+    def rewards(self) -> NDArray[np.float64]:
+        """What each row has earned in the last step, (rows,)."""
+        return self.score.rewards
+
+    @property
+    def is_over(self) -> NDArray[np.bool_]:
+        """Which episodes have no live robot left, (episodes,)."""
+        return np.asarray(~self.live.reshape(self.episodes, self.robots).any(axis=1))
+
+    @property
+    def is_ready(self) -> bool:
+        """Whether every episode has begun at least once."""
+        return None not in self.floors
+
+    @property
+    def terminated(self) -> NDArray[np.bool_]:
+        """Which robots ended in the last step other than by the horizon, (rows,)."""
+        return np.asarray((self.reasons != 0) & (self.reasons != HORIZON))
+
+    @property
+    def truncated(self) -> NDArray[np.bool_]:
+        """Which robots the horizon has cut in the last step, (rows,)."""
+        return np.asarray(self.reasons == HORIZON)
+
+    @property
+    def used_j(self) -> NDArray[np.float64]:
+        """The energy that robots have used [J], (rows,); 0 if their batteries have no limit."""
+        return np.zeros(self.rows) if self._meters is None else self._meters.used_j.copy()
+
+    def run(
+        self,
+        decoded: Any,  # noqa: ANN401
+        beginning: NDArray[np.int64] = NO_EPISODES,
+        seeds: Sequence[int | None] | None = None,
+        options: Mapping[int, ResetOptions] | None = None,
+        is_same_step: bool = False,
+        given: NDArray[np.bool_] | None = None,
+        after_step: AfterStep | None = None,
+    ) -> None:
+        """Begin some episodes and run the other live ones for one step or decision.
+
+        Parameters
+        ----------
+        decoded : object or None
+            Actions as `Level.read` or `Level.read_rows` returns them; None if nothing else is to run.
+        beginning : (K,) int64, optional
+            Which episodes begin. None by default.
+        seeds : sequence of int, optional
+            A seed for each of them; None goes on with the episode's own generator.
+        options : mapping, optional
+            Options by episode.
+        is_same_step : bool, optional
+            Whether this goes on with the step of the call before: its observations are then written over.
+        given : (rows,) bool, optional
+            Which robots decide; all that are live by default.
+        after_step : callable, optional
+            Called after each time step with the commands; episodes then run step by step.
+
+        Raises
+        ------
+        ValueError
+            If an option cannot be used; nothing has run then.
+        """
+        drawn = self._beginnings.draw(beginning, seeds, options or {}) if len(beginning) else {}
+        self._run(decoded, drawn, is_same_step, given, after_step)
+
+    def begin(self, starts: Mapping[int, EpisodeStart]) -> None:
+        """Begin episodes as they were drawn, or as they began before."""
+        self._run(None, starts, False, None, None)
+
+    def _run(
+        self,
+        decoded: Any,  # noqa: ANN401
+        starts: Mapping[int, EpisodeStart],
+        is_same_step: bool,
+        given: NDArray[np.bool_] | None,
+        after_step: AfterStep | None,
+    ) -> None:
+        # Most steps are of episodes of which none begins or has lost a robot: the rest costs nothing then.
+        is_plain = decoded is not None and not starts and self.is_whole
+        if is_plain:
+            modes = np.frombuffer(self._all_step, np.int8).copy()
+            acted = self.live.copy()
+        else:
+            modes = np.full(self.episodes, WAITS, np.int8)
+            if decoded is not None:
+                modes[~self.is_over] = STEPS
+                modes[list(starts)] = WAITS
+            acted = self.live & np.repeat(modes == STEPS, self.robots)
+        if decoded is not None:
+            chosen = acted if given is None else acted & given
+            self.level.carry_out(decoded, Turn(acted, chosen, self._commands, modes, self.operating))
+        seen = acted
+        if starts:
+            for episode, start in starts.items():
+                self._place(episode, start)
+                modes[episode] = SENSES
+            self.is_whole = bool(self.live.all())
+            seen = acted.copy()
+            seen.reshape(self.episodes, self.robots)[list(starts)] = True
+        self._turn_buffers(None if is_plain else seen, is_same_step)
+        self.score.earned.fill(0.0)
+        self._advance(modes, seen, after_step)
+        for episode in starts:
+            self._extra.start(episode)
+        self._finish(acted, seen, is_plain)
+
+    def step_at(self, commands: NDArray[np.float64], after_step: AfterStep | None = None) -> None:
+        """Run one time step of all episodes at speeds and turn rates (rows, 2) [m/s, rad/s]; `finish` ends it."""
+        self._tick(commands, None, after_step)
+
+    def finish(self) -> None:
+        """Observe, reward and end after steps by `step_at`."""
+        acted = self.live.copy()
+        self._turn_buffers(acted, False)
+        self._writer.write(self.observations, acted)
+        self._finish(acted, acted, self.is_whole)
+        self.score.earned.fill(0.0)
+
+    def _finish(self, acted: NDArray[np.bool_], seen: NDArray[np.bool_], is_plain: bool) -> None:
+        """Complete observations, rewards, endings and infos after the episodes have run."""
+        self._computed.write(self.observations, seen)
+        terms = self._take_terms(acted, is_plain)
+        self.acted = acted
+        self._note_endings(acted)
+        self._report(terms)
+        level_live = self.live & seen
+        if self.operating.is_active:
+            level_live &= ~self.operating.held
+        self.level.observe(acted, level_live, seen, self.observations, self.infos)
+
+    def _place(self, episode: int, start: EpisodeStart) -> None:
+        """Put the robots of an episode where they begin."""
+        rows = slice(episode * self.robots, (episode + 1) * self.robots)
+        self.simulation.place(episode, start.tables, start.starts, start.seed, self.settings.known_starts)
+        self.floors[episode] = start.floor
+        self.starts[episode] = start
+        self._offsets[rows] = map_frames(start, self.settings)
+        self._goals[rows] = goal_of_robots(start, self.settings)
+        self._rules.goals[episode] = np.nan if start.goal is None else start.goal
+        self._rules.is_empty[rows] = False
+        self._commands[rows] = 0.0
+        self.live[rows] = True
+        self.perception.start(start.goal, episode)
+        self._software.start(episode, start.seed)
+        if self._meters is not None:
+            self._meters.start(episode)
+        self.operating.start(episode)
+        if self.stations:
+            self.stations[episode].start()
+        self.level.start(episode)
+
+    def _advance(
+        self, modes: NDArray[np.int8], seen: NDArray[np.bool_], after_step: AfterStep | None
+    ) -> None:
+        """Run the episodes and write observations: all in one kernel call, or step by step."""
+        is_stepped = (
+            after_step is not None
+            or self._software.is_staged
+            or self.operating.is_active
+            or (self._meters is not None and self._meters.is_active)
+        )
+        if is_stepped:
+            self._run_stepwise(modes, after_step)
+            self._writer.fill(self.observations, seen)
+        else:
+            self.run_kernel(modes, self._commands, seen)
+
+    def run_kernel(
+        self, modes: NDArray[np.int8], commands: NDArray[np.float64], seen: NDArray[np.bool_]
+    ) -> None:
+        """Run episodes by the kernel alone, without beginnings, endings and infos.
+
+        ``modes`` (episodes,) int8 say what each episode does, ``commands`` (rows, 2) are the speeds of those that take
+        one step, ``seen`` (rows,) bool are the rows that are observed.
+        """
+        threads = self.simulation.use_threads()
+        # To and fro: the maps of the episodes that ran last are still in the caches.
+        self._orders.reverse()
+        run = run_parallel if threads > 1 else run_serial
+        sources, observed = self._writer.arguments(self.observations)
+        call = Run(
+            self.simulation.table, self.robots, modes, commands, self.level.steps, self._waiting, seen, sources
+        )
+        work = new_work(self._orders[0], threads)
+        run(call, self.level.drives, self.level.following, self._rules, observed, work)
+        self._writer.copy_sensors(self.observations, seen)
+
+    def _run_stepwise(self, modes: NDArray[np.int8], after_step: AfterStep | None) -> None:
+        """Run episodes as the kernel does, step by step; ``modes`` is used up."""
+        commands, level, robots, table = self._commands, self.level, self.robots, self.simulation.table
+        if modes.tobytes() == self._all_step:
+            self._tick(commands, None, after_step)
+            return
+        senses = modes == SENSES
+        if senses.any():
+            self._software.step(commands, moves_bodies=False, runs=senses)
+            modes[senses] = WAITS
+        self.operating.interrupting[:] = False
+        decides = modes == DECIDES
+        left = np.where(decides, level.steps, 1)
+        begin_decisions(decides, robots, level.drives, self._waiting)
+        while (runs := modes != WAITS).any():
+            follow_some(runs & decides, robots, table, level.drives, level.following, commands)
+            self._tick(commands, runs, after_step)
+            note_ends(modes, robots, table, level.drives, self._rules, self._waiting)
+            modes[self.operating.interrupting & decides] = WAITS
+            left[runs] -= 1
+            modes[left == 0] = WAITS
+
+    def _tick(
+        self, commands: NDArray[np.float64], runs: NDArray[np.bool_] | None, after_step: AfterStep | None
+    ) -> None:
+        """Run one time step of some episodes, or of all."""
+        operating, meters = self.operating, self._meters
+        is_active = operating.is_active
+        if is_active:
+            operating.before_step(commands, runs)
+        self._software.step(commands, runs=runs)
+        if is_active:
+            operating.after_step(runs)
+        if meters is not None and meters.is_active:
+            meters.advance()
+            if self.settings.battery.is_limited:
+                self._rules.is_empty[:] = meters.is_empty
+        if after_step is not None:
+            after_step(commands)
+
+    def _take_terms(self, acted: NDArray[np.bool_], is_plain: bool) -> dict[str, NDArray[np.float64]]:
+        """Return what each term of the reward brought in the step; add up those that are no kernels.
+
+        Rows that did not act have earned nothing; ``is_plain`` says that all did.
+        """
+        score = self.score
+        earned = {} if self._extra.is_empty else self._extra.earned()
+        for amounts in earned.values():
+            score.rewards += amounts
+        if not is_plain:
+            score.rewards[~acted] = 0.0
+            score.reward_terms[~acted] = 0.0
+            earned = {name: np.where(acted, amounts, 0.0) for name, amounts in earned.items()}
+        return {**dict(zip(TERMS, score.reward_terms.T.copy(), strict=True)), **earned}
+
+    def _note_endings(self, acted: NDArray[np.bool_]) -> None:
+        """Note why robots that took part in the step end, and let them stand.
+
+        What happens to them counts before reasons of their own. An empty battery takes the sensors and the radio of a
+        robot as well.
+        """
+        if self._rules_table is None:
+            self._rules_table = table_of(self._rules)
+        self.reasons = reasons = np.zeros(self.rows, np.int8)
+        count = note_endings(self.simulation.table, self.robots, self._rules_table, reasons)
+        stopping = self.operating.stopping
+        if not count and not stopping:
+            self.has_endings = False
+            return
+        if count:
+            reasons[~acted] = 0
+        words: dict[int, str] = {}
+        for row in [row for row in stopping if acted[row]]:
+            word = stopping.pop(row)
+            if reasons[row] in (0, HORIZON):
+                reasons[row] = REASONS.index(word) if word in REASONS else len(REASONS)
+                words[row] = word
+        rows = np.flatnonzero(reasons)
+        self.has_endings = len(rows) > 0
+        if not self.has_endings:
+            return
+        self.is_whole = False
+        self.live[rows] = False
+        self.world.moves[rows] = 0
+        self.world.flags[rows] |= ENDED
+        named = {row: words.get(row) or REASONS[reasons[row]] for row in rows.tolist()}
+        for row, word in named.items():
+            if word == "battery":
+                self.world.failed[row] = 1
+        self.operating.end(named)
+        self.ended_because = named
+
+    def _report(self, terms: dict[str, NDArray[np.float64]]) -> None:
+        """Put together the infos of the step: the truth, states, terms of the reward and endings."""
+        everyone, score, operating = self.everyone, self.score, self.operating
+        infos: dict[str, Any] = {
+            "truth": {
+                "pose": self.world.poses.copy(),
+                "coverage": np.repeat(score.coverages(), self.robots),
+                "seen_cells": score.seen.copy(),
+            },
+            "_truth": everyone,
+            "order": operating.order_names,
+            "_order": everyone,
+            "reward_terms": terms,
+            "_reward_terms": everyone,
+        }
+        if self.has_endings:
+            names = np.full(self.rows, None, object)
+            for row, word in self.ended_because.items():
+                names[row] = word
+            infos["ended_because"] = names
+            infos["_ended_because"] = self.reasons != 0
+        infos["state"] = operating.state_names
+        infos["_state"] = everyone
+        if self.settings.battery.is_limited:
+            infos["energy_j"] = self.used_j
+            infos["_energy_j"] = everyone
+        if self._calibration is not None:
+            infos["camera"] = self._calibration
+            infos["_camera"] = everyone
+        self.infos = infos
+
+    def _calibration_rows(self) -> dict[str, Any] | None:
+        """Return the calibration of the robots' cameras in arrays over rows, None without cameras."""
+        if self.simulation.camera is None:
+            return None
+        calibration = self.simulation.camera.camera.calibration
+        return {
+            "intrinsics": {
+                name: frozen(np.full(self.rows, value)) for name, value in calibration["intrinsics"].items()
+            },
+            "mount": frozen(np.tile(calibration["mount"], (self.rows, 1))),
+        }
+
+    def _new_buffers(self) -> Arrays:
+        more = {name: np.zeros((self.rows, *(box.shape or ())), box.dtype) for name, box in self._boxes.items()}
+        return {**self._writer.buffers(), **more}
+
+    def _turn_buffers(self, seen: NDArray[np.bool_] | None, is_same_step: bool) -> None:
+        """Choose the arrays for the observations of this step; rows that are not seen repeat their last one.
+
+        ``seen`` is None if all rows are.
+        """
+        before = self.observations
+        if self._copies:
+            self.observations = self._new_buffers()
+        elif not is_same_step:
+            self._buffers.reverse()
+            self.observations = self._buffers[0]
+        if seen is not None and self.observations is not before and not seen.all():
+            for name, array in self.observations.items():
+                array[~seen] = before[name][~seen]
+
+    def scenes(self) -> list["Scene"]:
+        """Return what a picture of each episode shows.
+
+        Raises
+        ------
+        RuntimeError
+            If an episode has not begun.
+        """
+        from lidarium.envs.drawing.rendering import Scene
+
+        if not self.is_ready:
+            raise RuntimeError("the environment was not reset; call reset() before render()")
+        ended = ~self.live.reshape(self.episodes, self.robots)
+        return [
+            Scene(self.simulation, self.settings, floor.name, ended[episode].tolist(), [], episode)
+            for episode, floor in enumerate(self.floors)
+            if floor is not None
+        ]
+
+    def __getstate__(self) -> dict[str, Any]:
+        # A copy's arrays lie elsewhere.
+        return {**self.__dict__, "_rules_table": None}

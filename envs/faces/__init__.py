@@ -1,0 +1,1 @@
+"""The faces of the engine: PettingZoo, Gymnasium and stable-baselines3."""

@@ -1,0 +1,112 @@
+"""Merged maps: robots exchange their maps at a period, each sees the team's map and teammates in its own frame."""
+
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+
+from lidarium.envs.faces.parallel import ExplorationEnv, Observation, Outcome
+from lidarium.envs.faces.team_exchange import (
+    CanTalk,
+    MergedRows,
+    MergeEvent,
+    MergingSettings,
+    frames_of,
+)
+from lidarium.envs.faces.wrapper import TeamWrapper, exploration_below
+from lidarium.envs.onboard.station.team_mapping import Frames, TeamMapping
+
+
+class MergedMaps(TeamWrapper):
+    """Gives each robot the map made by all robots that it is joined with, and their poses.
+
+    Observations have, besides those of the environment below, ``team_map`` uint8 (1, M, M) like ``map``, as of the
+    last exchange; its own map is part of it. ``teammates`` float32 (robots - 1, 5) has one row for each of the others
+    in their order: x, y [m], theta [rad] in the robot's own map frame, the age of what was received [s] and whether
+    there is any; zeros if there is none. ``infos[agent]["merges"]`` lists the robots with which it was joined in this
+    step, ``infos[agent]["truth"]["merges"]`` the `MergeEvent` of each. In a batch: ``vector_env(merging=...)``.
+
+    Parameters
+    ----------
+    env : ParallelEnv
+        The environment of a team of two robots or more, at any level of decision.
+    settings : MergingSettings, optional
+        How maps are merged.
+    can_talk : (robots, robots) bool or callable, optional
+        Which robots reach each other, at all times or as a function (see `CanTalk`). By default those that the
+        environment's radio joins. News are passed on.
+
+    Attributes
+    ----------
+    events : list of MergeEvent
+        All of this episode, in their order.
+
+    Raises
+    ------
+    ValueError
+        If there is only one robot, or ``can_talk`` is of another shape.
+    """
+
+    def __init__(
+        self,
+        env: Any,  # noqa: ANN401
+        settings: MergingSettings | None = None,
+        can_talk: NDArray[np.bool_] | CanTalk | None = None,
+    ) -> None:
+        base = exploration_below(getattr(env, "unwrapped", env), "MergedMaps")
+        super().__init__(env)
+        self.merging = settings or MergingSettings()
+        self.metadata = {**env.metadata, "name": str(env.metadata["name"]).replace("_v1", "_merged_v1")}
+        self._engine = base.engine
+        self._merged = MergedRows(base.engine, self.merging, can_talk)
+        self._index = {agent: row for row, agent in enumerate(self.possible_agents)}
+        self._observation_spaces: dict[str, spaces.Space[Any]] = {
+            agent: spaces.Dict({**env.observation_space(agent).spaces, **self._merged.boxes})
+            for agent in self.possible_agents
+        }
+
+    def observation_space(self, agent: str) -> spaces.Space[Any]:
+        """Return the space of an agent's observations, the same object at each call."""
+        return self._observation_spaces[agent]
+
+    def reset(
+        self, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[dict[str, Observation], dict[str, dict[str, Any]]]:
+        """Start an episode; see ``ExplorationEnv.reset``."""
+        observations, infos = super().reset(seed, options)
+        self._exchange(observations, infos)
+        return observations, infos
+
+    def step(self, actions: Any) -> Outcome:  # noqa: ANN401
+        """Take a step or a decision, and exchange maps if the period is over."""
+        outcome = super().step(actions)
+        self._exchange(outcome[0], outcome[4])
+        return outcome
+
+    @property
+    def team(self) -> TeamMapping:
+        """The maps and poses that the robots have received of each other."""
+        return self._merged.teams[0].team
+
+    @property
+    def events(self) -> list[MergeEvent]:
+        """All merges of this episode, in their order."""
+        return self._merged.teams[0].events
+
+    def _exchange(self, observations: dict[str, Observation], infos: dict[str, dict[str, Any]]) -> None:
+        """Let the robots exchange maps if it is time, and add the results to observations and infos."""
+        seen = np.zeros(len(self._index), np.bool_)
+        seen[[self._index[agent] for agent in infos]] = True
+        self._merged.exchange(seen, np.asarray(self._engine.world.steps <= 0))
+        arrays, names, events = self._merged.arrays, *self._merged.joined()
+        for agent, info in infos.items():
+            row = self._index[agent]
+            info["merges"] = names[row]
+            info["truth"]["merges"] = events[row]
+            observations[agent].update({name: array[row] for name, array in arrays.items()})
+
+
+def true_frames(env: ExplorationEnv) -> Frames:
+    """Return the true transforms between the map frames of all robots of an environment."""
+    return frames_of(env.perception, 0)

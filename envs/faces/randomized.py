@@ -1,0 +1,533 @@
+"""Settings that are drawn for each episode (domain randomisation), alone and in batches."""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+
+from lidarium.envs.engine.team_state import ROBOT_NUMBERS, state_space, team_state
+from lidarium.envs.faces.team import EpisodeTeam
+from lidarium.envs.faces.team_rows import TeamRows
+from lidarium.envs.faces.wrapper import TeamWrapper
+from lidarium.envs.settings.exploration import ExplorationSettings
+from lidarium.envs.settings.making import set_values
+from lidarium.envs.settings.reset_options import ResetOptions, checked_seed
+from lidarium.mapping.geometry.bounds import shown
+
+Distribution = Callable[[np.random.Generator], Any] | tuple[float, float] | list[Any]
+"""Of a setting: a callable of a generator; (low, high) for all between; a list of which each is as likely."""
+
+Distributions = Mapping[str, Distribution]
+"""By the names of settings, such as ``lidar.noise_floor``."""
+
+ROBOTS = "robots"
+"""The setting by which teams differ in size."""
+
+SETTINGS_STREAM = 77
+"""Separates the draws of settings from those of floors, starts and noise."""
+
+OF_TEAMMATES = ("teammates", "messages")
+"""Keys of observations with a row for each of the others."""
+
+
+class Draws:
+    """The draws of settings.
+
+    Parameters
+    ----------
+    settings : ExplorationSettings
+        The settings that are not drawn.
+    distributions : mapping
+        From names of settings to `Distribution`.
+
+    Raises
+    ------
+    ValueError
+        If there are none, or one is of no kind of `Distribution`.
+    """
+
+    def __init__(self, settings: ExplorationSettings, distributions: Any) -> None:  # noqa: ANN401
+        if not isinstance(distributions, Mapping) or not distributions:
+            raise ValueError(
+                f"randomize is {shown(distributions)}; want a dict from names of settings to distributions, such "
+                'as {"lidar.noise_floor": (0.0, 0.05)}'
+            )
+        for name, each in distributions.items():
+            is_range = isinstance(each, tuple) and len(each) == 2 and _are_numbers(each) and each[0] <= each[1]
+            if not (callable(each) or is_range or (isinstance(each, list) and each)):
+                raise ValueError(
+                    f"the distribution of {name} is {shown(each)}; want (low, high), a list to choose from, or a "
+                    "callable of a generator"
+                )
+        self._settings = settings
+        self._distributions: Distributions = dict(distributions)
+
+    @property
+    def max_robots(self) -> int | None:
+        """The largest number of robots that is drawn; None if the size of teams is not drawn.
+
+        Raises
+        ------
+        ValueError
+            If it cannot be known, or a draw is no number of robots.
+        """
+        sizes = self._distributions.get(ROBOTS)
+        if sizes is None:
+            return None
+        if isinstance(sizes, tuple | list) and all(_is_size(each) for each in sizes):
+            return int(max(sizes))
+        raise ValueError(
+            f"the distribution of robots is {shown(sizes)}; want (least, most) or a list of whole "
+            "numbers of 1 or more, so that the largest team is known"
+        )
+
+    def draw(self, generator: np.random.Generator) -> dict[str, Any]:
+        """Return a value for each setting that is drawn, by name."""
+        return {name: draw(each, generator) for name, each in self._distributions.items()}
+
+    def settings_of(self, drawn: Mapping[str, Any]) -> ExplorationSettings:
+        """Return the settings with values that were drawn."""
+        return set_values(self._settings, drawn)
+
+
+def draw(distribution: Distribution, generator: np.random.Generator) -> Any:  # noqa: ANN401
+    """Return a value; between whole numbers it is one, both ends included."""
+    if isinstance(distribution, list):
+        return distribution[int(generator.integers(len(distribution)))]
+    if isinstance(distribution, tuple):
+        low, high = distribution
+        is_whole = isinstance(low, int) and isinstance(high, int)
+        return (
+            int(generator.integers(int(low), int(high) + 1))
+            if is_whole
+            else float(generator.uniform(low, high))
+        )
+    return distribution(generator)
+
+
+class RandomizedTeam(TeamWrapper):
+    """Draws settings at each reset, and makes an environment of them.
+
+    If ``robots`` is drawn, ``possible_agents`` are those of the largest team, and ``agents`` those of the episode.
+    Observations of teammates have rows for the largest team, zeros behind those of the episode, and so has the state.
+
+    Parameters
+    ----------
+    make : callable
+        Takes settings and the number of the episode and returns the environment.
+    settings : ExplorationSettings
+        The settings that are not drawn.
+    distributions : mapping
+        From names of settings to `Distribution`.
+
+    Attributes
+    ----------
+    drawn : dict
+        The values that were drawn for this episode, by name.
+
+    Raises
+    ------
+    ValueError
+        If a name or a distribution is none, a draw is no value of its setting, or draws change the spaces of
+        observations or actions.
+    """
+
+    def __init__(
+        self,
+        make: Callable[[ExplorationSettings, int], Any],
+        settings: ExplorationSettings,
+        distributions: Distributions,
+    ) -> None:
+        self._draws = Draws(settings, distributions)
+        self._make = make
+        self._generator = np.random.default_rng(0)
+        self._episode = 0
+        maximum = self._draws.max_robots
+        first = self._next(0)
+        super().__init__(first)
+        largest = first
+        self._pads = maximum is not None
+        if maximum is not None:
+            self.drawn[ROBOTS] = maximum
+            largest = self._make(self._draws.settings_of(self.drawn), 0)
+            self.possible_agents = largest.possible_agents
+        agent = self.possible_agents[0]
+        self._spaces: tuple[spaces.Space[Any], spaces.Space[Any]] = (
+            largest.observation_space(agent),
+            largest.action_space(agent),
+        )
+        self._state_space = largest.state_space
+        self._has_begun = False
+
+    def _next(self, episode: int) -> Any:  # noqa: ANN401
+        self.drawn = self._draws.draw(self._generator)
+        return self._make(self._draws.settings_of(self.drawn), episode)
+
+    def observation_space(self, agent: str) -> spaces.Space[Any]:
+        """Return the space of an agent's observations, that of the largest team."""
+        self._check_agent(agent)
+        return self._spaces[0]
+
+    def action_space(self, agent: str) -> spaces.Space[Any]:
+        """Return the space of an agent's actions."""
+        self._check_agent(agent)
+        return self._spaces[1]
+
+    def _check_agent(self, agent: str) -> None:
+        if agent not in self.possible_agents:
+            raise ValueError(f"{agent!r} is not among the agents {self.possible_agents}")
+
+    def reset(
+        self, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
+        """Start an episode of newly drawn settings; see ``ExplorationEnv.reset``."""
+        seed = checked_seed(seed)
+        if seed is not None:
+            self._generator = np.random.default_rng((seed, SETTINGS_STREAM))
+        elif not self._has_begun:
+            self._generator = np.random.default_rng()
+        made = self._next(self._episode)
+        agent = self.possible_agents[0]
+        check_spaces(self.drawn, (made.observation_space(agent), made.action_space(agent)), self._spaces)
+        self.env.close()
+        self.env, self.settings, self._has_begun = made, made.settings, True
+        own = int(self._generator.integers(2**31)) if seed is None else seed
+        observations, infos = super().reset(own, options)
+        self._episode += 1
+        return self._padded(observations), infos
+
+    def step(self, actions: Any) -> Any:  # noqa: ANN401
+        """Take a step or a decision."""
+        observations, *others = super().step(actions)
+        return (self._padded(observations), *others)
+
+    def _padded(self, observations: dict[str, Any]) -> dict[str, Any]:
+        if not self._pads:
+            return observations
+        return {agent: padded(each, self._spaces[0]) for agent, each in observations.items()}
+
+    @property
+    def state_space(self) -> spaces.Box:
+        """The space of ``state``, that of the largest team."""
+        space: spaces.Box = self._state_space
+        return space
+
+    def state(self) -> NDArray[np.float32]:
+        """Return the true state of the team, zeros for robots that it lacks."""
+        return padded_state(super().state(), self.settings.robots, self._state_space)
+
+
+class RandomizedRows:
+    """The rows of many episodes, each with settings drawn as it begins; it has the face of `TeamRows`.
+
+    Kernels have one choice of settings, so each episode is an engine of its own, and they are stepped one after the
+    other. An episode is that of a `RandomizedTeam` with the same seed, to the bit. If the size of teams is drawn, each
+    episode has rows for the largest team; rows of robots that it lacks are never active, and hold zeros.
+
+    Parameters
+    ----------
+    episodes : int
+        Number of episodes.
+    make : callable
+        Takes settings and the number of an episode and returns the `TeamRows` of one episode.
+    settings : ExplorationSettings
+        The settings that are not drawn.
+    distributions : mapping
+        From names of settings to `Distribution`.
+
+    Attributes
+    ----------
+    drawn : list of dict
+        The values that each episode has drawn, by name.
+    parts : list of TeamRows
+        The rows of each episode.
+    """
+
+    def __init__(
+        self,
+        episodes: int,
+        make: Callable[[ExplorationSettings, int], TeamRows],
+        settings: ExplorationSettings,
+        distributions: Distributions,
+    ) -> None:
+        if isinstance(episodes, bool) or not isinstance(episodes, int | np.integer) or episodes < 1:
+            raise ValueError(f"the number of episodes is {episodes!r}; want a whole number of at least 1")
+        self._draws = Draws(settings, distributions)
+        self._make = make
+        self.episodes = int(episodes)
+        maximum = self._draws.max_robots
+        self._pads = maximum is not None
+        self.robots = settings.robots if maximum is None else maximum
+        self.rows = self.episodes * self.robots
+        generator = np.random.default_rng(0)
+        self.drawn = [self._draws.draw(generator) for _ in range(self.episodes)]
+        self.parts = [make(self._draws.settings_of(drawn), 0) for drawn in self.drawn]
+        largest = self.parts[0]
+        if maximum is not None:
+            largest = make(self._draws.settings_of({**self.drawn[0], ROBOTS: maximum}), 0)
+        self.settings = largest.engine.settings
+        self.space, self.action_space, self.columns = largest.space, largest.action_space, largest.columns
+        self._generators: list[np.random.Generator | None] = [None] * self.episodes
+        self._is_ready = np.zeros(self.episodes, np.bool_)
+        self._begun = 0
+
+    @property
+    def is_ready(self) -> bool:
+        """Whether every episode has begun at least once."""
+        return bool(self._is_ready.all())
+
+    @property
+    def is_over(self) -> NDArray[np.bool_]:
+        """Which episodes have no live robot left, (episodes,)."""
+        return np.array([part.engine.is_over[0] for part in self.parts])
+
+    @property
+    def live(self) -> NDArray[np.bool_]:
+        """Which robots have not ended, (rows,)."""
+        return self._together([part.engine.live for part in self.parts])
+
+    def begin(
+        self,
+        chosen: NDArray[np.int64],
+        seeds: Sequence[int | None] | None = None,
+        options: Mapping[int, ResetOptions] | None = None,
+        is_same_step: bool = False,
+    ) -> None:
+        """Begin episodes with newly drawn settings; see `TeamRows.begin`."""
+        del is_same_step
+        for k, episode in enumerate(chosen.tolist()):
+            self._begin(episode, None if seeds is None else seeds[k], (options or {}).get(episode))
+
+    def _begin(self, episode: int, seed: int | None, options: ResetOptions | None) -> None:
+        generator = self._generators[episode]
+        if seed is not None:
+            generator = np.random.default_rng((seed, SETTINGS_STREAM))
+        elif generator is None:
+            generator = np.random.default_rng()
+        drawn = self._draws.draw(generator)
+        part = self._make(self._draws.settings_of(drawn), self._begun)
+        check_spaces(drawn, (part.space, part.action_space), (self.space, self.action_space))
+        own = int(generator.integers(2**31)) if seed is None else seed
+        part.begin(np.zeros(1, np.int64), [own], None if options is None else {0: options})
+        self.parts[episode].engine.simulation.close()
+        self.parts[episode], self.drawn[episode], self._generators[episode] = part, drawn, generator
+        self._is_ready[episode] = True
+        self._begun += 1
+
+    def step(self, actions: Any, beginning: NDArray[np.int64]) -> None:  # noqa: ANN401
+        """Run all live episodes for one step or decision, and begin others; see `TeamRows.step`."""
+        begins = set(beginning.tolist())
+        for episode in range(self.episodes):
+            if episode in begins:
+                self._begin(episode, None, None)
+            else:
+                part, first = self.parts[episode], episode * self.robots
+                part.step(_of_rows(actions, slice(first, first + part.robots), self.rows))
+
+    @property
+    def rewards(self) -> NDArray[np.float64]:
+        """Rewards of the last step, (rows,)."""
+        return self._together([part.rewards for part in self.parts])
+
+    @property
+    def terminated(self) -> NDArray[np.bool_]:
+        """Which robots have ended in the last step, (rows,)."""
+        return self._together([part.terminated for part in self.parts])
+
+    @property
+    def truncated(self) -> NDArray[np.bool_]:
+        """Which rows were cut in the last step, (rows,); those of robots that a team lacks end with it."""
+        truncated = self._together([part.truncated for part in self.parts])
+        return truncated | ~self._exists & np.repeat(self.is_over, self.robots)
+
+    @property
+    def active(self) -> NDArray[np.bool_]:
+        """Which robots had not ended before the last step, (rows,)."""
+        return self._together([part.active for part in self.parts])
+
+    @property
+    def _exists(self) -> NDArray[np.bool_]:
+        return self._together([np.ones(part.rows, np.bool_) for part in self.parts])
+
+    @property
+    def observations(self) -> Any:  # noqa: ANN401
+        """The observations of all rows."""
+        return _joined([self._whole(part.observations, self.space) for part in self.parts])
+
+    def observation(self, row: int) -> Any:  # noqa: ANN401
+        """Return the observation of one row, its own arrays."""
+        episode, robot = divmod(row, self.robots)
+        part = self.parts[episode]
+        if robot >= part.robots:
+            return zeros_of(self.space)
+        found = part.observation(robot)
+        return padded(found, self.space) if self._pads else found
+
+    @property
+    def infos(self) -> dict[str, Any]:
+        """Infos of all rows; if an episode lacks one, its mask is False there."""
+        infos = [
+            {name: self._padded_info(values, part.rows) for name, values in part.infos.items()}
+            for part in self.parts
+        ]
+        return _joined_infos(infos, self.robots)
+
+    def _padded_info(self, values: Any, rows: int) -> Any:  # noqa: ANN401
+        if isinstance(values, Mapping):
+            return {name: self._padded_info(each, rows) for name, each in values.items()}
+        return _longer(values, self.robots) if rows < self.robots else values
+
+    def _whole(self, seen: Any, space: spaces.Space[Any]) -> Any:  # noqa: ANN401
+        """Return the observations of an episode with rows for the largest team."""
+        if not self._pads:
+            return seen
+        if isinstance(space, spaces.Dict):
+            return {name: self._whole(seen[name], part) for name, part in space.spaces.items()}
+        whole = np.zeros((self.robots, *(space.shape or ())), space.dtype)
+        whole[tuple(slice(size) for size in seen.shape)] = seen
+        return whole
+
+    def _together(self, parts: Sequence[NDArray[Any]]) -> NDArray[Any]:
+        return np.concatenate([_longer(part, self.robots) for part in parts])
+
+    @property
+    def masks(self) -> NDArray[np.bool_] | None:
+        """Which actions each row may choose now, (rows, actions); None if the level has no mask."""
+        masks = [part.masks for part in self.parts]
+        return None if masks[0] is None else self._together([each for each in masks if each is not None])
+
+    def states(self) -> NDArray[np.float32]:
+        """Return the true state of each team, (episodes, numbers); see `team_state`."""
+        space = state_space(self.settings)
+        return np.stack(
+            [
+                padded_state(
+                    team_state(part.engine.simulation, part.engine.settings), part.robots, space
+                )
+                for part in self.parts
+            ]
+        )
+
+    def scenes(self) -> list[Any]:
+        """Return the scene of each episode, for pictures."""
+        return [scene for part in self.parts for scene in part.engine.scenes()]
+
+    def team(self, episode: int) -> EpisodeTeam:
+        """Return the handle of an episode's team; it holds until the episode begins again."""
+        return EpisodeTeam(self.parts[episode].engine)
+
+    def close(self) -> None:
+        """Release everything that the worlds hold beyond arrays."""
+        for part in self.parts:
+            part.engine.simulation.close()
+
+
+def _longer(values: NDArray[Any], rows: int) -> NDArray[Any]:
+    """Return values with rows of zeros, or of None, behind them."""
+    if len(values) == rows:
+        return values
+    whole = np.full((rows, *values.shape[1:]), None if values.dtype == object else 0, values.dtype)
+    whole[: len(values)] = values
+    return whole
+
+
+def _of_rows(actions: Any, rows: slice, count: int) -> Any:  # noqa: ANN401
+    """Return the actions of some rows, those of all being an array or arrays by name."""
+    if isinstance(actions, Mapping):
+        return {name: _of_rows(part, rows, count) for name, part in actions.items()}
+    array = np.asarray(actions)
+    if array.ndim == 0 or len(array) != count:
+        raise ValueError(
+            f"actions have shape {array.shape}; want one for each of the {count} rows, row = episode * "
+            "robots + robot"
+        )
+    return array[rows]
+
+
+def _joined(parts: Sequence[Any]) -> Any:  # noqa: ANN401
+    """Return observations of all rows, those of each episode one after the other."""
+    if isinstance(parts[0], Mapping):
+        return {name: _joined([part[name] for part in parts]) for name in parts[0]}
+    return np.concatenate(parts)
+
+
+def _joined_infos(parts: Sequence[Mapping[str, Any]], rows: int) -> dict[str, Any]:
+    """Return infos of all rows; if an episode lacks one, its mask is False there."""
+    found: dict[str, Any] = {}
+    for name in dict.fromkeys(name for part in parts for name in part):
+        given = [part.get(name) for part in parts]
+        example = next(each for each in given if each is not None)
+        if isinstance(example, Mapping):
+            found[name] = _joined_infos([{} if each is None else each for each in given], rows)
+            continue
+        absent = np.full((rows, *example.shape[1:]), None if example.dtype == object else 0, example.dtype)
+        found[name] = np.concatenate([absent if each is None else each for each in given])
+    return found
+
+
+def check_spaces(
+    drawn: Mapping[str, Any],
+    made: tuple[spaces.Space[Any], spaces.Space[Any]],
+    wanted: tuple[spaces.Space[Any], spaces.Space[Any]],
+) -> None:
+    """Check that drawn settings leave the spaces of observations and actions as they are.
+
+    Raises
+    ------
+    ValueError
+        If they do not.
+    """
+    if not _fits_into(made[0], wanted[0]) or made[1] != wanted[1]:
+        raise ValueError(
+            f"settings drawn are {drawn}; want some that leave the spaces of observations and actions as "
+            "they are: learners have one for all episodes"
+        )
+
+
+def _fits_into(space: spaces.Space[Any], largest: spaces.Space[Any], key: str = "") -> bool:
+    """Whether observations fit those of the largest team but for rows of teammates."""
+    if isinstance(space, spaces.Dict) and isinstance(largest, spaces.Dict):
+        return space.keys() == largest.keys() and all(
+            _fits_into(part, largest[name], name) for name, part in space.items()
+        )
+    if key in OF_TEAMMATES and space.shape is not None and largest.shape is not None:
+        return space.shape[0] <= largest.shape[0] and space.shape[1:] == largest.shape[1:]
+    return space == largest
+
+
+def padded(observation: Any, space: spaces.Space[Any]) -> Any:  # noqa: ANN401
+    """Return an observation with zeros for the teammates that a team lacks."""
+    if isinstance(space, spaces.Dict):
+        return {name: padded(observation[name], part) for name, part in space.items()}
+    if observation.shape == space.shape:
+        return observation
+    whole = np.zeros(space.shape or (), space.dtype)
+    whole[: len(observation)] = observation
+    return whole
+
+
+def padded_state(state: NDArray[np.float32], robots: int, space: spaces.Box) -> NDArray[np.float32]:
+    """Return the state of a team of ``robots`` with zeros for those that it lacks."""
+    own = robots * len(ROBOT_NUMBERS)
+    lacking = np.zeros(len(space.low) - len(state), np.float32)
+    return np.concatenate([state[:own], lacking, state[own:]])
+
+
+def zeros_of(space: spaces.Space[Any]) -> Any:  # noqa: ANN401
+    """Return an observation of zeros."""
+    if isinstance(space, spaces.Dict):
+        return {name: zeros_of(part) for name, part in space.spaces.items()}
+    return np.zeros(space.shape or (), space.dtype)
+
+
+def _is_size(value: Any) -> bool:  # noqa: ANN401
+    return isinstance(value, int) and not isinstance(value, bool) and value >= 1
+
+
+def _are_numbers(values: Sequence[Any]) -> bool:
+    return all(
+        isinstance(value, int | float) and not isinstance(value, bool) and np.isfinite(value)
+        for value in values
+    )

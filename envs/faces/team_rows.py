@@ -1,0 +1,307 @@
+"""The rows of an engine in the forms of conventions; every face reads its results here."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+
+from lidarium.envs.engine.engine import NO_EPISODES, AfterStep, Engine
+from lidarium.envs.engine.team_state import team_state
+from lidarium.envs.faces.conventions import (
+    MASK,
+    PLAIN,
+    TEAM,
+    Conventions,
+    ObservationForm,
+    flat_row_infos,
+    shared_rewards,
+)
+from lidarium.envs.faces.messages import MESSAGES, MessageBoard, split_action, talking_space
+from lidarium.envs.faces.team import EpisodeTeam
+from lidarium.envs.faces.team_exchange import MergedRows, MergingSettings
+from lidarium.envs.settings.exploration import ExplorationSettings
+from lidarium.envs.settings.reset_options import ResetOptions
+
+ACTIVE = "active"
+"""Info: whether a robot had not ended before this step."""
+
+
+class TeamRows:
+    """Begins and steps the episodes of an engine; results are arrays over rows in the forms of conventions.
+
+    A robot that ends before its team is terminated once; its row then repeats its last observation with reward 0,
+    and the info ``active`` is False. When the last robot of an episode ends, the rows that repeat are truncated. With
+    ``ended_agents="zeros"`` rows of ended robots have observations of zeros instead, and all end with the last one.
+
+    Parameters
+    ----------
+    engine : Engine
+        The episodes.
+    conventions : Conventions, optional
+        The forms. Those of a plain environment by default.
+    merging : MergingSettings, optional
+        How robots merge their maps. They do not by default.
+
+    Attributes
+    ----------
+    space, action_space : Space
+        Of the observations and actions of a row.
+    columns : tuple
+        Where each key lies in the flat form; see ``flat_columns``.
+    rewards : (rows,) float64
+        Rewards of the last step.
+    terminated, truncated, active : (rows,) bool
+        Ends in the last step, and which robots had not ended before it.
+
+    Raises
+    ------
+    ValueError
+        If observations cannot take the form.
+    """
+
+    def __init__(
+        self, engine: Engine, conventions: Conventions = PLAIN, merging: MergingSettings | None = None
+    ) -> None:
+        self.engine = engine
+        self.conventions = conventions
+        self.rows, self.episodes, self.robots = engine.rows, engine.episodes, engine.robots
+        self._keeps = conventions.ended_agents == "zeros"
+        self._merged = None if merging is None else MergedRows(engine, merging)
+        self._board: MessageBoard | None = None
+        self._seen = np.ones(self.rows, np.bool_)
+        self._kept = np.zeros(self.rows, np.bool_)
+        self._endings = np.full(self.rows, None, object)
+        self._numbers: dict[str, NDArray[np.float64]] = {}
+        self.rewards = np.zeros(self.rows)
+        self._nobody = np.zeros(self.rows, np.bool_)
+        self.terminated = self.truncated = self._nobody
+        self.active = np.zeros(self.rows, np.bool_)
+        self.use_forms()
+
+    def use_forms(self) -> None:
+        """Take the spaces of the engine's level into the forms."""
+        engine, floats = self.engine, self.conventions.comm
+        space, self.action_space = engine.observation_space, engine.action_space
+        if self._merged is not None:
+            space = spaces.Dict({**space.spaces, **self._merged.boxes})
+        if floats:
+            self._board = MessageBoard(engine.perception, engine.settings, floats)
+            space = spaces.Dict({**space.spaces, MESSAGES: self._board.box})
+            self.action_space = talking_space(engine.action_space, floats)
+            self._sent = np.zeros((self.rows, floats))
+            self._messages = self._board.table()
+        self._form = ObservationForm(space, self.conventions)
+        self.space = self._form.space
+        self.columns = self._form.columns
+
+    def begin(
+        self,
+        chosen: NDArray[np.int64],
+        seeds: Sequence[int | None] | None = None,
+        options: Mapping[int, ResetOptions] | None = None,
+        is_same_step: bool = False,
+    ) -> None:
+        """Begin episodes; see `Engine.run`."""
+        self.engine.run(None, chosen, seeds, options, is_same_step)
+        self.came_out(~self.engine.live, is_step=False)
+
+    def step(self, actions: Any, beginning: NDArray[np.int64] = NO_EPISODES) -> None:  # noqa: ANN401
+        """Run all live episodes for one step or decision by an array of actions, and begin others."""
+        engine = self.engine
+        acting = engine.live.copy()
+        acting.reshape(self.episodes, self.robots)[beginning] = False
+        if self._board is not None:
+            actions = self._without_messages(actions)
+        decoded = engine.level.read_rows(actions, acting)
+        masked = ~engine.live
+        if len(beginning):
+            masked &= ~np.repeat(engine.is_over, self.robots)
+        engine.run(decoded, beginning)
+        self.came_out(masked)
+
+    def step_each(self, actions: Mapping[int, Any], names: list[str], after_step: AfterStep | None) -> None:
+        """Run all live episodes by actions of rows; robots without one go on with their last orders."""
+        engine = self.engine
+        if self._board is not None:
+            has_vectors = isinstance(engine.action_space, spaces.Box)
+            self._sent[:] = 0.0
+            rest = {}
+            for row, action in actions.items():
+                rest[row], self._sent[row] = split_action(
+                    action, self.conventions.comm, has_vectors, names[row % self.robots]
+                )
+            actions = rest
+        decoded = engine.level.read(actions, names)
+        given = None
+        if len(actions) < self.rows:
+            given = np.zeros(self.rows, np.bool_)
+            given[[*actions, *engine.operating.stopping]] = True
+        masked = ~engine.live
+        engine.run(decoded, given=given, after_step=after_step)
+        self.came_out(masked, given)
+
+    def came_out(
+        self, masked: NDArray[np.bool_], spoke: NDArray[np.bool_] | None = None, is_step: bool = True
+    ) -> None:
+        """Take in the results of a run; ``masked`` are the rows of robots that had ended before it."""
+        engine = self.engine
+        self._kept = masked
+        self.active = ~masked
+        self.exchange(spoke)
+        self.terminated = self.truncated = self._nobody
+        if engine.has_endings or (is_step and not engine.is_whole):
+            self.terminated, self.truncated = engine.terminated, engine.truncated
+            is_over = np.repeat(engine.is_over, self.robots)
+            if self._keeps:
+                self.terminated = (self.terminated | masked) & is_over
+            else:
+                self.truncated = self.truncated | masked & is_over
+        self.rewards = engine.rewards.copy()
+        self._infos = engine.infos
+        share = self.conventions.team_reward
+        if share and is_step:
+            teams = (-1, self.robots)
+            mixed = shared_rewards(engine.rewards.reshape(teams), engine.acted.reshape(teams), share).ravel()
+            terms = {**engine.infos["reward_terms"], TEAM: mixed - engine.rewards}
+            self.rewards = mixed
+            self._infos = {**engine.infos, "reward_terms": terms}
+
+    def _without_messages(self, actions: Any) -> Any:  # noqa: ANN401
+        """Return actions without their messages, which are kept to be sent."""
+        has_vectors = isinstance(self.engine.action_space, spaces.Box)
+        rest, message = split_action(actions, self.conventions.comm, has_vectors, "all rows")
+        if message.shape != self._sent.shape:
+            raise ValueError(
+                f"messages have shape {message.shape}; want {self._sent.shape}: one for each row = episode * "
+                "robots + robot"
+            )
+        self._sent = message
+        return rest
+
+    def exchange(self, spoke: NDArray[np.bool_] | None = None) -> None:
+        """Let messages and maps be exchanged, after a run."""
+        if self._board is None and self._merged is None:
+            return
+        engine = self.engine
+        began = np.asarray(engine.world.steps <= 0)
+        self._seen = engine.acted | np.repeat(began, self.robots)
+        if self._board is not None:
+            self._board.exchange(self._sent, engine.acted if spoke is None else engine.acted & spoke)
+            self._board.start(np.flatnonzero(began))
+            self._messages = np.where(self._seen[:, None, None], self._board.table(), self._messages)
+        if self._merged is not None:
+            self._merged.exchange(self._seen, began)
+
+    @property
+    def observations(self) -> Any:  # noqa: ANN401
+        """The observations of all rows."""
+        arrays = self._with_more()
+        if self._keeps and self._kept.any():
+            arrays = {name: array.copy() for name, array in arrays.items()}
+            for array in arrays.values():
+                array[self._kept] = 0
+        return self._form.of(arrays, (self.rows,))
+
+    def observation(self, row: int) -> Any:  # noqa: ANN401
+        """Return the observation of one row, its own arrays."""
+        return self._form.of({name: array[row].copy() for name, array in self._with_more().items()})
+
+    def _with_more(self) -> Mapping[str, NDArray[Any]]:
+        """Return the observations with what was exchanged."""
+        if self._board is None and self._merged is None:
+            return self.engine.observations
+        more: dict[str, NDArray[Any]] = {} if self._merged is None else dict(self._merged.arrays)
+        if self._board is not None:
+            more[MESSAGES] = self._messages
+        return {**self.engine.observations, **more}
+
+    @property
+    def infos(self) -> dict[str, Any]:
+        """Infos of all rows, arrays with their masks, as Gymnasium's vector environments have them."""
+        infos, everyone = self._infos, self.engine.everyone
+        if self._merged is not None:
+            infos = self._merged.infos(infos, self._seen)
+        form = self.conventions.infos
+        if form == "flat":
+            infos = flat_row_infos(infos, self.rows)
+        elif form == "none":
+            infos = {}
+        if self._keeps:
+            infos = self._with_ended(infos, form)
+        if self._form.has_mask_apart:
+            masks = self.engine.observations[MASK].copy()
+            if self._keeps:
+                masks[self._kept] = 0
+                masks[self._kept, -1] = 1
+            infos = {**infos, MASK: masks, f"_{MASK}": everyone}
+        return infos
+
+    def _with_ended(self, infos: dict[str, Any], form: str) -> dict[str, Any]:
+        """Return infos in which robots that had ended say why, and keep their last numbers."""
+        kept = self._kept
+        for row, word in self.engine.ended_because.items():
+            if self.engine.reasons[row]:
+                self._endings[row] = word
+        if form == "full":
+            of_live = {
+                name: infos[name] & ~kept if name.startswith("_") else infos[name] for name in infos
+            }
+            of_live["ended_because"] = np.where(kept, self._endings, infos.get("ended_because"))
+            of_live["_ended_because"] = kept | infos.get("_ended_because", np.False_)
+            return of_live
+        if form == "flat":
+            for name, values in infos.items():
+                if name.startswith("_"):
+                    continue
+                last = self._numbers.get(name)
+                if last is not None and kept.any():
+                    values[kept] = 0.0 if name.startswith("reward_terms.") else last[kept]
+            self._numbers = {name: values for name, values in infos.items() if not name.startswith("_")}
+        return infos
+
+    @property
+    def settings(self) -> ExplorationSettings:
+        """The settings of every episode."""
+        return self.engine.settings
+
+    @property
+    def is_ready(self) -> bool:
+        """Whether every episode has begun at least once."""
+        return self.engine.is_ready
+
+    @property
+    def is_over(self) -> NDArray[np.bool_]:
+        """Which episodes have no live robot left, (episodes,)."""
+        return self.engine.is_over
+
+    @property
+    def live(self) -> NDArray[np.bool_]:
+        """Which robots have not ended, (rows,)."""
+        return self.engine.live
+
+    @property
+    def masks(self) -> NDArray[np.bool_] | None:
+        """Which actions each row may choose now, (rows, actions); None if the level has no mask."""
+        masks = self.engine.observations.get(MASK)
+        return None if masks is None else masks != 0
+
+    def states(self) -> NDArray[np.float32]:
+        """Return the true state of each team, (episodes, numbers); see `team_state`."""
+        engine = self.engine
+        return np.stack(
+            [team_state(engine.simulation, engine.settings, episode) for episode in range(self.episodes)]
+        )
+
+    def scenes(self) -> list[Any]:
+        """Return the scene of each episode, for pictures."""
+        return self.engine.scenes()
+
+    def team(self, episode: int) -> EpisodeTeam:
+        """Return the handle of an episode's team."""
+        return EpisodeTeam(self.engine, episode)
+
+    def close(self) -> None:
+        """Release everything that the world holds beyond arrays."""
+        self.engine.simulation.close()

@@ -1,0 +1,204 @@
+"""Many episodes as one Gymnasium vector environment, a row for every robot of every episode."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from gymnasium.spaces import Box
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+from numpy.typing import NDArray
+
+from lidarium.envs.engine.engine import NO_EPISODES
+from lidarium.envs.engine.team_state import state_space
+from lidarium.envs.faces.requests import episodes_of, options_of, seeds_of
+from lidarium.envs.faces.team import EpisodeTeam
+from lidarium.envs.faces.team_rows import ACTIVE
+from lidarium.envs.faces.teams import make_rows
+from lidarium.envs.floors.floor_choice import Floors
+from lidarium.envs.settings.reset_options import Curriculum
+
+Step = tuple[Any, NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]
+
+
+class ExplorationVectorEnv(VectorEnv[Any, NDArray[Any], NDArray[Any]]):
+    """Teams of lidar robots that explore floors (Gymnasium); many episodes run in one kernel call.
+
+    Row = episode * robots + robot. A robot that ends before its team returns terminated once; its row then repeats
+    its last observation with reward 0 and ``infos["active"]`` False. When the last robot of an episode ends, the rows
+    that repeat return truncated, and the next step begins the episode again whatever its actions
+    (``AutoresetMode.NEXT_STEP``). Every row sees, earns and ends as the robot of a single environment with the same
+    seed, to the bit.
+
+    Parameters
+    ----------
+    episodes : int
+        Number of episodes.
+    floor : Floors, optional
+        As for ``lidarium.parallel_env``; of a set, each beginning draws one.
+    level : str, optional
+        What an action is: ``velocity`` by default, ``waypoint``, ``frontier`` or a registered one.
+    image_resolution : float, optional
+        Side of a pixel [m] if the floor is a plain image.
+    copy : bool, optional
+        Whether each step returns new arrays, the default. Otherwise two sets take turns: what a step returns is
+        overwritten by the step after the next one.
+    render_mode : str, optional
+        ``rgb_array``, for ``render`` and Gymnasium's ``RecordVideo``. Nothing is drawn by default.
+    curriculum : callable, optional
+        As for ``lidarium.parallel_env``; episodes are counted over all as they begin.
+    **options
+        As for ``lidarium.parallel_env``; ``threads`` is that of the machine by default. ``merging``
+        (``MergingSettings``) for merged maps, ``reports=True`` for stations, which supervised policies need; with
+        ``randomize`` each episode is an engine of its own.
+
+    Raises
+    ------
+    ValueError, FileNotFoundError
+        If an option cannot be used.
+    """
+
+    metadata: dict[str, Any] = {  # noqa: RUF012
+        "autoreset_mode": AutoresetMode.NEXT_STEP,
+        "render_modes": ["rgb_array"],
+        "render_fps": 10,
+    }
+
+    def __init__(
+        self,
+        episodes: int,
+        floor: Floors = "apartment",
+        level: str = "velocity",
+        image_resolution: float | None = None,
+        copy: bool = True,
+        render_mode: str | None = None,
+        curriculum: Curriculum | None = None,
+        **options: Any,  # noqa: ANN401
+    ) -> None:
+        self.closed = True  # Gymnasium before 1.2 closes even what could not be made
+        check_render_mode(render_mode)
+        self.batch = make_rows(episodes, floor, options, level, image_resolution, copy, curriculum)
+        self.settings = self.batch.settings
+        self.render_mode = render_mode
+        self.metadata = {**type(self).metadata, "render_fps": 1.0 / self._period_s(level)}
+        self.num_envs = self.batch.rows
+        self.single_observation_space = self.batch.space
+        self.single_action_space = self.batch.action_space
+        self.observation_space = batch_space(self.batch.space, self.num_envs)
+        self.action_space = batch_space(self.batch.action_space, self.num_envs)
+        self.closed = False
+
+    def _period_s(self, level: str) -> float:
+        return self.settings.time_step if level == "velocity" else self.settings.decision_period_s
+
+    def reset(
+        self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Any, dict[str, Any]]:
+        """Begin episodes.
+
+        Parameters
+        ----------
+        seed : int or sequence, optional
+            ``s`` gives episode e the seed s + e; a sequence has one entry per episode. By default the episodes'
+            generators go on.
+        options : dict, optional
+            ``floor``, ``starts``, ``goal`` as for ``ExplorationEnv.reset``, one for all or a sequence with one per
+            episode, and ``episodes`` (episodes,) bool: which ones begin, all by default. Others are ignored.
+        """
+        self._check_open()
+        batch = self.batch
+        chosen = episodes_of(options, batch.episodes)
+        seeds = seeds_of(seed, batch.episodes)
+        batch.begin(
+            chosen,
+            [seeds[episode] for episode in chosen],
+            options_of(options, chosen, batch.episodes, batch.robots),
+        )
+        return batch.observations, self._infos()
+
+    def step(self, actions: Any) -> Step:  # noqa: ANN401
+        """Run all episodes for one step (velocity) or decision; those that are over begin again.
+
+        Parameters
+        ----------
+        actions : (rows, ...) array
+            An action a row; those of rows that repeat or begin again are ignored. At the level of waypoints an array
+            of objects may hold ``Target``, ``Route`` and None.
+        """
+        self._check_open()
+        batch = self.batch
+        if not batch.is_ready:
+            raise RuntimeError("the environment was not reset; call reset() before step()")
+        if actions is None:
+            raise ValueError("actions is None; want an action for each row, row = episode * robots + robot")
+        batch.step(actions, NO_EPISODES if batch.live.all() else np.flatnonzero(batch.is_over))
+        return batch.observations, batch.rewards, batch.terminated, batch.truncated, self._infos()
+
+    def _infos(self) -> dict[str, Any]:
+        return {**self.batch.infos, ACTIVE: self.batch.active, f"_{ACTIVE}": np.ones(self.num_envs, np.bool_)}
+
+    def team(self, episode: int) -> EpisodeTeam:
+        """Return the handle of an episode's team, which policies ask; see ``Policy.reset``."""
+        return self.batch.team(episode)
+
+    @property
+    def columns(self) -> tuple[tuple[str, int, int], ...]:
+        """Where each key of an observation lies in the flat form; see `flat_columns`."""
+        return self.batch.columns
+
+    @property
+    def state_space(self) -> Box:
+        """The space of the true state of each team."""
+        return state_space(self.settings)
+
+    def state(self) -> NDArray[np.float32]:
+        """Return the true state of each team, (episodes, numbers); see `team_state`."""
+        return self.batch.states()
+
+    def render(self) -> tuple[NDArray[np.uint8], ...] | None:
+        """Draw the episode of each row; robots of a team have the same picture. `picture` tiles one of each."""
+        if self.render_mode is None:
+            return None
+        from lidarium.envs.drawing.batch_frames import batch_frames
+
+        return tuple(frame for frame in batch_frames(self.batch.scenes()) for _ in range(self.batch.robots))
+
+    def picture(self) -> NDArray[np.uint8]:
+        """Draw all episodes side by side in one picture (rows, columns, 3)."""
+        from lidarium.envs.drawing.batch_frames import batch_frames, tiled
+
+        return tiled(batch_frames(self.batch.scenes()))
+
+    def _check_open(self) -> None:
+        if self.closed:
+            raise RuntimeError("the environment is closed; make a new one")
+
+    def close_extras(self, **kwargs: Any) -> None:  # noqa: ANN401
+        """Release everything that the worlds hold beyond arrays."""
+        self.batch.close()
+
+
+def check_render_mode(render_mode: str | None) -> None:
+    """Check the render mode of a batch."""
+    if render_mode == "human":
+        raise ValueError(
+            "render_mode is 'human'; want rgb_array or None: a batch has no window, use lidarium.parallel_env"
+        )
+    if render_mode not in (None, "rgb_array"):
+        raise ValueError(f"render_mode is {render_mode!r}; want rgb_array or None")
+
+
+def make_vector_env(num_envs: int, **options: Any) -> ExplorationVectorEnv:  # noqa: ANN401
+    """Make the batched form of the Gymnasium environments, for ``gymnasium.make_vec``: one robot an episode.
+
+    Raises
+    ------
+    ValueError
+        If more than one robot is asked for, or an option cannot be used.
+    """
+    if options.setdefault("robots", 1) != 1:
+        raise ValueError(
+            f"robots is {options['robots']}; the Gymnasium form has one robot, use lidarium.vector_env for "
+            "teams"
+        )
+    return ExplorationVectorEnv(num_envs, **options)

@@ -1,0 +1,126 @@
+"""Decisions by frontiers: a robot chooses one of those that it can reach, cheapest path first."""
+
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+
+from lidarium.envs.levels.frontier_choices import FARTHEST, MOST_GAIN
+from lidarium.envs.levels.frontier_offers import REASONS, FrontierOffers
+from lidarium.envs.levels.level import STEPS, Mask, Turn, add_info, check_rows
+from lidarium.envs.levels.waypoint import WaypointLevel, Ways
+from lidarium.envs.onboard.perception import Perception
+from lidarium.envs.settings.exploration import ExplorationSettings
+from lidarium.envs.settings.limits import GAINS
+from lidarium.mapping.geometry.bounds import shown
+
+
+class FrontierLevel(WaypointLevel):
+    """An action is the number of a frontier.
+
+    Observations have ``frontiers`` float32 (F, 4): position along the axes of the map frame from where the robot
+    believes to be [m], cost of the path [m] and size [m] of each frontier on offer, cheapest path first, zeros behind
+    the last; and ``action_mask`` int8 (F + 1,). F is ``settings.frontiers``. Action k < F drives to frontier k, action
+    F stays and gives way; an action that the mask rules out stays as well.
+
+    A frontier to which a robot has driven and turned, and which is still there, is not offered again; the info
+    ``given_up`` names it with the reason. Robots without a frontier in reach stay idle; if no robot has one, all end
+    with ``no_frontier`` or ``frontier_unreachable``.
+    """
+
+    takes_none: ClassVar[bool] = False
+
+    def __init__(
+        self,
+        perception: Perception,
+        settings: ExplorationSettings,
+        shares_map: bool = True,
+        decision_period_s: float | None = None,
+    ) -> None:
+        super().__init__(perception, settings, shares_map)
+        del decision_period_s
+        self._stay = settings.frontiers
+        self.action_space = spaces.Discrete(self._stay + 1)
+        self.offers = FrontierOffers(perception, settings, self.driver)
+        high = np.full((self._stay, 4), FARTHEST, np.float32)
+        low = np.tile(np.array([-FARTHEST, -FARTHEST, 0.0, 0.0], np.float32), (self._stay, 1))
+        if GAINS in settings.observe:
+            self.boxes[GAINS] = spaces.Box(0.0, MOST_GAIN, (self._stay,), np.float32)
+        self.boxes["frontiers"] = spaces.Box(low, high, dtype=np.float32)
+        self.boxes["action_mask"] = spaces.Box(0, 1, (self._stay + 1,), np.int8)
+
+    def start(self, episode: int) -> None:
+        """Begin an episode: nothing is offered."""
+        super().start(episode)
+        self.offers.start(episode)
+
+    def read(self, actions: Mapping[int, Any], names: list[str]) -> NDArray[np.int64]:  # type: ignore[override]
+        """Return the numbers of frontiers (rows,)."""
+        numbers = np.full(self.rows, self._stay)
+        for row, action in actions.items():
+            number = _whole_number(action, self._stay)
+            if number is None:
+                raise ValueError(
+                    f"action of {names[row % len(names)]} is {shown(action)}; want a frontier from 0 to "
+                    f"{self._stay - 1}, or {self._stay} to stay"
+                )
+            numbers[row] = number
+        return numbers
+
+    def read_rows(self, actions: Any, live: Mask) -> NDArray[np.int64]:  # type: ignore[override]  # noqa: ANN401
+        """Return the numbers of frontiers (rows,)."""
+        wanted = f"a whole number from 0 to {self._stay}"
+        numbers = check_rows(actions, (self.rows,), live, wanted)
+        is_bad = live & ((numbers < 0) | (numbers > self._stay) | (numbers != np.floor(numbers)))
+        if is_bad.any():
+            bad = int(np.flatnonzero(is_bad)[0])
+            raise ValueError(f"the action of row {bad} is {numbers[bad]}; want {wanted}, {self._stay} to stay")
+        return np.where(live, numbers, self._stay).astype(np.int64)
+
+    def carry_out(self, decoded: NDArray[np.int64], turn: Turn) -> None:  # type: ignore[override]
+        """Drive to the chosen frontiers; end teams of which no robot is offered any.
+
+        A robot that an order sends elsewhere has no choice any more; a paused one keeps its own.
+        """
+        operating, robots = turn.operating, self.settings.robots
+        is_sent = np.zeros(self.rows, np.bool_)
+        is_sent[list(operating.sent)] = True
+        is_stopping = np.zeros(self.rows, np.bool_)
+        is_stopping[list(operating.stopping)] = True
+        numbers = np.where(is_sent, self._stay, decoded)
+        choosing = turn.given & ~is_stopping & ~operating.held | is_sent
+        orders = self.offers.choose(choosing, numbers)
+        is_free = (turn.given | ~turn.acting).reshape(-1, robots).all(axis=1)
+        is_free &= ~is_sent.reshape(-1, robots).any(axis=1)
+        has_work = (turn.acting & (self.offers.offers.counts > 0)).reshape(-1, robots).any(axis=1)
+        is_idle = np.repeat((turn.modes == STEPS) & is_free & ~has_work, robots)
+        for row in np.flatnonzero(is_idle & turn.acting & ~is_stopping).tolist():
+            operating.stopping[row] = self.offers.why_without_work(row)
+        super().carry_out(Ways(orders, {}), turn)
+
+    def observe(
+        self, acted: Mask, live: Mask, seen: Mask, out: dict[str, NDArray[Any]], infos: dict[str, Any]
+    ) -> None:
+        """Give up what was chosen in vain, offer again, and report both."""
+        reasons = self.offers.renew(live, seen)
+        for name, array in self.offers.observed.items():
+            out[name][seen] = array[seen]
+        super().observe(acted, live, seen, out, infos)
+        rows = np.flatnonzero(reasons).tolist()
+        if rows:
+            given_up = [(self.offers.target(row), REASONS[reasons[row]]) for row in rows]
+            add_info(infos, "given_up", reasons != 0, given_up)
+
+
+def _whole_number(action: Any, maximum: int) -> int | None:  # noqa: ANN401
+    """Return an action as a number from 0 to ``maximum``, None if it is none; arrays of one number count."""
+    try:
+        array = np.asarray(action)
+    except ValueError:  # rows of different lengths
+        return None
+    if array.shape not in ((), (1,)) or array.dtype.kind not in "iuf":
+        return None
+    number = float(array.item())
+    return int(number) if number.is_integer() and 0 <= number <= maximum else None

@@ -1,0 +1,145 @@
+"""Decisions by waypoints: the onboard driver takes a robot to its waypoint."""
+
+from collections.abc import Callable, Mapping
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+
+from lidarium.envs.levels.level import DECIDES, STEPS, Level, Mask, Turn, add_info, check_rows, numbers_of
+from lidarium.envs.onboard.driving.drives import DRIVE_STATES
+from lidarium.envs.onboard.driving.team_driver import TeamDriver
+from lidarium.envs.onboard.perception import Perception
+from lidarium.envs.onboard.radio.messages import Orders, Route, Target
+from lidarium.envs.settings.exploration import ExplorationSettings
+from lidarium.mapping.geometry.bounds import shown
+
+
+class Ways(NamedTuple):
+    """Where robots are to drive.
+
+    Attributes
+    ----------
+    orders : Orders
+        The target of each row.
+    routes : dict of int to Route
+        Routes that are followed as they are, by row.
+    """
+
+    orders: Orders
+    routes: dict[int, Route]
+
+
+class WaypointLevel(Level):
+    """An action is a point within the observed map.
+
+    It is two numbers within [-1, 1]: the position along the axes of the robot's map frame from where it believes to
+    be, as a share of half the map's side. A ``Target`` gives a position in the map frame directly; a ``Route`` is a
+    path that the policy has planned itself, and the robot follows it as it is, with the safety stop and right of way
+    of all driving; None lets the robot stay and give way. The onboard driver plans a path on what the robot knows. A
+    point that is not known to be free is approached as far as planning can come; if there is no path, the robot stays.
+
+    A decision lasts for the decision period. It ends earlier if any robot with a target arrives or finds no path,
+    pauses by itself, gets an order late, or ends.
+
+    Attributes
+    ----------
+    driver : TeamDriver
+        What drives the robots.
+    router : callable or None
+        Called with the rows that have a say in each decision, when all robots have their targets: it may let the
+        driver follow routes to them. None by default: paths are planned on grids.
+    """
+
+    takes_none: ClassVar[bool] = True
+    driver: TeamDriver
+
+    def __init__(
+        self,
+        perception: Perception,
+        settings: ExplorationSettings,
+        shares_map: bool = True,
+        decision_period_s: float | None = None,
+    ) -> None:
+        super().__init__(perception, settings, shares_map, decision_period_s)
+        self.action_space = spaces.Box(-1.0, 1.0, (2,), np.float32)
+        self.period_s = settings.decision_period_s if decision_period_s is None else decision_period_s
+        self.steps = max(round(self.period_s / settings.time_step), 1)
+        self.driver = TeamDriver(perception, settings, shares_map)
+        self.drives = self.driver.drives
+        self.following = self.driver.following
+        self.router: Callable[[NDArray[np.int64]], None] | None = None
+        self._half_side = 0.5 * settings.map_cells * settings.occupancy.resolution
+
+    def start(self, episode: int) -> None:
+        """Begin an episode: no robot has a target."""
+        self.driver.start(episode)
+
+    def read(self, actions: Mapping[int, Any], names: list[str]) -> Ways:
+        """Return targets and routes of rows."""
+        targets: list[Target | None] = [None] * self.rows
+        routes: dict[int, Route] = {}
+        for row, action in actions.items():
+            if isinstance(action, Route):
+                routes[row], targets[row] = action, action.target
+            elif action is None or isinstance(action, Target):
+                targets[row] = action
+            else:
+                targets[row] = self._target(row, action, names[row % len(names)])
+        return Ways(Orders.of(targets), routes)
+
+    def read_rows(self, actions: Any, live: Mask) -> Ways:  # noqa: ANN401
+        """Return the targets of all rows; an array of objects may hold ``Target``, ``Route`` and None."""
+        if isinstance(actions, np.ndarray) and actions.dtype == object and actions.shape[:1] == (self.rows,):
+            rows = np.flatnonzero(live).tolist()
+            names = [f"row {row}" for row in range(self.rows)]
+            return self.read({row: actions[row] for row in rows}, names)
+        wanted = "two finite numbers within [-1, 1]"
+        shares = check_rows(actions, (self.rows, 2), live, wanted).astype(np.float64)
+        positions = self.perception.beliefs.believed[:, :2] - self.perception.offsets
+        targets = positions + np.clip(shares, -1.0, 1.0) * self._half_side
+        return Ways(Orders(live.copy(), targets, np.full(self.rows, np.nan)), {})
+
+    def _target(self, row: int, action: Any, name: str) -> Target:  # noqa: ANN401
+        share = numbers_of(action)
+        if share.shape != (2,) or not np.isfinite(share).all():
+            raise ValueError(
+                f"waypoint of {name} is {shown(action)}; want two finite numbers within [-1, 1], a Target "
+                "or None"
+            )
+        here = self.perception.poses.pose_in_frame(row, row)[:2]
+        x, y = here + np.clip(share, -1.0, 1.0) * self._half_side
+        return Target(float(x), float(y))
+
+    def carry_out(self, decoded: Ways, turn: Turn) -> None:
+        """Give robots their targets and plan; an episode in which a robot is to end stands for one step.
+
+        A paused robot keeps its target, and an order of the station goes before the policy's choice.
+        """
+        operating, modes = turn.operating, turn.modes
+        is_assigned = turn.given & ~operating.held
+        self.driver.assign(is_assigned, decoded.orders)
+        for row, route in decoded.routes.items():
+            if is_assigned[row]:
+                self.driver.follow(row, route)
+        for row, target in operating.take_sent().items():
+            self.driver.assign(np.arange(self.rows) == row, Orders.of([target] * self.rows))
+        if self.router is not None:
+            self.router(np.flatnonzero(turn.acting))
+        running = modes == STEPS
+        self.driver.prepare(np.flatnonzero(running))
+        modes[running] = DECIDES
+        for row in operating.stopping:
+            episode = row // self.settings.robots
+            if running[episode]:
+                modes[episode] = STEPS
+                turn.commands[episode * self.settings.robots : (episode + 1) * self.settings.robots] = 0.0
+
+    def observe(
+        self, acted: Mask, live: Mask, seen: Mask, out: dict[str, NDArray[Any]], infos: dict[str, Any]
+    ) -> None:
+        """Report the states of the robots' drives."""
+        if acted.any():
+            states = self.driver.states()[acted].tolist()
+            add_info(infos, "drive", acted, [DRIVE_STATES[state] for state in states])

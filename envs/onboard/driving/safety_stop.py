@@ -1,0 +1,178 @@
+"""The safety stop: the speed from which a robot still stops before what is ahead of it.
+
+Returns of the laser are obstacles in the swath of the body. Teammates whose poses are known are met with half
+the room, because they brake as well; of two robots whose paths cross, the one with the higher number lets the
+other pass.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.mapping.kernels.compilation import Array, kernel
+from lidarium.mapping.kernels.views import scratch_grid
+
+STANDSTILL = 0.006
+"""Gap to a return at which a robot stands [m]."""
+
+TEAMMATE_GAP = 0.03
+"""Gap that robots keep to each other [m]."""
+
+LEAST_TEAMMATE_GAP = 0.004
+"""Gap that the lower-numbered robot keeps in passing [m].
+
+It holds where two robots stand nearer than the usual gap.
+"""
+
+SIDE_GAP = 0.0003
+"""Extra width of the swath that must be clear of returns, each side [m].
+
+The swath is this much wider than the body.
+"""
+
+FORESIGHT_TIMES = np.array([0.0, 0.4, 0.8])
+"""How far ahead the robot with the higher number predicts where another will be [s]."""
+
+CRUISE, TURN_LIMIT, BRAKING, TIME_STEP = range(4)
+"""Places in ``Bodies.limits``."""
+
+
+class Sensed(NamedTuple):
+    """What is known of the robots of a team now.
+
+    Attributes
+    ----------
+    poses, velocities : (robots, 3), (robots, 2) float64
+        Believed poses and velocities [m, rad, m/s, rad/s].
+    ranges : (robots, beams) float32
+        Scans [m].
+    contact, heard : (robots, robots) uint8, (robots, robots * 3) float64
+        Where not all teammates' poses are known: of whom each robot heard lately, and where they were then
+        [m, rad].
+    """
+
+    poses: NDArray[np.float64]
+    velocities: NDArray[np.float64]
+    ranges: NDArray[np.float32]
+    contact: NDArray[np.uint8]
+    heard: NDArray[np.float64]
+
+
+class Bodies(NamedTuple):
+    """What the robots of a team are, and what they go by.
+
+    Attributes
+    ----------
+    unit_vectors : (2, beams) float64
+        Directions of the beams.
+    radii : (robots,) float64
+        Of the bodies [m].
+    limits : (4,) float64
+        Cruise speed, greatest turn rate, braking and length of a step [m/s, rad/s, m/s2, s].
+    knows_teammates : bool
+        Whether teammates' poses are known (and comparable).
+    present : (robots,) uint8
+        Which robots are bodies to keep clear of.
+    foresight : (K,) float64
+        Times at which the other is predicted, the first 0 [s].
+    """
+
+    unit_vectors: NDArray[np.float64]
+    radii: NDArray[np.float64]
+    limits: NDArray[np.float64]
+    knows_teammates: bool
+    present: NDArray[np.uint8]
+    foresight: NDArray[np.float64]
+
+
+@kernel(borrowing=True)
+def _gap_in_scan(ranges: Array, unit_vectors: Array, radius: float) -> float:
+    """How far the disc can go straight ahead before it meets a return [m]."""
+    gap = np.inf
+    for beam in range(ranges.shape[0]):
+        distance = ranges[beam]
+        if not distance < np.inf:
+            continue
+        y = distance * unit_vectors[1, beam]
+        x = distance * unit_vectors[0, beam]
+        if x > 0.0 and -radius < y < radius:
+            gap = min(gap, x - math.sqrt(radius * radius - y * y))
+    return gap
+
+
+@kernel(borrowing=True)
+def _gap_to_teammates(robot: int, poses: Array, velocities: Array, bodies: Bodies, present: Array) -> float:
+    """Return how far the disc can go straight to a known teammate [m].
+
+    The teammate counts now or where it will be soon.
+    """
+    gap, radii, foresight = np.inf, bodies.radii, bodies.foresight
+    cosine, sine = math.cos(poses[robot, 2]), math.sin(poses[robot, 2])
+    for other in range(poses.shape[0]):
+        if other == robot or present[other] == 0:
+            continue
+        for k in range(foresight.shape[0]):
+            if k > 0 and other > robot:
+                break
+            reach = radii[robot] + radii[other] + TEAMMATE_GAP
+            drift = velocities[other, 0] * foresight[k]
+            gap_x = poses[other, 0] + drift * math.cos(poses[other, 2]) - poses[robot, 0]
+            gap_y = poses[other, 1] + drift * math.sin(poses[other, 2]) - poses[robot, 1]
+            x, y = cosine * gap_x + sine * gap_y, cosine * gap_y - sine * gap_x
+            if x * x + y * y <= reach * reach:
+                # Nearer than robots should be: the one with the lower number may pass where it does not
+                # touch, else apart.
+                touching = radii[robot] + radii[other] + LEAST_TEAMMATE_GAP
+                if x > 0.0 and (robot > other or -touching < y < touching):
+                    gap = 0.0
+            elif x > 0.0 and -reach < y < reach:
+                gap = min(gap, x - math.sqrt(reach * reach - y * y))
+    return gap
+
+
+@kernel(inline=True, borrowing=True)
+def _hears_any(contact: Array, robot: int) -> bool:
+    """Whether a robot heard of any teammate lately."""
+    heard = 0
+    for other in range(contact.shape[1]):
+        heard += contact[robot, other]
+    return heard > 0
+
+
+@kernel(borrowing=True)
+def _gap_to_heard(robot: int, sensed: Sensed, bodies: Bodies) -> float:
+    """Return how far the disc can go straight to a teammate heard of [m].
+
+    The teammate is taken to stand where it was.
+    """
+    robots = sensed.poses.shape[0]
+    known, still = scratch_grid(robots, 3, np.float64), scratch_grid(robots, 2, np.float64)
+    for other in range(robots):
+        still[other, 0] = still[other, 1] = 0.0
+        for axis in range(3):
+            known[other, axis] = sensed.heard[robot, 3 * other + axis]
+    for axis in range(3):
+        known[robot, axis] = sensed.poses[robot, axis]
+    gap: float = _gap_to_teammates(robot, known, still, bodies, sensed.contact[robot])
+    return gap
+
+
+@kernel(inline=True, borrowing=True)
+def safe_speed(sensed: Sensed, bodies: Bodies, robot: int) -> float:
+    """Return the speed that still stops before returns and teammates [m/s] (kernel).
+
+    Teammates brake as well.
+    """
+    braking, time_step = bodies.limits[BRAKING], bodies.limits[TIME_STEP]
+    own, speed = bodies.radii[robot] + SIDE_GAP, sensed.velocities[robot, 0]
+    gap = _gap_in_scan(sensed.ranges[robot], bodies.unit_vectors, own)
+    allowed = math.sqrt(2.0 * braking * max(gap - STANDSTILL - 0.5 * time_step * speed, 0.0))
+    if bodies.knows_teammates:
+        teammate_gap = _gap_to_teammates(robot, sensed.poses, sensed.velocities, bodies, bodies.present)
+        allowed = min(allowed, math.sqrt(braking * max(teammate_gap - time_step * speed, 0.0)))
+    elif _hears_any(sensed.contact, robot):
+        teammate_gap = _gap_to_heard(robot, sensed, bodies)
+        allowed = min(allowed, math.sqrt(braking * max(teammate_gap - time_step * speed, 0.0)))
+    return allowed

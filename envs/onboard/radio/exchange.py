@@ -1,0 +1,267 @@
+"""Messages that robots of a team exchange over a radio that is not ideal.
+
+The module also keeps what has reached whom.
+
+In every step each robot sends its pose; once a period, over each link, what the other does not have of any
+map that it holds: its own, and copies of others that reached it. So maps travel on over robots that meet
+later. A message carries blocks of 64 cells.
+
+Where robots report, a station listens at the place where the first of them started. With every map goes what
+its robot reported of itself when the map was as it is. The station gets both over the same links, from the
+robots themselves or from those that hold copies.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.envs.onboard.radio.map_blocks import (
+    BLOCK,
+    BLOCK_BYTES,
+    HEADER_BYTES,
+    NO_BLOCKS,
+    NO_CELLS,
+    POSE_BYTES,
+    STATUS_BYTES,
+    Message,
+    differing_blocks,
+)
+from lidarium.envs.onboard.radio.messages import Status
+from lidarium.envs.onboard.radio.radio_links import RadioLinks
+from lidarium.envs.settings.exploration import ExplorationSettings
+from lidarium.envs.simulation.kernels.arrays import ENDED
+from lidarium.envs.simulation.simulation import Simulation
+
+NEVER = -2
+"""Step of a message that never came.
+
+The scan at the start is of step 0, before which is -1.
+"""
+
+CONTACT_S = 0.5
+"""A teammate's pose is good for driving round it for this long [s]."""
+
+
+class Exchange:
+    """The radio traffic of one episode.
+
+    Parameters
+    ----------
+    simulation : Simulation
+        Whose robots talk.
+    settings : ExplorationSettings
+        The team and its radio.
+    episode : int
+        Which episode of the world.
+
+    Attributes
+    ----------
+    heard, heard_at : (robots, robots, 3) float64, (robots, robots) int64
+        The last pose of each robot that reached each other (receiver, source), and the step at which it was
+        true.
+    heard_ended : (robots, robots) bool
+        Whether the source said that it has ended.
+    copies : list of list of (rows, columns) int8 arrays
+        What each robot, and last the station, holds of each map (receiver, source), the map itself where it
+        is its own.
+    copied_at : (robots + 1, robots) int64
+        The step at which each copy was true.
+    statuses : list of list of Status or None
+        What each robot, and last the station, holds of what each robot reported of itself with its map
+        (receiver, source).
+    report_of : callable or None
+        Takes the number of a robot and returns what it reports of itself; where None, nobody reports and
+        there is no station.
+    windows : (robots, 4) int64
+        What part of the copies that each robot holds has changed since it was last taken: rows and
+        columns, low and high.
+    bytes_sent : (robots,) int64
+        Bytes that each robot has sent to others, lost ones included.
+    bytes_reported : (robots,) int64
+        Bytes that each robot has sent for the station's sake beside: to it, and as what goes with maps to
+        others.
+    """
+
+    def __init__(self, simulation: Simulation, settings: ExplorationSettings, episode: int = 0) -> None:
+        self._world, self._beliefs = simulation.world, simulation.beliefs
+        self._settings, self._episode = settings, episode
+        robots = settings.robots
+        self._first = episode * robots
+        self._period = max(round(settings.radio.period_s / settings.time_step), 1)
+        self._latency = round(settings.radio.latency_s / settings.time_step)
+        self._radio = RadioLinks(simulation.world, settings, episode)
+        self.report_of: Callable[[int], Status] | None = None
+        self.start(0)
+
+    @property
+    def links(self) -> NDArray[np.bool_]:
+        """Who reached whom in the last step, (robots, robots): sender, receiver."""
+        return self._radio.links
+
+    @property
+    def station_links(self) -> NDArray[np.bool_]:
+        """Who reached the station at its last maps or order, (robots,)."""
+        return self._radio.station_links
+
+    def start(self, seed: int) -> None:
+        """Begin an episode in which nobody knows anything of the others.
+
+        Chance comes from ``seed``.
+        """
+        robots, maps = (
+            self._settings.robots,
+            self._beliefs.log_odds[self._first : self._first + self._settings.robots],
+        )
+        self._radio.start(seed)
+        self._in_transit: list[Message] = []
+        self.heard, self.heard_at = np.zeros((robots, robots, 3)), np.full((robots, robots), NEVER, np.int64)
+        self.heard_ended = np.zeros((robots, robots), np.bool_)
+        self.copies = [
+            [log_odds if i == j else np.zeros((0, BLOCK), np.int8) for j, log_odds in enumerate(maps)]
+            for i in range(robots + 1)
+        ]
+        self.copied_at = np.full((robots + 1, robots), NEVER, np.int64)
+        self.statuses: list[list[Status | None]] = [[None] * robots for _ in range(robots + 1)]
+        self.windows = np.zeros((robots, 4), np.int64)
+        for robot in range(robots):
+            self._forget_changes(robot)
+        self.bytes_sent, self.bytes_reported = np.zeros(robots, np.int64), np.zeros(robots, np.int64)
+
+    def take_window(self, robot: int) -> NDArray[np.int64]:
+        """Return the window of a robot's copies that changed since the last call.
+
+        It holds rows and columns (4,), and is empty where low is not below high.
+        """
+        window: NDArray[np.int64] = self.windows[robot].copy()
+        self._forget_changes(robot)
+        return window
+
+    def _forget_changes(self, robot: int) -> None:
+        rows, columns = self._beliefs.log_odds[self._first + robot].shape
+        self.windows[robot] = (rows, 0, columns, 0)
+
+    def step(self) -> None:
+        """Let the robots talk, after they have sensed.
+
+        Called once in every step of the episode and at its start.
+        """
+        step = int(self._world.steps[self._episode])
+        is_time = step % self._period == 0
+        self._radio.find(step, draws=is_time)
+        if is_time and self.report_of is not None:
+            self._radio.find_station(draws=True)
+        self._send_poses(step)
+        if is_time:
+            self._send_maps(step)
+        due = [message for message in self._in_transit if message.arrives <= step]
+        self._in_transit = [message for message in self._in_transit if message.arrives > step]
+        for message in due:
+            self._receive(message)
+
+    def order_delay(self, receiver: int) -> int | None:
+        """Return the delay in steps of an order of the station sent now to a robot.
+
+        An order goes over links that stand now, from robot to robot; None where there are none, or it is lost
+        by chance.
+        """
+        self._radio.find_station()
+        is_reached, is_lost = self._radio.reached()[receiver], self._radio.is_lost(is_of_station=True)
+        return self._latency if is_reached and not is_lost else None
+
+    def _send(self, message: Message) -> None:
+        if not self._radio.is_lost(is_of_station=message.receiver == self._settings.robots):
+            self._in_transit.append(message)
+
+    def _send_poses(self, step: int) -> None:
+        for sender in np.flatnonzero(self.links.any(axis=1)).tolist():
+            row = self._first + sender
+            pose, has_ended = self._beliefs.believed[row].copy(), bool(self._world.flags[row] & ENDED)
+            # A pose is sent to all at once.
+            self.bytes_sent[sender] += POSE_BYTES
+            for receiver in np.flatnonzero(self.links[sender]).tolist():
+                self._send(
+                    Message(
+                        step + self._latency, receiver, sender, step, pose, has_ended, NO_BLOCKS, NO_CELLS
+                    )
+                )
+
+    def _send_maps(self, step: int) -> None:
+        robots = self._settings.robots
+        np.fill_diagonal(self.copied_at, step)
+        if self.report_of is not None:
+            for robot in range(robots):
+                self.statuses[robot][robot] = self.report_of(robot)
+        # What is sent is what was held when the exchange began: nothing goes on over two links at once.
+        chosen = [
+            (self._best_sender(receiver, source), receiver, source)
+            for receiver in range(robots if self.report_of is None else robots + 1)
+            for source in range(robots)
+            if receiver != source
+        ]
+        messages = [
+            (sender, self._part_to_send(sender, receiver, source, step))
+            for sender, receiver, source in chosen
+            if sender is not None
+        ]
+        for sender, message in messages:
+            size = HEADER_BYTES + BLOCK_BYTES * len(message.blocks)
+            is_to_station = message.receiver == robots
+            self.bytes_sent[sender] += 0 if is_to_station else size
+            self.bytes_reported[sender] += (size if is_to_station else 0) + (
+                0 if message.status is None else STATUS_BYTES
+            )
+            self._send(message)
+
+    def _best_sender(self, receiver: int, source: int) -> int | None:
+        """Return which of the robots that reach a receiver holds the latest copy of a map.
+
+        None where none has a later one, or it is being sent.
+        """
+        if any(
+            message.pose is None and (message.receiver, message.source) == (receiver, source)
+            for message in self._in_transit
+        ):
+            return None
+        robots = self._settings.robots
+        is_linked = self.station_links if receiver == robots else self.links[:, receiver]
+        held_at = np.where(is_linked, self.copied_at[:robots, source], NEVER)
+        best = int(np.argmax(held_at))
+        return best if held_at[best] > self.copied_at[receiver, source] else None
+
+    def _part_to_send(self, sender: int, receiver: int, source: int, step: int) -> Message:
+        """Return what a sender holds of a map that the receiver does not."""
+        held, copy = self.copies[sender][source], self._copy_of(receiver, source)
+        true_at, status = int(self.copied_at[sender, source]), self.statuses[sender][source]
+        arrives = step + self._latency
+        blocks, cells = differing_blocks(held, copy)
+        return Message(arrives, receiver, source, true_at, None, False, blocks, cells, status)
+
+    def _copy_of(self, receiver: int, source: int) -> NDArray[np.int8]:
+        """Return what a robot holds of another's map, blank at first."""
+        if self.copies[receiver][source].size == 0:
+            self.copies[receiver][source] = np.zeros(
+                self._beliefs.log_odds[self._first + source].shape, np.int8
+            )
+        return self.copies[receiver][source]
+
+    def _receive(self, message: Message) -> None:
+        receiver, source = message.receiver, message.source
+        if message.pose is not None:
+            if message.step > self.heard_at[receiver, source]:
+                self.heard[receiver, source], self.heard_at[receiver, source] = message.pose, message.step
+                self.heard_ended[receiver, source] = message.has_ended
+            return
+        if message.step <= self.copied_at[receiver, source]:
+            return
+        copy = self._copy_of(receiver, source)
+        copy.reshape(-1, BLOCK)[message.blocks] = message.cells
+        self.copied_at[receiver, source], self.statuses[receiver][source] = message.step, message.status
+        if len(message.blocks) and receiver < self._settings.robots:
+            rows, words = np.divmod(message.blocks, copy.shape[1] // BLOCK)
+            window = self.windows[receiver]
+            window[0], window[1] = min(window[0], rows.min()), max(window[1], rows.max() + 1)
+            window[2], window[3] = (
+                min(window[2], BLOCK * words.min()),
+                max(window[3], BLOCK * (words.max() + 1)),
+            )

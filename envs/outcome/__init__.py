@@ -1,1 +1,0 @@
-"""What comes of a step: the tally of an episode, the endings of robots."""

@@ -1,1 +1,0 @@
-"""What a team has covered of a floor."""

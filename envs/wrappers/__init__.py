@@ -1,1 +1,0 @@
-"""Wrappers that change what a policy decides or sees."""
