@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from lidarium.envs.floors.floor import Raster
-from lidarium.envs.engine.tally import Scorer
+from lidarium.envs.engine.tally import Tally
 from lidarium.envs.simulation.rewards import reward_weights
 from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.settings.lidar import Lidar
@@ -37,7 +37,7 @@ def scored(weights, robots=2):
     options = ExplorationSettings(robots=robots, reward=weights)
     simulation = team(robots, weights=reward_weights(options))
     simulation.place(0, tables_of(hall()), np.array([[1.0, 2.0, 0.0], [3.0, 2.0, math.pi]])[:robots], 1)
-    scorer = Scorer(simulation, options)
+    scorer = Tally(simulation, options)
     simulation.step(np.zeros((robots, 2)), moves_bodies=False)
     scorer.start()
     return simulation, scorer

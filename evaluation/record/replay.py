@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 import lidarium
-from lidarium.envs.engine.episode_start import EpisodeStart
+from lidarium.envs.engine.beginnings import EpisodeStart
 from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.floors.areas import around
 from lidarium.envs.floors.catalogue.names import is_file_name, load_floor

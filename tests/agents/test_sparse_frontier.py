@@ -179,13 +179,11 @@ def test_a_robot_that_faces_a_wall_looks_around_first():
 
 def started(env):
     """A policy that has begun an episode, and what its robots observe."""
-    from lidarium.envs.levels.waypoints import WaypointExploration
-    from lidarium.evaluation.episodes.runner import RunningTeam
-
-    level, policy = WaypointExploration(env), SparseFrontier()
-    observations, _ = level.reset(seed=0)
-    policy.reset(RunningTeam(env, level), 0)
-    return level, policy, observations
+    env.use_level("waypoint")
+    policy = SparseFrontier()
+    observations, _ = env.reset(seed=0)
+    policy.reset(env, 0)
+    return env, policy, observations
 
 
 def test_what_stands_in_the_way_for_now_is_driven_round_and_forgotten():

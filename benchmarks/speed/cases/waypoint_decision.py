@@ -95,7 +95,7 @@ class Deciders:
 
         Seconds per robot and step of both.
         """
-        simulation, bare = self._deciding.batch.simulation, self._bare.batch.simulation
+        simulation, bare = self._deciding.batch.engine.simulation, self._bare.batch.engine.simulation
         deciding, stepping, agent_steps = 0.0, 0.0, 0
         while agent_steps == 0 or deciding + stepping < 2.0 * seconds:
             actions = self._actions()
@@ -132,7 +132,7 @@ class Deciders:
 
         They are shares of half the observed map's side.
         """
-        simulation = self._deciding.batch.simulation
+        simulation = self._deciding.batch.engine.simulation
         places = simulation.beliefs.believed[:, :2]
         self._ages += 1
         for row in np.flatnonzero(self._is_idle | (self._ages > _LONGEST)):
@@ -145,7 +145,7 @@ class Deciders:
 
         Where it stands, if none of many draws is.
         """
-        simulation = self._deciding.batch.simulation
+        simulation = self._deciding.batch.engine.simulation
         angles, distances = (
             self._generator.uniform(-math.pi, math.pi, _TRIALS),
             self._generator.uniform(NEAREST, FARTHEST, _TRIALS),

@@ -12,7 +12,7 @@ import lidarium
 from lidarium.benchmarks.speed.harness.timing import cores
 from lidarium.benchmarks.speed.scenes.floors import BenchFloor
 from lidarium.benchmarks.speed.scenes.teams import DRAWS, HOLD, drawn_commands
-from lidarium.envs.engine.running import STEPS
+from lidarium.envs.levels.level import STEPS
 from lidarium.mapping.kernels.compilation import available_threads
 
 EPISODES, ROBOTS = 64, 2
@@ -86,12 +86,12 @@ class DrivenBatch:
 
     def step_kernel(self) -> None:
         """Take the same step by the kernel alone."""
-        self.env.batch.run_kernel(self._modes, self._commands[self._draw()], self._nobody)
+        self.env.batch.engine.run_kernel(self._modes, self._commands[self._draw()], self._nobody)
 
     @property
     def poses(self) -> NDArray[np.float64]:
         """True poses of all robots, (rows, 3) [m, rad]."""
-        return self.env.batch.world.poses
+        return self.env.batch.engine.world.poses
 
     def _draw(self) -> int:
         """Return which of the drawn commands holds in this step, and count the step."""

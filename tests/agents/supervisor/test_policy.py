@@ -136,7 +136,7 @@ def test_robots_that_touch_something_go_on_by_order_alone(resumes):
     run_episode(policy, env, seed=0)
     orders = [decision.order for decision in policy.decisions if decision.agent == "robot_0"]
     assert ("resume" in orders) == resumes
-    states = [e.what for e in env.unwrapped.operating.events if e.agent == "robot_0" and e.kind == "state"]
+    states = [e.what for e in env.unwrapped.operating.events[0] if e.agent == "robot_0" and e.kind == "state"]
     assert states[0] == "paused"
     assert ("operating" in states) == resumes
 
@@ -149,7 +149,7 @@ def test_robots_without_a_goal_are_paused_and_resume_to_go_to_one(assignment):
     figures = policy.report().supervision.figures
     assert figures["pauses"] > 0
     assert set(env.unwrapped.scorer.ended_because.values()) == {"no_frontier"}
-    events = env.unwrapped.operating.events
+    events = env.unwrapped.operating.events[0]
     assert not [event for event in events if event.kind == "refused"]
     for event in events:
         if (event.kind, event.what) == ("order", "resume"):

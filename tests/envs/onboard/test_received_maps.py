@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 
 from lidarium.envs.faces.parallel import ExplorationEnv
-from lidarium.envs.levels.waypoints import WaypointExploration
 from lidarium.envs.onboard.radio.messages import DriveState, Target
 from lidarium.envs.settings.making import make_settings
 from lidarium.mapping.merging.fusion import FusedMap
@@ -75,7 +74,8 @@ def test_the_own_scans_go_on_to_change_the_sum(env):
 
 def test_a_robot_drives_over_what_it_only_knows_from_others():
     env = ExplorationEnv("scene_loop", make_settings(robots=2, known_starts=False))
-    world = WaypointExploration(env)
+    world = env
+    env.use_level("waypoint")
     world.reset(seed=0)
     log_odds = env.perception.own_map(0).log_odds
     free = np.argwhere(log_odds < 0)

@@ -1,0 +1,167 @@
+"""What a team returns in the forms that a trainer wants."""
+
+import math
+
+import numpy as np
+import pytest
+from conventional_teams import AHEAD, CLOSET, OPTIONS, make, step
+from pettingzoo.test import parallel_api_test
+
+import lidarium
+
+
+@pytest.mark.parametrize("level", ["velocity", "frontier"])
+def test_the_flat_form_holds_the_numbers_of_the_dict_form(level):
+    plain, flat = make(level=level), make(level=level, observation="flat")
+    space = flat.observation_space("robot_0")
+    wanted, own = plain.reset(seed=1)[0], flat.reset(seed=1)[0]
+    for _ in range(3):
+        for agent, vector in own.items():
+            assert space.contains(vector)
+            for name, first, last in flat.columns(agent):
+                assert np.array_equal(vector[first:last], wanted[agent][name].ravel().astype(np.float32))
+            assert flat.columns(agent)[-1][2] == len(vector)
+        action = 0 if level == "frontier" else AHEAD
+        wanted, own = step(plain, action)[0], step(flat, action)[0]
+
+
+@pytest.mark.parametrize("form", ["dict", "flat"])
+def test_the_mask_may_be_beside_the_observation(form):
+    env = make(level="frontier", observation=form, action_mask="beside")
+    observations, _ = env.reset(seed=1)
+    for agent, observation in observations.items():
+        assert set(observation) == {"observation", "action_mask"}
+        assert env.observation_space(agent).contains(observation)
+        assert observation["action_mask"].shape == (33,)
+
+
+@pytest.mark.parametrize("form", ["dict", "flat"])
+@pytest.mark.parametrize("infos", ["full", "flat", "none"])
+def test_the_mask_may_be_in_infos_of_any_form(form, infos):
+    env = make(level="frontier", observation=form, action_mask="infos", infos=infos)
+    inside = make(level="frontier")
+    observations, told = env.reset(seed=1)
+    wanted = inside.reset(seed=1)[0]
+    for _ in range(3):
+        for agent, observation in observations.items():
+            assert env.observation_space(agent).contains(observation)
+            assert "action_mask" not in (observation if form == "dict" else ())
+            assert np.array_equal(told[agent]["action_mask"], wanted[agent]["action_mask"])
+            rest = {name: value for name, value in told[agent].items() if name != "action_mask"}
+            assert infos == "full" or all(type(value) is float for value in rest.values())
+            assert (infos == "none") == (not rest)
+        observations, *_, told = step(env, 0)
+        wanted = step(inside, 0)[0]
+
+
+def test_the_turn_based_form_has_masks_in_infos():
+    env = lidarium.env("scene_room", **OPTIONS, level="frontier", action_mask="infos", infos="none")
+    env.reset(seed=1)
+    for _ in range(6):
+        observation, _, terminated, truncated, info = env.last()
+        assert "action_mask" not in observation
+        assert info["action_mask"].any()
+        env.step(None if terminated or truncated else int(np.flatnonzero(info["action_mask"])[0]))
+
+
+@pytest.mark.parametrize("infos", ["full", "flat", "none"])
+def test_agents_that_have_ended_may_only_stay(infos):
+    env = make(level="frontier", action_mask="infos", infos=infos, ended_agents="zeros")
+    env.reset(seed=0)
+    env.stop("robot_1", "enough")
+    step(env, 0)
+    assert env.agents == ["robot_0", "robot_1"]
+    told = step(env, 0)[-1]
+    assert told["robot_1"]["action_mask"].tolist() == [0] * 32 + [1]
+
+
+@pytest.mark.parametrize("level", ["velocity", "waypoint", "frontier"])
+def test_flat_infos_are_numbers_under_the_same_names(level):
+    env, full = (
+        make(CLOSET, level=level, infos="flat", horizon_s=8.0),
+        make(CLOSET, level=level, horizon_s=8.0),
+    )
+    infos, wanted = env.reset(seed=1)[1], full.reset(seed=1)[1]
+    names = set(infos["robot_0"])
+    while True:
+        for agent, info in infos.items():
+            assert set(info) == names
+            assert all(type(value) is float for value in info.values())
+            assert info["truth.coverage"] == wanted[agent]["truth"]["coverage"]
+            assert info["truth.pose.2"] == wanted[agent]["truth"]["pose"][2]
+            assert info["reward_terms.area"] == wanted[agent]["reward_terms"]["area"]
+            assert (info["ended"] > 0) == ("ended_because" in wanted[agent])
+        if not env.agents:
+            break
+        action = 32 if level == "frontier" else AHEAD
+        infos, wanted = step(env, action)[4], step(full, action)[4]
+
+
+def test_no_infos_are_empty_infos():
+    env = make(infos="none")
+    assert env.reset(seed=0)[1] == {"robot_0": {}, "robot_1": {}}
+    assert step(env)[4] == {"robot_0": {}, "robot_1": {}}
+
+
+@pytest.mark.parametrize("infos", ["full", "flat", "none"])
+@pytest.mark.parametrize("form", ["dict", "flat"])
+def test_agents_that_end_stay_with_zeros_until_the_last_one_ends(infos, form):
+    env = make(infos=infos, observation=form, ended_agents="zeros")
+    env.reset(seed=0)
+    env.unwrapped.stop("robot_0", "enough")
+    observations, _, terminations, truncations, _ = step(env)
+    assert env.agents == ["robot_0", "robot_1"]
+    assert not any((*terminations.values(), *truncations.values()))
+    observations, rewards, terminations, truncations, told = step(env)
+    space = env.observation_space("robot_0")
+    assert space.contains(observations["robot_0"])
+    parts = observations["robot_0"].values() if form == "dict" else [observations["robot_0"]]
+    assert not any(part.any() for part in parts)
+    assert rewards["robot_0"] == 0.0
+    assert list(told) == ["robot_0", "robot_1"]
+    if infos != "none":
+        assert [bool(info["active"]) for info in told.values()] == [False, True]
+    env.unwrapped.stop("robot_1", "enough")
+    _, _, terminations, truncations, _ = step(env)
+    assert terminations == {"robot_0": True, "robot_1": True}
+    assert truncations == {"robot_0": False, "robot_1": False}
+    assert env.agents == []
+
+
+def test_agents_that_stay_end_as_terminated_where_the_horizon_cuts_the_others():
+    env = make(ended_agents="zeros", horizon_s=0.5)
+    env.reset(seed=0)
+    env.unwrapped.stop("robot_1", "enough")
+    while env.agents:
+        outcome = step(env)
+    assert outcome[2] == {"robot_0": False, "robot_1": True}
+    assert outcome[3] == {"robot_0": True, "robot_1": False}
+    env.reset(seed=1)
+    assert env.agents == ["robot_0", "robot_1"]
+
+
+@pytest.mark.parametrize(
+    "conventions",
+    [
+        {"ended_agents": "zeros", "infos": "flat", "observation": "flat"},
+        {"team_reward": 0.5, "infos": "none"},
+        {"level": "frontier", "observation": "flat", "action_mask": "beside"},
+        {"level": "frontier", "infos": "none", "action_mask": "infos", "ended_agents": "zeros"},
+    ],
+)
+def test_the_tests_of_pettingzoo_pass(conventions):
+    parallel_api_test(make(CLOSET, stop_on_contact=True, **conventions), num_cycles=60)
+
+
+@pytest.mark.parametrize("share", [0.25, 1.0])
+def test_a_share_of_the_reward_is_the_mean_of_the_team(share):
+    env, own = make(team_reward=share), make()
+    env.reset(seed=0)
+    own.reset(seed=0)
+    for _ in range(5):
+        _, rewards, _, _, infos = step(env)
+        alone = step(own)[1]
+        mean = sum(alone.values()) / 2
+        for agent, reward in rewards.items():
+            assert reward == pytest.approx((1 - share) * alone[agent] + share * mean)
+            assert math.fsum(infos[agent]["reward_terms"].values()) == pytest.approx(reward)
