@@ -22,7 +22,7 @@ from lidarium.envs.onboard.navigation import (
 )
 from lidarium.envs.onboard.team_maps import TeamMaps, refresh_team
 from lidarium.mapping.kernels.compilation import Array, kernel
-from lidarium.mapping.kernels.lanes.cost_lanes import FAR
+from lidarium.mapping.kernels.simd.costs import FAR
 from lidarium.mapping.kernels.work_queue import Work, take_next
 from lidarium.mapping.planning.cheapest_views import cheapest_views
 from lidarium.mapping.planning.frontiers import frontier_clusters, ignore_frontiers_near

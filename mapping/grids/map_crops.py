@@ -16,12 +16,12 @@ import numpy as np
 from lidarium.mapping.grids.occupancy import FREE, OCCUPIED, UNKNOWN
 from lidarium.mapping.grids.pooled_maps import POOL, POOL_COLUMNS, POOL_ROWS
 from lidarium.mapping.grids.turned_crops import turn_blocks
-from lidarium.mapping.kernels.cell_blocks import HALF_BLOCK, write_block_of_levels, write_levels
 from lidarium.mapping.kernels.compilation import Array, kernel
-from lidarium.mapping.kernels.crop_blocks import CAN_LOOK_UP_IN_REGISTERS
-from lidarium.mapping.kernels.crop_blocks import SIDE as BLOCK_SIDE
-from lidarium.mapping.kernels.vectors import BLOCK
-from lidarium.mapping.kernels.views import bytes_at, int8_at, int8_grid_at, scratch_grid
+from lidarium.mapping.kernels.llvm import BLOCK
+from lidarium.mapping.kernels.simd.cells import HALF_BLOCK, block_of_levels, half_block_of_levels
+from lidarium.mapping.kernels.simd.crops import CAN_LOOK_UP_IN_REGISTERS
+from lidarium.mapping.kernels.simd.crops import SIDE as BLOCK_SIDE
+from lidarium.mapping.kernels.views import grid_at, scratch_grid, vector_at
 
 _FREE, _UNKNOWN, _OCCUPIED = np.uint8(FREE), np.uint8(UNKNOWN), np.uint8(OCCUPIED)
 
@@ -32,30 +32,30 @@ Whole numbers throughout: crops at headings a quarter apart look up the same cel
 drifts. """
 
 
-@kernel(inline=True)
+@kernel(forceinline=True)
 def _level(log_odds: int) -> np.uint8:
     return _FREE if log_odds < 0 else (_OCCUPIED if log_odds > 0 else _UNKNOWN)
 
 
-@kernel(inline=True, borrowing=True)
+@kernel(forceinline=True, nrt=False)
 def _write_row(log_odds: int, count: int, levels: int) -> None:
     """Write ``count`` cells from one address on as levels from another on."""
     if count < HALF_BLOCK:
-        source, target = int8_at(log_odds, count), bytes_at(levels, count)
+        source, target = vector_at(log_odds, count, np.int8), vector_at(levels, count, np.uint8)
         for j in range(count):
             target[j] = _level(source[j])
         return
     # The last ones may overlap those before: nothing remains to go through one by one.
     if count < BLOCK:
-        write_levels(log_odds, levels)
-        write_levels(log_odds + count - HALF_BLOCK, levels + count - HALF_BLOCK)
+        half_block_of_levels(log_odds, levels)
+        half_block_of_levels(log_odds + count - HALF_BLOCK, levels + count - HALF_BLOCK)
         return
     for place in range(0, count - BLOCK, BLOCK):
-        write_block_of_levels(log_odds + place, levels + place)
-    write_block_of_levels(log_odds + count - BLOCK, levels + count - BLOCK)
+        block_of_levels(log_odds + place, levels + place)
+    block_of_levels(log_odds + count - BLOCK, levels + count - BLOCK)
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def crop_levels(log_odds: Array, row: int, column: int, crop: Array) -> None:
     """Copy the cells around (row, column) into ``crop`` (side, side) as levels.
 
@@ -89,7 +89,7 @@ def turn_by_cells(pools: Array, x: float, y: float, heading: float, scales: Arra
     for k in range(scales.shape[0]):
         row, column = _nearest_corner(x, y, scales[k])
         _copy_levels(
-            int8_grid_at(pools[k, POOL], pools[k, POOL_ROWS], pools[k, POOL_COLUMNS]),
+            grid_at(pools[k, POOL], pools[k, POOL_ROWS], pools[k, POOL_COLUMNS], np.int8),
             row - half,
             column - half,
             spans,
@@ -98,7 +98,7 @@ def turn_by_cells(pools: Array, x: float, y: float, heading: float, scales: Arra
         _look_up(patch, places, crops[k].reshape(cells * cells).view(np.uint32))
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def turn_in_registers(pools: Array, x: float, y: float, heading: float, scales: Array, crops: Array) -> None:
     """Fill the crops of ``crop_turned`` by blocks.
 
@@ -117,13 +117,13 @@ _turn_whole_blocks = turn_in_registers if CAN_LOOK_UP_IN_REGISTERS else turn_by_
 """What a processor cannot run is not compiled for it."""
 
 
-@kernel(inline=True)
+@kernel(forceinline=True)
 def _half_patch(cells: int, cosine: float, sine: float) -> int:
     """Return half the rows and columns of the patch that a turned crop touches."""
     return int(math.ceil(0.5 * cells * (abs(cosine) + abs(sine))))
 
 
-@kernel(inline=True)
+@kernel(forceinline=True)
 def _nearest_corner(x: float, y: float, scale: int) -> tuple[int, int]:
     """Return row and column of the corner of pooled cells nearest to a place.
 
@@ -212,7 +212,7 @@ def _places(half: int, width: int, step_x: int, step_y: int, cells: int) -> Arra
     return places.reshape(cells * cells)
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def crop_turned(pools: Array, x: float, y: float, heading: float, scales: Array, crops: Array) -> None:
     """Fill crops that are turned with a robot, as levels; unknown outside of the map.
 

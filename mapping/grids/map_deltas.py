@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from lidarium.mapping.grids.occupancy import FREE, OCCUPIED, UNKNOWN
 from lidarium.mapping.grids.scan_integration import WORD
 from lidarium.mapping.kernels.compilation import Array, kernel
-from lidarium.mapping.kernels.sign_blocks import sign_bits
-from lidarium.mapping.kernels.views import int8_at
+from lidarium.mapping.kernels.simd.cells import sign_bits
+from lidarium.mapping.kernels.views import vector_at
 
 _ALL = np.uint64(2**64 - 1)
 
@@ -66,7 +66,7 @@ def note_word(
 @kernel
 def _add_row(address: int, total: Array) -> None:
     """Add a piece of a row of log-odds to the sums ``total`` (cells,) int16."""
-    source = int8_at(address, total.size)
+    source = vector_at(address, total.size, np.int8)
     for k in range(total.size):
         total[k] = np.int16(total[k] + np.int16(source[k]))
 

@@ -14,7 +14,7 @@ import math
 import numpy as np
 
 from lidarium.mapping.kernels.compilation import Array, kernel
-from lidarium.mapping.kernels.views import int8_at, scratch_vector
+from lidarium.mapping.kernels.views import scratch_vector, vector_at
 
 DEVIATIONS = 3.0
 """Noise explains so many of its standard deviations, and one cell."""
@@ -23,7 +23,7 @@ STEP = 0.5
 """Beams are walked back from their ends in steps of this [cells]."""
 
 
-@kernel(inline=True, borrowing=True)
+@kernel(forceinline=True, nrt=False)
 def _is_beside_free(log_odds: Array, row: int, column: int) -> bool:
     """Whether one of the four neighbours of a cell is free.
 
@@ -39,7 +39,7 @@ def _is_beside_free(log_odds: Array, row: int, column: int) -> bool:
     )
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def _unsettled(
     log_odds: Array,
     x: float,
@@ -65,7 +65,8 @@ def _unsettled(
         is_inner[beam] = (row > 0) & (row < rows - 1) & (column > 0) & (column < columns - 1)
         cells[beam] = row * np.int32(columns) + column
     count = np.uintp(0)
-    flat, above, beside = int8_at(log_odds.ctypes.data, rows * columns), np.uintp(columns), np.uintp(1)
+    flat = vector_at(log_odds.ctypes.data, rows * columns, np.int8)
+    above, beside = np.uintp(columns), np.uintp(1)
     for beam in range(beams):
         if not is_hit[beam]:
             continue
@@ -80,7 +81,7 @@ def _unsettled(
     return int(count)
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def settle_returns(
     log_odds: Array,
     x: float,

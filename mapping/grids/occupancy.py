@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from lidarium.mapping.geometry.bounds import check_settings, within
 from lidarium.mapping.grids.scan_geometry import ScanGeometry
 from lidarium.mapping.grids.scan_integration import WORD, integrate_one
-from lidarium.mapping.kernels.vectors import LEVELS
+from lidarium.mapping.kernels.simd.cells import LEVELS
 
 LOG_ODDS_UNIT = 0.05
 

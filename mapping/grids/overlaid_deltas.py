@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from lidarium.mapping.grids.map_deltas import note_word, seen_spans
 from lidarium.mapping.kernels.compilation import Array, kernel
-from lidarium.mapping.kernels.views import int8_at, word_grid_at
+from lidarium.mapping.kernels.views import grid_at, vector_at
 
 _GROUP = 8
 """Cells of a rotated map compared, or lattice cells recomputed, at once.
@@ -58,8 +58,8 @@ def _mark_stale(
     ``before`` is an address; its cells are set to the present ones.
     """
     rows, groups = stale.shape
-    now_groups = word_grid_at(log_odds[0], log_odds[1], log_odds[2] // _GROUP)
-    old_groups = word_grid_at(before, log_odds[1], log_odds[2] // _GROUP)
+    now_groups = grid_at(log_odds[0], log_odds[1], log_odds[2] // _GROUP, np.uint64)
+    old_groups = grid_at(before, log_odds[1], log_odds[2] // _GROUP, np.uint64)
     cosine, sine = placement[COSINE], placement[SINE]
     # Half the sides of the box around a turned group, and a cell to spare [cells].
     half_x, half_y = (
@@ -106,9 +106,8 @@ def _add_overlaid_group(
         own_column = int(math.floor((cosine * east + sine * north - placement[ORIGIN_X]) / resolution))
         own_row = int(math.floor((cosine * north - sine * east - placement[ORIGIN_Y]) / resolution))
         if 0 <= own_row < log_odds[1] and 0 <= own_column < log_odds[2]:
-            total[k] = np.int16(
-                total[k] + np.int16(int8_at(log_odds[0] + own_row * log_odds[2] + own_column, 1)[0])
-            )
+            own = vector_at(log_odds[0] + own_row * log_odds[2] + own_column, 1, np.int8)[0]
+            total[k] = np.int16(total[k] + np.int16(own))
 
 
 @kernel
@@ -147,7 +146,7 @@ def note_overlaid_changes(
         frame[0], frame[1], frame[2] = placements[robot, ORIGIN_X], placements[robot, ORIGIN_Y], resolution
         span = seen_spans(poses[robot : robot + 1], last[robot : robot + 1], reach, frame)[0]
         _mark_stale(maps[robot], before[robot], placements[robot], resolution, span, stale)
-    marks = word_grid_at(stale.ctypes.data, rows, words)
+    marks = grid_at(stale.ctypes.data, rows, words, np.uint64)
     sums = np.empty(64, np.int16)
     found = 0
     for row in range(rows):

@@ -10,16 +10,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.mapping.grids.scan_integration import WORD
-from lidarium.mapping.kernels.bit_words import first_bit
-from lidarium.mapping.kernels.cell_blocks import write_greatest
 from lidarium.mapping.kernels.compilation import Array, kernel
+from lidarium.mapping.kernels.simd.cells import max_of_groups
+from lidarium.mapping.kernels.simd.words import first_bit
 from lidarium.mapping.kernels.views import scratch_vector, vector_at
 
 POOL, POOL_ROWS, POOL_COLUMNS = range(3)
 """Columns of a table of pooled maps: address, rows, columns."""
 
 
-@kernel(inline=True)
+@kernel(forceinline=True)
 def touched_words(columns: int) -> int:
     """Return how many words hold a bit for each word of 64 cells of a row of a map."""
     return (columns + WORD * WORD - 1) // (WORD * WORD)
@@ -42,7 +42,7 @@ def touch(touched: NDArray[np.uint64], rows: tuple[int, int], words: tuple[int, 
         touched[of_rows + row // WORD, 0] |= np.uint64(1 << row % WORD)
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def pool_touched(log_odds: Array, touched: Array, scale: int, pooled: Array) -> None:
     """Bring a pooled map up to date where levels of the map have changed.
 
@@ -77,7 +77,7 @@ def pool_touched(log_odds: Array, touched: Array, scale: int, pooled: Array) -> 
             left = left >> np.uint64(end & 63) << np.uint64(end & 63) if end & 63 else np.uint64(0)
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def forget_touched(touched: Array, rows: int) -> None:
     """Forget where a map of so many rows has changed."""
     for group in range(rows, touched.shape[0]):
@@ -88,7 +88,7 @@ def forget_touched(touched: Array, rows: int) -> None:
             left &= left - np.uint64(1)
 
 
-@kernel(inline=True, borrowing=True)
+@kernel(forceinline=True, nrt=False)
 def _pool_word(log_odds: Array, row: int, word: int, scale: int, greatest: Array, pooled: Array) -> None:
     """Write the pooled cells of a word of 64 cells in a row of pooled cells.
 
@@ -104,7 +104,7 @@ def _pool_word(log_odds: Array, row: int, word: int, scale: int, greatest: Array
             log_odds.ctypes.data + first_row * columns + word * WORD,
             pooled.ctypes.data + row * pooled.shape[1] + word * width,
         )
-        write_greatest(source, columns, count, -128 if count == scale else 0, halvings, greatest.ctypes.data)
+        max_of_groups(source, columns, count, -128 if count == scale else 0, halvings, greatest.ctypes.data)
         for place in range(0, width, 4):
             vector_at(target + place, 1, np.uint32)[0] = vector_at(
                 greatest.ctypes.data + place, 1, np.uint32
@@ -114,7 +114,7 @@ def _pool_word(log_odds: Array, row: int, word: int, scale: int, greatest: Array
         pooled[row, column] = _greatest(log_odds, row * scale, column * scale, scale)
 
 
-@kernel(inline=True, borrowing=True)
+@kernel(forceinline=True, nrt=False)
 def _greatest(log_odds: Array, first_row: int, first_column: int, scale: int) -> np.int8:
     """Return the greatest log-odds of a square of cells; beyond the map they are 0."""
     last_row, last_column = (

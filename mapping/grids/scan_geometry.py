@@ -98,7 +98,7 @@ class Beams(NamedTuple):
     reach: float
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def beam_directions(heading: float, unit_vectors: Array, directions: Array) -> None:
     """Rotate the beams' unit vectors (2, beams) by the heading.
 
@@ -114,7 +114,7 @@ def beam_directions(heading: float, unit_vectors: Array, directions: Array) -> N
         directions[3, beam] = 1.0 / direction_y if direction_y != 0.0 else math.inf
 
 
-@kernel(inline=True)
+@kernel(forceinline=True)
 def fast_angle(y: float, x: float) -> float:
     """Angle of (x, y) to within 2e-5 rad [rad], after Abramowitz and Stegun 4.4.49."""
     absolute_x, absolute_y = abs(x), abs(y)
@@ -132,7 +132,7 @@ def fast_angle(y: float, x: float) -> float:
     return -angle if y < 0.0 else angle
 
 
-@kernel(inline=True)
+@kernel(forceinline=True)
 def beams_towards(
     offset_x: float, offset_y: float, radius: float, heading: float, angle_first: float, increment: float
 ) -> tuple[float, float]:

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from lidarium.mapping.grids.noisy_returns import settle_returns
 from lidarium.mapping.grids.scan_geometry import beam_directions
 from lidarium.mapping.grids.scan_polygon import fill_scan_polygon, scan_ends, window_rows, window_words
-from lidarium.mapping.kernels.cell_blocks import fetch_block, update_block
 from lidarium.mapping.kernels.compilation import Array, kernel
+from lidarium.mapping.kernels.simd.cells import prefetch, update_block
 
 WORD = 64
 
@@ -19,7 +19,7 @@ ROWS_AHEAD = 12
 """So many rows before a row of a map is updated it is fetched from memory."""
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def _note_hits(ends: Array, is_hit: Array, hit_bits: Array) -> None:
     """Set the bits of the cells in which beams ended."""
     flat, words = hit_bits.reshape(-1), hit_bits.shape[1]
@@ -52,7 +52,7 @@ class SeenScan(NamedTuple):
     column_offset: int
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def integrate_scan(log_odds: Array, scan: SeenScan, increments: Array, touched: Array) -> None:
     """Update a map by a scan.
 
@@ -85,7 +85,7 @@ def integrate_scan(log_odds: Array, scan: SeenScan, increments: Array, touched: 
         changes = np.uint64(0)
         for word in range(word_low, word_high):
             seen, hits = bits[row, word], hit_bits[row, word]
-            fetch_block(ahead + word * WORD)
+            prefetch(ahead + word * WORD)
             if seen | hits != np.uint64(0):
                 changed = update_block(address + word * WORD, seen, hits, hit, miss, minimum, maximum)
                 changes |= np.uint64(changed != np.uint64(0)) << np.uint64((word + word_offset) & 63)

@@ -14,8 +14,8 @@ import numpy as np
 
 from lidarium.mapping.grids.outlines.outline_edges import Outline, toggle_between, toggle_edges
 from lidarium.mapping.grids.outlines.toggled_bits import row_of, toggle_edge
-from lidarium.mapping.kernels.bit_words import running_xor
 from lidarium.mapping.kernels.compilation import Array, kernel
+from lidarium.mapping.kernels.simd.words import running_xor
 from lidarium.mapping.kernels.views import scratch_vector
 
 GRAZING = 8.0
@@ -25,7 +25,7 @@ Neighbours are two neighbouring end points.
 """
 
 
-@kernel(inline=True)
+@kernel(forceinline=True)
 def window_words(reach: float) -> int:
     """Words per row of a scan's window.
 
@@ -34,13 +34,13 @@ def window_words(reach: float) -> int:
     return (2 * (int(reach) + 3)) // 64 + 2
 
 
-@kernel(inline=True)
+@kernel(forceinline=True)
 def window_rows(reach: float) -> int:
     """Rows of a scan's window."""
     return 2 * (int(reach) + 3) + 1
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def scan_ends(lengths: Array, directions: Array, x: float, y: float, ends: Array) -> None:
     """Fill ``ends`` (2, beams) with the end points of the beams in the window [cells].
 
@@ -61,7 +61,7 @@ def scan_ends(lengths: Array, directions: Array, x: float, y: float, ends: Array
         ends[1, beam] = y + lengths[beam] * directions[1, beam]
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def fill_scan_polygon(
     lengths: Array,
     directions: Array,
@@ -121,7 +121,7 @@ def fill_scan_polygon(
     return box
 
 
-@kernel(inline=True, borrowing=True)
+@kernel(forceinline=True, nrt=False)
 def _fill_rows(bits: Array, box: tuple[int, int, int, int]) -> None:
     """Set the bits between those toggled, in the rows and words of a box."""
     row_low, row_high, word_low, word_high = box

@@ -11,9 +11,9 @@ import numpy as np
 
 from lidarium.mapping.grids.occupancy import UNKNOWN
 from lidarium.mapping.grids.pooled_maps import POOL, POOL_COLUMNS, POOL_ROWS
-from lidarium.mapping.kernels.cell_blocks import fetch_block
 from lidarium.mapping.kernels.compilation import Array, kernel
-from lidarium.mapping.kernels.crop_blocks import (
+from lidarium.mapping.kernels.simd.cells import prefetch
+from lidarium.mapping.kernels.simd.crops import (
     CELLS,
     COLUMNS,
     PLACES,
@@ -21,14 +21,14 @@ from lidarium.mapping.kernels.crop_blocks import (
     SIDE,
     write_block,
     write_border,
-    write_places,
+    write_indices,
 )
 from lidarium.mapping.kernels.views import LINE, scratch_grid, scratch_vector, vector_at
 
 _ALL_UNKNOWN = np.uint64(UNKNOWN * 0x0101010101010101)
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def _write_all_places(half: int, cells: int, step_x: int, step_y: int, corners: Array, places: Array) -> None:
     """Compute the part of a patch each block of a crop loads, and its cells there.
 
@@ -63,19 +63,19 @@ def _write_all_places(half: int, cells: int, step_x: int, step_y: int, corners: 
             )
             row, column = (y + least_y) >> PLACES, (x + least_x) >> PLACES
             corners[block, 0], corners[block, 1] = row, column
-            write_places(
+            write_indices(
                 x, y, row * COLUMNS + column, offsets.ctypes.data, places.ctypes.data + block * CELLS
             )
 
 
-@kernel(inline=True, borrowing=True)
+@kernel(forceinline=True, nrt=False)
 def _fill(crop: int, side: int) -> None:
     """Write a block at an address that lies beyond the map."""
     for row in range(SIDE):
         vector_at(crop + row * side, 1, np.uint64)[0] = _ALL_UNKNOWN
 
 
-@kernel(inline=True)
+@kernel(forceinline=True)
 def _bits_within(first: int, count: int, size: int) -> np.uint16:
     """Return the bits of those of ``count`` indices that lie within a size.
 
@@ -85,17 +85,17 @@ def _bits_within(first: int, count: int, size: int) -> np.uint16:
     return np.uint16((1 << high) - (1 << low))
 
 
-@kernel(inline=True, borrowing=True)
+@kernel(forceinline=True, nrt=False)
 def _fetch_patch(pool: Array, corner: Array, half: int) -> None:
     """Begin to load the part of a pooled map that a crop touches."""
     rows, columns = pool[1], pool[2]
     first, last = max(corner[1], 0), min(corner[1] + 2 * half, columns)
     for row in range(max(corner[0], 0), min(corner[0] + 2 * half, rows)):
         for column in range(first, last, LINE):
-            fetch_block(pool[0] + row * columns + column)
+            prefetch(pool[0] + row * columns + column)
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def turn_blocks(pools: Array, corners: Array, half: int, step_x: int, step_y: int, crops: Array) -> None:
     """Fill crops that are turned, block by block.
 
@@ -133,7 +133,7 @@ def turn_blocks(pools: Array, corners: Array, half: int, step_x: int, step_y: in
             )
             # A crop was written two steps ago and has left the caches since: begin to load a row of the
             # blocks after these.
-            fetch_block(target + (SIDE + block % blocks) * side)
+            prefetch(target + (SIDE + block % blocks) * side)
             if row >= 0 and column >= 0 and row + ROWS <= rows and column + COLUMNS <= columns:
                 write_block(source, columns, where, target, side)
             elif row + ROWS <= 0 or column + COLUMNS <= 0 or row >= rows or column >= columns:

@@ -3,9 +3,9 @@
 import numpy as np
 
 from lidarium.mapping.grids.grid_lines import line_is_open
-from lidarium.mapping.kernels.bit_words import first_bit
 from lidarium.mapping.kernels.compilation import Array, kernel
-from lidarium.mapping.kernels.lanes.cost_lanes import FAR, LANES, cheaper_cells
+from lidarium.mapping.kernels.simd.costs import FAR, LANES, cheaper_cells
+from lidarium.mapping.kernels.simd.words import first_bit
 from lidarium.mapping.planning.search.swept_costs import SweptCosts
 
 COST_BYTES = 4
@@ -47,7 +47,7 @@ def cheapest_views(
     return places, costs
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def _cheapest_view(
     cell: Array, log_odds: Array, swept: SweptCosts, spans: Array, lowest: int, place: Array
 ) -> int:

@@ -18,7 +18,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.mapping.kernels.vectors import BLOCK
+from lidarium.mapping.kernels.llvm import BLOCK
 from lidarium.mapping.planning.clearance_updates import Window, update_closeness
 
 LARGEST_LIMIT = 32_767  # twice the limit must fit into 16 bits

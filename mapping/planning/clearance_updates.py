@@ -9,13 +9,13 @@ once, beats the lower envelope.
 
 import numpy as np
 
-from lidarium.mapping.kernels.clearance_blocks import (
+from lidarium.mapping.kernels.compilation import Array, kernel
+from lidarium.mapping.kernels.llvm import BLOCK
+from lidarium.mapping.kernels.simd.clearance import (
     cells_that_differ,
     raise_block,
     same_cells,
 )
-from lidarium.mapping.kernels.compilation import Array, kernel
-from lidarium.mapping.kernels.vectors import BLOCK
 from lidarium.mapping.planning.row_sweeps import is_within, recompute
 
 Window = tuple[int, int, int, int]
@@ -86,7 +86,7 @@ def update_around(log_odds: Array, closeness: Array, limit: int, stamp: Array, c
     return True
 
 
-@kernel(inline=True)
+@kernel(forceinline=True)
 def _next_stale(stale: Array, row: int) -> int:
     """Return the first stale row from ``row`` on.
 
@@ -152,7 +152,7 @@ def changed_cells(log_odds: Array, closeness: Array, limit: int, window: Window)
     return cells
 
 
-@kernel(inline=True)
+@kernel(forceinline=True)
 def room_for_cells() -> Array:
     """Return what ``list_cells`` can list cells in (kernel)."""
     return np.empty((256, 2), np.int64)

@@ -4,16 +4,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lidarium.mapping.kernels.clearance_blocks import (
+from lidarium.mapping.kernels.compilation import Array, kernel
+from lidarium.mapping.kernels.llvm import BLOCK
+from lidarium.mapping.kernels.simd.clearance import (
     count_rows,
-    write_least_sums,
+    write_min_sums,
     write_squares,
 )
-from lidarium.mapping.kernels.compilation import Array, kernel
-from lidarium.mapping.kernels.vectors import BLOCK
 
 
-@kernel(inline=True)
+@kernel(forceinline=True)
 def is_within(column: int, columns: int) -> int:
     """Return the first of 64 columns within the grid that cover those wanted.
 
@@ -117,8 +117,6 @@ def recompute(
             continue
         side = sides[nearest]
         target = closeness.ctypes.data + 2 * (row * columns + column) if used == BLOCK else result.ctypes.data
-        write_least_sums(
-            squares.ctypes.data, costs.ctypes.data, reach - side, reach + side + 1, limit, target
-        )
+        write_min_sums(squares.ctypes.data, costs.ctypes.data, reach - side, reach + side + 1, limit, target)
         if used < BLOCK:
             closeness[row, column : column + used] = result[:used]

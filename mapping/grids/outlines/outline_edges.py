@@ -57,7 +57,7 @@ class _Edges(NamedTuple):
     slopes: NDArray[np.float64]
 
 
-@kernel(inline=True, borrowing=True)
+@kernel(forceinline=True, nrt=False)
 def toggle_between(bits: int, width: int, outline: Outline, previous: int, beam: int) -> None:
     """Toggle the outline between the end points of two neighbouring beams."""
     lengths, directions, ends, x, y, steepness = outline
@@ -86,7 +86,7 @@ def toggle_between(bits: int, width: int, outline: Outline, previous: int, beam:
             toggle_edge(bits, width, ends[0, end], ends[1, end], corner_x, corner_y, end_row, row)
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def _find_edges(
     lengths: Array, ends: Array, rows: Array, steepness: float, width: int, found: _Edges
 ) -> None:
@@ -114,7 +114,7 @@ def _find_edges(
         second[k] = (min(from_row[k], to_row[k]) + np.int32(1)) * stride + np.int32(crossings[k] + slopes[k])
 
 
-@kernel(inline=True, borrowing=True)
+@kernel(forceinline=True, nrt=False)
 def toggle_edges(flat: int, width: int, outline: Outline, rows: Array) -> None:
     """Toggle the outline between all end points; ``rows`` (beams,) int32 are theirs."""
     beams = rows.shape[0]

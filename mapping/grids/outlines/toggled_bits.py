@@ -6,7 +6,7 @@ from lidarium.mapping.kernels.compilation import kernel
 from lidarium.mapping.kernels.views import vector_at
 
 
-@kernel(inline=True, borrowing=True)
+@kernel(forceinline=True, nrt=False)
 def toggle_bit(bits: int, place: int) -> None:
     """Toggle a bit of the words at an address.
 
@@ -16,7 +16,7 @@ def toggle_bit(bits: int, place: int) -> None:
     vector_at(bits + (place >> 6 << 3), 1, np.uint64)[0] ^= np.uint64(1) << np.uint64(place & 63)
 
 
-@kernel(inline=True, borrowing=True)
+@kernel(forceinline=True, nrt=False)
 def toggle_edge(
     bits: int, width: int, from_x: float, from_y: float, to_x: float, to_y: float, from_row: int, to_row: int
 ) -> None:
@@ -32,7 +32,7 @@ def toggle_edge(
         x += slope
 
 
-@kernel(inline=True)
+@kernel(forceinline=True)
 def row_of(y: float) -> int:
     """First row whose centre line is above y; y is not negative."""
     return int(y + 0.5)

@@ -56,7 +56,7 @@ class _Tally(NamedTuple):
     fullest: int
 
 
-@kernel(inline=True, borrowing=True)
+@kernel(forceinline=True, nrt=False)
 def estimate(row: int, column: int, task: Task) -> int:
     """Return the least cost from a cell to the goal, as on open floor (kernel)."""
     rise = abs(task.goal_row - row)
@@ -64,7 +64,7 @@ def estimate(row: int, column: int, task: Task) -> int:
     return STRAIGHT * max(rise, run) + (DIAGONAL - STRAIGHT) * min(rise, run)
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def expand_band(
     terrain: Terrain, state: SearchState, task: Task, lookout: Lookout, band: int, first: int, wanted: int
 ) -> int:
@@ -106,7 +106,7 @@ def expand_band(
     return i
 
 
-@kernel(inline=True, borrowing=True)
+@kernel(forceinline=True, nrt=False)
 def _expand_cell(
     terrain: Terrain, flat: _Flat, state: SearchState, task: Task, cell: int, band: int, tally: _Tally
 ) -> _Tally:
@@ -150,7 +150,7 @@ def _expand_cell(
     return _Tally(touched, pending, fullest)
 
 
-@kernel(inline=True, borrowing=True)
+@kernel(forceinline=True, nrt=False)
 def _queue(state: SearchState, bucket: int, cell: int) -> int:
     """Let a cell wait in a bucket; return how many wait there."""
     slot = np.uintp(bucket & (state.buckets.shape[0] - 1))
@@ -160,13 +160,13 @@ def _queue(state: SearchState, bucket: int, cell: int) -> int:
     return int(size + 1)
 
 
-@kernel(inline=True, borrowing=True)
+@kernel(forceinline=True, nrt=False)
 def _is_within(row: int, column: int, rows: int, columns: int) -> bool:
     """Whether a cell lies within the grid."""
     return bool(0 <= row < rows and 0 <= column < columns)
 
 
-@kernel(inline=True, borrowing=True)
+@kernel(forceinline=True, nrt=False)
 def _step_is_open(terrain: Terrain, flat: _Flat, here: int, k: int, nearest: int) -> bool:
     """Whether a diagonal step keeps its clearance between its ends.
 
@@ -187,7 +187,7 @@ def _step_is_open(terrain: Terrain, flat: _Flat, here: int, k: int, nearest: int
     return bool(half_costs[0, flat.closeness[beside]] > 0 and half_costs[0, flat.closeness[abeam]] > 0)
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def _sees_target(log_odds: Array, lookout: Lookout, row: int, column: int) -> bool:
     """Whether a cell with mask 1 is within reach and sight of a cell.
 
@@ -206,7 +206,7 @@ def _sees_target(log_odds: Array, lookout: Lookout, row: int, column: int) -> bo
     return False
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def _leave(terrain: Terrain, state: SearchState, task: Task, row: int, column: int, tally: _Tally) -> _Tally:
     """Expand a cell inside a blocked zone.
 
@@ -244,7 +244,7 @@ def _leave(terrain: Terrain, state: SearchState, task: Task, row: int, column: i
     return _Tally(touched, pending, fullest)
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def _dearest(half_costs: Array) -> int:
     """Return half the cost of the dearest step."""
     dearest = 0
@@ -254,7 +254,7 @@ def _dearest(half_costs: Array) -> int:
     return dearest
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def _margin(terrain: Terrain, row: int, column: int) -> float:
     """Return the room [cells] between a body centred in a cell and obstacles.
 
@@ -268,7 +268,7 @@ def _margin(terrain: Terrain, row: int, column: int) -> float:
     return float(margin)
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def _is_passable(log_odds: Array, row: int, column: int, k: int) -> bool:
     """Whether a step leads to a free cell of the grid, and past no occupied one."""
     to_row = row + ROW_STEPS[k]
@@ -281,7 +281,7 @@ def _is_passable(log_odds: Array, row: int, column: int, k: int) -> bool:
     return bool(k < FIRST_DIAGONAL or is_free_beside)
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def _is_blocked(terrain: Terrain, state: SearchState, row: int, column: int) -> bool:
     """Whether a cell belongs to a blocked zone, or was passed only to leave one."""
     left = state.remaining[row, column]

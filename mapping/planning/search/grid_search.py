@@ -76,7 +76,7 @@ def spread(terrain: Terrain, state: SearchState, task: Task, lookout: Lookout) -
     return counts[TOUCHED], counts[HITS], band
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def _begin(terrain: Terrain, state: SearchState, task: Task) -> int:
     """Let the start wait as the only cell; return its band of costs."""
     row, column = task.start_row, task.start_column

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.mapping.kernels.compilation import Array, kernel
-from lidarium.mapping.kernels.views import int8_grid_at, int32_table_at, uint8_grid_at
+from lidarium.mapping.kernels.views import grid_at
 from lidarium.mapping.planning.search.grid_search import spread
 from lidarium.mapping.planning.search.search_state import (
     BUCKET_SHIFT,
@@ -139,10 +139,10 @@ def search_in(
 def _state_in(memory: Array, rows: int, columns: int) -> SearchState:
     """View a piece of memory as that of a search over a grid."""
     return SearchState(
-        int32_table_at(memory[REMAINING_AT], rows, columns),
-        uint8_grid_at(memory[PARENT_AT], rows, columns),
-        int32_table_at(memory[TOUCHED_AT], 1, rows * columns + SPARE_CELLS)[0],
-        int32_table_at(memory[BUCKETS_AT], memory[SLOTS], memory[WIDTH]),
+        grid_at(memory[REMAINING_AT], rows, columns, np.int32),
+        grid_at(memory[PARENT_AT], rows, columns, np.uint8),
+        grid_at(memory[TOUCHED_AT], 1, rows * columns + SPARE_CELLS, np.int32)[0],
+        grid_at(memory[BUCKETS_AT], memory[SLOTS], memory[WIDTH], np.int32),
         np.zeros(memory[SLOTS], np.int64),
         np.zeros(4, np.int64),
         np.empty((2, DIRECTIONS), np.int64),
@@ -168,7 +168,7 @@ def search_at(
     count, hit_count, settled : int
         As ``search_in``.
     """
-    beliefs = int8_grid_at(log_odds, closeness.shape[0], closeness.shape[1])
+    beliefs = grid_at(log_odds, closeness.shape[0], closeness.shape[1], np.int8)
     terrain = Terrain(beliefs, closeness, passage, discs)
     _, _, count, hit_count, settled = search_in(terrain, memory, task, lookout)
     return count, hit_count, settled
@@ -205,8 +205,8 @@ def search_all(
 def clear_memory(memory: Array, rows: int, columns: int, count: int) -> None:
     """Leave a thread's memory as the next search wants it (kernel)."""
     clear(
-        int32_table_at(memory[REMAINING_AT], rows, columns),
-        int32_table_at(memory[TOUCHED_AT], 1, rows * columns + SPARE_CELLS)[0],
+        grid_at(memory[REMAINING_AT], rows, columns, np.int32),
+        grid_at(memory[TOUCHED_AT], 1, rows * columns + SPARE_CELLS, np.int32)[0],
         count,
     )
 
@@ -214,7 +214,7 @@ def clear_memory(memory: Array, rows: int, columns: int, count: int) -> None:
 @kernel
 def touched_in(memory: Array, rows: int, columns: int) -> Array:
     """Return the room for the cells that a search has touched, row and column packed (kernel)."""
-    touched: Array = int32_table_at(memory[TOUCHED_AT], 1, rows * columns + SPARE_CELLS)[0]
+    touched: Array = grid_at(memory[TOUCHED_AT], 1, rows * columns + SPARE_CELLS, np.int32)[0]
     return touched
 
 

@@ -13,9 +13,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.mapping.kernels.bit_words import first_bit, last_bit
 from lidarium.mapping.kernels.compilation import Array, kernel
-from lidarium.mapping.kernels.lanes.cost_lanes import (
+from lidarium.mapping.kernels.simd.costs import (
     FAR,
     FITS,
     LANES,
@@ -23,7 +22,8 @@ from lidarium.mapping.kernels.lanes.cost_lanes import (
     relax_backwards,
     relax_forwards,
 )
-from lidarium.mapping.kernels.views import int32_table_at, scratch_vector, uint8_grid_at, word_grid_at
+from lidarium.mapping.kernels.simd.words import first_bit, last_bit
+from lidarium.mapping.kernels.views import grid_at, scratch_vector
 from lidarium.mapping.planning.clearance_updates import Window
 from lidarium.mapping.planning.search.search_state import (
     COLUMN_BITS,
@@ -43,7 +43,7 @@ ALL_THREE = 0b111
 """A block and both beside it."""
 
 
-@kernel(inline=True)
+@kernel(forceinline=True)
 def words_of(blocks: int) -> int:
     """Return how many words hold a bit for each block and for one beside either end."""
     return (blocks + 2 + 63) // 64
@@ -139,17 +139,17 @@ def costs_in(memory: Array, window: Window) -> SweptCosts:
     blocks = (window[3] + LANES - 1) // LANES - first
     width = (blocks + 2) * LANES
     return SweptCosts(
-        int32_table_at(memory[COSTS_AT], rows + 2, width),
-        int32_table_at(memory[STRAIGHT_AT], rows + 2, width),
-        int32_table_at(memory[DIAGONAL_AT], rows + 2, width),
-        uint8_grid_at(memory[KINDS_AT], rows + 2, width),
-        word_grid_at(memory[WAITING_AT], 2 * (rows + 2), words_of(blocks)),
+        grid_at(memory[COSTS_AT], rows + 2, width, np.int32),
+        grid_at(memory[STRAIGHT_AT], rows + 2, width, np.int32),
+        grid_at(memory[DIAGONAL_AT], rows + 2, width, np.int32),
+        grid_at(memory[KINDS_AT], rows + 2, width, np.uint8),
+        grid_at(memory[WAITING_AT], 2 * (rows + 2), words_of(blocks), np.uint64),
         window[0],
         first * LANES,
     )
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def prepare_costs(swept: SweptCosts, log_odds: Array, closeness: Array, passage: Passage) -> None:
     """Look up what the steps of a body cost over the window of a map (kernel)."""
     body = scratch_vector(5, np.int64)
@@ -173,7 +173,7 @@ def prepare_costs(swept: SweptCosts, log_odds: Array, closeness: Array, passage:
             )
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def _describe(passage: Passage, body: Array) -> None:
     """Write what ``look_up_costs`` wants to know of a body, (5,)."""
     costs = passage.half_costs
@@ -185,7 +185,7 @@ def _describe(passage: Passage, body: Array) -> None:
     body[0], body[1], body[2], body[3], body[4] = costs.ctypes.data, length, plain, tight, passage.roomy
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def spread_costs(swept: SweptCosts, row: int, column: int) -> bool:
     """Find the costs of the cheapest paths from a cell, see the module (kernel).
 
@@ -210,7 +210,7 @@ def spread_costs(swept: SweptCosts, row: int, column: int) -> bool:
     return True
 
 
-@kernel(inline=True, borrowing=True)
+@kernel(forceinline=True, nrt=False)
 def _let_wait(waiting: Array, way: int, row: int, block: int, which: int) -> None:
     """Let some of three neighbouring blocks of a row wait for the next sweep.
 
@@ -222,7 +222,7 @@ def _let_wait(waiting: Array, way: int, row: int, block: int, which: int) -> Non
         waiting[at, (block >> 6) + 1] |= np.uint64(which) >> np.uint64(64 - bit)
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def _sweep(swept: SweptCosts, way: int) -> int:
     """Visit the blocks that wait, row by row; return how many there were."""
     rows, waiting, visited = swept.costs.shape[0] - 2, swept.waiting, 0
@@ -238,7 +238,7 @@ def _sweep(swept: SweptCosts, way: int) -> int:
     return visited
 
 
-@kernel(inline=True, borrowing=True)
+@kernel(forceinline=True, nrt=False)
 def _visit(swept: SweptCosts, way: int, row: int, block: int) -> int:
     """Lower the costs of a block, if there is one, and let those wait that this concerns; count it."""
     width = swept.costs.shape[1]

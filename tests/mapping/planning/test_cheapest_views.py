@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lidarium.mapping.kernels.lanes.cost_lanes import FAR
+from lidarium.mapping.kernels.simd.costs import FAR
 from lidarium.mapping.planning.cheapest_views import cheapest_views
 from lidarium.mapping.planning.clearance import ClearanceField
 from lidarium.mapping.planning.footprint import Footprint, passage_of

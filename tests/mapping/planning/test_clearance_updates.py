@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from lidarium.mapping.kernels.vectors import BLOCK
+from lidarium.mapping.kernels.llvm import BLOCK
 from lidarium.mapping.planning.clearance import ClearanceField
 from lidarium.mapping.planning.clearance_updates import (
     changed_cells,
