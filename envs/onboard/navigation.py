@@ -15,11 +15,9 @@ from numpy.typing import NDArray
 
 from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.kernels.views import grid_at
-from lidarium.mapping.planning.clearance import ClearanceField
-from lidarium.mapping.planning.clearance_updates import Window, changed_cells, update_around
-from lidarium.mapping.planning.frontier_kernels import update_frontiers
-from lidarium.mapping.planning.frontiers import FrontierMap
-from lidarium.mapping.planning.search.search_space import SearchSpace
+from lidarium.mapping.planning.clearance import ClearanceField, Window, changed_cells, update_around
+from lidarium.mapping.planning.frontiers.frontier_map import FrontierMap, update_frontiers
+from lidarium.mapping.planning.search.path_search import SearchSpace
 
 CLEARANCE_LIMIT = 0.6
 """Clearance is known exactly up to this [m]."""

@@ -18,7 +18,7 @@ from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.kernels.llvm import BLOCK
 from lidarium.mapping.kernels.simd.cells import positive_cells, sum_blocks
 from lidarium.mapping.kernels.views import vector_at
-from lidarium.mapping.planning.clearance_updates import (
+from lidarium.mapping.planning.clearance import (
     Window,
     list_cells,
     room_for_cells,

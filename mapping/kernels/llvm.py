@@ -24,6 +24,8 @@ INT, LONG = ir.IntType(32), ir.IntType(64)
 
 _numba_config: Any = config
 _utils: Any = cgutils
+numba_types: Any = types
+pack_array: Any = cgutils.pack_array
 _lower: Any = lower_builtin
 _type_callable: Any = type_callable
 
@@ -80,7 +82,7 @@ def generic_llvm_overload(function: Callable[..., Any], typer: Callable[..., Any
             named: Any = lambda *arguments: typer(*arguments)  # noqa: E731
             named.pysig = inspect.signature(function)
             _type_callable(function)(lambda _context: named)
-            _lower(function, types.VarArg(types.Any))(lower)
+            _lower(function, numba_types.VarArg(numba_types.Any))(lower)
         return lower
 
     return decorate

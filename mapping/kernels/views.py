@@ -10,7 +10,7 @@ Each view is defined in Python first; below it is the text that kernels are comp
 import ctypes
 import math
 from collections.abc import Iterable
-from typing import Any, NamedTuple, get_args, get_type_hints
+from typing import Any, get_args, get_type_hints
 
 import numba
 import numpy as np
@@ -19,10 +19,9 @@ from numba.np import arrayobj
 from numpy.typing import NDArray
 
 from lidarium.mapping.kernels.compilation import Array, Numbers
-from lidarium.mapping.kernels.llvm import Builder, Value, generic_llvm_overload
+from lidarium.mapping.kernels.llvm import Builder, Value, generic_llvm_overload, numba_types
 
 _numba_arrays: Any = arrayobj
-_numba_types: Any = types
 
 LINE = 64
 """A line of the caches [bytes]."""
@@ -36,7 +35,7 @@ def array_at(address: int, shape: tuple[int, ...], dtype: Any) -> NDArray[Any]: 
     size = math.prod(shape) * np.dtype(dtype).itemsize
     if size == 0:
         return np.zeros(shape, dtype).view(Numbers)
-    memory: Any = (ctypes.c_char * size).from_address(address)
+    memory: Any = (ctypes.c_char * size).from_address(int(address))
     return np.frombuffer(memory, dtype).reshape(shape).view(Numbers)
 
 
@@ -67,7 +66,7 @@ def scratch_grid(rows: int, columns: int, dtype: Any) -> Any:  # noqa: ANN401
     return np.zeros((rows, columns), dtype).view(Numbers)
 
 
-def arrays_at(table: Array, named: type[NamedTuple]) -> Any:  # noqa: ANN401
+def arrays_at(table: Array, named: Any) -> Any:  # noqa: ANN401
     """View all arrays of a table (arrays, ENTRY) int64 of ``table_of`` as the fields of a named tuple.
 
     The fields of its class are annotated ``Annotated[Array, dtype, dimensions]``.
@@ -151,7 +150,7 @@ def _named_type(table: Any, named: Any) -> Any:  # noqa: ANN401
     """Return the signature of ``arrays_at``."""
     declared = _declared(named.instance_class)
     members = [types.Array(numba.from_dtype(np.dtype(dtype)), count, "C") for dtype, count in declared]
-    return _numba_types.NamedTuple(members, named.instance_class)(table, named)
+    return numba_types.NamedTuple(members, named.instance_class)(table, named)
 
 
 @generic_llvm_overload(arrays_at, _named_type)

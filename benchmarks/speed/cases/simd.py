@@ -7,12 +7,13 @@ hand-written text: the median of rounds in which both run in turns. The results 
 ``docs/how_to/change_a_kernel.md``.
 """
 
+import functools
 import math
 import statistics
 import sys
 from collections import namedtuple
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any
 
 import llvmlite
 import numba
@@ -25,6 +26,7 @@ from lidarium.envs.simulation.kernels.ray_tables import RayTables
 from lidarium.envs.simulation.kernels.ray_travel import cast_in_lanes, cast_one_by_one
 from lidarium.mapping.grids.map_crops import turn_by_cells, turn_in_registers
 from lidarium.mapping.grids.scan_geometry import Beams, ScanGeometry, beam_directions
+from lidarium.mapping.kernels.compilation import Array
 from lidarium.mapping.kernels.simd import cells, clearance, codes, costs, crops, faces, words
 from lidarium.mapping.kernels.views import vector_at
 
@@ -307,7 +309,7 @@ def _difference(words: tuple[np.uint64, np.uint64]) -> Any:  # noqa: ANN401
 def _chained(operation: Any) -> Any:  # noqa: ANN401
     """Return a function whose calls wait for each other, as in the filling of polygons."""
 
-    def call(data, k):  # noqa: ANN001, ANN202
+    def call(data: Any, k: int) -> int:  # noqa: ANN401
         data.words[-1] = operation(data.words[k] ^ (data.words[-1] >> np.uint64(63)))
         return int(data.words[-1])
 
@@ -368,17 +370,19 @@ def _calls() -> dict[str, tuple[Any, Any, Callable[[Any], Any]]]:
 
 
 def _runs(
-    operations: tuple[Any, Any], adapt: Callable[[Any], Any], data: NamedTuple
+    operations: tuple[Any, Any],
+    adapt: Callable[[Any], Any],
+    data: Any,  # noqa: ANN401
 ) -> list[Callable[[], object]]:
     """Return functions that run either form on all blocks and keep its results, if it has any."""
     returned = np.zeros(BLOCKS, np.int64)
 
     def run(call: Any) -> Callable[[], object]:  # noqa: ANN401
-        def write_only(data, _returned):  # noqa: ANN001, ANN202
+        def write_only(data: Any, _returned: Array) -> None:  # noqa: ANN401
             for k in range(BLOCKS):
                 call(data, k)
 
-        def keep_results(data, returned):  # noqa: ANN001, ANN202
+        def keep_results(data: Any, returned: Array) -> None:  # noqa: ANN401
             for k in range(BLOCKS):
                 returned[k] = call(data, k)
 
@@ -401,32 +405,33 @@ def _scans() -> list[Callable[[], object]]:
     beams, ranges = Beams(613.4, 588.7, 0.3, first, increment, directions, 400.0), np.empty(720)
     squares = tables.squares.ravel()
     return [
-        lambda cast=cast: cast(squares, tables.rows, tables.columns, beams, ranges)
+        functools.partial(cast, squares, tables.rows, tables.columns, beams, ranges)
         for cast in (cast_in_lanes, cast_one_by_one)
     ]
 
 
-def _crops() -> list[Callable[[], object]]:
+def _crops(kept: list[Array]) -> list[Callable[[], object]]:
     """Return functions that fill turned crops in registers and cell by cell."""
     log_odds = np.random.default_rng(0).integers(-20, 30, (512, 512)).astype(np.int8)
     pools = np.array([[log_odds.ctypes.data, 512, 512]])
     scales, result = np.ones(1, np.int64), np.empty((1, 64, 64), np.uint8)
-    # The maps stay alive with the functions that read them at their addresses.
+    kept.append(log_odds)  # it is read at its address
     return [
-        lambda turn=turn, _kept=log_odds: turn(pools, 250.3, 260.8, 0.7, scales, result)
+        functools.partial(turn, pools, 250.3, 260.8, 0.7, scales, result)
         for turn in (turn_in_registers, turn_by_cells)
     ]
 
 
 def main() -> None:
     """Measure all operations, or those that are named."""
+    kept: list[Array] = []
     names, effort, arrays = sys.argv[1:], Effort(rounds=15, block_s=0.05), _arrays()
     addresses = {name: array if name == "words" else array.ctypes.data for name, array in arrays.items()}
     data = namedtuple("Data", addresses)(**addresses)
     pairs = {name: (_runs(forms[:2], forms[2], data), BLOCKS) for name, forms in _calls().items()}
     pairs["travel_rays, travel_bundles (a scan)"] = _scans(), 1
     if crops.CAN_LOOK_UP_IN_REGISTERS:
-        pairs["write_block, write_border (a crop)"] = _crops(), 1
+        pairs["write_block, write_border (a crop)"] = _crops(kept), 1
     print(f"numba {numba.__version__}, llvmlite {llvmlite.__version__}, {binding.get_host_cpu_name()}\n")
     print("| operation | hand-written [ns] | plain numba [ns] | ratio (range) |\n|---|---|---|---|")
     for name, (runs, units) in pairs.items():

@@ -32,10 +32,9 @@ from lidarium.envs.simulation.kernels.arrays import (
 )
 from lidarium.envs.simulation.kernels.masks import score_area, window_corner
 from lidarium.envs.simulation.kernels.scanning import ScanScratch, is_noisy, sense
-from lidarium.mapping.grids.noisy_returns import settle_returns
 from lidarium.mapping.grids.pooled_maps import touched_words
 from lidarium.mapping.grids.scan_geometry import beam_directions, beams_towards
-from lidarium.mapping.grids.scan_integration import SeenScan, integrate_scan
+from lidarium.mapping.grids.scan_integration import SeenScan, integrate_scan, settle_returns
 from lidarium.mapping.grids.scan_polygon import fill_scan_polygon, scan_ends
 from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.kernels.views import grid_at, scratch_vector

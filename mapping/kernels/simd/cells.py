@@ -23,6 +23,8 @@ from lidarium.mapping.kernels.llvm import (
     lanewise,
     llvm_overload,
     load_at,
+    numba_types,
+    pack_array,
     pointer_at,
     splat,
     stack_slot,
@@ -177,11 +179,11 @@ def sign_bits(address: int) -> tuple[np.uint64, np.uint64]:
     return bits_of(sums < 0), bits_of(sums > 0)
 
 
-@llvm_overload(sign_bits, types.UniTuple(types.uint64, 2), types.int64)
+@llvm_overload(sign_bits, numba_types.UniTuple(types.uint64, 2), types.int64)
 def _(builder: Builder, address: Value) -> Value:
     sums = load_at(builder, address, SHORTS)
     words = [bits_of_lanes(builder, builder.icmp_signed(order, sums, NO_SHORTS)) for order in "<>"]
-    return cgutils.pack_array(builder, words)
+    return pack_array(builder, words)
 
 
 def negative_cells(address: int) -> np.uint64:

@@ -161,12 +161,12 @@ def _shifted(builder: Builder, lanes: Value, count: int, step: int) -> Value:
 
 @llvm_overload(relax_forwards, types.int64, *(types.int64,) * 6)
 def _(builder: Builder, *values: Value) -> Value:
-    return _relax_lanes(builder, values[:4], *values[4:], 1)
+    return _relax_lanes(builder, values[:4], values[4], values[5], 1)
 
 
 @llvm_overload(relax_backwards, types.int64, *(types.int64,) * 6)
 def _(builder: Builder, *values: Value) -> Value:
-    return _relax_lanes(builder, values[:4], *values[4:], -1)
+    return _relax_lanes(builder, values[:4], values[4], values[5], -1)
 
 
 def cheaper_cells(costs: int, limit: int) -> int:

@@ -24,6 +24,7 @@ from lidarium.mapping.kernels.llvm import (
     load_at,
     max_lanes,
     min_lanes,
+    numba_types,
     splat,
     store_at,
     vector,
@@ -44,7 +45,7 @@ BEHIND = 3
 
 _INTS, _REALS, _FLAGS = vector(INT, GROUP), vector(ir.DoubleType(), GROUP), vector(ir.IntType(1), GROUP)
 _ZEROS, _ONES, _BYTE = (constant(_INTS, number) for number in (0, 1, 255))
-_PAIR, _TRIPLE = types.UniTuple(types.int64, 2), types.UniTuple(types.float64, 3)
+_PAIR, _TRIPLE = numba_types.UniTuple(types.int64, 2), numba_types.UniTuple(types.float64, 3)
 
 Advance = Callable[[Any, Any], tuple[Any, Any]]
 

@@ -33,7 +33,7 @@ TAKE = {"name": "lidarium.mapping.kernels.work_queue:take_next", "signature": ["
 SCRIPT = f"""
 import json, sys
 from lidarium.mapping.kernels.first_start import compile_in_processes
-module = "lidarium.mapping.planning.search.search_targets:"
+module = "lidarium.mapping.planning.search.search_state:"
 entries = [
     {{"name": module + "_grown", "signature": ["int32:2C", "int64"], "needs": [1]}},
     {TAKE},

@@ -1,6 +1,6 @@
-"""Places from which robots observe frontiers: where much of what is unknown is in view.
+"""Cells from which robots observe frontiers with much of the unknown area in view.
 
-A frontier begins at the corner behind which it hides. From beside that corner nothing new is seen; from a few
+A frontier begins at the corner that hides it. From next to that corner nothing new is visible; from a few
 steps farther on all of it is.
 """
 
@@ -15,24 +15,24 @@ from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.planning.touring.coarse_distances import UNREACHED, CoarseGrid
 
 RAYS = 32
-"""Rays by which a view is measured."""
+"""Number of rays by which a view is measured."""
 
 
 class ViewRules(NamedTuple):
-    """How views are measured and chosen.
+    """Settings of the measurement and choice of views.
 
     Attributes
     ----------
     around : float
-        Views lie within this of a cell of the frontier [m].
+        Maximum distance of views from a cell of the frontier [m].
     spacing : float
-        Distance of views that are tried [m].
+        Distance between candidates [m].
     reach : float
-        Unknown space counts up to this far from the view [m].
+        Unknown area counts up to this distance from the view [m].
     depth : float
-        Of what is unknown along a ray so much counts at most [m]: what lies deeper may be no floor.
+        Maximum depth of unknown area that counts along a ray [m]: deeper cells may be no floor.
     kept_share : float
-        The view with the shortest path is taken among those that show this share of what the best one shows.
+        The view with the shortest path is taken among those that show this share of the best one's area.
     """
 
     around: float = 1.0
@@ -48,7 +48,7 @@ class Views(NamedTuple):
     Attributes
     ----------
     cells : (K, 2) int64
-        Coarse cells (row, column) to observe from; -1 where there is none.
+        Coarse cells (row, column) to observe from; -1 if there is none.
     gains : (K,) float64
         Unknown area in view [m2].
     lengths : (K,) int64
@@ -61,7 +61,7 @@ class Views(NamedTuple):
 
 
 class _Frame(NamedTuple):
-    """Where coarse cells lie on the map, and rules in cells."""
+    """Position of coarse cells on the map, and view rules in cells."""
 
     row: int
     column: int
@@ -92,13 +92,13 @@ def views_of(
     resolution : float
         Side of its cells [m].
     grid : CoarseGrid
-        Where a body may stand on it.
+        Cells in which a body may stand.
     lengths : (rows, columns) int32
         Lengths of the paths to all coarse cells.
     clusters : (N, 2) int64, (K + 1,) int64
-        Cells (row, column) of the map, and where each cluster starts.
+        Cells (row, column) of the map, and the start of each cluster.
     rules : ViewRules
-        How views are measured and chosen.
+        Settings.
     """
     frame = _frame_of(grid, resolution, rules)
     cells, gains, found = _view_all(log_odds, lengths, clusters[0], clusters[1], _rays(), frame)
@@ -108,19 +108,7 @@ def views_of(
 def gain_at(
     log_odds: NDArray[np.int8], resolution: float, cell: tuple[int, int], rules: ViewRules
 ) -> tuple[float, float]:
-    """Return the unknown area in view of a cell, and the direction to it [m2, rad].
-
-    Parameters
-    ----------
-    log_odds : (rows, columns) int8
-        The map.
-    resolution : float
-        Side of its cells [m].
-    cell : (row, column)
-        Where the view is.
-    rules : ViewRules
-        How views are measured.
-    """
+    """Return the unknown area in view of a cell (row, column), and the direction to it [m2, rad]."""
     stride = _stride_of(resolution)
     reach, depth = round(rules.reach / resolution), round(rules.depth / resolution)
     gain, along, across = _gain(log_odds, cell[0], cell[1], _rays(), (reach, depth, stride))
@@ -184,7 +172,7 @@ def _gain(
 def _view_all(
     log_odds: Array, lengths: Array, cells: Array, starts: Array, rays: Array, frame: _Frame
 ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.int64]]:
-    """Return each cluster's view, what it shows [m2] and its path's length."""
+    """Return each cluster's view, its gain [m2] and its path's length."""
     count = len(starts) - 1
     views = np.full((count, 2), -1, np.int64)
     gains, found = np.zeros(count), np.full(count, UNREACHED, np.int64)
@@ -206,7 +194,7 @@ def _view_all(
 def _tried(
     log_odds: Array, lengths: Array, cells: Array, rays: Array, frame: _Frame, tried: Array, number: int
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Return the coarse cells that see a cluster, and what each shows [m2]."""
+    """Return the coarse cells that see a cluster, and the gain of each [m2]."""
     rows, columns = lengths.shape
     places, shown = np.empty((512, 2), np.int64), np.empty(512)
     count = 0

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from lidarium.mapping.planning.clearance import ClearanceField
-from lidarium.mapping.planning.frontiers import FrontierMap
+from lidarium.mapping.planning.frontiers.frontier_map import FrontierMap
+from lidarium.mapping.planning.frontiers.views import RAYS, ViewRules, gain_at, views_of
 from lidarium.mapping.planning.touring.coarse_distances import coarse_grid, distances_from
-from lidarium.mapping.planning.touring.frontier_views import RAYS, ViewRules, gain_at, views_of
 
 RESOLUTION = 0.05
 

@@ -1,7 +1,7 @@
-"""Tours of a team that share out places among them.
+"""Open tours past places: the shortest one of a robot, and those of a team that shares the places.
 
-The tours of all robots are one sequence: numbers of places, and between the tours of two robots a number that
-is no place's. So one set of moves orders the places of a robot and hands places on to others.
+The tours of a team are one sequence: indices of places, and between the tours of two robots a number above
+all indices. So one set of moves orders the places of a robot and moves places to other robots.
 """
 
 from typing import NamedTuple
@@ -11,14 +11,112 @@ from numpy.typing import NDArray
 
 from lidarium.mapping.kernels.compilation import Array, kernel
 
+_BEGINNINGS = 4
+"""Number of tours that are improved, each from another of the nearest places."""
+
 _LONGEST_PIECE = 3
-"""Pieces of up to so many places are moved to elsewhere."""
+"""Maximum number of places of a piece that is moved within a tour or to another one."""
 
 _LESS = 1e-9
 
 
+@kernel
+def shortest_tour(first: NDArray[np.float64], between: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Return the order, (n,) int64, in which an approximately shortest open tour visits all places.
+
+    Tours continue at the nearest place from each of the nearest beginnings, and are improved by reversing
+    pieces (2-opt; Croes 1958) and by moving pieces (Or 1976) until neither helps. Explorers that plan tours
+    and drive to the first place have shorter paths than those that go to the nearest one (Kulich, Faigl and
+    Preucil 2011).
+
+    Parameters
+    ----------
+    first : (n,) float64
+        Cost of the path from the robot to each place; finite.
+    between : (n, n) float64
+        Cost of the paths between places; finite and symmetric.
+    """
+    count = first.shape[0]
+    best, best_length = np.arange(count), np.inf
+    nearest = np.argsort(first, kind="mergesort")
+    tour, trial = np.empty(count, np.int64), np.empty(count, np.int64)
+    for beginning in range(min(_BEGINNINGS, count)):
+        _go_to_nearest(nearest[beginning], between, tour)
+        length = _length(tour, first, between)
+        while True:
+            shorter = _shorten_by_turns(tour, trial, first, between, length)
+            shorter = _shorten_by_moves(tour, trial, first, between, shorter)
+            if shorter >= length - _LESS:
+                break
+            length = shorter
+        if length < best_length - _LESS:
+            best[:], best_length = tour, length
+    return best
+
+
+@kernel
+def _length(tour: Array, first: Array, between: Array) -> float:
+    length = first[tour[0]]
+    for k in range(1, tour.shape[0]):
+        length += between[tour[k - 1], tour[k]]
+    return float(length)
+
+
+@kernel
+def _go_to_nearest(beginning: int, between: Array, tour: Array) -> None:
+    """Write the tour that continues at the nearest remaining place."""
+    count = tour.shape[0]
+    is_left = np.ones(count, np.bool_)
+    tour[0], is_left[beginning] = beginning, False
+    for k in range(1, count):
+        nearest = -1
+        for place in range(count):
+            if is_left[place] and (
+                nearest < 0 or between[tour[k - 1], place] < between[tour[k - 1], nearest]
+            ):
+                nearest = place
+        tour[k], is_left[nearest] = nearest, False
+
+
+@kernel
+def _shorten_by_turns(tour: Array, trial: Array, first: Array, between: Array, length: float) -> float:
+    """Reverse every piece that makes the tour shorter; return its length."""
+    count = tour.shape[0]
+    for start in range(count):
+        for end in range(start + 2, count + 1):
+            trial[:] = tour
+            trial[start:end] = tour[start:end][::-1]
+            shorter = _length(trial, first, between)
+            if shorter < length - _LESS:
+                tour[:], length = trial, shorter
+    return length
+
+
+@kernel
+def _shorten_by_moves(tour: Array, trial: Array, first: Array, between: Array, length: float) -> float:
+    """Move every short piece to a position that makes the tour shorter; return its length."""
+    count = tour.shape[0]
+    rest = np.empty(count, np.int64)
+    for size in range(1, min(_LONGEST_PIECE, count - 1) + 1):
+        for start in range(count - size + 1):
+            piece = tour[start : start + size].copy()
+            left = count - size
+            rest[:start], rest[start:left] = tour[:start], tour[start + size :]
+            for place in range(left + 1):
+                trial[:place], trial[place : place + size], trial[place + size :] = (
+                    rest[:place],
+                    piece,
+                    rest[place:left],
+                )
+                shorter = _length(trial, first, between)
+                if shorter < length - _LESS:
+                    tour[:], length = trial, shorter
+                    break
+    return length
+
+
 class TourWeights(NamedTuple):
-    """What makes tours good: all are weights of lengths, of which the sum is least.
+    """Weights of lengths, whose sum is the cost of tours.
 
     Attributes
     ----------
@@ -27,7 +125,7 @@ class TourWeights(NamedTuple):
     total : float
         Weight of the sum of the tours.
     waiting : float
-        Weight of the way until each place is visited, times what the place is worth.
+        Weight of the path until each place is visited, times the place's worth.
     """
 
     longest: float
@@ -42,27 +140,26 @@ def team_tours(
     worth: NDArray[np.float64],
     weights: TourWeights,
 ) -> NDArray[np.int64]:
-    """Return which places each robot of a team visits, and in which order.
+    """Return the places that each robot of a team visits, in order: approximately the best open tours.
 
-    The open tours are approximately the best ones. Places are inserted one by one where that costs least, the
-    one that costs least first; then pieces are turned round (2-opt; Croes 1958) and moved elsewhere, within a
-    tour or to another robot's (Or 1976), until neither helps.
+    Places are inserted one by one at the lowest cost, the cheapest first; then pieces are reversed (2-opt;
+    Croes 1958) and moved, within a tour or to another robot's (Or 1976), until neither helps.
 
     Parameters
     ----------
     first : (robots, n) float64
-        What the path from each robot to each place costs; finite.
+        Cost of the path from each robot to each place; finite.
     between : (n, n) float64
-        What the paths from place to place cost; finite.
+        Cost of the paths between places; finite.
     worth : (n,) float64
-        What each place is worth.
+        Worth of each place.
     weights : TourWeights
-        What is least.
+        Weights of the cost.
 
     Returns
     -------
     (n + robots - 1,) int64
-        Numbers of places, robot after robot; n and above between the places of two robots.
+        Indices of places, robot after robot; n and above between the places of two robots.
     """
     robots, count = first.shape
     sequence = np.empty(count + robots - 1, np.int64)
@@ -87,7 +184,7 @@ def tours_cost(
     worth: NDArray[np.float64],
     weights: TourWeights,
 ) -> float:
-    """Return what tours cost [m]; parameters as in ``costs_of_firsts``."""
+    """Return the cost of tours [m]; parameters as in ``costs_of_firsts``."""
     return float(_cost(sequence, sequence.shape[0], first, between, worth, weights))
 
 
@@ -100,16 +197,17 @@ def costs_of_firsts(
     worth: NDArray[np.float64],
     weights: TourWeights,
 ) -> NDArray[np.float64]:
-    """Return by how much tours cost more where a robot visits each place first, (n,).
+    """Return the extra cost of tours if a robot visits each place first, (n,).
 
-    All else keeps its order. Where places are equal, or tours are not the best ones, it may be 0 or less.
+    All other places keep their order. The extra cost may be 0 or less if places are equal, or tours are not
+    the best ones.
 
     Parameters
     ----------
     sequence : (n + robots - 1,) int64
         The tours, as ``team_tours`` returns them.
     robot : int
-        Whose tour begins with the place.
+        The robot whose tour begins with the place.
     first, between, worth, weights
         As in ``team_tours``.
     """
@@ -124,14 +222,10 @@ def costs_of_firsts(
 
 @kernel
 def with_first(sequence: NDArray[np.int64], robot: int, place: int, count: int) -> NDArray[np.int64]:
-    """Return tours past ``count`` places in which a robot visits one of them first; the rest keeps its order.
+    """Return tours past ``count`` places in which a robot visits one of them first.
 
-    Parameters
-    ----------
-    sequence : (count + robots - 1,) int64
-        The tours, as ``team_tours`` returns them.
-    robot, place, count : int
-        Which robot, which place, and how many places there are.
+    All other places keep their order. ``sequence`` (count + robots - 1,) int64 are the tours, as
+    ``team_tours`` returns them.
     """
     changed = np.empty_like(sequence)
     size, tour = 0, 0
@@ -154,7 +248,7 @@ def with_first(sequence: NDArray[np.int64], robot: int, place: int, count: int) 
 def _cost(
     sequence: Array, size: int, first: Array, between: Array, worth: Array, weights: TourWeights
 ) -> float:
-    """Return what the tours of the first ``size`` numbers of a sequence cost."""
+    """Return the cost of the tours of the first ``size`` numbers of a sequence."""
     count = first.shape[1]
     robot, last = 0, -1
     length, longest, total, waiting = 0.0, 0.0, 0.0, 0.0
@@ -173,13 +267,13 @@ def _cost(
 
 @kernel
 def _insert_all(sequence: Array, first: Array, between: Array, worth: Array, weights: TourWeights) -> None:
-    """Insert all places into tours without any, each time the one that costs least."""
+    """Insert all places into empty tours, each time the one with the lowest cost."""
     robots, count = first.shape
     size = robots - 1
     is_left = np.ones(count, np.bool_)
     trial = np.empty_like(sequence)
     for _ in range(count):
-        least, chosen, at = np.inf, -1, 0
+        minimum, chosen, at = np.inf, -1, 0
         for place in range(count):
             if not is_left[place]:
                 continue
@@ -188,8 +282,8 @@ def _insert_all(sequence: Array, first: Array, between: Array, worth: Array, wei
                 trial[position] = place
                 trial[position + 1 : size + 1] = sequence[position:size]
                 cost = _cost(trial, size + 1, first, between, worth, weights)
-                if cost < least - _LESS:
-                    least, chosen, at = cost, place, position
+                if cost < minimum - _LESS:
+                    minimum, chosen, at = cost, place, position
         for k in range(size, at, -1):
             sequence[k] = sequence[k - 1]
         sequence[at], is_left[chosen] = chosen, False
@@ -206,7 +300,7 @@ def _turn_pieces(
     weights: TourWeights,
     cost: float,
 ) -> float:
-    """Turn every piece round that makes the tours better; return what they cost."""
+    """Reverse every piece that makes the tours better; return their cost."""
     size = sequence.shape[0]
     for start in range(size):
         for end in range(start + 2, size + 1):
@@ -228,7 +322,7 @@ def _move_pieces(
     weights: TourWeights,
     cost: float,
 ) -> float:
-    """Move short pieces to where tours get better; return what they cost."""
+    """Move short pieces to positions that make the tours better; return their cost."""
     trial, rest = scratch
     size = sequence.shape[0]
     for length in range(1, min(_LONGEST_PIECE, size - 1) + 1):
