@@ -20,8 +20,8 @@ from lidarium.envs.onboard.driving.path_planner import footprint_of
 from lidarium.envs.onboard.navigation import NavigationMap
 from lidarium.envs.onboard.radio.messages import DriveState, Target
 from lidarium.mapping.planning.footprint import Footprint
-from lidarium.mapping.planning.frontier_approach import approach, default_reach
-from lidarium.mapping.planning.frontier_kernels import FRONTIER, IGNORED
+from lidarium.mapping.planning.frontiers.approach import approach, default_reach
+from lidarium.mapping.planning.frontiers.frontier_map import FRONTIER, IGNORED
 from lidarium.mapping.planning.grid_planning import Cell, cells_of, centres_of, search
 
 PATIENCE_S = 20.0

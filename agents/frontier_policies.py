@@ -12,8 +12,8 @@ from lidarium.agents.frontier_reach import Choice, Reach, reach_of
 from lidarium.agents.policy import Team
 from lidarium.envs.onboard.navigation import NavigationMap
 from lidarium.mapping.grids.grid_lines import visible
-from lidarium.mapping.planning.frontier_approach import nearest_frontier
-from lidarium.mapping.planning.frontiers import Clusters
+from lidarium.mapping.planning.frontiers.approach import nearest_frontier
+from lidarium.mapping.planning.frontiers.frontier_map import Clusters
 
 MOST_UTILITY_LOST = 2.0
 """Largest excess of utility that a path to a frontier may cost.

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from lidarium.envs.onboard.navigation import NavigationMap
 from lidarium.mapping.planning.footprint import Footprint
-from lidarium.mapping.planning.frontier_approach import approach, default_reach
-from lidarium.mapping.planning.frontiers import Clusters
+from lidarium.mapping.planning.frontiers.approach import approach, default_reach
+from lidarium.mapping.planning.frontiers.frontier_map import Clusters
 from lidarium.mapping.planning.grid_planning import Cell, Until, search
 
 

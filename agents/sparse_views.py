@@ -34,7 +34,7 @@ class ViewSettings:
     minimum_size: Annotated[float, above(0.0, 1000.0)] = 0.3
     gain: Annotated[float, within(0.0, 1000.0)] = 0.3
     most_m2: Annotated[float, above(0.0, 1e6)] = 4.0
-    near_share: Annotated[float, share(has_least=False)] = 0.6
+    near_share: Annotated[float, share(has_minimum=False)] = 0.6
 
     def __post_init__(self) -> None:
         check_settings(self, "views")

@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import strategies as st
 
 from lidarium.mapping.planning.clearance import ClearanceField
-from lidarium.mapping.planning.frontiers import FrontierMap
+from lidarium.mapping.planning.frontiers.frontier_map import FrontierMap
 
 RESOLUTION = 0.025
 

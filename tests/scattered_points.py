@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from lidarium.mapping.kernels.lanes.point_lanes import TILE
+from lidarium.mapping.kernels.simd.codes import TILE
 
 
 def room(count=3000, seed=0):

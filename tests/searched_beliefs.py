@@ -10,7 +10,7 @@ from scipy.sparse.csgraph import dijkstra
 
 from lidarium.mapping.planning.clearance import ClearanceField, clearance
 from lidarium.mapping.planning.footprint import Footprint
-from lidarium.mapping.planning.search.search_space import SearchSpace
+from lidarium.mapping.planning.search.path_search import SearchSpace
 
 RESOLUTION = 0.025
 

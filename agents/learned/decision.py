@@ -21,7 +21,7 @@ from lidarium.envs.onboard.navigation import NavigationMap
 from lidarium.mapping.planning.grid_planning import centres_of
 from lidarium.mapping.planning.touring.coarse_distances import place_in
 from lidarium.mapping.planning.touring.map_crops import OCCUPIED, UNKNOWN, map_crops
-from lidarium.mapping.planning.touring.team_tours import TourWeights, costs_of_firsts
+from lidarium.mapping.planning.touring.tours import TourWeights, costs_of_firsts
 
 CROP_SIDE, CROP_STEP = 24, 0.25
 """Squares a side of the crop around each option, and the side of a square [m]."""

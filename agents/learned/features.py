@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from lidarium.agents.tours.planning import NO_PATH, Tourist, TourOptions
 from lidarium.mapping.geometry.rigid import wrapped
-from lidarium.mapping.planning.touring.frontier_views import ViewRules, gain_at
+from lidarium.mapping.planning.frontiers.views import ViewRules, gain_at
 
 NEAR_M, AROUND_M = 3.0, 6.0
 """Options within these paths of an option lie near and around it [m]."""

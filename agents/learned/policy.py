@@ -15,7 +15,7 @@ from lidarium.agents.policy import Team
 from lidarium.agents.tours.planning import TourOptions
 from lidarium.agents.tours.policy import TourFrontier
 from lidarium.envs.onboard.navigation import NavigationMap
-from lidarium.mapping.planning.touring.team_tours import with_first
+from lidarium.mapping.planning.touring.tours import with_first
 
 CORRECTED = "corrected"
 """Sent elsewhere than where tours begin."""

@@ -14,7 +14,7 @@ from lidarium.agents.srt.memories.memory import Legs, Memory, Place
 from lidarium.agents.srt.motion.drive import Limits
 from lidarium.agents.srt.senses import Senses
 from lidarium.mapping.geometry.rigid import wrapped
-from lidarium.mapping.planning.tours import shortest_tour
+from lidarium.mapping.planning.touring.tours import shortest_tour
 
 MOST = 14
 """Tours go past so many frontiers at most, the nearest ones."""

@@ -32,7 +32,7 @@ CHOICES: dict[str, tuple[str, ...]] = {
 }
 """Settings that are one of several words."""
 
-Limit = Annotated[float, Bounds(0.0, 1e7, has_least=False, never=True)]
+Limit = Annotated[float, Bounds(0.0, 1e7, has_minimum=False, never=True)]
 """A limit, or infinity for none."""
 HalfTurn = Annotated[float, above(0.0, math.pi)]
 """An angle by which a robot may have to turn [rad]."""
@@ -113,7 +113,7 @@ class SrtSettings:
     drive: str = "turn_advance"
     places_nodes_at_targets: bool = False
     repeats_nodes: bool = False
-    step_share: Annotated[float, share(has_least=False, has_most=False)] = 0.8
+    step_share: Annotated[float, share(has_minimum=False, has_maximum=False)] = 0.8
     random_share: Annotated[float, share()] = 0.0
     way_weight: Positive = 0.7
     least_step: Length = 0.3

@@ -9,7 +9,7 @@ from lidarium.agents.policy import Action, Stop, Team
 from lidarium.agents.supervisor.supervisor import Command
 from lidarium.envs.onboard.belief import Belief
 from lidarium.envs.onboard.radio.messages import DriveState, Order, OrderKind
-from lidarium.mapping.planning.frontiers import FRONTIER
+from lidarium.mapping.planning.frontiers.frontier_map import FRONTIER
 from lidarium.mapping.planning.grid_planning import cells_of
 
 PATIENCE_S = 20.0

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from lidarium.agents.tours.settings import TourSettings
 from lidarium.envs.onboard.navigation import NavigationMap
-from lidarium.mapping.planning.frontiers import Clusters
+from lidarium.mapping.planning.frontiers.frontier_map import Clusters
+from lidarium.mapping.planning.frontiers.views import ViewRules, gain_at, views_of
 from lidarium.mapping.planning.grid_planning import Cell
 from lidarium.mapping.planning.touring.coarse_distances import (
     STRAIGHT,
@@ -20,8 +21,7 @@ from lidarium.mapping.planning.touring.coarse_distances import (
     distances_from,
     place_in,
 )
-from lidarium.mapping.planning.touring.frontier_views import ViewRules, gain_at, views_of
-from lidarium.mapping.planning.touring.team_tours import team_tours
+from lidarium.mapping.planning.touring.tours import team_tours
 
 AHEAD = 0.5
 """The direction in which a path begins is that of a place about so far along it [m]."""

@@ -31,11 +31,10 @@ from lidarium.envs.onboard.belief import Belief
 from lidarium.envs.onboard.navigation import NavigationMap
 from lidarium.mapping.geometry.rigid import wrapped
 from lidarium.mapping.grids.grid_lines import visible
-from lidarium.mapping.planning.frontier_approach import nearest_frontier
-from lidarium.mapping.planning.frontier_kernels import FRONTIER
-from lidarium.mapping.planning.frontiers import Clusters
+from lidarium.mapping.planning.frontiers.approach import nearest_frontier
+from lidarium.mapping.planning.frontiers.frontier_map import FRONTIER, Clusters
+from lidarium.mapping.planning.frontiers.views import gain_at
 from lidarium.mapping.planning.grid_planning import centres_of
-from lidarium.mapping.planning.touring.frontier_views import gain_at
 from lidarium.registry import unknown
 
 SIGHT_MARGIN = 0.5

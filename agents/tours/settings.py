@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from lidarium.mapping.geometry.bounds import above, check_settings, share, within
-from lidarium.mapping.planning.touring.frontier_views import ViewRules
-from lidarium.mapping.planning.touring.team_tours import TourWeights
+from lidarium.mapping.planning.frontiers.views import ViewRules
+from lidarium.mapping.planning.touring.tours import TourWeights
 
 Length = Annotated[float, within(0.0, 1000.0)]
 

@@ -25,7 +25,7 @@ from lidarium.mapping.grids.scan_geometry import Beams, beam_directions
 from lidarium.mapping.grids.scan_integration import SeenScan, integrate_scan
 from lidarium.mapping.grids.scan_polygon import fill_scan_polygon, scan_ends, window_rows, window_words
 from lidarium.mapping.kernels.compilation import Array, kernel
-from lidarium.mapping.kernels.views import int8_grid_at, word_grid_at
+from lidarium.mapping.kernels.views import grid_at
 
 ROBOTS, WARM_STEPS = 16, 30
 
@@ -79,8 +79,8 @@ def _fill(
 @kernel
 def _score(masks: Array, bits: Array, boxes: Array, corners: Array, news: Array) -> None:
     for row in range(bits.shape[0]):
-        own = word_grid_at(masks[row, 0], masks[row, 3], masks[row, 4])
-        counted = word_grid_at(masks[row, 2], masks[row, 3], masks[row, 4])
+        own = grid_at(masks[row, 0], masks[row, 3], masks[row, 4], np.uint64)
+        counted = grid_at(masks[row, 2], masks[row, 3], masks[row, 4], np.uint64)
         box = (boxes[row, 0], boxes[row, 1], boxes[row, 2], boxes[row, 3])
         mark_seen(own, counted, bits[row], box, corners[row, 0], corners[row, 1] >> 6, news[row])
 
@@ -98,9 +98,9 @@ def _map(
 ) -> None:
     for row in range(bits.shape[0]):
         hit_bits[row] = 0
-        log_odds = int8_grid_at(maps[row, 0], maps[row, 1], maps[row, 2])
+        log_odds = grid_at(maps[row, 0], maps[row, 1], maps[row, 2], np.int8)
         box = (boxes[row, 0], boxes[row, 1], boxes[row, 2], boxes[row, 3])
-        touched = word_grid_at(maps[row, 3], maps[row, 4], touched_words(maps[row, 2]))
+        touched = grid_at(maps[row, 3], maps[row, 4], touched_words(maps[row, 2]), np.uint64)
         seen = SeenScan(
             bits[row], hit_bits[row], box, ends[row], is_hit[row], corners[row, 0], corners[row, 1]
         )

@@ -8,9 +8,8 @@ from collections.abc import Iterable
 from itertools import islice
 from pathlib import Path
 
-from lidarium.mapping.kernels.compilation import kernel_cache
-from lidarium.mapping.kernels.first_start.side_by_side import SWITCH, compiled_side_by_side
-from lidarium.mapping.kernels.in_python.interpreted import IS_INTERPRETED
+from lidarium.mapping.kernels.compilation import IS_INTERPRETED, kernel_cache
+from lidarium.mapping.kernels.first_start import SWITCH, compile_in_processes
 
 LIST = Path(__file__).parent / "data" / "kernels_of_reset.json"
 """The kernels of a first reset that take long; ``scripts/dev/list_reset_kernels.py`` writes it."""
@@ -47,7 +46,7 @@ def compile_first_reset() -> None:
         return
     os.close(lock)
     try:
-        for _ in _shown(compiled_side_by_side(entries, processes), len(entries), processes):
+        for _ in _shown(compile_in_processes(entries, processes), len(entries), processes):
             pass
     finally:
         (folder / LOCK).unlink(missing_ok=True)

@@ -50,7 +50,7 @@ class Run(NamedTuple):
     sources: Array
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def _ends(
     world: WorldArrays, episode: int, robots: int, drives: Drives, rules: Rules, waiting: Array, decides: bool
 ) -> bool:
@@ -101,7 +101,7 @@ def note_ends(modes: Array, robots: int, table: Array, drives: Drives, rules: Ru
             modes[episode] = WAITS
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def _run_episode(run: Run, episode: int, drives: Drives, following: Following, rules: Rules) -> None:
     """Run one episode for a step, or for a decision.
 

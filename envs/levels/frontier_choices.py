@@ -28,10 +28,10 @@ from lidarium.envs.onboard.navigation import (
 )
 from lidarium.envs.onboard.team_maps import TeamMaps, refresh_team
 from lidarium.mapping.kernels.compilation import Array, kernel
-from lidarium.mapping.kernels.lanes.cost_lanes import FAR
+from lidarium.mapping.kernels.simd.costs import FAR
 from lidarium.mapping.kernels.work_queue import Work, take_next
-from lidarium.mapping.planning.cheapest_views import cheapest_views
-from lidarium.mapping.planning.frontiers import frontier_clusters, ignore_frontiers_near
+from lidarium.mapping.planning.frontiers.approach import cheapest_views
+from lidarium.mapping.planning.frontiers.frontier_map import frontier_clusters, ignore_frontiers_near
 from lidarium.mapping.planning.search.path_search import clear_memory, search_all, touched_in
 from lidarium.mapping.planning.search.search_state import STRAIGHT
 from lidarium.mapping.planning.search.swept_costs import (

@@ -22,8 +22,8 @@ from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.settings.limits import GAINS
 from lidarium.mapping.kernels.compilation import kernel
 from lidarium.mapping.kernels.work_queue import new_work
-from lidarium.mapping.planning.frontier_approach import default_reach
-from lidarium.mapping.planning.search.search_targets import disc_spans
+from lidarium.mapping.planning.frontiers.approach import default_reach
+from lidarium.mapping.planning.search.search_state import disc_spans
 from lidarium.mapping.planning.search.swept_costs import SweepMemory
 
 REASONS = ("", "unseen", "blocked", "no_progress")

@@ -27,7 +27,7 @@ from lidarium.mapping.grids.pooled_maps import (
     touched_words,
 )
 from lidarium.mapping.kernels.compilation import Array, kernel
-from lidarium.mapping.kernels.views import arrays_at, grid_at, int8_grid_at, word_grid_at
+from lidarium.mapping.kernels.views import arrays_at, grid_at
 
 SCAN, POSE, VELOCITY, BUMPER, LEVELS, EGOCENTRIC_LEVELS, GOAL = range(len(KEYS))
 """Places of the arrays of ``KEYS``."""
@@ -69,7 +69,7 @@ RESOLUTION, LONGEST_RANGE, TOP_SPEED, TOP_TURN_RATE = range(4)
 """Places in ``Sources.limits``."""
 
 
-@kernel(spliced=True)
+@kernel(inline="always")
 def _write_maps(row: int, world: WorldArrays, given: Sources, maps: Array, egocentric_maps: Array) -> None:
     """Write the crops of a robot's map, each where it is observed."""
     believed, origins, beliefs = world.believed, world.origins, world.belief_rows
@@ -78,12 +78,15 @@ def _write_maps(row: int, world: WorldArrays, given: Sources, maps: Array, egoce
         (believed[row, 0] - origins[row, 0]) / resolution,
         (believed[row, 1] - origins[row, 1]) / resolution,
     )
-    log_odds = int8_grid_at(beliefs[row, MAP], beliefs[row, MAP_ROWS], beliefs[row, MAP_COLUMNS])
+    log_odds = grid_at(beliefs[row, MAP], beliefs[row, MAP_ROWS], beliefs[row, MAP_COLUMNS], np.int8)
     if maps.size > 0:
         crop_levels(log_odds, int(math.floor(y)), int(math.floor(x)), maps[row, 0])
     if egocentric_maps.size > 0:
-        touched = word_grid_at(
-            beliefs[row, TOUCHED], beliefs[row, TOUCHED_ROWS], touched_words(beliefs[row, MAP_COLUMNS])
+        touched = grid_at(
+            beliefs[row, TOUCHED],
+            beliefs[row, TOUCHED_ROWS],
+            touched_words(beliefs[row, MAP_COLUMNS]),
+            np.uint64,
         )
         pools = grid_at(
             given.pools.ctypes.data + row * given.pools.shape[1] * 8, given.scales.shape[0], 3, np.int64
@@ -94,13 +97,13 @@ def _write_maps(row: int, world: WorldArrays, given: Sources, maps: Array, egoce
                     log_odds,
                     touched,
                     given.scales[k],
-                    int8_grid_at(pools[k, POOL], pools[k, POOL_ROWS], pools[k, POOL_COLUMNS]),
+                    grid_at(pools[k, POOL], pools[k, POOL_ROWS], pools[k, POOL_COLUMNS], np.int8),
                 )
         forget_touched(touched, log_odds.shape[0])
         crop_turned(pools, x, y, believed[row, 2], given.scales, egocentric_maps[row])
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def write_row(row: int, sources: Array, observed: Arrays) -> None:
     """Write a row of the arrays of ``KEYS``.
 

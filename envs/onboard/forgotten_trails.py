@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from lidarium.envs.onboard.known_poses import KnownPoses
 from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.simulation.simulation import Simulation
-from lidarium.mapping.planning.footprint_masks import MARGIN_M, passed
+from lidarium.mapping.planning.footprint import MARGIN_M, passed
 
 STALE = -2
 """Instead of the step at which the maps of a team were last brought up to date: they are not any more."""

@@ -14,17 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.mapping.kernels.compilation import Array, kernel
-from lidarium.mapping.kernels.views import (
-    int8_grid_at,
-    int32_table_at,
-    uint8_grid_at,
-    uint16_grid_at,
-)
-from lidarium.mapping.planning.clearance import ClearanceField
-from lidarium.mapping.planning.clearance_updates import Window, changed_cells, update_around
-from lidarium.mapping.planning.frontier_kernels import update_frontiers
-from lidarium.mapping.planning.frontiers import FrontierMap
-from lidarium.mapping.planning.search.search_space import SearchSpace
+from lidarium.mapping.kernels.views import grid_at
+from lidarium.mapping.planning.clearance import ClearanceField, Window, changed_cells, update_around
+from lidarium.mapping.planning.frontiers.frontier_map import FrontierMap, update_frontiers
+from lidarium.mapping.planning.search.path_search import SearchSpace
 
 CLEARANCE_LIMIT = 0.6
 """Clearance is known exactly up to this [m]."""
@@ -143,34 +136,34 @@ class NavigationMap:
         return self._long
 
 
-@kernel(inline=True)
+@kernel(forceinline=True)
 def log_odds_of(record: Array) -> Any:  # noqa: ANN401
     """View the log-odds (rows, columns) int8 of a record (kernel)."""
-    return int8_grid_at(record[LOG_ODDS], record[ROWS], record[COLUMNS])
+    return grid_at(record[LOG_ODDS], record[ROWS], record[COLUMNS], np.int8)
 
 
-@kernel(inline=True)
+@kernel(forceinline=True)
 def closeness_of(record: Array) -> Any:  # noqa: ANN401
     """View the closeness (rows, columns) uint16 of a record (kernel)."""
-    return uint16_grid_at(record[CLOSENESS], record[ROWS], record[COLUMNS])
+    return grid_at(record[CLOSENESS], record[ROWS], record[COLUMNS], np.uint16)
 
 
-@kernel(inline=True)
+@kernel(forceinline=True)
 def flags_of(record: Array) -> Any:  # noqa: ANN401
     """View the frontier flags (rows, columns) uint8 of a record (kernel).
 
     The record must keep them.
     """
-    return uint8_grid_at(record[FLAGS], record[ROWS], record[COLUMNS])
+    return grid_at(record[FLAGS], record[ROWS], record[COLUMNS], np.uint8)
 
 
-@kernel(inline=True)
+@kernel(forceinline=True)
 def tiles_of(record: Array) -> Any:  # noqa: ANN401
     """View the counts of frontier cells by tiles of a record, int32 (kernel).
 
     Tiles are 16 x 16 cells. The record must keep the counts.
     """
-    return int32_table_at(record[TILES], (record[ROWS] + 15) // 16, (record[COLUMNS] + 15) // 16)
+    return grid_at(record[TILES], (record[ROWS] + 15) // 16, (record[COLUMNS] + 15) // 16, np.int32)
 
 
 @kernel

@@ -13,7 +13,7 @@ from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.simulation.simulation import Simulation
 from lidarium.mapping.merging.fusion import FusedMap, overlay
 from lidarium.mapping.planning.clearance import limit_of, stamp_of
-from lidarium.mapping.planning.frontiers import IGNORED
+from lidarium.mapping.planning.frontiers.frontier_map import IGNORED
 
 
 class ReceivedMaps:

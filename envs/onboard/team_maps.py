@@ -14,14 +14,11 @@ from lidarium.envs.onboard.navigation import (
     take_in,
 )
 from lidarium.envs.simulation.kernels.arrays import MAP, MAP_COLUMNS, MAP_ROWS
-from lidarium.mapping.kernels.cell_blocks import sum_blocks
 from lidarium.mapping.kernels.compilation import Array, kernel
-from lidarium.mapping.kernels.sign_blocks import positive_cells
-from lidarium.mapping.kernels.vectors import BLOCK
-from lidarium.mapping.kernels.views import (
-    int8_at,
-)
-from lidarium.mapping.planning.clearance_updates import (
+from lidarium.mapping.kernels.llvm import BLOCK
+from lidarium.mapping.kernels.simd.cells import positive_cells, sum_blocks
+from lidarium.mapping.kernels.views import vector_at
+from lidarium.mapping.planning.clearance import (
     Window,
     list_cells,
     room_for_cells,
@@ -59,7 +56,7 @@ def _sum_maps(beliefs: Array, window: Window, total: Array) -> Array:
     return cells
 
 
-@kernel(inline=True)
+@kernel(forceinline=True)
 def _sum_block(beliefs: Array, place: int, total: Array, nothing: Array) -> np.uint64:
     """Sum a block of the maps.
 
@@ -78,12 +75,12 @@ def _sum_block(beliefs: Array, place: int, total: Array, nothing: Array) -> np.u
     return changed
 
 
-@kernel(inline=True)
+@kernel(forceinline=True)
 def _sum_cell(beliefs: Array, place: int, total: Array) -> bool:
     """Sum a cell of the maps; return whether it became occupied or ceased to be."""
-    value = int(int8_at(beliefs[0, MAP] + place, 1)[0])
+    value = int(vector_at(beliefs[0, MAP] + place, 1, np.int8)[0])
     for k in range(1, beliefs.shape[0]):
-        value = min(max(value + int(int8_at(beliefs[k, MAP] + place, 1)[0]), -127), 127)
+        value = min(max(value + int(vector_at(beliefs[k, MAP] + place, 1, np.int8)[0]), -127), 127)
     cell = total.reshape(-1)
     was_occupied, cell[place] = cell[place] > 0, np.int8(value)
     return bool(was_occupied != (value > 0))

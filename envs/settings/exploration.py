@@ -173,7 +173,7 @@ class ExplorationSettings:
     backend: str = "kinematic"
     time_step: Annotated[float, within(1e-4, 10.0)] = 0.1
     horizon_s: Annotated[float, above(0.0, 1e8)] | None = 600.0
-    stop_coverage: Annotated[float, share(has_least=False)] | None = 0.99
+    stop_coverage: Annotated[float, share(has_minimum=False)] | None = 0.99
     stop_on_contact: bool = False
     goal_radius: Annotated[float, above(0.0, 1e4)] = 0.3
     observe: tuple[str, ...] = ("scan", "pose", "velocity", "bumper", "map")

@@ -13,7 +13,7 @@ KINDS = ("", "laser_dropout", "blind_sector", "stuck_wheel", "kidnapping", "dead
 Rate = Annotated[float, within(0.0, 1e6, "a number an hour")]
 """How often a fault befalls a robot [1/h]."""
 
-LASTING = Bounds(0.0, 1e9, has_least=False, what="a time", never=True)
+LASTING = Bounds(0.0, 1e9, has_minimum=False, what="a time", never=True)
 """How long a fault may last [s]."""
 
 WIDTH = Rule(float, bounds=above(0.0, 2.0 * math.pi))

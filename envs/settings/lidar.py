@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from lidarium.mapping.geometry.bounds import Distance, above, check_settings, within
-from lidarium.mapping.grids.scan_geometry import MOST_BEAMS, ScanGeometry
+from lidarium.mapping.grids.scan_geometry import MAX_BEAMS, ScanGeometry
 from lidarium.registry import Registry
 
 MOST_RANGE_M = 200.0
@@ -25,7 +25,7 @@ class Lidar(ScanGeometry):
     """
 
     # The first four are those of a scan; here they have the bounds of what can be simulated.
-    beams: Annotated[int, within(1, MOST_BEAMS)] = 727
+    beams: Annotated[int, within(1, MAX_BEAMS)] = 727
     field_of_view: Annotated[float, above(0.0, 2.0 * math.pi + 1e-9)] = math.radians(240.0)
     range_min: Distance = 0.02
     range_max: Annotated[float, above(0.0, MOST_RANGE_M)] = 5.6

@@ -33,8 +33,8 @@ class OdometrySettings:
         [1].
     """
 
-    distance_bias: Annotated[float, share(has_most=False)] = 0.0
-    turn_bias: Annotated[float, share(has_most=False)] = 0.0
+    distance_bias: Annotated[float, share(has_maximum=False)] = 0.0
+    turn_bias: Annotated[float, share(has_maximum=False)] = 0.0
     drift: Annotated[float, within(0.0, 10.0)] = 0.0
     turn_noise_of_turn: Annotated[float, within(0.0, 10.0)] = 0.0
     turn_noise_of_distance: Annotated[float, within(0.0, 10.0)] = 0.0

@@ -55,7 +55,7 @@ class RadioSettings:
     wall_exponent: Annotated[float, within(0.0, 100.0)] = 4.0
     wall_loss: Annotated[float, within(0.0, 1e4)] = 6.5
     shadowing: Annotated[float, within(0.0, 1000.0)] = 0.0
-    loss: Annotated[float, share(has_most=False, what="a probability")] = 0.0
+    loss: Annotated[float, share(has_maximum=False, what="a probability")] = 0.0
     latency_s: Annotated[float, within(0.0, 1e6)] = 0.0
     period_s: Annotated[float, above(0.0, 1e6)] = 1.0
 

@@ -8,9 +8,9 @@ smallest robot sweeps over its configuration space, connected to the starts.
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.mapping.kernels.cell_blocks import fetch_block
 from lidarium.mapping.kernels.compilation import Array, kernel
-from lidarium.mapping.kernels.views import word_grid_at
+from lidarium.mapping.kernels.simd.cells import prefetch
+from lidarium.mapping.kernels.views import grid_at
 
 ROWS_AHEAD = 24
 """So many rows before a row of a mask is read it is fetched from memory."""
@@ -35,7 +35,7 @@ def unpack_bits(bits: NDArray[np.uint64], columns: int) -> NDArray[np.bool_]:
     )
 
 
-@kernel(inline=True)
+@kernel(forceinline=True)
 def count_bits(value: np.uint64) -> int:
     """Count the set bits of a uint64."""
     value = value - ((value >> np.uint64(1)) & np.uint64(0x5555555555555555))
@@ -46,7 +46,7 @@ def count_bits(value: np.uint64) -> int:
     return int((value * np.uint64(0x0101010101010101)) >> np.uint64(56))
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def mark_seen(
     own: Array,
     counted: Array,
@@ -83,7 +83,7 @@ def mark_seen(
     row_low, row_high = rows, 0
     for row in range(max(box[0], -row_offset), min(box[1], rows - row_offset)):
         i = row + row_offset
-        fetch_block(own.ctypes.data + (i + ROWS_AHEAD) * words * 8)
+        prefetch(own.ctypes.data + (i + ROWS_AHEAD) * words * 8)
         found = np.uint64(0)
         for word in range(word_low, word_high):
             j = word + word_offset
@@ -103,7 +103,7 @@ def mark_seen(
     return new
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def share_new_cells(owns: Array, team: Array, changes: Array, first: int, robots: int, gains: Array) -> int:
     """Credit each cell that is new to the team to the robots that saw it.
 
@@ -133,7 +133,7 @@ def share_new_cells(owns: Array, team: Array, changes: Array, first: int, robots
     total = 0
     for robot in range(first, first + robots):
         gain = 0.0
-        own = word_grid_at(owns[robot], rows, words)
+        own = grid_at(owns[robot], rows, words, np.uint64)
         for row in range(changes[robot, 0], changes[robot, 1]):
             for word in range(changes[robot, 2], changes[robot, 3]):
                 value = own[row, word] & ~team[row, word]
@@ -142,7 +142,7 @@ def share_new_cells(owns: Array, team: Array, changes: Array, first: int, robots
                 others = np.uint64(0)
                 for other in range(first, first + robots):
                     if other != robot and changes[other, 0] < changes[other, 1]:
-                        others |= word_grid_at(owns[other], rows, words)[row, word]
+                        others |= grid_at(owns[other], rows, words, np.uint64)[row, word]
                 gain += count_bits(value & ~others)
                 value &= others
                 while value != np.uint64(0):
@@ -150,12 +150,12 @@ def share_new_cells(owns: Array, team: Array, changes: Array, first: int, robots
                     value ^= bit
                     seen_by = 1
                     for other in range(first, first + robots):
-                        if other != robot and word_grid_at(owns[other], rows, words)[row, word] & bit:
+                        if other != robot and grid_at(owns[other], rows, words, np.uint64)[row, word] & bit:
                             seen_by += 1
                     gain += 1.0 / seen_by
         gains[robot] = gain
     for robot in range(first, first + robots):
-        own = word_grid_at(owns[robot], rows, words)
+        own = grid_at(owns[robot], rows, words, np.uint64)
         for row in range(changes[robot, 0], changes[robot, 1]):
             for word in range(changes[robot, 2], changes[robot, 3]):
                 value = own[row, word] & ~team[row, word]

@@ -81,13 +81,13 @@ def make_rules(simulation: Simulation, settings: ExplorationSettings) -> Rules:
     )
 
 
-@kernel(inline=True)
+@kernel(forceinline=True)
 def is_near(x: float, y: float, goal_x: float, goal_y: float, radius: float) -> bool:
     """Whether a place is within a radius of the goal [m]; never of a goal that is nan."""
     return bool((x - goal_x) * (x - goal_x) + (y - goal_y) * (y - goal_y) <= radius * radius)
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def ending_of(world: WorldArrays, row: int, episode: int, rules: Rules) -> int:
     """Return why a robot ends now, by number in ``REASONS``; 0 where it goes on or has ended."""
     if not rules.live[row]:

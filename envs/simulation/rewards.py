@@ -26,7 +26,7 @@ def reward_weights(settings: ExplorationSettings) -> NDArray[np.float64]:
     return numbers
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def add_rewards(
     gains: Array,
     contacts: Array,

@@ -38,7 +38,7 @@ from lidarium.evaluation.truth.beliefs import team_log_odds
 from lidarium.evaluation.truth.true_map import occupied_in_truth
 from lidarium.mapping.grids.occupancy import FREE, OCCUPIED, UNKNOWN, three_levels
 from lidarium.mapping.grids.speckle_filter import without_small_components
-from lidarium.mapping.planning.frontier_kernels import IGNORED
+from lidarium.mapping.planning.frontiers.frontier_map import IGNORED
 from lidarium.mapping.planning.grid_planning import centres_of
 
 FRONTIER_COLOUR, GIVEN_UP_COLOUR, UNSEEN_COLOUR, UNCOUNTED_COLOUR = "#e11d48", "#7c3aed", "#ffd9a0", "#dfe3ea"

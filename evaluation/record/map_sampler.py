@@ -8,8 +8,7 @@ from numpy.typing import NDArray
 from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.evaluation.record.display import MapChanges
 from lidarium.evaluation.truth.beliefs import cells_beyond
-from lidarium.mapping.grids.map_deltas import note_changes
-from lidarium.mapping.grids.overlaid_deltas import OverlaidMaps, note_overlaid_changes
+from lidarium.mapping.grids.map_deltas import OverlaidMaps, note_changes, note_overlaid_changes
 
 FAR = 1e5
 """How far from a robot a map may have changed that was rendered again [m]."""

@@ -20,7 +20,7 @@ from lidarium.envs.simulation.kernels.arrays import (
 from lidarium.envs.simulation.kernels.masks import footprint
 from lidarium.mapping.grids.scan_polygon import window_rows, window_words
 from lidarium.mapping.kernels.compilation import Array, kernel
-from lidarium.mapping.kernels.views import word_grid_at
+from lidarium.mapping.kernels.views import grid_at
 
 
 @kernel
@@ -66,7 +66,7 @@ def _count_footprints(table: Array, episode: int, windows: Array) -> tuple[int, 
         if world.flags[row] & ENDED:
             continue
         masks = world.mask_rows[row]
-        counted = word_grid_at(masks[COUNTED_MASK], masks[MASK_ROWS], masks[MASK_WORDS])
+        counted = grid_at(masks[COUNTED_MASK], masks[MASK_ROWS], masks[MASK_WORDS], np.uint64)
         box, row_offset, word_offset = footprint(world, row, first, robots, windows[robot])
         spans[robot, 0], spans[robot, 1], spans[robot, 2], spans[robot, 3] = box
         corners[robot, 0], corners[robot, 1] = row_offset, word_offset

@@ -28,7 +28,7 @@ from lidarium.evaluation.truth.team_counts import (
     sum_up,
 )
 from lidarium.mapping.kernels.compilation import Array, kernel
-from lidarium.mapping.kernels.sign_blocks import negative_cells, positive_cells
+from lidarium.mapping.kernels.simd.cells import negative_cells, positive_cells
 
 SLACK = 4
 """Cells by which a map may change beyond the longest range.

@@ -7,7 +7,7 @@ import numpy as np
 from lidarium.envs.simulation.coverage import count_bits
 from lidarium.envs.simulation.kernels.arrays import MAP_RESOLUTION, WorldArrays
 from lidarium.mapping.kernels.compilation import Array, kernel
-from lidarium.mapping.kernels.views import int8_grid_at
+from lidarium.mapping.kernels.views import grid_at
 
 KNOWABLE, VALID, COUNTED = range(3)
 """Places of the true masks, and of the counts made with them.
@@ -69,13 +69,14 @@ def _free_of_sum(world: WorldArrays, team: Team, line: int, word: int, cells: np
         for row in range(team.first, team.first + team.robots):
             belief = world.belief_rows[row]
             first_row, first_column = cells_beyond(world, row, team.first // team.robots)
-            total += int8_grid_at(belief[0], belief[1], belief[2])[line + first_row, column + first_column]
+            log_odds = grid_at(belief[0], belief[1], belief[2], np.int8)
+            total += log_odds[line + first_row, column + first_column]
         if total < 0:
             free |= bit
     return free
 
 
-@kernel(inline=True)
+@kernel(forceinline=True)
 def recount_free(maps: CountedMaps, who: int, i: int, j: int, free: np.uint64) -> None:
     """Replace old bits of free cells by new ones, and update the count.
 
@@ -87,7 +88,7 @@ def recount_free(maps: CountedMaps, who: int, i: int, j: int, free: np.uint64) -
         maps.bits[who, i, j, FREE] = free
 
 
-@kernel(inline=True)
+@kernel(forceinline=True)
 def sum_up(world: WorldArrays, team: Team, maps: CountedMaps, i: int, j: int) -> None:
     """Update a word of the team's map, and the counts by the difference."""
     truth, bits, disputed, counts, robots = maps.truth, maps.bits, maps.disputed, maps.counts, team.robots

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from lidarium.mapping.files.mending.clocks import continued
 from lidarium.mapping.files.mending.odometry_jumps import without_jumps
-from lidarium.mapping.grids.scan_geometry import MOST_BEAMS, ScanGeometry
+from lidarium.mapping.grids.scan_geometry import MAX_BEAMS, ScanGeometry
 
 MOST_REACH_M = 10_000.0
 """Longest range of a laser that a log may have [m]."""
@@ -181,10 +181,10 @@ def symmetric_scans(
             f"{beams} beams from {angle_min} rad in steps of {increment} rad; want steps of more than 0 "
             "within a circle"
         )
-    if not abs(2.0 * angle_min / increment) + 2 * beams <= 2 * MOST_BEAMS or not reach[1] <= MOST_REACH_M:
+    if not abs(2.0 * angle_min / increment) + 2 * beams <= 2 * MAX_BEAMS or not reach[1] <= MOST_REACH_M:
         raise ValueError(
             f"{beams} beams from {angle_min} rad in steps of {increment} rad reach {reach[1]:g} m; want at "
-            f"most {MOST_BEAMS:,} about the heading, and {MOST_REACH_M:,.0f} m"
+            f"most {MAX_BEAMS:,} about the heading, and {MOST_REACH_M:,.0f} m"
         )
     whole = 2.0 * math.pi
     if abs((beams - 1) * increment - whole) < CIRCLE_BEAMS * increment:

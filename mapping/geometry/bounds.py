@@ -1,7 +1,7 @@
-"""Types and bounds of settings: declared in their annotations, checked alike wherever values come from.
+"""Types and bounds of settings, declared in annotations and checked for all sources of values.
 
-A number is declared as ``Annotated[float, within(0.0, 10.0)]``, one that may be left out as that ``| None``,
-and a part whose class declares none as ``Annotated[Part, inner(name=within(...))]``.
+A number is declared as ``Annotated[float, within(0.0, 10.0)]``, an optional one as that ``| None``, and a
+part whose class declares no bounds as ``Annotated[Part, inner(name=within(...))]``.
 """
 
 import math
@@ -15,89 +15,89 @@ from typing import Annotated, Any, Union, get_args, get_origin, get_type_hints
 import numpy as np
 
 UNBOUNDED = 1e9
-"""What a number without bounds of its own may be at most, to both sides of zero."""
+"""Largest magnitude of a number without bounds of its own."""
 
-_MOST_LETTERS = 80
+_MAX_LETTERS = 80
 _PLAIN = (int, float, bool, str)
 
 
 @dataclass(frozen=True, slots=True)
 class Bounds:
-    """From where to where a number may be.
+    """The interval of a number.
 
     Attributes
     ----------
-    least, most : float
+    minimum, maximum : float
         The ends.
-    has_least, has_most : bool
+    has_minimum, has_maximum : bool
         Whether the ends themselves are allowed.
     what : str
-        What such a number is called in messages.
+        Name of such a number in messages.
     never : bool
-        Whether infinity is allowed as well, for a limit that is none.
+        Whether infinity is allowed as well, for a limit that can be switched off.
     """
 
-    least: float = -UNBOUNDED
-    most: float = UNBOUNDED
-    has_least: bool = True
-    has_most: bool = True
+    minimum: float = -UNBOUNDED
+    maximum: float = UNBOUNDED
+    has_minimum: bool = True
+    has_maximum: bool = True
     what: str = "a number"
     never: bool = False
 
     def hold(self, value: Any) -> bool:  # noqa: ANN401
-        """Whether a number is within."""
+        """Whether a number is within the bounds."""
         if self.never and value == math.inf:
             return True
-        above = value >= self.least if self.has_least else value > self.least
-        return bool(above and (value <= self.most if self.has_most else value < self.most))
+        above = value >= self.minimum if self.has_minimum else value > self.minimum
+        return bool(above and (value <= self.maximum if self.has_maximum else value < self.maximum))
 
     @property
     def interval(self) -> str:
-        """The bounds as an interval: a square bracket where the end is allowed."""
-        low, high = ("[" if self.has_least else "("), ("]" if self.has_most else ")")
-        return f"{low}{self.least:.6g}, {self.most:.6g}{high}"
+        """The bounds as an interval, with a square bracket if the end is allowed."""
+        low, high = ("[" if self.has_minimum else "("), ("]" if self.has_maximum else ")")
+        return f"{low}{self.minimum:.6g}, {self.maximum:.6g}{high}"
 
     def __str__(self) -> str:
-        if self.has_least and self.has_most and self.least != 0.0:
-            return f"from {self.least:,.10g} to {self.most:,.10g}"
-        low = f"of {self.least:g} or more" if self.has_least else f"above {self.least:g}"
-        high = f"at most {self.most:,.10g}" if self.has_most else f"below {self.most:,.10g}"
+        if self.has_minimum and self.has_maximum and self.minimum != 0.0:
+            return f"from {self.minimum:,.10g} to {self.maximum:,.10g}"
+        low = f"of {self.minimum:g} or more" if self.has_minimum else f"above {self.minimum:g}"
+        high = f"at most {self.maximum:,.10g}" if self.has_maximum else f"below {self.maximum:,.10g}"
         return f"{low} and {high}{', or inf' if self.never else ''}"
 
 
 @dataclass(frozen=True, slots=True)
-class Inner:
-    """Bounds of the numbers of a part, by their names."""
+class _Inner:
+    """Bounds of the numbers of a part, by name."""
 
     bounds: Mapping[str, Bounds]
 
 
-def within(least: float, most: float, what: str = "a number") -> Bounds:
+def within(minimum: float, maximum: float, what: str = "a number") -> Bounds:
     """Return bounds whose ends are allowed."""
-    return Bounds(least, most, what=what)
+    return Bounds(minimum, maximum, what=what)
 
 
-def above(least: float, most: float, what: str = "a number") -> Bounds:
-    """Return bounds of which the lower end is not allowed."""
-    return Bounds(least, most, has_least=False, what=what)
+def above(minimum: float, maximum: float, what: str = "a number") -> Bounds:
+    """Return bounds whose lower end is not allowed."""
+    return Bounds(minimum, maximum, has_minimum=False, what=what)
 
 
-def share(has_least: bool = True, has_most: bool = True, what: str = "a share") -> Bounds:
+def share(has_minimum: bool = True, has_maximum: bool = True, what: str = "a share") -> Bounds:
     """Return the bounds of a share, from 0 to 1."""
-    return Bounds(0.0, 1.0, has_least, has_most, what)
+    return Bounds(0.0, 1.0, has_minimum, has_maximum, what)
 
 
-def inner(**bounds: Bounds) -> Inner:
+def inner(**bounds: Bounds) -> _Inner:
     """Return bounds of the numbers of a part."""
-    return Inner(bounds)
+    return _Inner(bounds)
 
 
 Length = Annotated[float, above(0.0, 1000.0)]
-"""A length of something that is there [m]."""
+"""A positive length [m]."""
 Distance = Annotated[float, within(0.0, 1000.0)]
 """A distance that may be zero [m]."""
 Angle = Annotated[float, above(0.0, 2.0 * math.pi)]
-"""An angle of something that is there [rad]."""
+"""A positive angle [rad]."""
 Turn = Annotated[float, within(0.0, 2.0 * math.pi)]
 """An angle that may be zero [rad]."""
 Duration = Annotated[float, within(0.0, 1e7)]
@@ -107,24 +107,23 @@ Positive = Annotated[float, above(0.0, 1e6)]
 FromZero = Annotated[float, within(0.0, 1e6)]
 """A number that may be zero."""
 Count = Annotated[int, within(1, 1_000_000)]
-"""How many there are, at least one."""
+"""A number of things, at minimum one."""
 Counted = Annotated[int, within(0, 1_000_000)]
-"""How many there are, or none."""
+"""A number of things that may be zero."""
 
 
 @dataclass(frozen=True, slots=True)
 class Rule:
-    """What a setting has to be.
+    """The type and bounds of a setting.
 
     Attributes
     ----------
     kind : type
-        ``int``, ``float``, ``bool``, ``str`` or the class of a part; ``object`` for what its class checks
-        itself.
+        ``int``, ``float``, ``bool``, ``str`` or the class of a part; ``object`` if its class checks itself.
     is_optional : bool
         Whether it may be None.
     bounds : Bounds
-        Where a number may be.
+        Bounds of a number.
     inner : mapping of str to Bounds
         Bounds of the numbers of a part.
     """
@@ -136,14 +135,14 @@ class Rule:
 
     @property
     def wanted(self) -> str:
-        """What it has to be, in words."""
+        """The type and bounds in words."""
         kinds = {float: self.bounds.what, int: "a whole number", bool: "true or false", str: "text"}
         kind = kinds.get(self.kind, self.kind.__name__)
         bounds = f" {self.bounds}" if self.kind in (int, float) else ""
         return f"{kind}{bounds}{', or None' if self.is_optional else ''}"
 
     def hold(self, value: Any) -> bool:  # noqa: ANN401
-        """Whether a value is what the setting has to be."""
+        """Whether a value satisfies the rule."""
         if self.kind is object or (value is None and self.is_optional):
             return True
         if self.kind not in _PLAIN:
@@ -159,7 +158,7 @@ _RULES: dict[Any, dict[str, Rule]] = {}
 
 
 def rules_of(kind: Any) -> dict[str, Rule]:  # noqa: ANN401
-    """Return what each setting of a class has to be, as its annotations declare it."""
+    """Return the rule of each setting of a class, by its annotations."""
     if kind not in _RULES:
         hints = get_type_hints(kind, include_extras=True)
         _RULES[kind] = {each.name: _rule(hints[each.name]) for each in fields(kind)}
@@ -169,17 +168,8 @@ def rules_of(kind: Any) -> dict[str, Rule]:  # noqa: ANN401
 def check_settings(settings: Any, whose: str = "") -> None:  # noqa: ANN401
     """Check the types and bounds of all settings of a dataclass.
 
-    Parameters
-    ----------
-    settings : dataclass instance
-        The settings.
-    whose : str
-        Whose they are, for messages: ``the robot``.
-
-    Raises
-    ------
-    ValueError
-        Where one is of another type or out of its bounds; the message names it, its value and what to want.
+    ``whose`` names it in messages, such as ``the robot``. Raises ValueError if a setting has another type or
+    is out of bounds; the message names it, its value and the rule.
     """
     of = f" of {whose}" if whose else ""
     kind: Any = type(settings)
@@ -192,12 +182,9 @@ def check_settings(settings: Any, whose: str = "") -> None:  # noqa: ANN401
 
 
 def check_values(values: Mapping[str, Any], bounds: Mapping[str, Bounds], whose: str) -> None:
-    """Check numbers by name, those that have bounds.
+    """Check those of the named numbers that have bounds.
 
-    Raises
-    ------
-    ValueError
-        Where one is no number, or out of its bounds.
+    Raises ValueError if one is no number or out of bounds.
     """
     for name, value in values.items():
         rule = Rule(float, False, bounds.get(name, Bounds()))
@@ -208,7 +195,7 @@ def check_values(values: Mapping[str, Any], bounds: Mapping[str, Bounds], whose:
 def check_anything(settings: Any, whose: str) -> None:  # noqa: ANN401
     """Check settings of a class that may declare no bounds, and those of its parts.
 
-    Its numbers have to be of their type and within `UNBOUNDED`, unless it declares something else.
+    By default, numbers must have their type and be within `UNBOUNDED`.
     """
     check_settings(settings, whose)
     for each in fields(settings):
@@ -218,12 +205,12 @@ def check_anything(settings: Any, whose: str) -> None:  # noqa: ANN401
 
 
 def shown(value: Any) -> str:  # noqa: ANN401
-    """Return a value for a message, never longer than a line."""
+    """Return a value for a message, at most one line long."""
     try:
         text = str(value) if isinstance(value, Real) else " ".join(reprlib.repr(value).split())
     except (ValueError, RecursionError):
         return f"a {type(value).__name__} too long to be shown"
-    return text if len(text) <= _MOST_LETTERS else f"{text[:_MOST_LETTERS]}..."
+    return text if len(text) <= _MAX_LETTERS else f"{text[:_MAX_LETTERS]}..."
 
 
 def _rule(hint: Any) -> Rule:  # noqa: ANN401
@@ -231,7 +218,7 @@ def _rule(hint: Any) -> Rule:  # noqa: ANN401
         kind, *extras = get_args(hint)
         plain = _rule(kind)
         bounds = next((extra for extra in extras if isinstance(extra, Bounds)), plain.bounds)
-        parts = next((extra.bounds for extra in extras if isinstance(extra, Inner)), {})
+        parts = next((extra.bounds for extra in extras if isinstance(extra, _Inner)), {})
         return Rule(plain.kind, plain.is_optional, bounds, parts)
     if get_origin(hint) in (Union, types.UnionType):
         kinds = [each for each in get_args(hint) if each is not type(None)]

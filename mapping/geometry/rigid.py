@@ -47,11 +47,7 @@ class Transform:
         )
 
     def difference(self, other: "Transform", at: ArrayLike = (0.0, 0.0)) -> tuple[float, float]:
-        """Return by how much two transforms differ at a point [m, rad].
-
-        The distance between the point's images under both [m], and the angle between the transforms
-        [rad].
-        """
+        """Return by how much two transforms differ at a point [m, rad]: between its images, and in angle."""
         return float(np.linalg.norm(self.apply(at) - other.apply(at))), abs(wrapped(self.theta - other.theta))
 
 
@@ -60,19 +56,8 @@ def wrapped(angle: float) -> float:
     return math.pi - (math.pi - angle) % (2.0 * math.pi)
 
 
-def yaw_of_quaternion(z: float, w: float) -> float:
-    """Return the angle in (-pi, pi] of a rotation about the vertical.
-
-    The quaternion is (0, 0, z, w), of any length and sign.
-    """
-    return wrapped(2.0 * math.atan2(z, w))
-
-
 def halfway(first: Transform, second: Transform, at: ArrayLike) -> Transform:
-    """Return the motion midway between two motions.
-
-    It takes a point to the middle between its images.
-    """
+    """Return the motion midway between two motions: it maps a point to the middle between its images."""
     turn = Transform(0.0, 0.0, wrapped(first.theta + 0.5 * wrapped(second.theta - first.theta)))
     x, y = (0.5 * (first.apply(at) + second.apply(at)) - turn.apply(at)).tolist()
     return Transform(x, y, turn.theta)
@@ -81,20 +66,8 @@ def halfway(first: Transform, second: Transform, at: ArrayLike) -> Transform:
 def fit(source: NDArray[np.float64], target: NDArray[np.float64]) -> Transform:
     """Return the rigid motion that best aligns points with others by least squares.
 
-    Parameters
-    ----------
-    source, target : (n, 2) float64
-        Pairs of points [m].
-
-    Returns
-    -------
-    Transform
-        Maps source to target; a mere translation where all source points are one.
-
-    Raises
-    ------
-    ValueError
-        Where there are no pairs or not equally many points.
+    It maps source to target, (n, 2) each [m]; it is a translation if all source points are equal. Raises
+    ValueError if there are no pairs, or the numbers of points differ.
     """
     if len(source) == 0 or source.shape != target.shape:
         raise ValueError(
@@ -137,3 +110,13 @@ def relative(frame: NDArray[np.float64], pose: NDArray[np.float64]) -> NDArray[n
 def _turned(first: NDArray[np.float64], second: NDArray[np.float64], sign: float) -> NDArray[np.float64]:
     """Return the first heading plus or minus the second, in (-pi, pi]."""
     return np.asarray(math.pi - (math.pi - first[..., 2] - sign * second[..., 2]) % (2.0 * math.pi))
+
+
+def turned(matrix: NDArray[np.float64], angle: float) -> NDArray[np.float64]:
+    """Return a (3, 3) covariance or information of x, y, theta in another frame.
+
+    Its own frame is rotated by the angle [rad] in that frame.
+    """
+    cosine, sine = math.cos(angle), math.sin(angle)
+    turn = np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
+    return np.asarray(turn @ matrix @ turn.T, np.float64)

@@ -1,9 +1,9 @@
-"""Straight lines between cells of a belief: what is seen from where.
+"""Lines of sight between cells of a belief.
 
 A line runs between the centres of two cells and visits every cell that it crosses, in exact integer
 arithmetic, so that it visits the same cells in both directions (Amanatides and Woo, A fast voxel traversal
-algorithm, Eurographics 1987). Where it passes exactly through a corner it goes on diagonally, and is stopped
-only if both cells beside the corner are.
+algorithm, Eurographics 1987). If it passes exactly through a corner, it continues diagonally, and is stopped
+only if both cells next to the corner are occupied.
 """
 
 import numpy as np
@@ -18,17 +18,17 @@ def visible(
     cells: NDArray[np.integer],
     maximum_range: float = np.inf,
 ) -> NDArray[np.bool_]:
-    """Which cells would be seen from a cell; what is unknown lets the line pass.
+    """Return which cells are visible from a cell; unknown cells do not block the line.
 
     Burgard et al., Coordinated multi-robot exploration, IEEE T-RO 2005, lower with it the utility of the
-    frontier cells that a robot will see from the target it was given.
+    frontier cells that a robot will see from its target. Raises ValueError if a cell lies outside the grid.
 
     Parameters
     ----------
     log_odds : (rows, columns) int8
         The belief; > 0 is occupied.
     from_cell : (row, column)
-        Where the line of sight begins.
+        The cell from which the line of sight begins.
     cells : (N, 2) int
         Cells (row, column) at the other end; their own state does not matter.
     maximum_range : float
@@ -38,11 +38,6 @@ def visible(
     -------
     (N,) bool
         Whether no occupied cell lies strictly between.
-
-    Raises
-    ------
-    ValueError
-        If a cell lies outside the grid, or ``cells`` is not (N, 2).
     """
     ends = (
         np.ascontiguousarray(cells, dtype=np.int64).reshape(-1, 2)
@@ -102,10 +97,7 @@ def line_is_open(log_odds: NDArray[np.int8], row: int, column: int, to_row: int,
 
 @kernel
 def line_is_free(log_odds: NDArray[np.int8], row: int, column: int, to_row: int, to_column: int) -> bool:
-    """Whether all cells from one to another are known to be free (kernel).
-
-    The last cell is included.
-    """
+    """Whether all cells from one to another, the last included, are known to be free (kernel)."""
     row_step = 1 if to_row > row else -1
     column_step = 1 if to_column > column else -1
     rise = abs(to_row - row)

@@ -1,4 +1,4 @@
-"""Arrays to which rows come one by one."""
+"""Arrays that grow row by row."""
 
 from typing import Any
 
@@ -7,9 +7,7 @@ from numpy.typing import DTypeLike, NDArray
 
 
 class GrowingArray:
-    """Rows in one piece of memory.
-
-    Where there is no room left it becomes twice as large.
+    """Rows in one piece of memory, which is doubled if it is full.
 
     Parameters
     ----------
@@ -24,17 +22,11 @@ class GrowingArray:
         self._count = 0
 
     def __len__(self) -> int:
-        """Return how many rows there are."""
+        """Return the number of rows."""
         return self._count
 
     def append(self, row: Any) -> None:  # noqa: ANN401
-        """Add a row, which is copied.
-
-        Raises
-        ------
-        ValueError
-            Where its shape is another one.
-        """
+        """Add a copy of a row; raise ValueError if its shape is another one."""
         if np.shape(row) != self._room.shape[1:]:
             raise ValueError(f"row has shape {np.shape(row)}; want {self._room.shape[1:]}")
         if self._count == len(self._room):
@@ -46,8 +38,5 @@ class GrowingArray:
 
     @property
     def rows(self) -> NDArray[Any]:
-        """All rows so far, shape (rows, ...).
-
-        A view, which later rows do not change.
-        """
+        """All rows so far, shape (rows, ...): a view that later rows do not change."""
         return self._room[: self._count]

@@ -1,12 +1,16 @@
-"""The three-level map of a team as two bits per cell, and what changes in it.
+"""The three-level map of a team as two bits per cell, and its changes.
 
-A cell is free where the sum of the robots' log-odds is below 0, occupied where it is above, and else unknown.
-Two planes of bits hold which cells are known and which are occupied, one word for 64 cells of a row; what
-changed is given by words: which one, and which of its bits flipped. So a wall that noise moves to and fro
-flips bits of one plane only. Only what the robots can have seen since the last call is compared again.
+A cell is free if the sum of the robots' log-odds is below 0, occupied if it is above, and unknown otherwise.
+Two planes of bits hold which cells are known and which are occupied, one word for 64 cells of a row. A
+change is the index of a word and its flipped bits, so a wall that noise moves to and fro flips bits of one
+plane only. Only the area that the robots can have seen since the last call is compared again.
+
+If the robots' maps are rotated, groups of cells that changed mark the lattice below them, and marked cells
+are summed again.
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,20 +18,18 @@ from numpy.typing import NDArray
 from lidarium.mapping.grids.occupancy import FREE, OCCUPIED, UNKNOWN
 from lidarium.mapping.grids.scan_integration import WORD
 from lidarium.mapping.kernels.compilation import Array, kernel
-from lidarium.mapping.kernels.sign_blocks import sign_bits
-from lidarium.mapping.kernels.views import int8_at
+from lidarium.mapping.kernels.simd.cells import sign_bits
+from lidarium.mapping.kernels.views import grid_at, vector_at
 
 _ALL = np.uint64(2**64 - 1)
 
 
 @kernel
 def seen_spans(poses: Array, last: Array, reach: float, frame: Array) -> Array:
-    """Return the cells that robots can have seen since ``last``: (robots, 4).
+    """Return the cells that robots can have seen since ``last``, (robots, 4): columns and rows, low and high.
 
-    ``last`` holds their earlier places, and is set to the present ones.
-
-    Columns and rows in the grid of ``frame`` (3,), corner and side of a cell: column_low, column_high,
-    row_low, row_high.
+    ``last`` holds their earlier positions, and is updated. Columns and rows are in the grid of ``frame``
+    (3,), its corner and the side of a cell.
     """
     spans = np.empty((poses.shape[0], 4), np.int64)
     for robot in range(poses.shape[0]):
@@ -43,10 +45,9 @@ def seen_spans(poses: Array, last: Array, reach: float, frame: Array) -> Array:
 def note_word(
     sums: int, where: np.uint64, row: int, word: int, known: Array, occupied: Array, change: Array
 ) -> bool:
-    """Compare 64 sums with a word of the planes and record flipped bits.
+    """Compare 64 int16 sums at an address with a word of the planes; return whether bits have flipped.
 
-    The sums are int16 at an address. Only bits ``where`` are compared; flips are written into ``change``
-    (3,).
+    Only the bits ``where`` are compared; flipped bits are written into ``change`` (3,).
     """
     is_free, is_occupied = sign_bits(sums)
     flipped_known, flipped_occupied = (
@@ -65,7 +66,7 @@ def note_word(
 @kernel
 def _add_row(address: int, total: Array) -> None:
     """Add a piece of a row of log-odds to the sums ``total`` (cells,) int16."""
-    source = int8_at(address, total.size)
+    source = vector_at(address, total.size, np.int8)
     for k in range(total.size):
         total[k] = np.int16(total[k] + np.int16(source[k]))
 
@@ -81,7 +82,7 @@ def note_changes(
     occupied: Array,
     changes: Array,
 ) -> int:
-    """Update the planes of a team's map where its robots' maps may have changed.
+    """Update the planes of a team's map around its robots; return the number of changed words.
 
     All robots' maps are on one lattice.
 
@@ -91,21 +92,16 @@ def note_changes(
         Address of each robot's log-odds (int8) at the lattice's first cell, and rows and columns of its map,
         which may be larger.
     poses, last : (robots, 2 or more), (robots, 2) float64
-        Where the robots are, and where they were at the last call (updated) [m].
+        Positions of the robots, now and at the last call (updated) [m].
     reach : float
-        How far from either place a robot can have seen [m].
+        Maximum distance at which a robot sees [m].
     frame : (3,) float64
         Lower left corner x, y and side of a cell of the lattice [m].
     known, occupied : (rows, words) uint64
         The planes; updated.
     changes : (rows * words, 3) uint64
-        Result: place of each changed word (column of words * rows + row), its flipped bits in ``known`` and
+        Result: index of each changed word (column of words * rows + row), its flipped bits in ``known`` and
         in ``occupied``.
-
-    Returns
-    -------
-    int
-        Number of changed words.
     """
     rows, words = known.shape
     spans = seen_spans(poses, last, reach, frame)
@@ -134,9 +130,9 @@ def note_changes(
 
 
 def levels_of_planes(known: NDArray[np.uint64], occupied: NDArray[np.uint64]) -> NDArray[np.uint8]:
-    """Return the three-level map of two planes (rows, words).
+    """Return the three-level map (rows, words * 64) of two planes (rows, words).
 
-    Levels: 0 occupied, 127 unknown, 255 free, shape (rows, words * 64).
+    Levels: 0 occupied, 127 unknown, 255 free.
     """
     rows, words = known.shape
     is_known, is_occupied = (
@@ -146,3 +142,147 @@ def levels_of_planes(known: NDArray[np.uint64], occupied: NDArray[np.uint64]) ->
         for plane in (known, occupied)
     )
     return np.asarray(np.array([UNKNOWN, FREE, UNKNOWN, OCCUPIED], np.uint8)[is_known + 2 * is_occupied])
+
+
+_GROUP = 8
+"""Cells of a rotated map compared, or lattice cells recomputed, at once: as many as a word has bytes."""
+
+CORNER_X, CORNER_Y, START_X, START_Y, COSINE, SINE, ORIGIN_X, ORIGIN_Y = range(8)
+"""Indices into the placement of a robot's map on the lattice.
+
+The lattice's corner, the start and its heading, and the map's corner in the start's frame.
+"""
+
+
+class OverlaidMaps(NamedTuple):
+    """Maps in frames of their robots' own starts, overlaid on a lattice.
+
+    Attributes
+    ----------
+    maps : (robots, 3 or more) int64
+        As for ``note_changes``; columns of the maps are a multiple of 8.
+    before : (robots,) int64
+        Addresses of the maps at the last call, blank at the first; updated.
+    placements : (robots, 8) float64
+        Placement of each map on the lattice: corner x, y of the lattice, start x, y, cosine and sine of the
+        start's heading, and corner x, y of the map in the start's frame [m].
+    resolution : float
+        Side of a cell [m].
+    """
+
+    maps: NDArray[np.int64]
+    before: NDArray[np.int64]
+    placements: NDArray[np.float64]
+    resolution: float
+
+
+@kernel
+def _mark_stale(
+    log_odds: Array, before: int, placement: Array, resolution: float, span: Array, stale: Array
+) -> None:
+    """Mark the groups of the lattice over cells that have changed since the map at address ``before``.
+
+    That map is updated.
+    """
+    rows, groups = stale.shape
+    now_groups = grid_at(log_odds[0], log_odds[1], log_odds[2] // _GROUP, np.uint64)
+    old_groups = grid_at(before, log_odds[1], log_odds[2] // _GROUP, np.uint64)
+    cosine, sine = placement[COSINE], placement[SINE]
+    # Half the sides of the box around a turned group, and a cell to spare [cells].
+    half_x, half_y = (
+        0.5 * (_GROUP * abs(cosine) + abs(sine)) + 1.0,
+        0.5 * (_GROUP * abs(sine) + abs(cosine)) + 1.0,
+    )
+    shift_x, shift_y = (
+        (placement[START_X] - placement[CORNER_X]) / resolution,
+        (placement[START_Y] - placement[CORNER_Y]) / resolution,
+    )
+    for row in range(max(span[2], 0), min(span[3], log_odds[1])):
+        for group in range(max(span[0] // _GROUP, 0), min(span[1] // _GROUP + 1, log_odds[2] // _GROUP)):
+            if now_groups[row, group] == old_groups[row, group]:
+                continue
+            old_groups[row, group] = now_groups[row, group]
+            x, y = (
+                placement[ORIGIN_X] / resolution + (group + 0.5) * _GROUP,
+                placement[ORIGIN_Y] / resolution + row + 0.5,
+            )
+            east, north = cosine * x - sine * y + shift_x, sine * x + cosine * y + shift_y
+            first, end = (
+                max(int(math.floor(east - half_x)) // _GROUP, 0),
+                min(int(math.floor(east + half_x)) // _GROUP + 1, groups),
+            )
+            for i in range(
+                max(int(math.floor(north - half_y)), 0), min(int(math.floor(north + half_y)) + 1, rows)
+            ):
+                for over in range(first, end):
+                    stale[i, over] = np.uint8(255)
+
+
+@kernel
+def _add_overlaid_group(
+    log_odds: Array, placement: Array, resolution: float, row: int, first: int, total: Array
+) -> None:
+    """Add the cells of a rotated map that lie below the centres of a group of lattice cells.
+
+    The group begins at column ``first``.
+    """
+    cosine, sine = placement[COSINE], placement[SINE]
+    north = (row + 0.5) * resolution + placement[CORNER_Y] - placement[START_Y]
+    for k in range(_GROUP):
+        east = (first + k + 0.5) * resolution + placement[CORNER_X] - placement[START_X]
+        own_column = int(math.floor((cosine * east + sine * north - placement[ORIGIN_X]) / resolution))
+        own_row = int(math.floor((cosine * north - sine * east - placement[ORIGIN_Y]) / resolution))
+        if 0 <= own_row < log_odds[1] and 0 <= own_column < log_odds[2]:
+            own = vector_at(log_odds[0] + own_row * log_odds[2] + own_column, 1, np.int8)[0]
+            total[k] = np.int16(total[k] + np.int16(own))
+
+
+@kernel
+def note_overlaid_changes(
+    overlaid: OverlaidMaps,
+    poses: Array,
+    last: Array,
+    reach: float,
+    known: Array,
+    occupied: Array,
+    changes: Array,
+) -> int:
+    """Do as ``note_changes`` with maps that are each in the frame of its robot's start.
+
+    Parameters
+    ----------
+    overlaid : OverlaidMaps
+        The robots' maps.
+    poses, last : (robots, 2 or more), (robots, 2) float64
+        Position of each robot in the frame of its start, now and at the last call (updated) [m].
+    reach, known, occupied, changes
+        As for ``note_changes``.
+    """
+    rows, words = known.shape
+    maps, before, placements, resolution = overlaid
+    stale = np.zeros((rows, words * (64 // _GROUP)), np.uint8)
+    frame = np.empty(3)
+    for robot in range(maps.shape[0]):
+        frame[0], frame[1], frame[2] = placements[robot, ORIGIN_X], placements[robot, ORIGIN_Y], resolution
+        span = seen_spans(poses[robot : robot + 1], last[robot : robot + 1], reach, frame)[0]
+        _mark_stale(maps[robot], before[robot], placements[robot], resolution, span, stale)
+    marks = grid_at(stale.ctypes.data, rows, words, np.uint64)
+    sums = np.empty(64, np.int16)
+    found = 0
+    for row in range(rows):
+        for word in range(words):
+            # A byte of 255 for each group of 8 cells: the same as their bits.
+            where = marks[row, word]
+            if where == np.uint64(0):
+                continue
+            for group in range(64 // _GROUP):
+                if stale[row, word * (64 // _GROUP) + group]:
+                    part = sums[group * _GROUP : (group + 1) * _GROUP]
+                    part[:] = np.int16(0)
+                    for robot in range(maps.shape[0]):
+                        _add_overlaid_group(
+                            maps[robot], placements[robot], resolution, row, word * 64 + group * _GROUP, part
+                        )
+            if note_word(sums.ctypes.data, where, row, word, known, occupied, changes[found]):
+                found += 1
+    return found

@@ -1,9 +1,9 @@
 """Occupancy grids in log-odds, updated by scans.
 
 The inverse sensor model is that of the OccupancyGrid algorithm (Thrun, Burgard, Fox: Probabilistic Robotics,
-section 9.2) with the beams' fans in place of single cones: a cell whose centre the scan has seen becomes more
-likely free, a cell in which a beam ended more likely occupied, each once per scan; all others keep their
-value. Log-odds are integers of ``LOG_ODDS_UNIT``; 0 is unknown.
+section 9.2) with fans between beams instead of single cones: a cell whose centre the scan has seen becomes
+more likely free, a cell in which a beam ended more likely occupied, each once per scan; all others keep
+their value. Log-odds are integers of ``LOG_ODDS_UNIT``; 0 is unknown.
 """
 
 import math
@@ -16,14 +16,14 @@ from numpy.typing import ArrayLike, NDArray
 from lidarium.mapping.geometry.bounds import check_settings, within
 from lidarium.mapping.grids.scan_geometry import ScanGeometry
 from lidarium.mapping.grids.scan_integration import WORD, integrate_one
-from lidarium.mapping.kernels.vectors import LEVELS
+from lidarium.mapping.kernels.simd.cells import LEVELS
 
 LOG_ODDS_UNIT = 0.05
 
 Resolution = Annotated[float, within(1e-4, 1000.0)]
 """Side of a cell [m]."""
 Gain = Annotated[float, within(LOG_ODDS_UNIT, 127 * LOG_ODDS_UNIT)]
-"""What a scan adds to a cell or takes [log-odds]."""
+"""Change of a cell by a scan [log-odds]."""
 
 
 OCCUPIED, UNKNOWN, FREE = LEVELS
@@ -34,14 +34,15 @@ MAX_CELLS = 400_000_000
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OccupancySettings:
-    """How scans change the log-odds.
+    """Sensor model of a map.
 
     Attributes
     ----------
     resolution : float
         Side of a cell [m].
     hit, miss : float
-        Added where a beam ended, taken where the scan saw through [log-odds, positive].
+        Added to a cell in which a beam ended, and subtracted from a cell that the scan saw [log-odds,
+        positive].
     minimum, maximum : float
         Bounds of a cell's value [log-odds].
     """
@@ -75,10 +76,10 @@ class OccupancyGrid:
 
     Parameters
     ----------
-    settings : OccupancySettings
+    settings : OccupancySettings, optional
         Resolution and sensor model.
-    bounds : (x_min, y_min, x_max, y_max) or None
-        Rectangle that the map holds from the start [m]; it grows beyond it where needed.
+    bounds : (x_min, y_min, x_max, y_max), optional
+        Initial rectangle of the map [m]; empty by default. The map grows beyond it as needed.
 
     Attributes
     ----------
@@ -108,10 +109,7 @@ class OccupancyGrid:
         return self._first_column * self.settings.resolution, self._first_row * self.settings.resolution
 
     def contain(self, x_min: float, y_min: float, x_max: float, y_max: float) -> None:
-        """Grow so that the rectangle [m] lies within the map.
-
-        What is known keeps its place.
-        """
+        """Grow so that the rectangle [m] lies within the map; known cells keep their coordinates."""
         resolution = self.settings.resolution
         rows, columns = self.log_odds.shape
         low_row, high_row = (
@@ -145,7 +143,10 @@ class OccupancyGrid:
         geometry: ScanGeometry,
         noise: tuple[float, float] = (0.0, 0.0),
     ) -> tuple[int, int, int, int]:
-        """Update the map by one scan.
+        """Update the map by one scan; return the box of cells outside which nothing has changed.
+
+        Raises ValueError if the pose is not finite, the number of ranges is not that of the geometry, or the
+        noise is negative or not finite.
 
         Parameters
         ----------
@@ -162,14 +163,7 @@ class OccupancyGrid:
         Returns
         -------
         tuple of int
-            row_low, row_high, column_low, column_high: the cells outside did not change (high ends
-            exclusive).
-
-        Raises
-        ------
-        ValueError
-            Where the pose is not finite, the number of ranges is not that of the geometry, or the noise is
-            negative or not finite.
+            row_low, row_high, column_low, column_high, high ends exclusive.
         """
         x, y, theta = np.asarray(pose, np.float64)
         scan = np.asarray(ranges, np.float32)
@@ -208,10 +202,7 @@ class OccupancyGrid:
         return max(low_row - 1, 0), min(high_row + 1, rows), max(low_column, 0), min(high_column, columns)
 
     def levels(self) -> NDArray[np.uint8]:
-        """Return the three-level map, shape (rows, columns).
-
-        Levels: 0 occupied, 127 unknown, 255 free.
-        """
+        """Return the three-level map (rows, columns): 0 occupied, 127 unknown, 255 free."""
         return three_levels(self.log_odds)
 
     def probability(self) -> NDArray[np.float32]:
@@ -220,7 +211,7 @@ class OccupancyGrid:
 
 
 def three_levels(log_odds: NDArray[np.signedinteger[Any]]) -> NDArray[np.uint8]:
-    """Return 0 where occupied, 127 where unknown, 255 where free."""
+    """Return 0 for occupied, 127 for unknown and 255 for free cells."""
     levels = np.full(log_odds.shape, UNKNOWN, np.uint8)
     levels[log_odds > 0] = OCCUPIED
     levels[log_odds < 0] = FREE

@@ -1,40 +1,36 @@
-"""Maps whose cells hold the greatest log-odds of a square of cells.
+"""Maps whose cells hold the maximum log-odds of a square of cells.
 
-They are kept beside a map and recomputed only where it has changed.
-
-Where that is, is marked by bits: one for each word of 64 cells in which a level has changed, and one for each
-row that has such words, behind the last row, so that rows in which nothing has changed are not even read.
+They are kept next to a map and recomputed only in areas that have changed. Bits mark these: one for each
+word of 64 cells in which a level has changed, and one for each row with such words, after the last row, so
+that unchanged rows are not even read.
 """
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.mapping.grids.scan_integration import WORD
-from lidarium.mapping.kernels.bit_words import first_bit
-from lidarium.mapping.kernels.cell_blocks import write_greatest
 from lidarium.mapping.kernels.compilation import Array, kernel
+from lidarium.mapping.kernels.simd.cells import max_of_groups
+from lidarium.mapping.kernels.simd.words import first_bit
 from lidarium.mapping.kernels.views import scratch_vector, vector_at
 
 POOL, POOL_ROWS, POOL_COLUMNS = range(3)
 """Columns of a table of pooled maps: address, rows, columns."""
 
 
-@kernel(inline=True)
+@kernel(forceinline=True)
 def touched_words(columns: int) -> int:
-    """Return how many words hold a bit for each word of 64 cells of a row of a map."""
+    """Return the number of words that hold a bit for each word of 64 cells of a row of a map."""
     return (columns + WORD * WORD - 1) // (WORD * WORD)
 
 
 def untouched(rows: int, columns: int) -> NDArray[np.uint64]:
-    """Return the change bits of a map in which nothing has changed.
-
-    Shape (rows + rows / 64, ``touched_words``); none for no rows.
-    """
+    """Return the change bits of an unchanged map: (rows + rows / 64, ``touched_words``); none for no rows."""
     return np.zeros((rows + -(-rows // WORD), touched_words(columns)), np.uint64)
 
 
 def touch(touched: NDArray[np.uint64], rows: tuple[int, int], words: tuple[int, int]) -> None:
-    """Mark a map as changed in rows and words of 64 cells of them (low, high)."""
+    """Mark a map as changed in rows (low, high), and in words of 64 cells of them (low, high)."""
     of_rows = len(touched) - -(-len(touched) // (WORD + 1))
     for word in range(*words):
         touched[rows[0] : rows[1], word // WORD] |= np.uint64(1 << word % WORD)
@@ -42,9 +38,9 @@ def touch(touched: NDArray[np.uint64], rows: tuple[int, int], words: tuple[int, 
         touched[of_rows + row // WORD, 0] |= np.uint64(1 << row % WORD)
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def pool_touched(log_odds: Array, touched: Array, scale: int, pooled: Array) -> None:
-    """Bring a pooled map up to date where levels of the map have changed.
+    """Update a pooled map in the areas in which levels of the map have changed.
 
     Parameters
     ----------
@@ -55,31 +51,29 @@ def pool_touched(log_odds: Array, touched: Array, scale: int, pooled: Array) -> 
     scale : int
         Side of a pooled cell [cells of the map].
     pooled : (ceil(rows / scale), ceil(columns / scale)) int8
-        Of the sign of the greatest log-odds of the cells of each pooled cell; what a pooled cell has beyond
-        the map counts as unknown.
+        Result, with the sign of the maximum log-odds of the cells of each pooled cell; cells beyond the map
+        count as unknown.
     """
-    rows, greatest = log_odds.shape[0], scratch_vector(WORD, np.int8)
+    rows, maxima = log_odds.shape[0], scratch_vector(WORD, np.int8)
     for group in range(rows, touched.shape[0]):
         left = touched[group, 0]
         while left != np.uint64(0):
             row = (group - rows) * WORD + first_bit(left)
             # The rows of one row of pooled cells are pooled together, as far as this word of rows goes.
             end = min((row // scale + 1) * scale, (group - rows + 1) * WORD)
-            for place in range(touched.shape[1]):
+            for index in range(touched.shape[1]):
                 words = np.uint64(0)
                 for other in range(row, min(end, rows)):
-                    words |= touched[other, place]
+                    words |= touched[other, index]
                 while words != np.uint64(0):
-                    _pool_word(
-                        log_odds, row // scale, place * WORD + first_bit(words), scale, greatest, pooled
-                    )
+                    _pool_word(log_odds, row // scale, index * WORD + first_bit(words), scale, maxima, pooled)
                     words &= words - np.uint64(1)
             left = left >> np.uint64(end & 63) << np.uint64(end & 63) if end & 63 else np.uint64(0)
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def forget_touched(touched: Array, rows: int) -> None:
-    """Forget where a map of so many rows has changed."""
+    """Clear the change bits of a map with a number of rows."""
     for group in range(rows, touched.shape[0]):
         left = touched[group, 0]
         touched[group, 0] = np.uint64(0)
@@ -88,11 +82,11 @@ def forget_touched(touched: Array, rows: int) -> None:
             left &= left - np.uint64(1)
 
 
-@kernel(inline=True, borrowing=True)
-def _pool_word(log_odds: Array, row: int, word: int, scale: int, greatest: Array, pooled: Array) -> None:
+@kernel(forceinline=True, nrt=False)
+def _pool_word(log_odds: Array, row: int, word: int, scale: int, maxima: Array, pooled: Array) -> None:
     """Write the pooled cells of a word of 64 cells in a row of pooled cells.
 
-    ``greatest`` (64,) int8 is scratch.
+    ``maxima`` (64,) int8 is scratch.
     """
     rows, columns = log_odds.shape
     if scale in (2, 4, 8, 16):
@@ -104,26 +98,26 @@ def _pool_word(log_odds: Array, row: int, word: int, scale: int, greatest: Array
             log_odds.ctypes.data + first_row * columns + word * WORD,
             pooled.ctypes.data + row * pooled.shape[1] + word * width,
         )
-        write_greatest(source, columns, count, -128 if count == scale else 0, halvings, greatest.ctypes.data)
-        for place in range(0, width, 4):
-            vector_at(target + place, 1, np.uint32)[0] = vector_at(
-                greatest.ctypes.data + place, 1, np.uint32
-            )[0]
+        max_of_groups(source, columns, count, -128 if count == scale else 0, halvings, maxima.ctypes.data)
+        for index in range(0, width, 4):
+            vector_at(target + index, 1, np.uint32)[0] = vector_at(maxima.ctypes.data + index, 1, np.uint32)[
+                0
+            ]
         return
     for column in range(word * WORD // scale, min(((word + 1) * WORD - 1) // scale + 1, pooled.shape[1])):
-        pooled[row, column] = _greatest(log_odds, row * scale, column * scale, scale)
+        pooled[row, column] = _max_of_square(log_odds, row * scale, column * scale, scale)
 
 
-@kernel(inline=True, borrowing=True)
-def _greatest(log_odds: Array, first_row: int, first_column: int, scale: int) -> np.int8:
-    """Return the greatest log-odds of a square of cells; beyond the map they are 0."""
+@kernel(forceinline=True, nrt=False)
+def _max_of_square(log_odds: Array, first_row: int, first_column: int, scale: int) -> np.int8:
+    """Return the maximum log-odds of a square of cells; cells beyond the map are 0."""
     last_row, last_column = (
         min(first_row + scale, log_odds.shape[0]),
         min(first_column + scale, log_odds.shape[1]),
     )
     is_whole = last_row == first_row + scale and last_column == first_column + scale
-    greatest = np.int8(-128) if is_whole else np.int8(0)
+    maxima = np.int8(-128) if is_whole else np.int8(0)
     for row in range(first_row, last_row):
         for column in range(first_column, last_column):
-            greatest = max(greatest, log_odds[row, column])
-    return greatest
+            maxima = max(maxima, log_odds[row, column])
+    return maxima

@@ -10,18 +10,16 @@ from numpy.typing import NDArray
 from lidarium.mapping.geometry.bounds import above, check_settings, within
 from lidarium.mapping.kernels.compilation import Array, kernel
 
-MOST_BEAMS = 16_384
-"""Kernels keep some 200 bytes a beam on the stack."""
+MAX_BEAMS = 16_384
+"""Maximum number of beams: kernels keep some 200 bytes per beam on the stack."""
 
-MOST_RANGE_M = 10_000.0
-"""Farthest that a laser may reach of which scans are read [m]."""
+MAX_RANGE_M = 10_000.0
+"""Maximum reach of a laser [m]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ScanGeometry:
-    """Beams of a planar laser range finder, symmetric about the heading.
-
-    They are ordered counter-clockwise.
+    """Beams of a planar laser range finder, symmetric about the heading, ordered counter-clockwise.
 
     Attributes
     ----------
@@ -34,10 +32,10 @@ class ScanGeometry:
         Shortest and longest measured range [m].
     """
 
-    beams: Annotated[int, within(1, MOST_BEAMS)] = 727
+    beams: Annotated[int, within(1, MAX_BEAMS)] = 727
     field_of_view: Annotated[float, above(0.0, 2.0 * math.pi + 1e-9)] = math.radians(240.0)
-    range_min: Annotated[float, within(0.0, MOST_RANGE_M)] = 0.02
-    range_max: Annotated[float, above(0.0, MOST_RANGE_M)] = 5.6
+    range_min: Annotated[float, within(0.0, MAX_RANGE_M)] = 0.02
+    range_max: Annotated[float, above(0.0, MAX_RANGE_M)] = 5.6
 
     def __post_init__(self) -> None:
         check_settings(self, "the scan")
@@ -98,7 +96,7 @@ class Beams(NamedTuple):
     reach: float
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def beam_directions(heading: float, unit_vectors: Array, directions: Array) -> None:
     """Rotate the beams' unit vectors (2, beams) by the heading.
 
@@ -114,9 +112,9 @@ def beam_directions(heading: float, unit_vectors: Array, directions: Array) -> N
         directions[3, beam] = 1.0 / direction_y if direction_y != 0.0 else math.inf
 
 
-@kernel(inline=True)
+@kernel(forceinline=True)
 def fast_angle(y: float, x: float) -> float:
-    """Angle of (x, y) to within 2e-5 rad [rad], after Abramowitz and Stegun 4.4.49."""
+    """Return the angle of (x, y) to within 2e-5 rad [rad], after Abramowitz and Stegun 4.4.49."""
     absolute_x, absolute_y = abs(x), abs(y)
     larger, smaller = max(absolute_x, absolute_y), min(absolute_x, absolute_y)
     # Without a branch, so that loops over many angles run on vectors.
@@ -132,16 +130,15 @@ def fast_angle(y: float, x: float) -> float:
     return -angle if y < 0.0 else angle
 
 
-@kernel(inline=True)
+@kernel(forceinline=True)
 def beams_towards(
     offset_x: float, offset_y: float, radius: float, heading: float, angle_first: float, increment: float
 ) -> tuple[float, float]:
     """Return the range of beams that a disc at an offset from the laser may meet.
 
-    The first beam (not rounded) and how many. The range repeats after a full turn.
-
-    Good to a few thousandths of a beam's gap at a third of a degree; a caller that must miss none takes one
-    beam more.
+    These are the first beam, not rounded, and the number of beams, which repeat after a full turn. Accurate
+    to a few thousandths of the gap between beams at a third of a degree; a caller that must miss none takes
+    one more beam.
     """
     squared = offset_x * offset_x + offset_y * offset_y
     beyond = squared - radius * radius

@@ -1,59 +1,224 @@
 """The area that a scan has seen, as bits: one bit per cell, rows of 64-bit words.
 
 A scan is a star-shaped polygon: the laser's position and the end points of the beams in order. Neighbouring
-beams span a fan between them. Where their ranges differ so much that no surface seen at more than about seven
-degrees could join the two end points, the fan ends at the nearer range: nothing is claimed about what lies
-behind an edge. A cell is seen when its centre lies inside the polygon.
+beams span a fan between them. If their ranges differ by more than a surface seen at about seven degrees
+would explain, the fan ends at the nearer range: nothing behind an edge counts as seen. A cell is seen if its
+centre lies inside the polygon.
 
-Each edge of the polygon toggles one bit in every row of cells whose centre line it crosses, at the first cell
-centre right of the crossing; the running exclusive-or along a row is then the inside of the polygon, and
-every cell is visited once however many beams crossed it.
+Each edge of the polygon toggles one bit in every row of cells whose centre line it crosses, at the first
+cell centre right of the crossing. The running exclusive-or along a row is then the inside of the polygon,
+and every cell is visited once, by any number of beams.
 """
+
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from lidarium.mapping.grids.outlines.outline_edges import Outline, toggle_between, toggle_edges
-from lidarium.mapping.grids.outlines.toggled_bits import row_of, toggle_edge
-from lidarium.mapping.kernels.bit_words import running_xor
 from lidarium.mapping.kernels.compilation import Array, kernel
-from lidarium.mapping.kernels.views import scratch_vector
+from lidarium.mapping.kernels.simd.words import running_xor
+from lidarium.mapping.kernels.views import scratch_vector, vector_at
 
-GRAZING = 8.0
-"""Cotangent of the flattest angle at which neighbours share a surface.
 
-Neighbours are two neighbouring end points.
+@kernel(forceinline=True, nrt=False)
+def _toggle_bit(bits: int, index: int) -> None:
+    """Toggle a bit of the words at an address.
+
+    Words are accessed by address because numba counts references to an array whenever it is passed on or
+    sliced, which would cost more than the few bits of an edge.
+    """
+    vector_at(bits + (index >> 6 << 3), 1, np.uint64)[0] ^= np.uint64(1) << np.uint64(index & 63)
+
+
+@kernel(forceinline=True, nrt=False)
+def _toggle_edge(
+    bits: int, width: int, from_x: float, from_y: float, to_x: float, to_y: float, from_row: int, to_row: int
+) -> None:
+    """Toggle the cell centres right of an edge, in the rows of ``width`` cells between its ends.
+
+    The interval is half open, so that corners count once.
+    """
+    slope = (to_x - from_x) / (to_y - from_y)
+    first, last = min(from_row, to_row), max(from_row, to_row)
+    x = from_x + (first + 0.5 - from_y) * slope + 0.5
+    for start in range(first * width, last * width, width):
+        _toggle_bit(bits, start + int(x))
+        x += slope
+
+
+@kernel(forceinline=True)
+def _row_of(y: float) -> int:
+    """Return the first row whose centre line is above y, which is not negative."""
+    return int(y + 0.5)
+
+
+JUMP = np.uint8(255)
+"""Mark of an edge that is traced by itself.
+
+It leads from a near to a far end point, or crosses more rows than a byte holds.
 """
 
 
-@kernel(inline=True)
-def window_words(reach: float) -> int:
-    """Words per row of a scan's window.
+class _Outline(NamedTuple):
+    """The outline of the area that a scan has seen.
 
-    It extends ``reach`` cells to both sides, at any alignment.
+    Attributes
+    ----------
+    lengths, directions, ends
+        As for ``scan_ends``.
+    x, y : float
+        Position of the laser in the window [cells].
+    steepness : float
+        Maximum difference of the ranges of neighbours on one surface, as a share of the nearer range.
     """
+
+    lengths: NDArray[np.float64]
+    directions: NDArray[np.float64]
+    ends: NDArray[np.float64]
+    x: float
+    y: float
+    steepness: float
+
+
+class _Edges(NamedTuple):
+    """The edges of an outline between neighbouring beams.
+
+    Attributes
+    ----------
+    crossed : (edges,) uint8
+        Number of rows that each crosses, or ``JUMP``.
+    first, second : (edges,) int32
+        Bits toggled in the first two of them.
+    crossings, slopes : (edges,) float64
+        Column at which its line crosses the first row, and the step to that of each row after it.
+    """
+
+    crossed: NDArray[np.uint8]
+    first: NDArray[np.int32]
+    second: NDArray[np.int32]
+    crossings: NDArray[np.float64]
+    slopes: NDArray[np.float64]
+
+
+@kernel(forceinline=True, nrt=False)
+def _toggle_between(bits: int, width: int, outline: _Outline, previous: int, beam: int) -> None:
+    """Toggle the outline between the end points of two neighbouring beams."""
+    lengths, directions, ends, x, y, steepness = outline
+    step = lengths[beam] - lengths[previous]
+    if abs(step) <= 1.0 + steepness * min(lengths[beam], lengths[previous]):
+        from_row, to_row = _row_of(ends[1, previous]), _row_of(ends[1, beam])
+        if from_row != to_row:
+            _toggle_edge(
+                bits,
+                width,
+                ends[0, previous],
+                ends[1, previous],
+                ends[0, beam],
+                ends[1, beam],
+                from_row,
+                to_row,
+            )
+        return
+    # Between a near and a far end point the outline goes along the far beam, up to the near range only.
+    near, far = (previous, beam) if step > 0.0 else (beam, previous)
+    corner_x, corner_y = x + lengths[near] * directions[0, far], y + lengths[near] * directions[1, far]
+    row = _row_of(corner_y)
+    for end in (near, far):
+        end_row = _row_of(ends[1, end])
+        if end_row != row:
+            _toggle_edge(bits, width, ends[0, end], ends[1, end], corner_x, corner_y, end_row, row)
+
+
+@kernel(nrt=False)
+def _find_edges(
+    lengths: Array, ends: Array, rows: Array, steepness: float, width: int, found: _Edges
+) -> None:
+    """Compute the rows crossed, the toggled bits and the line of the edge from each beam to the next.
+
+    Loops without branches over few arrays, which LLVM runs on vectors.
+    """
+    crossed, first, second, crossings, slopes = found
+    edges = lengths.shape[0] - 1
+    from_x, to_x, from_y, to_y = ends[0, :-1], ends[0, 1:], ends[1, :-1], ends[1, 1:]
+    from_row, to_row, from_length, to_length = rows[:-1], rows[1:], lengths[:-1], lengths[1:]
+    for k in range(edges):
+        step = abs(to_length[k] - from_length[k])
+        climb = abs(to_row[k] - from_row[k])
+        is_surface = (step <= 1.0 + steepness * min(from_length[k], to_length[k])) & (climb < JUMP)
+        crossed[k] = np.uint8(climb) if is_surface else JUMP
+    for k in range(edges):
+        slopes[k] = (to_x[k] - from_x[k]) / (to_y[k] - from_y[k])
+    for k in range(edges):
+        crossings[k] = from_x[k] + (min(from_row[k], to_row[k]) + 0.5 - from_y[k]) * slopes[k] + 0.5
+    stride = np.int32(width)
+    for k in range(edges):
+        first[k] = min(from_row[k], to_row[k]) * stride + np.int32(crossings[k])
+    for k in range(edges):
+        second[k] = (min(from_row[k], to_row[k]) + np.int32(1)) * stride + np.int32(crossings[k] + slopes[k])
+
+
+@kernel(forceinline=True, nrt=False)
+def _toggle_edges(flat: int, width: int, outline: _Outline, rows: Array) -> None:
+    """Toggle the outline between all end points; ``rows`` (beams,) int32 are theirs."""
+    beams = rows.shape[0]
+    crossed, first, second = (
+        scratch_vector(beams, np.uint8),
+        scratch_vector(beams, np.int32),
+        scratch_vector(beams, np.int32),
+    )
+    crossings, slopes = scratch_vector(beams, np.float64), scratch_vector(beams, np.float64)
+    edges = _Edges(crossed, first, second, crossings, slopes)
+    _find_edges(outline.lengths, outline.ends, rows, outline.steepness, width, edges)
+    toggles, listed = scratch_vector(2 * beams + 2, np.int32), np.uintp(0)
+    for k in range(beams - 1):
+        count = crossed[k]
+        if count == JUMP:
+            _toggle_between(flat, width, outline, k, k + 1)
+            continue
+        # Most edges cross two rows, one or none. Their toggles are listed without branches, which could not
+        # be predicted.
+        toggles[listed] = first[k]
+        listed += np.uintp(count > 0)
+        toggles[listed] = second[k]
+        listed += np.uintp(count > 1)
+        if count > 2:
+            start, crossing = min(rows[k], rows[k + 1]) * width + width, crossings[k] + slopes[k]
+            for _ in range(2, count):
+                start += width
+                crossing += slopes[k]
+                _toggle_bit(flat, start + int(crossing))
+    for k in range(listed):
+        _toggle_bit(flat, toggles[k])
+
+
+GRAZING = 8.0
+"""Cotangent of the flattest angle at which the end points of neighbouring beams share a surface."""
+
+
+@kernel(forceinline=True)
+def window_words(reach: float) -> int:
+    """Return the words per row of a scan's window: ``reach`` cells to both sides, at any alignment."""
     return (2 * (int(reach) + 3)) // 64 + 2
 
 
-@kernel(inline=True)
+@kernel(forceinline=True)
 def window_rows(reach: float) -> int:
-    """Rows of a scan's window."""
+    """Return the rows of a scan's window."""
     return 2 * (int(reach) + 3) + 1
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def scan_ends(lengths: Array, directions: Array, x: float, y: float, ends: Array) -> None:
     """Fill ``ends`` (2, beams) with the end points of the beams in the window [cells].
 
     Parameters
     ----------
     lengths : (beams,) float64
-        How far each beam went [cells], 0 for a beam that says nothing.
+        Lengths of the beams [cells], 0 for invalid ones.
     directions : (2 or more, beams) float64
-        Unit vectors of the beams in the grid's axes.
+        Unit vectors of the beams along the grid's axes.
     x, y : float
         Position of the laser in the window [cells].
-    ends : (2, beams) float64
-        Result.
     """
     for beam in range(lengths.shape[0]):
         ends[0, beam] = x + lengths[beam] * directions[0, beam]
@@ -61,7 +226,7 @@ def scan_ends(lengths: Array, directions: Array, x: float, y: float, ends: Array
         ends[1, beam] = y + lengths[beam] * directions[1, beam]
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def fill_scan_polygon(
     lengths: Array,
     directions: Array,
@@ -72,7 +237,7 @@ def fill_scan_polygon(
     is_full_circle: bool,
     bits: Array,
 ) -> tuple[int, int, int, int]:
-    """Set the bits of the cells whose centre the scan has seen.
+    """Set the bits of the cells whose centre the scan has seen; return the box that may hold bits.
 
     Parameters
     ----------
@@ -90,19 +255,19 @@ def fill_scan_polygon(
     Returns
     -------
     row_low, row_high, word_low, word_high : int
-        The box that may hold bits, high ends exclusive.
+        The box, high ends exclusive.
     """
     beams = lengths.shape[0]
     flat, width = bits.ctypes.data, 64 * bits.shape[1]
-    outline = Outline(lengths, directions, ends, x, y, GRAZING * increment)
+    outline = _Outline(lengths, directions, ends, x, y, GRAZING * increment)
     if is_full_circle:
-        toggle_between(flat, width, outline, beams - 1, 0)
+        _toggle_between(flat, width, outline, beams - 1, 0)
     else:
-        own_row = row_of(y)
+        own_row = _row_of(y)
         for beam in (0, beams - 1):
-            end_row = row_of(ends[1, beam])
+            end_row = _row_of(ends[1, beam])
             if end_row != own_row:
-                toggle_edge(flat, width, ends[0, beam], ends[1, beam], x, y, end_row, own_row)
+                _toggle_edge(flat, width, ends[0, beam], ends[1, beam], x, y, end_row, own_row)
     rows, columns = scratch_vector(beams, np.int32), scratch_vector(beams, np.int32)
     for beam in range(beams):
         rows[beam], columns[beam] = np.int32(ends[1, beam] + 0.5), np.int32(ends[0, beam])
@@ -110,7 +275,7 @@ def fill_scan_polygon(
     for beam in range(beams):
         low_row, high_row = min(low_row, rows[beam]), max(high_row, rows[beam])
         low_column, high_column = min(low_column, columns[beam]), max(high_column, columns[beam])
-    toggle_edges(flat, width, outline, rows)
+    _toggle_edges(flat, width, outline, rows)
     box = (
         max(int(low_row) - 2, 0),
         min(int(high_row) + 2, bits.shape[0]),
@@ -121,7 +286,7 @@ def fill_scan_polygon(
     return box
 
 
-@kernel(inline=True, borrowing=True)
+@kernel(forceinline=True, nrt=False)
 def _fill_rows(bits: Array, box: tuple[int, int, int, int]) -> None:
     """Set the bits between those toggled, in the rows and words of a box."""
     row_low, row_high, word_low, word_high = box

@@ -1,6 +1,6 @@
-"""Small components of free cells within walls, and their removal.
+"""Removal of small groups of free cells within walls, for pictures.
 
-Noise leaves them in fine maps, and they are unwanted in pictures.
+In fine maps, noise leaves them between the ends of beams.
 """
 
 import cv2
@@ -10,27 +10,18 @@ from numpy.typing import NDArray
 from lidarium.mapping.grids.occupancy import FREE, OCCUPIED
 
 LARGEST_COMPONENT = 3
-"""Most free cells of a small component, where it lies in a wall.
-
-No other free cell touches the component over a side.
-"""
+"""Maximum number of cells of a group that is removed."""
 
 _CROSS = np.array([[0, 1, 0], [1, 1, 1], [0, 1, 0]], np.uint8)
 
 
 def without_small_components(levels: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Return a three-level map with small free components within walls closed.
+    """Return a three-level map (rows, columns) with small free components within walls closed, for pictures.
 
-    The map is for pictures.
-
-    Where cells are finer than the noise of the laser, ends of beams scatter over a wall's front, and single
-    free cells remain between them. A speck is a group of at most `LARGEST_COMPONENT` free cells, joined over
-    sides, half or more of whose sides are walls.
-
-    Parameters
-    ----------
-    levels : (rows, columns) uint8
-        0 occupied, 127 unknown, 255 free; not changed.
+    If cells are finer than the noise of the laser, ends of beams scatter over the front of a wall, and
+    single free cells remain between them. A component is removed if it has at most `LARGEST_COMPONENT`
+    cells, joined over sides, and half or more of its sides are walls. ``levels`` (0 occupied, 127 unknown,
+    255 free) is not changed.
     """
     count, labels, statistics, _ = cv2.connectedComponentsWithStats(
         (levels == FREE).astype(np.uint8), connectivity=4

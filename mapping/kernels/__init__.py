@@ -1,6 +1,1 @@
-"""Compiled functions: their decorator, cache, views of arrays, work queue.
-
-The decorator, the kernel cache, views of arrays at addresses, and work for threads.
-"""
-
-from typing import Any
+"""Compiled functions: their decorator and cache, views of arrays, vector operations, work for threads."""

@@ -1,9 +1,9 @@
-"""Folders in which caches can be kept: ours alone, or none.
+"""Private folders for caches.
 
-What lies in a cache is loaded as code (numba's index files are pickles) or believed. A folder is therefore
-taken only where nobody else could have put anything into it: a folder and no link, of this user, which no
-other may write to. The same holds for each folder above that was made for the cache, and the one in which
-they lie must keep others from renaming them.
+Cached files are loaded as code (numba's index files are pickles) or trusted. A folder is therefore used only
+if nobody else could have put anything into it: a directory and no link, of this user, that no other user may
+write to. The same holds for each folder above that was made for the cache, and the folder that contains them
+must keep other users from renaming them.
 """
 
 import os
@@ -21,10 +21,7 @@ _ROOT = 0
 
 
 def user_cache_folder() -> Path | None:
-    """Return the folder in which the user's programs keep what they can make again.
-
-    None where the user has no home.
-    """
+    """Return the folder for the user's caches, or None if the user has no home."""
     chosen = os.environ.get("XDG_CACHE_HOME", "")
     # The specification of these folders has a relative one ignored: it would be another in every folder.
     if os.path.isabs(chosen):
@@ -36,22 +33,18 @@ def user_cache_folder() -> Path | None:
 
 
 def cache_folder(*names: str, beside: Path | None = None) -> Path | None:
-    """Return a folder for a cache that is ours alone, made if absent.
+    """Return a private folder for a cache, made if absent, or None.
 
-    Files can be written to it.
+    It is the first safe and writable one of: next to the source, in the user's cache folder, in the
+    temporary folder.
 
     Parameters
     ----------
     *names : str
-        What is kept, from the outer folder to the inner.
-    beside : Path or None
-        A source file whose compiled form it is. The cache is then kept beside it, if possible, as those of
-        Python are; who owns the source may own the cache as well, since his code is run already.
-
-    Returns
-    -------
-    Path or None
-        The first that is good of: beside the source, in the user's cache folder, in the temporary folder.
+        Names of the folders, from the outer to the inner.
+    beside : Path, optional
+        A source file whose compiled form is cached. Its own folder is then tried first, as Python does; the
+        owner of the source may own the cache as well, since that code is run already.
     """
     return next(
         (
@@ -64,22 +57,19 @@ def cache_folder(*names: str, beside: Path | None = None) -> Path | None:
 
 
 def trusted_folder(base: Path, names: Collection[str], owners: Collection[int] = ()) -> Path | None:
-    """Return a folder below ``base`` that is ours alone, made if absent.
+    """Return a private folder below ``base``, made if absent, or None.
+
+    None if it cannot be made, or if it, or one above it that was made for it, is a link, belongs to another
+    user, or is writable for others.
 
     Parameters
     ----------
     base : Path
-        Where it lies; may be shared where others cannot rename what is ours there, as in ``/tmp``.
+        Existing folder; may be shared if others cannot rename this user's folders there, as in ``/tmp``.
     names : collection of str
-        The folders below that were made for the cache, from the outer to the inner.
+        Names of the folders below, from the outer to the inner.
     owners : collection of int
-        Numbers of users who are trusted beside this one.
-
-    Returns
-    -------
-    Path or None
-        None where it cannot be made, or where it, or one above it that was made for it, is a link, belongs to
-        someone else, or can be written to by others.
+        User IDs that are trusted besides this one.
     """
     trusted = {*owners, os.geteuid()} if _HAS_OWNERS else set()
     try:
@@ -97,10 +87,10 @@ def trusted_folder(base: Path, names: Collection[str], owners: Collection[int] =
     return folder
 
 
-def is_private(status: os.stat_result, trusted: Collection[int]) -> bool:
-    """Whether what was found is a folder that only trusted users can write to.
+def _is_private(status: os.stat_result, trusted: Collection[int]) -> bool:
+    """Whether a status is of a directory that only trusted users can write to.
 
-    It was found without following links.
+    It was read without following links.
     """
     if not stat.S_ISDIR(status.st_mode):
         return False
@@ -122,7 +112,7 @@ def is_writable(folder: Path | None) -> bool:
 def _candidates(
     names: tuple[str, ...], beside: Path | None
 ) -> Iterator[tuple[Path, tuple[str, ...], tuple[int, ...]]]:
-    """Yield where a cache could lie: base, folders below, owners that are trusted."""
+    """Yield candidates for the cache: base, folders below, trusted owners."""
     if beside is not None:
         owners = (beside.stat().st_uid,) if _HAS_OWNERS else ()
         yield beside.parent / "__pycache__", names, owners
@@ -137,10 +127,10 @@ def _candidates(
 
 
 def _keeps_names(base: Path, trusted: Collection[int]) -> bool:
-    """Whether nobody else can rename our folders in it, nor it or one above it.
+    """Whether nobody else can rename this user's folders in it, nor it or one above it.
 
-    Who may write to a folder may rename what is in it, unless it is sticky, as ``/tmp`` is: there only its
-    owner may, and the owner of what is renamed.
+    Users who may write to a folder may rename its entries, unless it is sticky, as ``/tmp`` is: there only
+    the owners of the folder and of the entry may.
     """
     if not _HAS_OWNERS:
         return True
@@ -150,11 +140,11 @@ def _keeps_names(base: Path, trusted: Collection[int]) -> bool:
 
 
 def _is_made_ours(folder: Path, trusted: Collection[int], *, is_inner: bool) -> bool:
-    """Make a folder if absent, and return whether it is ours alone.
+    """Make a folder if absent, and return whether it is private.
 
-    An outer one of ours to which others can write, as some masks leave them, is closed to them: what they
-    could have put there is another folder, and that is checked by itself. The inner one may hold files of
-    theirs, and is not taken.
+    An outer folder of this user to which others can write, as some masks leave them, is closed to them: they
+    could have put only other folders there, and these are checked themselves. The inner one may hold their
+    files, and is not used.
     """
     try:
         os.mkdir(folder, PRIVATE)
@@ -163,4 +153,4 @@ def _is_made_ours(folder: Path, trusted: Collection[int], *, is_inner: bool) -> 
         is_mine = stat.S_ISDIR(status.st_mode) and _HAS_OWNERS and status.st_uid == os.geteuid()
         if is_mine and status.st_mode & _BY_OTHERS and not is_inner:
             os.chmod(folder, stat.S_IMODE(status.st_mode) & ~_BY_OTHERS)
-    return is_private(os.lstat(folder), trusted)
+    return _is_private(os.lstat(folder), trusted)

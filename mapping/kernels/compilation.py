@@ -1,34 +1,39 @@
-"""The one decorator of all numba kernels.
+"""The decorator of all numba kernels, their cache, and how Python runs them without a compiler.
 
-Arithmetic is exact, and kernels are cached where a directory can be written.
+Arithmetic is exact, and kernels are cached if a directory can be written.
 
-Numba caches compiled code per source file and does not see a change in another file that the kernel calls
-into. The cache directory is therefore keyed by a hash of all sources with kernels and of what they import,
-and of the settings of numba that change the code, such as ``NUMBA_BOUNDSCHECK``. It lies in the package's own
-folder, the user's cache folder or the temporary folder: the first that this user can write to, and nobody
-else.
+Numba caches compiled code per source file and does not notice a change in another file that the kernel calls
+into. The cache directory is therefore keyed by a hash of all sources with kernels, of their imports, and of
+the settings of numba that change the code, such as ``NUMBA_BOUNDSCHECK``. It lies in the package's own
+folder, the user's cache folder or the temporary folder: the first that only this user can write to.
+
+With ``NUMBA_DISABLE_JIT=1`` Python runs kernels as they are written: for debugging only, and thousands of
+times slower. Kernels expect numba's numbers: an element of an array of small integers does not overflow, and
+a division by zero gives inf or nan. Python's numbers differ, so each kernel gets its arrays as ``Numbers``.
 """
 
+import functools
 import hashlib
 import os
 import re
 import sys
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numba
+import numpy as np
 from numba.core import config
+from numba.core.caching import FunctionCache
 from numpy.typing import NDArray
 
 from lidarium.mapping.kernels.cache_folders import cache_folder
-from lidarium.mapping.kernels.in_python.interpreted import IS_INTERPRETED, interpreted
-from lidarium.mapping.kernels.kept_code import keep
 
-# OpenMP's threads spin where they wait for each other, by default. Where others use the cores as well, as a
-# learner does, two threads then take longer than one. Threads that sleep at once make the short operations of
-# a network a third slower, so they spin for some microseconds. Who has said otherwise is left alone. It has
-# to be said before numba loads OpenMP, which it does when the first threads start.
+# By default, OpenMP's threads spin while they wait for each other. If other programs use the cores as well,
+# as a learner does, two threads then take longer than one. Threads that sleep at once make the short
+# operations of a network a third slower, so they spin for some microseconds, unless the user has set the
+# policy. It has to be set before numba loads OpenMP, which it does when the first threads start.
 if "OMP_WAIT_POLICY" not in os.environ:
     os.environ["OMP_WAIT_POLICY"] = "passive"
     os.environ.setdefault("GOMP_SPINCOUNT", "2000")
@@ -37,27 +42,28 @@ Array = NDArray[Any]
 """An array in the signature of a kernel; its docstring gives shape and type."""
 
 _numba_config: Any = config
+_caching: Any = FunctionCache
+
+IS_INTERPRETED = bool(_numba_config.DISABLE_JIT)
+"""Whether Python runs the kernels, as they are written."""
 
 PACKAGE_FOLDERS = ("mapping", "envs", "evaluation")
 """Folders whose kernels call each other."""
 
-CHOICES = ("BOUNDSCHECK", "DEBUGINFO_DEFAULT", "OPT", "LOOP_VECTORIZE", "SLP_VECTORIZE")
-"""Settings of numba that change compiled code, and by which its own cache does not tell it apart."""
+NUMBA_SETTINGS = ("BOUNDSCHECK", "DEBUGINFO_DEFAULT", "OPT", "LOOP_VECTORIZE", "SLP_VECTORIZE")
+"""Settings of numba that change compiled code and that its own cache ignores."""
 
 _ROOT = Path(__file__).resolve().parents[2]
 _IMPORTS = re.compile(rb"^from lidarium\.([\w.]+) import", re.MULTILINE)
 
 
 def key_sources(root: Path = _ROOT) -> list[Path]:
-    """Return the sources whose code or constants are in compiled kernels.
-
-    Those are files with kernels, this package, and the modules that either imports from.
-    """
+    """Return the sources of compiled kernels: files with kernels, this package, and their imports."""
     found: set[Path] = set()
     for folder in PACKAGE_FOLDERS:
         for path in (root / folder).rglob("*.py"):
             source = path.read_bytes()
-            if b"@kernel" in source or path.parent.name == "kernels":
+            if b"@kernel" in source or "kernels" in path.parts:
                 modules = (
                     root / f"{name.decode().replace('.', '/')}.py" for name in _IMPORTS.findall(source)
                 )
@@ -67,7 +73,7 @@ def key_sources(root: Path = _ROOT) -> list[Path]:
 
 def _sources_hash(root: Path = _ROOT) -> str:
     digest = hashlib.sha256(numba.__version__.encode())
-    digest.update(repr([getattr(_numba_config, name) for name in CHOICES]).encode())
+    digest.update(repr([getattr(_numba_config, name) for name in NUMBA_SETTINGS]).encode())
     for path in key_sources(root):
         digest.update(path.relative_to(root).as_posix().encode())
         digest.update(path.read_bytes())
@@ -75,7 +81,7 @@ def _sources_hash(root: Path = _ROOT) -> str:
 
 
 def _cache_folder() -> Path | None:
-    """Return the folder of the compiled kernels, or None where none is good."""
+    """Return the folder of the compiled kernels, or None if none is safe."""
     return cache_folder("kernels", _sources_hash(), beside=Path(__file__).resolve())
 
 
@@ -85,16 +91,13 @@ _CAN_CACHE = _CHOSEN_BY_USER or _FOLDER is not None
 
 
 def kernel_cache() -> Path | None:
-    """Return the folder of the compiled kernels, or None where nothing can be cached."""
+    """Return the folder of the compiled kernels, or None if nothing can be cached."""
     folder = os.environ["NUMBA_CACHE_DIR"] if _CHOSEN_BY_USER else _FOLDER
     return None if folder is None else Path(folder)
 
 
 def is_cache_empty() -> bool:
-    """Whether the cache holds no compiled kernel yet, so that this start compiles.
-
-    False where nothing can be cached.
-    """
+    """Whether the cache holds no compiled kernel yet, so that this start compiles; False without a cache."""
     folder = kernel_cache()
     return folder is not None and next(folder.rglob("*.nbi"), None) is None
 
@@ -103,65 +106,56 @@ def kernel(
     function: Callable[..., Any] | None = None,
     *,
     parallel: bool = False,
-    inline: bool = False,
-    spliced: bool = False,
-    borrowing: bool = False,
+    forceinline: bool = False,
+    inline: str = "never",
+    nrt: bool = True,
 ) -> Any:  # noqa: ANN401
-    """Compile a function of arrays with numba.
-
-    In nopython mode, with exact floating point, without the GIL, and cached.
+    """Compile a function with ``numba.njit``: with exact floating point, without the GIL, and cached.
 
     Parameters
     ----------
     function : callable
         The function to compile.
-    parallel : bool
-        Whether ``numba.prange`` loops run on threads. Only loops whose iterations write to places of their
+    parallel : bool, optional
+        Whether ``numba.prange`` loops run on threads. Only loops whose iterations write to elements of their
         own may, so that the result does not depend on the number of threads. Such a function calls kernels
-        and does nothing else: what it wrote itself to arrays viewed at addresses, numba would drop as of no
-        use.
-    inline : bool
-        Whether the function is inlined into its callers by LLVM (small helpers in hot loops).
-    spliced : bool
-        Whether numba puts the function's body into its callers before it compiles them. For thin functions
-        around heavy ones: what lies below a compiled function is compiled again with every caller.
-    borrowing : bool
-        Whether the function only works on arrays that others hold: it makes none but by ``scratch_vector``
-        and ``scratch_grid``, and returns none but views at addresses. Nothing is counted then, where each
-        array that is handed on is counted twice otherwise, and the forty of a world as well.
-
-    Returns
-    -------
-    callable
-        The compiled function.
+        and does nothing else: numba would drop its own writes to arrays viewed at addresses as unused.
+    forceinline : bool, optional
+        Whether LLVM inlines the function into its callers: for small helpers in hot loops.
+    inline : {"never", "always"}, optional
+        "always" lets numba put the function's body into its callers before it compiles them: for thin
+        functions around large ones, since each caller of a compiled function compiles its callees again.
+    nrt : bool, optional
+        Whether numba's runtime counts references to arrays. A function with ``nrt=False`` allocates only by
+        ``scratch_vector`` and ``scratch_grid``, and returns only views at addresses. Otherwise each array
+        that is passed on is counted twice, and so are the forty of a world.
     """
     if IS_INTERPRETED:
-        return interpreted if function is None else interpreted(function)
+        return _interpreted if function is None else _interpreted(function)
 
     def decorate(target: Callable[..., Any]) -> Any:  # noqa: ANN401
-        # Division by zero gives inf or nan, as in numpy: a check before each division would keep loops off
-        # vector registers.
         options: dict[str, Any] = {
             "nogil": True,
             "fastmath": False,
+            # Division by zero gives inf or nan, as in numpy: a check before each division would keep loops
+            # off vector registers.
             "error_model": "numpy",
             "parallel": parallel,
+            "inline": inline,
+            # Passed to every kernel: one without it would take over the choice of the first of its callers.
+            "_nrt": nrt,
         }
-        # Told to every kernel: one that says nothing would take over what the first of its callers says.
-        options["_nrt"] = not borrowing
-        if inline:
+        if forceinline:
             options["forceinline"] = True
-        if spliced:
-            options["inline"] = "always"
         previous = _numba_config.CACHE_DIR
         folder = previous if _FOLDER is None else str(_FOLDER)
         # The serial and the parallel form of one function would take each other's code from the cache, which
-        # knows no options.
+        # ignores options.
         _numba_config.CACHE_DIR = os.path.join(folder, "parallel") if parallel and folder else folder
         try:
             compiled = numba.njit(**options)(target)
             if _CAN_CACHE:
-                keep(compiled)
+                _keep(compiled)
             return compiled
         finally:
             _numba_config.CACHE_DIR = previous
@@ -169,8 +163,104 @@ def kernel(
     return decorate if function is None else decorate(function)
 
 
+# -- Cache -------------------------------------------------------------------------------------------------
+
+
+class _KernelCache(_caching):
+    """Numba's cache of a function that survives full disks, closed folders and damaged files."""
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:  # noqa: ANN401
+        """Return the compiled form for types of arguments, or None if there is none or it is damaged."""
+        try:
+            return super().load_overload(sig, target_context)
+        except Exception:  # unpickling damaged bytes can raise anything
+            self._forget()
+            return None
+
+    def save_overload(self, sig: Any, data: Any) -> None:  # noqa: ANN401
+        """Keep a compiled form, if that is possible."""
+        try:
+            super().save_overload(sig, data)
+        except OSError as error:
+            _warn_once(error)
+
+    def _forget(self) -> None:
+        """Begin the index of the function anew."""
+        try:
+            self.flush()
+        except OSError as error:
+            self.disable()
+            _warn_once(error)
+
+
+_has_warned = False
+
+
+def _warn_once(reason: Exception) -> None:
+    """Warn that compiled code cannot be kept, once in a process."""
+    global _has_warned  # one warning for hundreds of kernels
+    if not _has_warned:
+        _has_warned = True
+        warnings.warn(
+            f"compiled kernels cannot be kept and are compiled at each start: {str(reason)[:300]}; make room "
+            "there, or name another folder in NUMBA_CACHE_DIR",
+            stacklevel=2,
+        )
+
+
+def _keep(compiled: Any) -> None:  # noqa: ANN401
+    """Keep the compiled forms of a function in files, if there is a folder for them."""
+    try:
+        compiled._cache = _KernelCache(compiled.py_func)  # numba has no public way
+    except (RuntimeError, OSError) as error:  # no folder can be made
+        _warn_once(error)
+
+
+# -- Without a compiler ------------------------------------------------------------------------------------
+
+
+class Numbers(np.ndarray[Any, Any]):
+    """An array whose single elements are read as kernels expect them."""
+
+    def __getitem__(self, index: Any) -> Any:  # noqa: ANN401
+        """Return a part, or an element as a number of full width."""
+        found = super().__getitem__(index)
+        return found if isinstance(found, np.ndarray) else _widened(found)
+
+
+def _widened(value: Any) -> Any:  # noqa: ANN401
+    """Return an argument or an element as compiled kernels take it.
+
+    Integers except uint64 become Python's, Python's floats float64, arrays ``Numbers``; float32 stays.
+    """
+    if isinstance(value, np.ndarray):
+        return value if isinstance(value, Numbers) else value.view(Numbers)
+    if isinstance(value, tuple):
+        members = [_widened(each) for each in value]
+        return type(value)(*members) if hasattr(value, "_fields") else tuple(members)
+    if isinstance(value, float):
+        return np.float64(value)
+    if isinstance(value, (np.integer, np.bool_)) and not isinstance(value, np.uint64):
+        return value.item()
+    return value
+
+
+def _interpreted(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Return a kernel that Python runs."""
+
+    @functools.wraps(function)
+    def call(*given: Any, **named: Any) -> Any:  # noqa: ANN401
+        with np.errstate(all="ignore"):
+            return function(*map(_widened, given), **{name: _widened(each) for name, each in named.items()})
+
+    return call
+
+
+# -- Threads -----------------------------------------------------------------------------------------------
+
+
 def available_threads() -> int:
-    """Return how many threads parallel kernels can use."""
+    """Return the maximum number of threads of parallel kernels."""
     return int(_numba_config.NUMBA_NUM_THREADS)
 
 
@@ -178,9 +268,9 @@ _process_of_threads = 0
 
 
 def _start_threads() -> None:
-    """Start the threads of parallel kernels, and leave PyTorch as many as it had.
+    """Start the threads of parallel kernels, and keep PyTorch's number of threads.
 
-    Where PyTorch came first, OpenMP is one for both, and numba sets its number of threads.
+    If PyTorch came first, both share one OpenMP, and numba sets its number of threads.
     """
     torch: Any = sys.modules.get("torch")
     threads = torch.get_num_threads() if hasattr(torch, "get_num_threads") else None
@@ -190,18 +280,10 @@ def _start_threads() -> None:
 
 
 def use_threads(threads: int) -> int:
-    """Let parallel kernels run on so many threads, and return how many they may use.
+    """Set the number of threads of parallel kernels; return the number they may use.
 
-    Parameters
-    ----------
-    threads : int
-        How many are wanted.
-
-    Returns
-    -------
-    int
-        As many, or 1 in a process that was forked after threads had started. They do not live on in it, and
-        a parallel kernel would wait for them forever; serial forms give the same.
+    It is 1 in a process that was forked after threads had started. They do not exist there, and a parallel
+    kernel would wait for them forever; serial forms give the same.
     """
     global _process_of_threads  # threads belong to the process
     process = os.getpid()

@@ -1,12 +1,16 @@
 """Views of arrays at addresses, inside kernels.
 
 Batches hold floors and maps of different sizes. Kernels therefore take tables of addresses and view each
-array where it lies: nothing is concatenated or copied, a floor is shared by all episodes on it, and a map
-grows alone. The Python side that fills such a table keeps its arrays alive.
+array in place: nothing is concatenated or copied, a floor is shared by all episodes on it, and a map grows
+alone. The Python side that fills such a table keeps its arrays alive.
+
+Each view is defined in Python first; below it is the text that kernels are compiled with.
 """
 
+import ctypes
+import math
 from collections.abc import Iterable
-from typing import Any, NamedTuple, get_args, get_type_hints
+from typing import Any, get_args, get_type_hints
 
 import numba
 import numpy as np
@@ -14,12 +18,10 @@ from numba import types
 from numba.np import arrayobj
 from numpy.typing import NDArray
 
-from lidarium.mapping.kernels.compilation import Array, kernel
-from lidarium.mapping.kernels.in_python import plain_forms
-from lidarium.mapping.kernels.in_python.interpreted import machine_code, room_for
+from lidarium.mapping.kernels.compilation import Array, Numbers
+from lidarium.mapping.kernels.llvm import Builder, Value, generic_llvm_overload, numba_types
 
 _numba_arrays: Any = arrayobj
-_numba_types: Any = types
 
 LINE = 64
 """A line of the caches [bytes]."""
@@ -28,173 +30,51 @@ ENTRY = 3
 """Numbers of an entry of a table of arrays: address, rows, columns (1 for a vector)."""
 
 
-def _fill_view(context: Any, builder: Any, kind: Any, address: Any, shape: list[Any]) -> Any:  # noqa: ANN401
-    """Return an array of a kind at an address that nobody counts."""
-    view = context.make_array(kind)(context, builder)
-    size = context.get_abi_sizeof(context.get_data_type(kind.dtype))
-    strides = [context.get_constant(types.intp, size)]
-    for length in reversed(shape[1:]):
-        strides.insert(0, builder.mul(strides[0], length))
-    pointer = builder.inttoptr(address, view.data.type)
-    _numba_arrays.populate_array(
-        view,
-        data=pointer,
-        shape=shape,
-        strides=strides,
-        itemsize=context.get_constant(types.intp, size),
-        meminfo=None,
-    )
-    return view._getvalue()
+def array_at(address: int, shape: tuple[int, ...], dtype: Any) -> NDArray[Any]:  # noqa: ANN401
+    """Return a view of the array at an address, for definitions that Python runs."""
+    size = math.prod(shape) * np.dtype(dtype).itemsize
+    if size == 0:
+        return np.zeros(shape, dtype).view(Numbers)
+    memory: Any = (ctypes.c_char * size).from_address(int(address))
+    return np.frombuffer(memory, dtype).reshape(shape).view(Numbers)
 
 
-def _vector_of(typing_context: Any, address: Any, count: Any, kind: Any) -> Any:  # noqa: ANN401
-    """View a vector of a kind at an address inside a kernel."""
-    array = types.Array(kind.dtype, 1, "C")
+def vector_at(address: int, count: int, dtype: Any) -> Any:  # noqa: ANN401
+    """View ``count`` numbers of a type such as ``np.float64`` at an address.
 
-    def generate(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:  # noqa: ANN401
-        return _fill_view(context, builder, array, arguments[0], [arguments[1]])
-
-    return array(types.intp, types.intp, kind), generate
-
-
-def _grid_of(typing_context: Any, address: Any, rows: Any, columns: Any, kind: Any) -> Any:  # noqa: ANN401
-    """View a grid of a kind at an address inside a kernel."""
-    array = types.Array(kind.dtype, 2, "C")
-
-    def generate(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:  # noqa: ANN401
-        return _fill_view(context, builder, array, arguments[0], list(arguments[1:3]))
-
-    return array(types.intp, types.intp, types.intp, kind), generate
-
-
-def _room_for(typing_context: Any, count: Any, kind: Any) -> Any:  # noqa: ANN401
-    """Reserve room for so many numbers on the calling kernel's stack.
-
-    Returns its address, valid until that kernel returns. The numbers are of a given kind.
+    It gives a part of a row at less cost than a slice. The caller keeps the array alive.
     """
-
-    def generate(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:  # noqa: ANN401
-        room = builder.alloca(context.get_data_type(kind.dtype), arguments[0])
-        room.align = LINE
-        return builder.ptrtoint(room, context.get_value_type(types.intp))
-
-    return types.intp(types.intp, kind), generate
+    return array_at(address, (count,), dtype)
 
 
-def _forms_of(named: type) -> list[Any]:
-    """Return the array types that a class of arrays declares, in the order of its fields."""
-    hints = get_type_hints(named, include_extras=True)
-    forms = []
-    for name in named._fields:  # type: ignore[attr-defined]
-        _, dtype, dimensions = get_args(hints[name])
-        forms.append(types.Array(numba.from_dtype(np.dtype(dtype)), dimensions, "C"))
-    return forms
+def grid_at(address: int, rows: int, columns: int, dtype: Any) -> Any:  # noqa: ANN401
+    """View a (rows, columns) grid at an address."""
+    return array_at(address, (rows, columns), dtype)
 
 
-def _arrays_of(typing_context: Any, table: Any, kind: Any) -> Any:  # noqa: ANN401
-    """View all arrays of a table as the fields of a class of arrays inside a kernel."""
-    forms = _forms_of(kind.instance_class)
-    named: Any = _numba_types.NamedTuple(forms, kind.instance_class)
+def scratch_vector(count: int, dtype: Any) -> Any:  # noqa: ANN401
+    """Return a vector on the stack of the calling kernel: undefined at first, and gone when it returns.
 
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:  # noqa: ANN401
-        entries = context.make_array(signature.args[0])(context, builder, arguments[0]).data
-        views = []
-        for place, form in enumerate(forms):
-            address, *shape = (
-                builder.load(builder.gep(entries, [context.get_constant(types.intp, ENTRY * place + number)]))
-                for number in range(1 + form.ndim)
-            )
-            views.append(_fill_view(context, builder, form, address, shape))
-        return context.make_tuple(builder, named, views)
-
-    return named(table, kind), generate
-
-
-_vector_view = machine_code(_vector_of, plain_forms.vector_view)
-_grid_view = machine_code(_grid_of, plain_forms.grid_view)
-_named_views = machine_code(_arrays_of, plain_forms.named_views)
-_room = machine_code(_room_for, room_for)
-
-
-@kernel(spliced=True)
-def scratch_vector(count: int, kind: Any) -> Any:  # noqa: ANN401
-    """Return ``count`` numbers of a kind, for use within the calling kernel.
-
-    Undefined at first, and gone when the calling kernel returns.
-
-    For some numbers a beam, not for grids: a stack holds a few megabytes. Not within a loop, which would set
-    aside room each time.
+    For some numbers per beam, not for grids: a stack holds a few megabytes. Do not call it in a loop, which
+    would reserve memory each time.
     """
-    return _vector_view(_room(count, kind), count, kind)
+    return np.zeros(count, dtype).view(Numbers)
 
 
-@kernel(spliced=True)
-def scratch_grid(rows: int, columns: int, kind: Any) -> Any:  # noqa: ANN401
-    """Return a (rows, columns) grid in the way of ``scratch_vector``."""
-    return _grid_view(_room(rows * columns, kind), rows, columns, kind)
+def scratch_grid(rows: int, columns: int, dtype: Any) -> Any:  # noqa: ANN401
+    """Return a (rows, columns) grid as ``scratch_vector`` does."""
+    return np.zeros((rows, columns), dtype).view(Numbers)
 
 
-@kernel(spliced=True)
-def vector_at(address: int, count: int, kind: Any) -> Any:  # noqa: ANN401
-    """View ``count`` numbers of a kind at an address inside a kernel.
+def arrays_at(table: Array, named: Any) -> Any:  # noqa: ANN401
+    """View all arrays of a table (arrays, ENTRY) int64 of ``table_of`` as the fields of a named tuple.
 
-    A kind is such as np.float64. The caller keeps the array alive.
+    The fields of its class are annotated ``Annotated[Array, dtype, dimensions]``.
     """
-    return _vector_view(address, count, kind)
-
-
-@kernel(spliced=True)
-def grid_at(address: int, rows: int, columns: int, kind: Any) -> Any:  # noqa: ANN401
-    """View a (rows, columns) grid of a kind at an address inside a kernel.
-
-    A kind is such as np.float64.
-    """
-    return _grid_view(address, rows, columns, kind)
-
-
-@kernel(spliced=True)
-def bytes_at(address: int, count: int) -> Any:  # noqa: ANN401
-    """View ``count`` uint8 at an address inside a kernel."""
-    return _vector_view(address, count, np.uint8)
-
-
-@kernel(spliced=True)
-def int8_at(address: int, count: int) -> Any:  # noqa: ANN401
-    """View ``count`` int8 at an address inside a kernel.
-
-    It gives a part of a row at less cost than a slice.
-    """
-    return _vector_view(address, count, np.int8)
-
-
-@kernel(spliced=True)
-def int8_grid_at(address: int, rows: int, columns: int) -> Any:  # noqa: ANN401
-    """View a (rows, columns) int8 grid at an address inside a kernel."""
-    return _grid_view(address, rows, columns, np.int8)
-
-
-@kernel(spliced=True)
-def uint8_grid_at(address: int, rows: int, columns: int) -> Any:  # noqa: ANN401
-    """View a (rows, columns) uint8 grid at an address inside a kernel."""
-    return _grid_view(address, rows, columns, np.uint8)
-
-
-@kernel(spliced=True)
-def uint16_grid_at(address: int, rows: int, columns: int) -> Any:  # noqa: ANN401
-    """View a (rows, columns) uint16 grid at an address inside a kernel."""
-    return _grid_view(address, rows, columns, np.uint16)
-
-
-@kernel(spliced=True)
-def word_grid_at(address: int, rows: int, columns: int) -> Any:  # noqa: ANN401
-    """View a (rows, columns) uint64 grid at an address inside a kernel."""
-    return _grid_view(address, rows, columns, np.uint64)
-
-
-@kernel(spliced=True)
-def int32_table_at(address: int, rows: int, columns: int) -> Any:  # noqa: ANN401
-    """View a (rows, columns) int32 table at an address inside a kernel."""
-    return _grid_view(address, rows, columns, np.int32)
+    views = []
+    for (dtype, dimensions), (address, *shape) in zip(_declared(named), table.tolist(), strict=False):
+        views.append(array_at(address, tuple(shape[:dimensions]), dtype))
+    return named(*views)
 
 
 def table_of(arrays: Iterable[NDArray[Any]]) -> NDArray[np.int64]:
@@ -205,15 +85,81 @@ def table_of(arrays: Iterable[NDArray[Any]]) -> NDArray[np.int64]:
     )
 
 
-@kernel(spliced=True)
-def arrays_at(table: Array, kind: type[NamedTuple]) -> Any:  # noqa: ANN401
-    """View all arrays of a table inside a kernel.
+def _declared(named: Any) -> list[tuple[Any, int]]:  # noqa: ANN401
+    """Return dtype and dimensions of the fields of a class of arrays, in order."""
+    hints = get_type_hints(named, include_extras=True)
+    return [get_args(hints[name])[1:3] for name in named._fields]
 
-    Parameters
-    ----------
-    table : (arrays, ENTRY) int64
-        What ``table_of`` returned, in the order of the fields of ``kind``.
-    kind : NamedTuple class
-        Its fields are annotated ``Annotated[Array, dtype, dimensions]``.
-    """
-    return _named_views(table, kind)
+
+def _fill_view(context: Any, builder: Builder, view_type: Any, address: Value, shape: list[Value]) -> Value:  # noqa: ANN401
+    """Return an array at an address, without a count of references."""
+    view = context.make_array(view_type)(context, builder)
+    size = context.get_abi_sizeof(context.get_data_type(view_type.dtype))
+    strides = [context.get_constant(types.intp, size)]
+    for length in reversed(shape[1:]):
+        strides.insert(0, builder.mul(strides[0], length))
+    _numba_arrays.populate_array(
+        view,
+        data=builder.inttoptr(address, view.data.type),
+        shape=shape,
+        strides=strides,
+        itemsize=context.get_constant(types.intp, size),
+        meminfo=None,
+    )
+    return view._getvalue()
+
+
+def _reserve(context: Any, builder: Builder, dtype: Any, count: Value) -> Value:  # noqa: ANN401
+    """Return the address of memory for a number of elements on the kernel's stack."""
+    memory = builder.alloca(context.get_data_type(dtype), count)
+    memory.align = LINE
+    return builder.ptrtoint(memory, context.get_value_type(types.intp))
+
+
+_INTEGERS = (types.intp,) * 3
+
+
+def _array(dtype: Any, dimensions: int) -> Any:  # noqa: ANN401
+    """Return the type of views of numbers of a class such as ``np.float64``."""
+    return types.Array(dtype.dtype, dimensions, "C")
+
+
+@generic_llvm_overload(vector_at, lambda address, count, dtype: _array(dtype, 1)(*_INTEGERS[:2], dtype))
+def _(context: Any, builder: Builder, signature: Any, values: list[Value]) -> Value:  # noqa: ANN401
+    return _fill_view(context, builder, signature.return_type, values[0], [values[1]])
+
+
+@generic_llvm_overload(grid_at, lambda address, rows, columns, dtype: _array(dtype, 2)(*_INTEGERS, dtype))
+def _(context: Any, builder: Builder, signature: Any, values: list[Value]) -> Value:  # noqa: ANN401
+    return _fill_view(context, builder, signature.return_type, values[0], values[1:3])
+
+
+@generic_llvm_overload(scratch_vector, lambda count, dtype: _array(dtype, 1)(types.intp, dtype))
+def _(context: Any, builder: Builder, signature: Any, values: list[Value]) -> Value:  # noqa: ANN401
+    address = _reserve(context, builder, signature.return_type.dtype, values[0])
+    return _fill_view(context, builder, signature.return_type, address, values[:1])
+
+
+@generic_llvm_overload(scratch_grid, lambda rows, columns, dtype: _array(dtype, 2)(*_INTEGERS[:2], dtype))
+def _(context: Any, builder: Builder, signature: Any, values: list[Value]) -> Value:  # noqa: ANN401
+    address = _reserve(context, builder, signature.return_type.dtype, builder.mul(values[0], values[1]))
+    return _fill_view(context, builder, signature.return_type, address, values[:2])
+
+
+def _named_type(table: Any, named: Any) -> Any:  # noqa: ANN401
+    """Return the signature of ``arrays_at``."""
+    declared = _declared(named.instance_class)
+    members = [types.Array(numba.from_dtype(np.dtype(dtype)), count, "C") for dtype, count in declared]
+    return numba_types.NamedTuple(members, named.instance_class)(table, named)
+
+
+@generic_llvm_overload(arrays_at, _named_type)
+def _(context: Any, builder: Builder, signature: Any, values: list[Value]) -> Value:  # noqa: ANN401
+    entries, views = context.make_array(signature.args[0])(context, builder, values[0]).data, []
+    for index, member in enumerate(signature.return_type.types):
+        address, *shape = (
+            builder.load(builder.gep(entries, [context.get_constant(types.intp, ENTRY * index + number)]))
+            for number in range(1 + member.ndim)
+        )
+        views.append(_fill_view(context, builder, member, address, shape))
+    return context.make_tuple(builder, signature.return_type, views)

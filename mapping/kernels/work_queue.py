@@ -1,11 +1,10 @@
 """Dynamic distribution of a loop's work among threads.
 
-Each thread takes the next free piece of work, so that all end at about the same time.
-
-Which thread runs a piece changes nothing in it; pieces must not touch each other.
+Each thread takes the next item that is left, so that all end at about the same time. The result does not
+depend on the thread that takes an item; items must not write to each other's memory.
 """
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from llvmlite import ir
@@ -13,8 +12,8 @@ from numba import types
 from numpy.typing import NDArray
 
 from lidarium.mapping.kernels.compilation import Array, kernel
-from lidarium.mapping.kernels.in_python import plain_forms
-from lidarium.mapping.kernels.in_python.interpreted import machine_code
+from lidarium.mapping.kernels.llvm import LONG, Builder, Value, llvm_overload, pointer_at
+from lidarium.mapping.kernels.views import vector_at
 
 
 class Work(NamedTuple):
@@ -23,11 +22,11 @@ class Work(NamedTuple):
     Attributes
     ----------
     items : (n,) int64
-        What there is to do, in the order in which it is taken.
+        The items, in the order in which they are taken.
     taken : (1,) int64
-        How many have been taken, see ``take_next``.
+        The number of items that have been taken, see ``take_next``.
     threads : int
-        How many threads take items.
+        The number of threads that take items.
     """
 
     items: NDArray[np.int64]
@@ -45,26 +44,19 @@ def new_queue() -> NDArray[np.int64]:
     return np.zeros(1, np.int64)
 
 
-def _add_one(typing_context: Any, address: Any) -> Any:  # noqa: ANN401
-    """Count on at an address, as one act for all threads."""
-
-    def generate(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:  # noqa: ANN401
-        number = ir.IntType(64)
-        return builder.atomic_rmw(
-            "add", builder.inttoptr(arguments[0], number.as_pointer()), ir.Constant(number, 1), "monotonic"
-        )
-
-    return types.int64(address), generate
+def _add_one(address: int) -> int:
+    """Increment the int64 at an address, atomically in kernels; return the number before."""
+    counter = vector_at(address, 1, np.int64)
+    counter[0] += 1
+    return int(counter[0]) - 1
 
 
-_take = machine_code(_add_one, plain_forms.add_one)
+@llvm_overload(_add_one, types.int64, types.int64)
+def _(builder: Builder, address: Value) -> Value:
+    return builder.atomic_rmw("add", pointer_at(builder, address, LONG), ir.Constant(LONG, 1), "monotonic")
 
 
-@kernel(inline=True)
+@kernel(forceinline=True)
 def take_next(taken: Array) -> int:
-    """Return the place of the next item by the counter of ``new_queue``, from 0 on.
-
-    No two threads are given the same.
-    """
-    place: int = _take(taken.ctypes.data)
-    return place
+    """Return the index of the next item by the counter of ``new_queue``; no two threads get the same."""
+    return _add_one(taken.ctypes.data)

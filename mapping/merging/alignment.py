@@ -197,7 +197,7 @@ def _vote(
                 first_taken_by[first[m]], second_taken_by[second[m]] = k, k
 
 
-@kernel(inline=True)
+@kernel(forceinline=True)
 def _is_alike(a: float, b: float, ratio: float) -> bool:
     """Return whether the smaller coordinate is more than a share of the larger one."""
     low, high = min(abs(a), abs(b)), max(abs(a), abs(b))

@@ -73,7 +73,7 @@ class CorrespondenceSettings:
     is_known_only: bool = True
     least_known: Annotated[float, share()] = 0.25
     use_shift: bool = True
-    length_tolerance: Annotated[float, share(has_least=False, has_most=False)] = 0.08
+    length_tolerance: Annotated[float, share(has_minimum=False, has_maximum=False)] = 0.08
     cluster_radius_m: Length = 3.0
 
     def __post_init__(self) -> None:

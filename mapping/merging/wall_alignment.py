@@ -164,7 +164,7 @@ def _best_move(places: Array, facing: Array, gaps: Array, centre_x: float, centr
     return np.linalg.solve(hessian, np.array([bx, by, bt]))
 
 
-@kernel(inline=True)
+@kernel(forceinline=True)
 def gap_to_wall(
     levels: Array, distance: Array, side: float, x: float, y: float, u: float, v: float, steps: int
 ) -> float:

@@ -1,8 +1,8 @@
-"""Paths over a belief for a round body: where it can go, at what cost, and how.
+"""Paths over a belief for a round body: reachable cells, their costs, and the cheapest paths.
 
 A body of radius r may stand in a known free cell whose clearance is at least r, and a path of such cells,
-joined by straight and diagonal steps, keeps that clearance all along. Steps near walls cost more, so that
-paths keep off walls where there is room and still pass where the body just fits.
+joined by straight and diagonal steps, keeps that clearance throughout. Steps near walls cost more, so that
+paths keep off walls if there is space and still pass through gaps that just fit the body.
 """
 
 import math
@@ -14,17 +14,16 @@ from numpy.typing import NDArray
 
 from lidarium.mapping.planning.clearance import ClearanceField
 from lidarium.mapping.planning.footprint import Footprint, passage_of
-from lidarium.mapping.planning.search.path_search import budget_of, find_path, search_at
-from lidarium.mapping.planning.search.search_space import Search, SearchSpace
+from lidarium.mapping.planning.search.path_search import Search, SearchSpace, budget_of, find_path, search_at
 from lidarium.mapping.planning.search.search_state import (
     COLUMN_BITS,
     ROW_SHIFT,
     STRAIGHT,
     Lookout,
+    Targets,
     Task,
     Terrain,
 )
-from lidarium.mapping.planning.search.search_targets import Targets
 
 Cell = tuple[int, int]
 Disc = tuple[float, float, float]
@@ -33,10 +32,7 @@ Disc = tuple[float, float, float]
 def cells_of(
     points: NDArray[np.float64], origin: tuple[float, float], resolution: float
 ) -> NDArray[np.int64]:
-    """Cells (row, column) that hold points (..., 2) given as (x, y) [m].
-
-    Not clipped to any grid.
-    """
+    """Return the cells (row, column) of points (..., 2) given as (x, y) [m], not clipped to any grid."""
     steps = (np.asarray(points, dtype=np.float64) - np.asarray(origin)) / resolution
     cells: NDArray[np.int64] = np.floor(steps[..., ::-1]).astype(np.int64)
     return cells
@@ -45,7 +41,7 @@ def cells_of(
 def centres_of(
     cells: NDArray[np.integer], origin: tuple[float, float], resolution: float
 ) -> NDArray[np.float64]:
-    """Centres (..., 2) as (x, y) [m] of cells (row, column)."""
+    """Return the centres (..., 2) as (x, y) [m] of cells (row, column)."""
     centres: NDArray[np.float64] = (
         np.asarray(cells, dtype=np.float64)[..., ::-1] + 0.5
     ) * resolution + np.asarray(origin)
@@ -54,7 +50,7 @@ def centres_of(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Until:
-    """When a search ends; without any of these, where all is reached.
+    """Conditions that end a search; by default it ends when all reachable cells are reached.
 
     Attributes
     ----------
@@ -63,16 +59,12 @@ class Until:
     targets : Targets, optional
         Stop when ``count`` cells are settled from which a target is in reach and sight.
     count : int
-        How many.
+        Number of such cells.
     beyond : float
-        With the targets found, go on until all costs up to the dearest one's and this above it are final [m].
+        After the targets are found, continue until all costs up to the largest of theirs plus this are final
+        [m]; at least 0.
     maximum_cost : float
         Stop at this cost [m].
-
-    Raises
-    ------
-    ValueError
-        If ``beyond`` is negative.
     """
 
     goal: Cell | None = None
@@ -87,7 +79,7 @@ class Until:
 
 
 ALL_REACHED = Until()
-"""A search ends where all is reached."""
+"""A search without an end condition."""
 
 
 def search(
@@ -100,39 +92,29 @@ def search(
     until: Until = ALL_REACHED,
     blocked: Iterable[Disc] = (),
 ) -> Search:
-    """Spread costs from a cell over all that a body can reach.
+    """Spread costs from a cell over all cells that a body can reach, until an end condition is met.
 
-    Ends early where the target is found.
+    Raises ValueError if shapes differ, the belief is no C-contiguous int8, a cell lies outside the grid, or
+    the footprint needs more clearance than the field's maximum.
 
     Parameters
     ----------
     space : SearchSpace
-        Scratch memory; the search before is forgotten.
+        Scratch memory; the previous search is forgotten.
     log_odds : (rows, columns) int8
         The belief, C-contiguous: < 0 free, 0 unknown, > 0 occupied. Only known free cells are entered.
     clearance : ClearanceField
         Clearance of the same belief.
     start : (row, column)
-        Where the body stands. If it stands too near to a wall or inside a blocked disc, it may leave along
+        Cell of the body. If it is too near to a wall or inside a blocked disc, the body may leave along
         cells that are no nearer; such cells are part of paths but count as not reached.
     footprint : Footprint
         The body.
     until : Until
-        When to end.
+        End conditions.
     blocked : iterable of (row, column, radius)
-        Discs in cells (see :func:`discs_of`), such as teammates with both radii added, that the body's centre
-        may not enter.
-
-    Returns
-    -------
-    Search
-        Costs, paths and targets.
-
-    Raises
-    ------
-    ValueError
-        If shapes differ, the belief is no C-contiguous int8, a cell lies outside the grid, or the footprint
-        needs more clearance than the field knows.
+        Discs in cells (see :func:`discs_of`), such as teammates with both radii added, that the body's
+        centre may not enter.
     """
     _check_search(space, log_odds, clearance, start, until.goal)
     passage = passage_of(footprint, space.resolution, clearance.limit)
@@ -149,7 +131,7 @@ def search(
 
 
 def _task_of(start: Cell, until: Until, resolution: float) -> Task:
-    """Return where a search starts, and when it ends."""
+    """Return the start and the end conditions of a search as kernels take them."""
     budget = int(budget_of(float(until.maximum_cost), resolution))
     further = int(budget_of(float(until.beyond), resolution)) if until.beyond > 0.0 else 0
     goal_row, goal_column = (-1, -1) if until.goal is None else (int(until.goal[0]), int(until.goal[1]))
@@ -158,7 +140,7 @@ def _task_of(start: Cell, until: Until, resolution: float) -> Task:
 
 
 def _lookout_for(targets: Targets | None, hits: NDArray[np.int32]) -> Lookout:
-    """Return the targets of a search, nothing where there are none."""
+    """Return the targets of a search as kernels take them; empty arrays for None."""
     if targets is None:
         return Lookout(_NO_MASK, _NO_MASK, np.zeros(1, np.int64), hits)
     return Lookout(targets.mask, targets.near, targets.spans.copy(), hits)
@@ -183,16 +165,10 @@ def plan(
     maximum_cost: float = math.inf,
     blocked: Iterable[Disc] = (),
 ) -> tuple[float, NDArray[np.int64]] | None:
-    """Return the cheapest path to one cell, by A* with the octile distance.
+    """Return the cheapest path to one cell, by A* with the octile distance (Hart, Nilsson, Raphael 1968).
 
-    Hart, Nilsson and Raphael, IEEE T-SSC 1968.
-
-    Parameters are those of :func:`search` and :class:`Until`; the cost is the same as there.
-
-    Returns
-    -------
-    (float, (N, 2) int64) or None
-        Cost [m] and cells (row, column) from start to goal; None if there is no way.
+    Parameters are those of :func:`search` and :class:`Until`, and so is the cost. Returns the cost [m] and
+    the cells (N, 2) int64 from start to goal, or None if there is no path.
     """
     _check_search(space, log_odds, clearance, start, goal)
     passage = passage_of(footprint, space.resolution, clearance.limit)
@@ -209,10 +185,7 @@ def plan(
 
 
 def discs_of(discs: Iterable[Disc], origin: tuple[float, float], resolution: float) -> list[Disc]:
-    """Return discs (x, y, radius) [m] as (row, column, radius) in cells.
-
-    Counted from the centre of cell (0, 0).
-    """
+    """Return discs (x, y, radius) [m] as (row, column, radius) in cells, from the centre of cell (0, 0)."""
     return [
         ((y - origin[1]) / resolution - 0.5, (x - origin[0]) / resolution - 0.5, radius / resolution)
         for x, y, radius in discs

@@ -57,7 +57,7 @@ class RegistrationSettings:
 
     first_distance_m: Annotated[float, above(0.0, 100.0)] = 1.0
     last_distance_m: Annotated[float, above(0.0, 100.0)] = 0.2
-    kept_share: Annotated[float, share(has_least=False)] = 0.85
+    kept_share: Annotated[float, share(has_minimum=False)] = 0.85
     most_angle: Annotated[float, above(0.0, math.pi / 2.0)] = math.radians(35.0)
     steps: Annotated[int, within(1, 1000)] = 40
     least_pairs: Annotated[int, within(6, 1_000_000)] = 12

@@ -101,7 +101,7 @@ class MapperSettings:
     noise_depth_m: Annotated[float, within(0.0, 100.0)] = 0.10
     range_m: Annotated[float, above(0.0, 1e4)] | None = None
     voxel_m: Annotated[float, within(0.0, 1.0)] = 0.02
-    floor_share: Annotated[float, share(has_least=False, has_most=False)] = 0.3
+    floor_share: Annotated[float, share(has_minimum=False, has_maximum=False)] = 0.3
     merges: bool = True
     slack_m: Annotated[float, within(0.0, 1.0)] = 0.02
     most_boxes: Annotated[int, within(1, 1_000_000)] = 1500

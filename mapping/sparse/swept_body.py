@@ -136,12 +136,12 @@ def _sort_boxes(boxes: Array, origin: Array, cell: float, shape: Array) -> tuple
     return counts, members
 
 
-@kernel(inline=True)
+@kernel(forceinline=True)
 def _clamped(value: float, count: int) -> int:
     return int(min(max(math.floor(value), 0.0), count - 1.0))
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def squared_gap(x1: float, y1: float, x2: float, y2: float, box: Array) -> Any:  # noqa: ANN401
     """Return the squared distance in the plane between a segment and the rectangle of a box [m2]."""
     low_x, low_y, high_x, high_y = box[0], box[1], box[3], box[4]
@@ -174,14 +174,14 @@ def squared_gap(x1: float, y1: float, x2: float, y2: float, box: Array) -> Any: 
     return least
 
 
-@kernel(inline=True)
+@kernel(forceinline=True)
 def _end_gap(x: float, y: float, box: Array) -> Any:  # noqa: ANN401
     gap_x = max(box[0] - x, 0.0, x - box[3])
     gap_y = max(box[1] - y, 0.0, y - box[4])
     return gap_x * gap_x + gap_y * gap_y
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def is_free(index: BoxIndex, a: Array, b: Array, body: Array) -> bool:
     """Whether a body can be driven along a segment.
 
@@ -218,7 +218,7 @@ def is_free(index: BoxIndex, a: Array, b: Array, body: Array) -> bool:
     return True
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def _columns_beside(a: Array, b: Array, radius: float, index: BoxIndex, row: int) -> tuple[int, int]:
     """Return the first and the last column of a row of the grid that a swept disc may touch."""
     cell, origin_x = index.cell[0], index.origin[0]

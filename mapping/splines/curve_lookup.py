@@ -123,7 +123,7 @@ def _is_straight(points: Array, first: int, last: int) -> bool:
     return True
 
 
-@kernel(inline=True)
+@kernel(forceinline=True)
 def piece_distance(pieces: Array, piece: int, x: float, y: float) -> float:
     """Return the distance of a point from a straight piece [m]."""
     dx, dy = x - pieces[piece, 0], y - pieces[piece, 1]
@@ -134,7 +134,7 @@ def piece_distance(pieces: Array, piece: int, x: float, y: float) -> float:
     return math.sqrt(aside * aside + along * along)
 
 
-@kernel(inline=True)
+@kernel(forceinline=True)
 def piece_at(nearest: Array, frame: Array, x: float, y: float) -> int:
     """Return the nearest piece of a place, -1 where there is none."""
     column, row = int((x - frame[0]) * (1.0 / CELL)), int((y - frame[1]) * (1.0 / CELL))

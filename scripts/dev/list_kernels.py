@@ -14,7 +14,7 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-from lidarium.mapping.kernels.first_start.listed_kernels import encode_type
+from lidarium.mapping.kernels.first_start import encode_type
 from lidarium.scripts.process.first_start import LIST, count_compiled
 
 CHILD = "--child"

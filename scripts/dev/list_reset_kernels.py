@@ -14,8 +14,7 @@ import time
 from typing import Any
 
 from lidarium.envs.engine.first_reset import LIST
-from lidarium.mapping.kernels.first_start.listed_kernels import encode_type
-from lidarium.mapping.kernels.first_start.side_by_side import SWITCH
+from lidarium.mapping.kernels.first_start import SWITCH, encode_type
 
 CHILD = "--child"
 LEAST_SHARE = 0.015

@@ -10,7 +10,7 @@ from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 
 from lidarium.evaluation.suites.processes import interrupts_held
-from lidarium.mapping.kernels.first_start.listed_kernels import Entry, compile_kernel
+from lidarium.mapping.kernels.first_start import Entry, compile_kernel
 from lidarium.scripts.common import counted, notify
 
 LIST = Path(__file__).parents[1] / "data" / "kernels_of_run.json"

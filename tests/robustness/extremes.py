@@ -114,7 +114,7 @@ def _all_bounds() -> list[tuple[str, _Bounded | None]]:
 
 def _extreme(row: _Bounded, chance: random.Random) -> Any:
     """Return a value at an end of the bounds, or between them by magnitude."""
-    low, high = row.bounds.least, row.bounds.most
+    low, high = row.bounds.minimum, row.bounds.maximum
     way = chance.random()
     if way < 0.3:
         value = high if chance.random() < 0.7 else high * (1.0 + 1e-9)

@@ -43,7 +43,7 @@ def test_every_number_of_a_localizer_has_bounds_of_its_own(localization):
             if is_dataclass(value):
                 check(value)
             elif rule.kind in (int, float):
-                assert rule.bounds.most < UNBOUNDED, f"{type(settings).__name__}.{name}"
+                assert rule.bounds.maximum < UNBOUNDED, f"{type(settings).__name__}.{name}"
 
     check(localizer_settings(localization, {}))
 

@@ -63,7 +63,7 @@ def refused(kind, name, value):
 @pytest.mark.parametrize(("kind", "name"), settings_of(int, float))
 def test_numbers_are_bounded_and_no_number_is_refused(kind, name):
     rule = rules_of(kind)[name]
-    assert rule.bounds.most < UNBOUNDED
+    assert rule.bounds.maximum < UNBOUNDED
     assert rule.hold(getattr(kind(), name))
     for value in (*ABSURD, *OTHERS, True):
         refused(kind, name, value)

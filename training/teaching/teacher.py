@@ -15,7 +15,7 @@ from lidarium.agents.learned.policy import ChosenTours
 from lidarium.agents.tours.planning import NO_PATH, TourOptions
 from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.evaluation.bounds.view_graph import count
-from lidarium.mapping.planning.touring.team_tours import TourWeights, team_tours, tours_cost
+from lidarium.mapping.planning.touring.tours import TourWeights, team_tours, tours_cost
 from lidarium.training.teaching.known_floor import KnownFloor, known_floor
 
 MOST_STOPS = 16

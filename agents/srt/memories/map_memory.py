@@ -9,10 +9,10 @@ from lidarium.agents.srt.memories.memory import Frontiers, Legs, Place
 from lidarium.agents.srt.tree import Node
 from lidarium.envs.onboard.driving.path_planner import footprint_of
 from lidarium.envs.onboard.navigation import NavigationMap
-from lidarium.mapping.planning.frontier_approach import approach, default_reach
-from lidarium.mapping.planning.frontier_kernels import FRONTIER
+from lidarium.mapping.planning.frontiers.approach import approach, default_reach
+from lidarium.mapping.planning.frontiers.frontier_map import FRONTIER
 from lidarium.mapping.planning.grid_planning import Cell, Until, centres_of, plan, search
-from lidarium.mapping.planning.search.search_targets import Targets
+from lidarium.mapping.planning.search.search_state import Targets
 
 CLEAR_MARGIN = 0.02
 """Straight ways across the map keep the body this far from what is occupied [m]."""

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from lidarium.envs.onboard.navigation import NavigationMap
 from lidarium.mapping.planning.footprint import Footprint
-from lidarium.mapping.planning.frontier_approach import approach
+from lidarium.mapping.planning.frontiers.approach import approach
 from lidarium.mapping.planning.grid_planning import Cell, search
 
 NONE = -1

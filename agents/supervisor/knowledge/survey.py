@@ -18,7 +18,7 @@ from lidarium.mapping.grids.grid_lines import visible
 from lidarium.mapping.grids.occupancy import FREE, OCCUPIED
 from lidarium.mapping.merging.fusion import FusedMap
 from lidarium.mapping.planning.footprint import Footprint
-from lidarium.mapping.planning.frontier_approach import default_reach
+from lidarium.mapping.planning.frontiers.approach import default_reach
 from lidarium.mapping.planning.grid_planning import Cell, Until, cells_of, centres_of, search
 
 _MARGIN = 1

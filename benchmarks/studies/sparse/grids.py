@@ -20,7 +20,7 @@ from lidarium.benchmarks.studies.sparse.survey import Frame
 from lidarium.mapping.planning.clearance import ClearanceField
 from lidarium.mapping.planning.footprint import Footprint
 from lidarium.mapping.planning.grid_planning import cells_of, centres_of, plan
-from lidarium.mapping.planning.search.search_space import SearchSpace
+from lidarium.mapping.planning.search.path_search import SearchSpace
 
 RESOLUTION_M = 0.05
 RANGE_M = 4.0

@@ -10,7 +10,7 @@ from lidarium.envs.simulation.kernels.floor_tables import FloorTables
 from lidarium.mapping.planning.clearance import ClearanceField
 from lidarium.mapping.planning.footprint import Footprint
 from lidarium.mapping.planning.grid_planning import cells_of, centres_of, plan
-from lidarium.mapping.planning.search.search_space import SearchSpace
+from lidarium.mapping.planning.search.path_search import SearchSpace
 
 Place = tuple[float, float]
 

@@ -133,13 +133,13 @@ def no_drives(rows: int) -> Drives:
     )
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def drop_path(drives: Drives, row: int) -> None:
     """Forget a robot's path: it stands (kernel)."""
     drives.has_path[row], drives.states[row], drives.stood[row], drives.counts[row] = False, IDLE, 0, 0
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def drive_state(drives: Drives, row: int) -> int:
     """Return the number of what a robot's driving is about (kernel)."""
     if drives.passing[row] >= 0:
@@ -163,14 +163,14 @@ def drive_states(drives: Drives) -> NDArray[np.int8]:
     return numbers
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def is_done(drives: Drives, row: int) -> bool:
     """Whether a robot with a target waits for its next order (kernel)."""
     is_at_rest = drives.states[row] != DRIVING and drives.states[row] != BLOCKED
     return bool(drives.is_ordered[row] and drives.passing[row] < 0 and is_at_rest)
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def mark_waiting(drives: Drives, first: int, last: int, waiting: Array) -> None:
     """Note in ``waiting`` which rows wait for their next order (kernel).
 
@@ -180,7 +180,7 @@ def mark_waiting(drives: Drives, first: int, last: int, waiting: Array) -> None:
         waiting[row] = is_done(drives, row)
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def any_newly_done(drives: Drives, first: int, last: int, live: Array, waiting: Array) -> bool:
     """Whether a live robot newly waits for its next order (kernel).
 

@@ -113,12 +113,12 @@ class Courses(NamedTuple):
     backing: NDArray[np.int64]
 
 
-@kernel(inline=True, borrowing=True)
+@kernel(forceinline=True, nrt=False)
 def _wrap(angle: float) -> float:
     return angle - 2.0 * math.pi * math.floor((angle + math.pi) / (2.0 * math.pi))
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def follow_paths(sensed: Sensed, courses: Courses, bodies: Bodies, commands: Array) -> None:
     """Give each robot the speed and turn rate that follow its path (kernel).
 
@@ -144,7 +144,7 @@ def follow_paths(sensed: Sensed, courses: Courses, bodies: Bodies, commands: Arr
                 _drive_on(sensed, courses, bodies, robot, commands)
 
 
-@kernel(inline=True, borrowing=True)
+@kernel(forceinline=True, nrt=False)
 def _drive_on(sensed: Sensed, courses: Courses, bodies: Bodies, robot: int, commands: Array) -> None:
     """Turn a robot to the next piece of its path, and drive where it faces it."""
     aim_x, aim_y = _aim(sensed, courses, robot)
@@ -168,14 +168,14 @@ def _drive_on(sensed: Sensed, courses: Courses, bodies: Bodies, robot: int, comm
         courses.states[robot] = DRIVING
 
 
-@kernel(inline=True, borrowing=True)
+@kernel(forceinline=True, nrt=False)
 def _turn_rate(error: float, limits: Array) -> float:
     """Return the turn rate that makes up for a heading error [rad/s]."""
     gain, limit = min(TURN_GAIN, TURN_IN_A_STEP / limits[TIME_STEP]), limits[TURN_LIMIT]
     return float(min(max(gain * error, -limit), limit))
 
 
-@kernel(inline=True, borrowing=True)
+@kernel(forceinline=True, nrt=False)
 def _pass_points(sensed: Sensed, courses: Courses, robot: int) -> None:
     """Let a robot drive to the first point of its path that it has not passed."""
     x, y = sensed.poses[robot, 0], sensed.poses[robot, 1]
@@ -189,21 +189,21 @@ def _pass_points(sensed: Sensed, courses: Courses, robot: int) -> None:
     courses.places[robot] = place
 
 
-@kernel(inline=True, borrowing=True)
+@kernel(forceinline=True, nrt=False)
 def _remaining(sensed: Sensed, courses: Courses, robot: int) -> float:
     """Return the distance to the point that a robot drives to [m]."""
     place, x, y = courses.places[robot], sensed.poses[robot, 0], sensed.poses[robot, 1]
     return math.hypot(courses.paths[robot, place, 0] - x, courses.paths[robot, place, 1] - y)
 
 
-@kernel(inline=True, borrowing=True)
+@kernel(forceinline=True, nrt=False)
 def _is_at_end(sensed: Sensed, courses: Courses, robot: int) -> bool:
     """Whether a robot is where its path ends."""
     is_last = courses.places[robot] == courses.counts[robot] - 1
     return bool(is_last and _remaining(sensed, courses, robot) <= ARRIVAL)
 
 
-@kernel(inline=True, borrowing=True)
+@kernel(forceinline=True, nrt=False)
 def _turn_at_end(sensed: Sensed, courses: Courses, bodies: Bodies, robot: int) -> float:
     """Return the turn rate towards the wanted heading; note where it is reached."""
     wanted = courses.headings[robot]
@@ -215,7 +215,7 @@ def _turn_at_end(sensed: Sensed, courses: Courses, bodies: Bodies, robot: int) -
     return 0.0
 
 
-@kernel(inline=True, borrowing=True)
+@kernel(forceinline=True, nrt=False)
 def _aim(sensed: Sensed, courses: Courses, robot: int) -> tuple[float, float]:
     """Return the point at which a robot aims, on the line of its piece of path [m].
 
@@ -235,7 +235,7 @@ def _aim(sensed: Sensed, courses: Courses, robot: int) -> tuple[float, float]:
     return from_x + along_x * ahead / length, from_y + along_y * ahead / length
 
 
-@kernel(inline=True, borrowing=True)
+@kernel(forceinline=True, nrt=False)
 def _speed_to_next(sensed: Sensed, courses: Courses, limits: Array, robot: int, tolerance: float) -> float:
     """Return the speed that still brakes for the next bend or the end [m/s].
 

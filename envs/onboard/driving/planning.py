@@ -23,7 +23,7 @@ TEAMMATE_DISTANCE = 0.06
 """Paths round teammates keep this gap to them [m]."""
 
 
-@kernel(inline=True)
+@kernel(forceinline=True)
 def passage_in(planning: Planning) -> Passage:
     """Return how a body passes over a map (kernel)."""
     return Passage(

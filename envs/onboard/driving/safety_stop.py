@@ -87,7 +87,7 @@ class Bodies(NamedTuple):
     foresight: NDArray[np.float64]
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def _gap_in_scan(ranges: Array, unit_vectors: Array, radius: float) -> float:
     """How far the disc can go straight ahead before it meets a return [m]."""
     gap = np.inf
@@ -102,7 +102,7 @@ def _gap_in_scan(ranges: Array, unit_vectors: Array, radius: float) -> float:
     return gap
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def _gap_to_teammates(robot: int, poses: Array, velocities: Array, bodies: Bodies, present: Array) -> float:
     """Return how far the disc can go straight to a known teammate [m].
 
@@ -132,7 +132,7 @@ def _gap_to_teammates(robot: int, poses: Array, velocities: Array, bodies: Bodie
     return gap
 
 
-@kernel(inline=True, borrowing=True)
+@kernel(forceinline=True, nrt=False)
 def _hears_any(contact: Array, robot: int) -> bool:
     """Whether a robot heard of any teammate lately."""
     heard = 0
@@ -141,7 +141,7 @@ def _hears_any(contact: Array, robot: int) -> bool:
     return heard > 0
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def _gap_to_heard(robot: int, sensed: Sensed, bodies: Bodies) -> float:
     """Return how far the disc can go straight to a teammate heard of [m].
 
@@ -159,7 +159,7 @@ def _gap_to_heard(robot: int, sensed: Sensed, bodies: Bodies) -> float:
     return gap
 
 
-@kernel(inline=True, borrowing=True)
+@kernel(forceinline=True, nrt=False)
 def safe_speed(sensed: Sensed, bodies: Bodies, robot: int) -> float:
     """Return the speed that still stops before returns and teammates [m/s] (kernel).
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from lidarium.mapping.grids.occupancy import OCCUPIED, UNKNOWN
 from lidarium.mapping.merging.growing_maps import GrowingMap
-from lidarium.mapping.planning.footprint_masks import footprint_mask
+from lidarium.mapping.planning.footprint import footprint_mask
 
 
 def without_own_trail(

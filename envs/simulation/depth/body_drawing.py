@@ -16,7 +16,7 @@ from lidarium.envs.simulation.depth.face_drawing import (
 from lidarium.mapping.kernels.compilation import Array, kernel
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def _box_around(
     centre: Array, radius: float, height: float, axes: Array, eye: Array, view: Array
 ) -> tuple[int, int, int, int]:
@@ -42,7 +42,7 @@ def _box_around(
     )
 
 
-@kernel(inline=True)
+@kernel(forceinline=True)
 def _meets_cylinder(
     x: float, y: float, z: float, ray_x: float, ray_y: float, ray_z: float, radius: float, height: float
 ) -> float:
@@ -68,7 +68,7 @@ def _meets_cylinder(
     return 0.0
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def draw_body(
     centre: Array, radius: float, height: float, axes: Array, eye: Array, view: Array, inverse: Array
 ) -> None:

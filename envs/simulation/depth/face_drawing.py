@@ -15,7 +15,7 @@ from typing import Annotated, NamedTuple
 import numpy as np
 
 from lidarium.mapping.kernels.compilation import Array, kernel
-from lidarium.mapping.kernels.lanes.beam_lanes import PIXEL_LANES, raise_lanes
+from lidarium.mapping.kernels.simd.faces import PIXELS, raise_pixels
 from lidarium.mapping.kernels.views import scratch_grid
 
 FOCAL, CENTRE_COLUMN, CENTRE_ROW, DEPTH_MIN, DEPTH_MAX, COLUMNS, ROWS = range(7)
@@ -74,7 +74,7 @@ def new_span(rows: int) -> Span:
     return Span(np.empty((CORNERS, 3)), np.empty((2, rows)), np.empty((2, rows), np.int64))
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def is_in_view(faces: FaceArrays, face: int, axes: Array, eye: Array, view: Array, sides: Array) -> bool:
     """Whether a face looks at the camera and its sphere touches what the camera sees.
 
@@ -94,7 +94,7 @@ def is_in_view(faces: FaceArrays, face: int, axes: Array, eye: Array, view: Arra
     return True
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def view_sides(axes: Array, view: Array, sides: Array) -> None:
     """Write the inward unit normals of the planes around a view into ``sides`` (4, 3), in the world."""
     left, right = -0.5 - view[CENTRE_COLUMN], view[COLUMNS] - 0.5 - view[CENTRE_COLUMN]
@@ -107,7 +107,7 @@ def view_sides(axes: Array, view: Array, sides: Array) -> None:
         sides[3, k] = (bottom * axes[2, k] - focal * axes[1, k]) / math.hypot(focal, bottom)
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def _rows_of(corners: Array, view: Array) -> tuple[int, int]:
     """Return the first and the last row that a face of corners in the optical frame may cover."""
     low, high = math.inf, -math.inf
@@ -128,7 +128,7 @@ def _rows_of(corners: Array, view: Array) -> tuple[int, int]:
     return int(math.ceil(max(first, 0.0))), int(math.floor(min(last, view[ROWS] - 1.0)))
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def _is_outside(corners: Array, view: Array) -> bool:
     """Whether all corners in the optical frame lie beyond one of the planes around the view."""
     left, right = (
@@ -150,7 +150,7 @@ def _is_outside(corners: Array, view: Array) -> bool:
     return beyond != 0
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def cover(corners: Array, axes: Array, eye: Array, view: Array, span: Span) -> tuple[int, int]:
     """Find the columns that a face covers on each row of an image.
 
@@ -211,7 +211,7 @@ def cover(corners: Array, axes: Array, eye: Array, view: Array, span: Span) -> t
     return first, last
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def inverse_plane(plane: Array, axes: Array, eye: Array, view: Array) -> tuple[float, float, float]:
     """Return the inverse depth of a plane at pixel (0, 0) and its change a column and a row [1/m]."""
     distance = plane[0] * eye[0] + plane[1] * eye[1] + plane[2] * eye[2] - plane[3]
@@ -222,7 +222,7 @@ def inverse_plane(plane: Array, axes: Array, eye: Array, view: Array) -> tuple[f
     return z - x * view[CENTRE_COLUMN] - y * view[CENTRE_ROW], x, y
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def draw_faces(faces: FaceArrays, axes: Array, eye: Array, view: Array, span: Span, inverse: Array) -> None:
     """Draw the faces in view into inverse depths.
 
@@ -235,7 +235,7 @@ def draw_faces(faces: FaceArrays, axes: Array, eye: Array, view: Array, span: Sp
     span : Span
         Scratch.
     inverse : (rows, columns + padding) float32
-        Greatest inverse depths so far; raised [1/m]. Its columns are a multiple of ``PIXEL_LANES``.
+        Greatest inverse depths so far; raised [1/m]. Its columns are a multiple of ``PIXELS``.
     """
     sides = scratch_grid(4, 3, np.float64)
     view_sides(axes, view, sides)
@@ -251,8 +251,8 @@ def draw_faces(faces: FaceArrays, axes: Array, eye: Array, view: Array, span: Sp
             left, right = begins[row], ends[row]
             # Rounded once a block: the inverse depth at a block's first column.
             base, address = start + across * row, pixels + 4 * row * width
-            for column in range(left & -PIXEL_LANES, right + 1, PIXEL_LANES):
-                raise_lanes(
+            for column in range(left & -PIXELS, right + 1, PIXELS):
+                raise_pixels(
                     address + 4 * column,
                     np.float32(base + along * column),
                     slope,

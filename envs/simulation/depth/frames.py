@@ -21,7 +21,7 @@ from lidarium.envs.simulation.depth.face_drawing import (
 from lidarium.envs.simulation.disturbances.noise import GAUSSIAN_TABLE, gaussian_at, mix, stream_key
 from lidarium.envs.simulation.disturbances.odometry import HEIGHT, RADIUS
 from lidarium.mapping.kernels.compilation import Array, kernel
-from lidarium.mapping.kernels.lanes.beam_lanes import PIXEL_LANES
+from lidarium.mapping.kernels.simd.faces import PIXELS
 from lidarium.mapping.kernels.views import grid_at, scratch_grid, vector_at
 
 DEPTH_STREAM = 0x64657074
@@ -84,7 +84,7 @@ def view_numbers(camera: DepthCamera) -> NDArray[np.float64]:
     )
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def rotate(roll: float, pitch: float, yaw: float, rotation: Array) -> None:
     """Write the rotation by roll, pitch and yaw about x, y and z, in this order, into (3, 3)."""
     cr, sr, cp, sp = math.cos(roll), math.sin(roll), math.cos(pitch), math.sin(pitch)
@@ -94,7 +94,7 @@ def rotate(roll: float, pitch: float, yaw: float, rotation: Array) -> None:
     rotation[2, 0], rotation[2, 1], rotation[2, 2] = -sp, cp * sr, cp * cr
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def place_camera(pose: Array, attitude: Array, mount: Array, axes: Array, eye: Array) -> None:
     """Write the optical axes (right, down, ahead) and the optical centre of a robot's camera.
 
@@ -117,7 +117,7 @@ def place_camera(pose: Array, attitude: Array, mount: Array, axes: Array, eye: A
     eye[2] += attitude[0]
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def _measure_depth(inverse: Array, view: Array, depth: Array) -> None:
     """Write depths of inverse depths; 0 for what is out of range."""
     nearest, farthest = np.float32(1.0 / max(view[DEPTH_MIN], 1e-9)), np.float32(1.0 / view[DEPTH_MAX])
@@ -129,7 +129,7 @@ def _measure_depth(inverse: Array, view: Array, depth: Array) -> None:
             depth[row, column] = one / value if is_measured else nothing
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def _disturb_depth(cameras: Cameras, key: np.uint32, depth: Array) -> None:
     """Add noise to depths and round their inverses."""
     noise, low, high = cameras.noise, cameras.pinhole[DEPTH_MIN], cameras.pinhole[DEPTH_MAX]
@@ -171,9 +171,7 @@ def _take_frame(cameras: Cameras, row: int, robots: int, depth: Array) -> None:
     episode, first = row // robots, row // robots * robots
     axes, eye = np.empty((3, 3)), np.empty(3)
     place_camera(cameras.poses[row], cameras.attitudes[row], cameras.mount, axes, eye)
-    inverse = np.empty(
-        (depth.shape[0], (depth.shape[1] + PIXEL_LANES - 1) // PIXEL_LANES * PIXEL_LANES), np.float32
-    )
+    inverse = np.empty((depth.shape[0], (depth.shape[1] + PIXELS - 1) // PIXELS * PIXELS), np.float32)
     draw_view(_faces_at(cameras.face_rows[episode]), axes, eye, cameras.pinhole, inverse)
     centre = np.empty(3)
     for other in range(first, first + robots):

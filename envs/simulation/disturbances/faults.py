@@ -129,12 +129,12 @@ def _needs(
     return float(x), float(y), float(generator.uniform(-math.pi, math.pi))
 
 
-@kernel(inline=True, borrowing=True)
+@kernel(forceinline=True, nrt=False)
 def _is_active(faults: Array, k: int, kind: int, step: int) -> bool:
     return bool(faults[k + KIND] == kind and faults[k + FIRST_STEP] <= step < faults[k + END_STEP])
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def has_fault(faults: Array, kind: int, step: int) -> bool:
     """Whether a robot with ``faults`` (capacity * 6,) has one of a kind in a step."""
     for k in range(0, faults.shape[0], FAULT_NUMBERS):  # noqa: SIM110
@@ -143,7 +143,7 @@ def has_fault(faults: Array, kind: int, step: int) -> bool:
     return False
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def stick_wheels(faults: Array, step: int, wheel_base: float, command: Array) -> None:
     """Reduce a robot's speed and turn rate (2,) where a wheel does not turn.
 
@@ -157,7 +157,7 @@ def stick_wheels(faults: Array, step: int, wheel_base: float, command: Array) ->
             command[1] = (-turning if faults[k + WHEEL] != 0.0 else turning) / wheel_base
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def kidnap(faults: Array, step: int, robot: int, bodies: Array, poses: Array) -> bool:
     """Put a robot elsewhere if it is time to and the place is free.
 
@@ -179,7 +179,7 @@ def kidnap(faults: Array, step: int, robot: int, bodies: Array, poses: Array) ->
     return False
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def blind_beams(
     faults: Array, step: int, angle_first: float, increment: float, ranges: Array, lengths: Array
 ) -> None:

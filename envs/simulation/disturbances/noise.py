@@ -23,7 +23,7 @@ def _half_variance_table() -> NDArray[np.float32]:
 GAUSSIAN_TABLE = _half_variance_table()
 
 
-@kernel(inline=True)
+@kernel(forceinline=True)
 def mix(value: np.uint32) -> np.uint32:
     """Scramble 32 bits (finaliser of MurmurHash3, by A. Appleby, public domain)."""
     value = np.uint32(value)
@@ -35,7 +35,7 @@ def mix(value: np.uint32) -> np.uint32:
     return value
 
 
-@kernel(inline=True)
+@kernel(forceinline=True)
 def stream_key(seed: int, robot: int, step: int) -> np.uint32:
     """Key of one robot's draws in one step, from a 64-bit seed."""
     low = np.uint32(seed & np.uint64(0xFFFFFFFF))
@@ -46,14 +46,14 @@ def stream_key(seed: int, robot: int, step: int) -> np.uint32:
     return np.uint32(mix(key ^ np.uint32(step & 0xFFFFFFFF)))  # a step may be -1
 
 
-@kernel(inline=True, borrowing=True)
+@kernel(forceinline=True, nrt=False)
 def gaussian_at(key: np.uint32, table: Array, k: int) -> np.float32:
     """Draw number ``k`` of the stream ``key``, a standard Gaussian."""
     bits = mix(np.uint32(key + np.uint32(np.uint32(k) * np.uint32(0x9E3779B9))))
     return np.float32(table[bits & np.uint32(4095)] + table[(bits >> np.uint32(12)) & np.uint32(4095)])
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def fill_gaussian(key: np.uint32, table: Array, values: Array) -> None:
     """Fill ``values`` (count,) float32 with standard Gaussian draws.
 

@@ -42,7 +42,7 @@ They are its biases, the false travel of its wheels [m], and the ticks read from
 WHEEL_NUMBERS = 7
 
 
-@kernel(inline=True)
+@kernel(forceinline=True)
 def within_half_turns(angle: float) -> float:
     """Return an angle in (-pi, pi] (kernel)."""
     return angle - 2.0 * math.pi * math.ceil((angle - math.pi) / (2.0 * math.pi))
@@ -61,7 +61,7 @@ def begin_wheels(settings: OdometrySettings, robots: int, seed: int) -> NDArray[
     return wheels
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def disturb_commands(numbers: Array, noise_table: Array, seed: np.uint64, step: int, commands: Array) -> None:
     """Disturb a team's speeds and turn rates (robots, 2) as its drives do."""
     for robot in range(commands.shape[0]):
@@ -88,7 +88,7 @@ class Encoders(NamedTuple):
     odometry: Array
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def read_encoders(
     numbers: Array,
     noise_table: Array,

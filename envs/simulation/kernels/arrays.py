@@ -172,7 +172,7 @@ class WorldArrays(NamedTuple):
     heard: Annotated[Array, np.float64, 2]
 
 
-@kernel(spliced=True)
+@kernel(inline="always")
 def world_at(table: Array) -> WorldArrays:
     """View the arrays of a table inside a kernel."""
     return arrays_at(table, WorldArrays)  # type: ignore[no-any-return]

@@ -97,14 +97,14 @@ def distance_bound(solid: NDArray[np.uint8]) -> NDArray[np.uint8]:
     return np.asarray(np.clip(np.floor(centres - math.sqrt(2.0) - 1e-4), 0, 255), np.uint8)
 
 
-@kernel(inline=True)
+@kernel(forceinline=True)
 def wrapped(angle: float) -> float:
     """Return an angle in (-pi, pi]."""
     turned = angle - 2.0 * math.pi * math.floor((angle + math.pi) / (2.0 * math.pi))
     return math.pi if turned <= -math.pi else turned
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def deepest_wall(solid: Array, x: float, y: float, radius: float) -> tuple[float, float, float]:
     """Find the solid cell that a disc enters deepest; positions and radius in cells.
 
@@ -146,7 +146,7 @@ def deepest_wall(solid: Array, x: float, y: float, radius: float) -> tuple[float
     return depth, normal_x, normal_y
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def _deepest_robot(team: TeamBodies, robot: int, x: float, y: float) -> tuple[float, float, float]:
     """Find the robot that the disc of ``robot`` at x, y [m] enters deepest."""
     poses, bodies = team.poses, team.bodies
@@ -166,7 +166,7 @@ def _deepest_robot(team: TeamBodies, robot: int, x: float, y: float) -> tuple[fl
     return depth, normal_x, normal_y
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def is_free_of_contact(
     grids: BodyGrids, team: TeamBodies, robot: int, x: float, y: float, margin: float
 ) -> bool:
@@ -186,7 +186,7 @@ def is_free_of_contact(
     return True
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def push_out(
     grids: BodyGrids, team: TeamBodies, robot: int, x: float, y: float, heading: float
 ) -> tuple[float, float, bool, bool]:

@@ -14,7 +14,7 @@ import numpy as np
 from lidarium.envs.simulation.kernels.ray_tables import TILE
 from lidarium.mapping.grids.scan_geometry import Beams, fast_angle
 from lidarium.mapping.kernels.compilation import Array, kernel
-from lidarium.mapping.kernels.lanes.beam_lanes import FLOAT, LANES, lower_lanes
+from lidarium.mapping.kernels.simd.faces import BEAMS, FLOAT, lower_ranges
 from lidarium.mapping.kernels.views import scratch_grid, vector_at
 
 CORNER_OVERLAP = 1e-9
@@ -59,7 +59,7 @@ class BeamRows(NamedTuple):
     ranges: int
 
 
-@kernel(inline=True, borrowing=True)
+@kernel(forceinline=True, nrt=False)
 def _draw_face(
     first: int, last: int, rows: BeamRows, distance: float, run: float, low: float, high: float
 ) -> None:
@@ -71,7 +71,7 @@ def _draw_face(
     if first > last:
         return
     beams = rows.beams
-    if beams < LANES:
+    if beams < BEAMS:
         inverses = vector_at(rows.inverses, beams, np.float64)
         directions = vector_at(rows.directions, beams, np.float64)
         nearest = vector_at(rows.ranges, beams, np.float64)
@@ -81,13 +81,13 @@ def _draw_face(
             if low <= along <= high and 0.0 < candidate < nearest[k]:
                 nearest[k] = candidate
         return
-    for beam in range(first, last + 1, LANES):
-        offset = FLOAT * min(beam, beams - LANES)
+    for beam in range(first, last + 1, BEAMS):
+        offset = FLOAT * min(beam, beams - BEAMS)
         inverse, direction, ranges = rows.inverses + offset, rows.directions + offset, rows.ranges + offset
-        lower_lanes(inverse, direction, ranges, distance, run, low, high)
+        lower_ranges(inverse, direction, ranges, distance, run, low, high)
 
 
-@kernel(inline=True, borrowing=True)
+@kernel(forceinline=True, nrt=False)
 def _list_faces(
     table: FaceTable, window: tuple[int, int, int, int], direction: int, beams: Beams, listed: Array
 ) -> int:
@@ -118,7 +118,7 @@ def _list_faces(
     return int(count)
 
 
-@kernel(inline=True, borrowing=True)
+@kernel(forceinline=True, nrt=False)
 def _find_spans(listed: Array, count: int, direction: int, beams: Beams, spans: Array) -> None:
     """Find the beams that may meet each of the listed faces.
 
@@ -151,7 +151,7 @@ def _find_spans(listed: Array, count: int, direction: int, beams: Beams, spans: 
         goes_on[k] = min(int(end - turn) + 2, last_beam) if end + 3.0 >= turn else -1
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def cast_by_faces(table: FaceTable, window: tuple[int, int, int, int], beams: Beams, ranges: Array) -> None:
     """Fill ``ranges`` [cells] from the faces of the tiles in ``window``.
 

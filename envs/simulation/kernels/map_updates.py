@@ -32,13 +32,12 @@ from lidarium.envs.simulation.kernels.arrays import (
 )
 from lidarium.envs.simulation.kernels.masks import score_area, window_corner
 from lidarium.envs.simulation.kernels.scanning import ScanScratch, is_noisy, sense
-from lidarium.mapping.grids.noisy_returns import settle_returns
 from lidarium.mapping.grids.pooled_maps import touched_words
 from lidarium.mapping.grids.scan_geometry import beam_directions, beams_towards
-from lidarium.mapping.grids.scan_integration import SeenScan, integrate_scan
+from lidarium.mapping.grids.scan_integration import SeenScan, integrate_scan, settle_returns
 from lidarium.mapping.grids.scan_polygon import fill_scan_polygon, scan_ends
 from lidarium.mapping.kernels.compilation import Array, kernel
-from lidarium.mapping.kernels.views import int8_grid_at, scratch_vector, word_grid_at
+from lidarium.mapping.kernels.views import grid_at, scratch_vector
 
 TEAMMATE_MARGIN = 1.5
 """Distance within which a beam's end counts as a teammate's body [map cells].
@@ -47,7 +46,7 @@ It is measured to the body of the teammate.
 """
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def _filter_teammates(
     world: WorldArrays, row: int, first: int, robots: int, x: float, y: float, ends: Array, is_hit: Array
 ) -> None:
@@ -103,7 +102,7 @@ def invalidate_teammates(world: WorldArrays, row: int, first: int, robots: int, 
             ranges[beam] = np.float32(np.nan)
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def update_map(
     world: WorldArrays,
     row: int,
@@ -132,7 +131,7 @@ def update_map(
     is_hit = scratch_vector(beams, np.bool_)
     for beam in range(beams):
         is_hit[beam] = ranges[beam] <= sensor[RANGE_MAX]
-    log_odds = int8_grid_at(belief[MAP], belief[MAP_ROWS], belief[MAP_COLUMNS])
+    log_odds = grid_at(belief[MAP], belief[MAP_ROWS], belief[MAP_COLUMNS], np.int8)
     row_offset, column_offset = window_corner(x, y, reach)
     local_x, local_y = x - column_offset, y - row_offset
     if not is_filled:
@@ -156,7 +155,7 @@ def update_map(
         )
     if world.flags[row] & (KNOWN_TEAMMATES | SOME_TEAMMATES):
         _filter_teammates(world, row, first, robots, local_x, local_y, ends, is_hit)
-    touched = word_grid_at(belief[TOUCHED], belief[TOUCHED_ROWS], touched_words(belief[MAP_COLUMNS]))
+    touched = grid_at(belief[TOUCHED], belief[TOUCHED_ROWS], touched_words(belief[MAP_COLUMNS]), np.uint64)
     seen = SeenScan(bits, scratch.windows[1], box, ends, is_hit, row_offset, column_offset)
     integrate_scan(log_odds, seen, world.increments, touched)
     # A hit may lie one cell beyond the seen area.
@@ -167,7 +166,7 @@ def update_map(
     window[3] = min(max(window[3], 64 * box[3] + column_offset + 1), belief[MAP_COLUMNS])
 
 
-@kernel(spliced=True)
+@kernel(inline="always")
 def perceive_robot(world: WorldArrays, row: int, first: int, robots: int, scratch: ScanScratch) -> None:
     """Run stage two alone: update one robot's map from its ranges.
 
@@ -178,7 +177,7 @@ def perceive_robot(world: WorldArrays, row: int, first: int, robots: int, scratc
     update_map(world, row, first, robots, scratch, (0, 0, 0, 0), False)
 
 
-@kernel(spliced=True)
+@kernel(inline="always")
 def sense_and_perceive(
     world: WorldArrays, row: int, first: int, robots: int, perceives: bool, scratch: ScanScratch
 ) -> None:

@@ -22,10 +22,10 @@ from lidarium.envs.simulation.kernels.scanning import ScanScratch, is_noisy, mea
 from lidarium.mapping.grids.scan_geometry import beam_directions
 from lidarium.mapping.grids.scan_polygon import fill_scan_polygon, scan_ends
 from lidarium.mapping.kernels.compilation import Array, kernel
-from lidarium.mapping.kernels.views import word_grid_at
+from lidarium.mapping.kernels.views import grid_at
 
 
-@kernel(spliced=True)
+@kernel(inline="always")
 def score_robot(world: WorldArrays, row: int, first: int, robots: int, scratch: ScanScratch) -> None:
     """Add what a robot's true ranges see to its mask."""
     scratch.windows[:] = np.uint64(0)
@@ -34,7 +34,7 @@ def score_robot(world: WorldArrays, row: int, first: int, robots: int, scratch: 
     score_area(world, row, first, robots, scratch)
 
 
-@kernel(inline=True, borrowing=True)
+@kernel(forceinline=True, nrt=False)
 def true_lengths(ranges: Array, sensor: Array, lengths: Array) -> None:
     """Fill the lengths of beams [map cells] from true ranges [m]; 0 for invalid ones."""
     scale = 1.0 / sensor[MAP_RESOLUTION]
@@ -43,7 +43,7 @@ def true_lengths(ranges: Array, sensor: Array, lengths: Array) -> None:
         lengths[beam] = min(value, sensor[RANGE_MAX]) * scale if value == value else 0.0
 
 
-@kernel(spliced=True)
+@kernel(inline="always")
 def window_corner(x: float, y: float, reach: float) -> tuple[int, int]:
     """Return the row and column of the map at which a scan's window begins [cells].
 
@@ -53,7 +53,7 @@ def window_corner(x: float, y: float, reach: float) -> tuple[int, int]:
     return int(math.floor(y)) - margin, ((int(math.floor(x)) - margin) >> 6) << 6
 
 
-@kernel(inline=True, borrowing=True)
+@kernel(forceinline=True, nrt=False)
 def _seen_area(
     world: WorldArrays,
     row: int,
@@ -80,7 +80,7 @@ def _seen_area(
     return box, row_offset, column_offset >> 6
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def score_area(
     world: WorldArrays, row: int, first: int, robots: int, scratch: ScanScratch
 ) -> tuple[int, int, int, int]:
@@ -95,8 +95,8 @@ def score_area(
     )
     masks = world.mask_rows[row]
     own, counted = (
-        word_grid_at(masks[OWN_MASK], masks[MASK_ROWS], masks[MASK_WORDS]),
-        word_grid_at(masks[COUNTED_MASK], masks[MASK_ROWS], masks[MASK_WORDS]),
+        grid_at(masks[OWN_MASK], masks[MASK_ROWS], masks[MASK_WORDS], np.uint64),
+        grid_at(masks[COUNTED_MASK], masks[MASK_ROWS], masks[MASK_WORDS], np.uint64),
     )
     world.seen[row] += mark_seen(own, counted, bits, box, row_offset, word_offset, world.boxes[row])
     return box

@@ -7,6 +7,8 @@ ever ends a step inside a solid cell or another robot.
 
 import math
 
+import numpy as np
+
 from lidarium.envs.simulation.disturbances.odometry import (
     MAX_ACCELERATION,
     MAX_SPEED,
@@ -29,24 +31,24 @@ from lidarium.envs.simulation.kernels.contact import (
     wrapped,
 )
 from lidarium.mapping.kernels.compilation import Array, kernel
-from lidarium.mapping.kernels.views import uint8_grid_at
+from lidarium.mapping.kernels.views import grid_at
 
 PIECE = 0.25
 """Longest piece of an arc near contact [cells]."""
 
 
-@kernel(spliced=True)
+@kernel(inline="always")
 def body_grids(floor_row: Array, frame: Array) -> BodyGrids:
     """View the grids of a floor, one of ``floor_rows``, at the height of the bodies."""
     rows, columns = floor_row[FLOOR_ROWS], floor_row[FLOOR_COLUMNS]
     return BodyGrids(
-        uint8_grid_at(floor_row[BOUND], rows, columns),
-        uint8_grid_at(floor_row[BODY_SOLID], rows, columns),
+        grid_at(floor_row[BOUND], rows, columns, np.uint8),
+        grid_at(floor_row[BODY_SOLID], rows, columns, np.uint8),
         frame,
     )
 
 
-@kernel(spliced=True)
+@kernel(inline="always")
 def team_of(world: WorldArrays, first: int, last: int) -> TeamBodies:
     """View the bodies of the robots of one episode, rows ``first`` to ``last``."""
     return TeamBodies(
@@ -61,7 +63,7 @@ def team_of(world: WorldArrays, first: int, last: int) -> TeamBodies:
     )
 
 
-@kernel(inline=True)
+@kernel(forceinline=True)
 def _along_arc(
     x: float, y: float, heading: float, speed: float, turn_rate: float, duration: float
 ) -> tuple[float, float, float]:
@@ -83,7 +85,7 @@ def _along_arc(
     )
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def move_robots(grids: BodyGrids, team: TeamBodies, commands: Array, duration: float) -> None:
     """Drive the robots of one episode for one step, in their order.
 

@@ -29,7 +29,7 @@ from lidarium.envs.simulation.kernels.ray_tables import TILE
 from lidarium.envs.simulation.kernels.ray_travel import cast_by_squares
 from lidarium.mapping.grids.scan_geometry import Beams, beam_directions, beams_towards
 from lidarium.mapping.kernels.compilation import Array, kernel
-from lidarium.mapping.kernels.views import bytes_at, int32_table_at
+from lidarium.mapping.kernels.views import grid_at, vector_at
 
 FACES, FACES_PER_BEAM = 300, 1.4
 """Most faces in reach for which the face caster runs, alone and for each beam.
@@ -39,7 +39,7 @@ time at about 550 faces with 180 beams and at 1,300 with 720, over drawn, genera
 the same ranges. """
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def cast_scan(tables: Array, beams: Beams, ranges: Array) -> None:
     """Fill ``ranges`` with the distances to the first solid cell along each beam.
 
@@ -54,7 +54,7 @@ def cast_scan(tables: Array, beams: Beams, ranges: Array) -> None:
     """
     x, y, reach = beams.x, beams.y, beams.reach
     rows, columns, tile_columns = tables[FLOOR_ROWS], tables[FLOOR_COLUMNS], tables[TILE_COLUMNS]
-    starts = int32_table_at(tables[FACE_STARTS], 1, tables[FACE_START_COUNT])[0]
+    starts = grid_at(tables[FACE_STARTS], 1, tables[FACE_START_COUNT], np.int32)[0]
     window = (
         max(int(y - reach) // TILE, 0),
         min(int(y + reach), rows - 1) // TILE,
@@ -67,14 +67,14 @@ def cast_scan(tables: Array, beams: Beams, ranges: Array) -> None:
         last = (tile_row * tile_columns + window[3]) * 4 + 4
         in_reach += starts[last] - starts[first]
     if in_reach <= FACES + FACES_PER_BEAM * ranges.shape[0]:
-        faces = int32_table_at(tables[FACE_TABLE], tables[FACE_COUNT], 3)
+        faces = grid_at(tables[FACE_TABLE], tables[FACE_COUNT], 3, np.int32)
         cast_by_faces(FaceTable(faces, starts, tile_columns), window, beams, ranges)
     else:
-        squares = bytes_at(tables[SQUARES], 4 * rows * columns)
+        squares = vector_at(tables[SQUARES], 4 * rows * columns, np.uint8)
         cast_by_squares(squares, rows, columns, beams, ranges)
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def cut_by_disc(beams: Beams, disc_x: float, disc_y: float, disc_radius: float, ranges: Array) -> None:
     """Shorten the beams that meet a disc (another robot).
 

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.mapping.kernels.compilation import Array, kernel
-from lidarium.mapping.kernels.lanes.ray_groups import BEHIND
+from lidarium.mapping.kernels.simd.rays import BEHIND
 
 TILE = 128
 """Side of the square tiles that group the faces [cells]."""

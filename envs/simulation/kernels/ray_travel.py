@@ -8,8 +8,8 @@ import numpy as np
 
 from lidarium.mapping.grids.scan_geometry import Beams
 from lidarium.mapping.kernels.compilation import Array, kernel
-from lidarium.mapping.kernels.lanes.ray_groups import FLOAT, GROUP, HAS_GATHERS, RAYS
-from lidarium.mapping.kernels.lanes.ray_lanes import travel_bundles, travel_rays
+from lidarium.mapping.kernels.llvm import HAS_GATHERS
+from lidarium.mapping.kernels.simd.rays import FLOAT, GROUP, RAYS, travel_bundles, travel_rays
 from lidarium.mapping.kernels.views import scratch_grid, scratch_vector
 
 BUNDLE = GROUP
@@ -22,13 +22,13 @@ MOST_PLACES = 2**31
 """Squares of a table that numbers of 32 bits count."""
 
 
-@kernel(inline=True, borrowing=True)
+@kernel(forceinline=True, nrt=False)
 def _quadrant(directions: Array, beam: int) -> int:
     """Return the quadrant of a beam's direction: 1 for leftwards plus 2 for downwards."""
     return (1 if directions[0, beam] < 0.0 else 0) + (2 if directions[1, beam] < 0.0 else 0)
 
 
-@kernel(inline=True, borrowing=True)
+@kernel(forceinline=True, nrt=False)
 def _travel(squares: Array, offset: int, columns: int, beams: Beams, beam: int, distance: float) -> float:
     """Return the distance at which one beam enters a solid cell [cells].
 
@@ -72,7 +72,7 @@ def _travel(squares: Array, offset: int, columns: int, beams: Beams, beam: int, 
             row += step_y * side
 
 
-@kernel(inline=True, borrowing=True)
+@kernel(forceinline=True, nrt=False)
 def _travel_together(squares: Array, offset: int, columns: int, beams: Beams, first: int, last: int) -> float:
     """Return the distance up to which beams run through squares that hold them all.
 
@@ -110,7 +110,7 @@ def _travel_together(squares: Array, offset: int, columns: int, beams: Beams, fi
             return distance
 
 
-@kernel(inline=True, borrowing=True)
+@kernel(forceinline=True, nrt=False)
 def _is_bundle(directions: Array, first: int, last: int) -> bool:
     """Whether the beams from the first to the last are of one quadrant."""
     quadrant = _quadrant(directions, first)
@@ -119,7 +119,7 @@ def _is_bundle(directions: Array, first: int, last: int) -> bool:
     return is_one
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def cast_one_by_one(squares: Array, rows: int, columns: int, beams: Beams, ranges: Array) -> None:
     """Fill ``ranges`` as ``cast_by_squares`` does, beam by beam."""
     plane, directions = rows * columns, beams.directions
@@ -137,7 +137,7 @@ def cast_one_by_one(squares: Array, rows: int, columns: int, beams: Beams, range
                 ranges[beam] = _travel(squares, offset, columns, beams, beam, together)
 
 
-@kernel(inline=True, borrowing=True)
+@kernel(forceinline=True, nrt=False)
 def _list_bundles(beams: Beams, count: int, listed: Array) -> None:
     """List what ``travel_bundles`` takes of each bundle of a scan of so many beams.
 
@@ -160,7 +160,7 @@ def _list_bundles(beams: Beams, count: int, listed: Array) -> None:
                 listed[row, bundle] = 0.0
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def cast_in_lanes(squares: Array, rows: int, columns: int, beams: Beams, ranges: Array) -> None:
     """Fill ``ranges`` as ``cast_by_squares`` does, 32 beams at once: at least so many."""
     count, table, shape = ranges.shape[0], squares.ctypes.data, (rows * columns, columns)
@@ -191,7 +191,7 @@ def cast_in_lanes(squares: Array, rows: int, columns: int, beams: Beams, ranges:
         ranges[beam] = ends[beam - whole]
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def cast_by_squares(squares: Array, rows: int, columns: int, beams: Beams, ranges: Array) -> None:
     """Fill ``ranges`` [cells] with the distance to the first solid cell, or the reach."""
     if HAS_GATHERS and ranges.shape[0] >= RAYS and squares.shape[0] < MOST_PLACES:

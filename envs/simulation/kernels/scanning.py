@@ -58,7 +58,7 @@ class ScanScratch(NamedTuple):
     windows: Array
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def measure(
     world: WorldArrays, row: int, first: int, robots: int, directions: Array, ranges: Array, lengths: Array
 ) -> None:
@@ -97,7 +97,7 @@ def measure(
     blind_beams(world.faults[row], world.steps[episode], angle_first, increment, ranges, lengths)
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def _add_noise(world: WorldArrays, row: int, first: int, robots: int) -> None:
     """Disturb a scan as the sensor does."""
     sensor, ranges = world.sensor, world.ranges[row]
@@ -114,7 +114,7 @@ def _add_noise(world: WorldArrays, row: int, first: int, robots: int) -> None:
         ranges[beam] = min(max(noisy, low), high) if true_range < np.float32(np.inf) else true_range
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def sense(world: WorldArrays, row: int, first: int, robots: int, directions: Array, lengths: Array) -> None:
     """Take the scan of one robot: measured ranges, and ``lengths`` of true beams [cells].
 
@@ -125,7 +125,7 @@ def sense(world: WorldArrays, row: int, first: int, robots: int, directions: Arr
         _add_noise(world, row, first, robots)
 
 
-@kernel(spliced=True)
+@kernel(inline="always")
 def sense_robot(world: WorldArrays, row: int, first: int, robots: int, scratch: ScanScratch) -> None:
     """Take the scan of one robot, and keep its true ranges."""
     measure(world, row, first, robots, scratch.directions, world.true_ranges[row], scratch.lengths)
@@ -134,7 +134,7 @@ def sense_robot(world: WorldArrays, row: int, first: int, robots: int, scratch: 
         _add_noise(world, row, first, robots)
 
 
-@kernel(spliced=True)
+@kernel(inline="always")
 def disturb_robot(world: WorldArrays, row: int, first: int, robots: int, scratch: ScanScratch) -> None:
     """Disturb true ranges of one robot that are not of ``measure`` as the sensor does."""
     sensor, faults = world.sensor, world.faults[row]
@@ -145,13 +145,13 @@ def disturb_robot(world: WorldArrays, row: int, first: int, robots: int, scratch
         _add_noise(world, row, first, robots)
 
 
-@kernel(spliced=True)
+@kernel(inline="always")
 def is_noisy(sensor: Array) -> bool:
     """Whether ranges carry noise."""
     return bool(sensor[NOISE_FLOOR] > 0.0 or sensor[NOISE_SHARE] > 0.0)
 
 
-@kernel(spliced=True)
+@kernel(inline="always")
 def scan_scratch(world: WorldArrays) -> ScanScratch:
     """Return scratch arrays for the scans of a world.
 

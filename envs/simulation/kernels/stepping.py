@@ -8,6 +8,7 @@ forms run the same functions and agree to the bit.
 import math
 
 import numba
+import numpy as np
 
 from lidarium.envs.simulation.coverage import share_new_cells
 from lidarium.envs.simulation.disturbances.faults import DEAD_ROBOT, has_fault, kidnap, stick_wheels
@@ -44,10 +45,10 @@ from lidarium.envs.simulation.kernels.motion import body_grids, move_robots, tea
 from lidarium.envs.simulation.kernels.scanning import disturb_robot, scan_scratch, sense_robot
 from lidarium.envs.simulation.rewards import add_rewards
 from lidarium.mapping.kernels.compilation import Array, kernel
-from lidarium.mapping.kernels.views import word_grid_at
+from lidarium.mapping.kernels.views import grid_at
 
 
-@kernel(spliced=True)
+@kernel(inline="always")
 def _believe_truth(pose: Array, start: Array, is_relative: bool, believed: Array) -> None:
     """Localize perfectly: in the floor's axes, or in the frame of the start."""
     if not is_relative:
@@ -59,7 +60,7 @@ def _believe_truth(pose: Array, start: Array, is_relative: bool, believed: Array
     believed[2] = within_half_turns(pose[2] - start[2])
 
 
-@kernel(spliced=True)
+@kernel(inline="always")
 def _believe_odometry(odometry: Array, start: Array, is_relative: bool, believed: Array) -> None:
     """Localize by dead reckoning from the start.
 
@@ -74,7 +75,7 @@ def _believe_odometry(odometry: Array, start: Array, is_relative: bool, believed
     believed[2] = within_half_turns(odometry[2] + start[2])
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def _drive(world: WorldArrays, episode: int, robots: int, commands: Array) -> None:
     """Apply faults and write what the drives make of ``commands`` (rows, 2).
 
@@ -97,7 +98,7 @@ def _drive(world: WorldArrays, episode: int, robots: int, commands: Array) -> No
             world.velocities[row, 0] = world.velocities[row, 1] = 0.0
 
 
-@kernel(spliced=True)
+@kernel(inline="always")
 def _encode(world: WorldArrays, episode: int, robots: int, velocities: Array) -> None:
     """Read the encoders of an episode, whose wheels drove at ``velocities`` (rows, 2)."""
     first = episode * robots
@@ -113,7 +114,7 @@ def _encode(world: WorldArrays, episode: int, robots: int, velocities: Array) ->
         )
 
 
-@kernel(spliced=True)
+@kernel(inline="always")
 def _move(world: WorldArrays, episode: int, robots: int, commands: Array, moves_bodies: bool) -> None:
     """Move the bodies of an episode by ``commands`` (rows, 2), and read their encoders."""
     first, last = episode * robots, (episode + 1) * robots
@@ -128,7 +129,7 @@ def _move(world: WorldArrays, episode: int, robots: int, commands: Array, moves_
         _encode(world, episode, robots, world.velocities)
 
 
-@kernel(spliced=True)
+@kernel(inline="always")
 def _localize(world: WorldArrays, episode: int, robots: int) -> None:
     """Localize the robots whose localizer is in the kernels, and forget what was new in the step before."""
     for row in range(episode * robots, (episode + 1) * robots):
@@ -140,17 +141,18 @@ def _localize(world: WorldArrays, episode: int, robots: int) -> None:
             _believe_odometry(world.odometry[row], world.starts[row], is_relative, world.believed[row])
 
 
-@kernel(spliced=True)
+@kernel(inline="always")
 def _share(world: WorldArrays, episode: int, robots: int) -> None:
     """Credit the episode's robots with cells they saw first, and reward them.
 
     The step is counted.
     """
     first, last = episode * robots, (episode + 1) * robots
-    team = word_grid_at(
+    team = grid_at(
         world.mask_rows[first, TEAM_MASK],
         world.mask_rows[first, MASK_ROWS],
         world.mask_rows[first, MASK_WORDS],
+        np.uint64,
     )
     world.team_seen[episode] += share_new_cells(
         world.mask_rows[:, OWN_MASK], team, world.boxes, first, robots, world.gains

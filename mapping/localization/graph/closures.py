@@ -11,8 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.mapping.geometry.covariance import turned
-from lidarium.mapping.geometry.rigid import composed, relative, wrapped
+from lidarium.mapping.geometry.rigid import composed, relative, turned, wrapped
 from lidarium.mapping.localization.matching.branch_and_bound import Pyramid, place, pyramid
 from lidarium.mapping.localization.matching.local_mapping import Finished
 from lidarium.mapping.localization.matching.scan_matching import Match, refine

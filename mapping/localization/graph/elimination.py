@@ -151,7 +151,7 @@ def solve(places: Elimination, factor: Array, right: Array) -> Array:
     return solution[places.turn]
 
 
-@kernel(inline=True)
+@kernel(forceinline=True)
 def _subtract_product(of: Array, left: Array, right: Array) -> None:
     """Subtract left right^T from a block."""
     for i in range(3):
@@ -159,7 +159,7 @@ def _subtract_product(of: Array, left: Array, right: Array) -> None:
             of[i, k] -= left[i, 0] * right[k, 0] + left[i, 1] * right[k, 1] + left[i, 2] * right[k, 2]
 
 
-@kernel(inline=True)
+@kernel(forceinline=True)
 def _factorise_block(block: Array, factor: Array) -> bool:
     """Write the factor of a block on the diagonal; return whether it has one."""
     factor[:] = 0.0
@@ -177,7 +177,7 @@ def _factorise_block(block: Array, factor: Array) -> bool:
     return True
 
 
-@kernel(inline=True)
+@kernel(forceinline=True)
 def _divide(block: Array, diagonal: Array, quotient: Array) -> None:
     """Write the block that, times the diagonal's transposed factor, gives a block."""
     for i in range(3):

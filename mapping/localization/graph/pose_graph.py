@@ -199,7 +199,7 @@ def _normal_equations(
     return gradient
 
 
-@kernel(inline=True)
+@kernel(forceinline=True)
 def _write_jacobians(a: Array, b: Array, jacobians: Array) -> None:
     """Write the derivatives (2, 3, 3) of an edge's residual by poses a and b."""
     cosine, sine = math.cos(a[2]), math.sin(a[2])

@@ -168,7 +168,7 @@ def _bounds_of_blocks(coarse: CoarseLevels, cells: Array, top: int, blocks: int)
     return bounds
 
 
-@kernel(inline=True)
+@kernel(forceinline=True)
 def _push(stack: Array, depth: int, block: tuple[int, int, int, int, int]) -> None:
     """Put a block on a stack: its bound, level, heading index, column and row."""
     stack[depth, 0], stack[depth, 1], stack[depth, 2], stack[depth, 3], stack[depth, 4] = block

@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.mapping.geometry.covariance import turned
+from lidarium.mapping.geometry.rigid import turned
 from lidarium.mapping.grids.scan_geometry import ScanGeometry
 from lidarium.mapping.localization.matching.branch_and_bound import place, pyramid
 from lidarium.mapping.localization.matching.scan_matching import Match, refine

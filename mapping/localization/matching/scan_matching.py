@@ -218,7 +218,7 @@ def _curve_around(objective: Objective, pose: Array, hessian: Array) -> None:
         hessian += 1.0 / PROBES * weight * trial_hessian
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def _normal_equations(objective: Objective, pose: Array, hessian: Array, gradient: Array) -> float:
     """Fill the normal equations of the points' disagreement at a pose.
 
@@ -259,7 +259,7 @@ def _normal_equations(objective: Objective, pose: Array, hessian: Array, gradien
     return cost
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def _judge(grid: AgreementGrid, points: Array, pose: Array, judgement: Array) -> None:
     """Compute agreement and shares of points that are known or in free space.
 

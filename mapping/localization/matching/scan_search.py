@@ -132,7 +132,7 @@ def _search(
                     found[:] = around + away
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def _sum_disagreement(
     levels: Array, points: Array, place: tuple[float, float, float, float], unseen_cost: int, sums: Array
 ) -> None:
@@ -157,7 +157,7 @@ def _sum_disagreement(
                 sums[i, j] += unseen_cost if level == UNSEEN else squared
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def _add_everywhere(sums: Array, cost: int) -> None:
     for i in range(sums.shape[0]):
         for j in range(sums.shape[1]):

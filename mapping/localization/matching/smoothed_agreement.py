@@ -12,7 +12,7 @@ NEAR_CELLS = 3
 """A cell is near another within so many rows and columns."""
 
 
-@kernel(inline=True, borrowing=True)
+@kernel(forceinline=True, nrt=False)
 def _spline_weights(t: float) -> tuple[float, float, float, float]:
     """Return the weights of four neighbouring cells in a cubic B-spline.
 
@@ -27,14 +27,14 @@ def _spline_weights(t: float) -> tuple[float, float, float, float]:
     )
 
 
-@kernel(inline=True, borrowing=True)
+@kernel(forceinline=True, nrt=False)
 def _spline_slopes(t: float) -> tuple[float, float, float, float]:
     """Return the slopes of the weights."""
     u, square = 1.0 - t, t * t
     return -0.5 * u * u, 1.5 * square - 2.0 * t, -1.5 * square + t + 0.5, 0.5 * square
 
 
-@kernel(inline=True, borrowing=True)
+@kernel(forceinline=True, nrt=False)
 def agreement(levels: Array, x: float, y: float) -> tuple[float, float, float]:
     """Return the smoothed agreement at x, y [cells] and its slopes [1/cell] (kernel).
 
@@ -59,14 +59,14 @@ def agreement(levels: Array, x: float, y: float) -> tuple[float, float, float]:
     return value / LEVEL_RANGE, slope_x / LEVEL_RANGE, slope_y / LEVEL_RANGE
 
 
-@kernel(inline=True, borrowing=True)
+@kernel(forceinline=True, nrt=False)
 def is_unseen(levels: Array, x: float, y: float) -> bool:
     """Whether the map has not observed the cell at x, y [cells] (kernel)."""
     column, row = int(math.floor(x)), int(math.floor(y))
     return not (0 <= column < levels.shape[1] and 0 <= row < levels.shape[0]) or levels[row, column] == UNSEEN
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def extremes_around(levels: Array, column: int, row: int) -> tuple[int, int]:
     """Return the lowest and the highest level within three cells (kernel).
 

@@ -231,7 +231,7 @@ def _count_seen(
                     _observe(weights, counts, levels, row + row_offset, first + k, np.float32(0.0))
 
 
-@kernel(inline=True)
+@kernel(forceinline=True)
 def _observe(weights: Array, counts: Array, levels: Array, row: int, column: int, share: float) -> None:
     counts[row, column] += np.uint16(1)
     weight = weights[row, column] + np.float32(share)

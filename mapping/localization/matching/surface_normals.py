@@ -20,7 +20,7 @@ LEAST_POINTS = 3
 """Fewer points have no axis of their own."""
 
 
-@kernel(inline=True)
+@kernel(forceinline=True)
 def _is_one_surface(points: Array, k: int) -> bool:
     """Whether a point and the next one lie on one surface."""
     gap = SURFACE_GAP * max(math.hypot(points[k, 0], points[k, 1]), 1.0)
@@ -53,7 +53,7 @@ def find_normals(points: Array, reach: float, normals: Array) -> None:
             normals[k, 0], normals[k, 1] = -along_y / length, along_x / length
 
 
-@kernel(inline=True)
+@kernel(forceinline=True)
 def _is_near(points: Array, k: int, m: int, reach: float) -> bool:
     return bool(math.hypot(points[k, 0] - points[m, 0], points[k, 1] - points[m, 1]) <= reach)
 

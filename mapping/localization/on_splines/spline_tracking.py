@@ -14,8 +14,7 @@ from abc import ABC, abstractmethod
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.mapping.geometry.covariance import turned
-from lidarium.mapping.geometry.rigid import Transform, composed, relative, wrapped
+from lidarium.mapping.geometry.rigid import Transform, composed, relative, turned, wrapped
 from lidarium.mapping.grids.scan_geometry import ScanGeometry
 from lidarium.mapping.localization.dead_reckoning.localizer import KeyScans, Sensing
 from lidarium.mapping.localization.dead_reckoning.odometry import compounded

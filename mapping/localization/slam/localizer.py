@@ -13,8 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.mapping.geometry.covariance import turned
-from lidarium.mapping.geometry.rigid import composed, relative
+from lidarium.mapping.geometry.rigid import composed, relative, turned
 from lidarium.mapping.grids.occupancy import OccupancyGrid
 from lidarium.mapping.grids.scan_geometry import ScanGeometry
 from lidarium.mapping.localization.dead_reckoning.localizer import KeyScans, Sensing

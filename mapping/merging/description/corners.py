@@ -179,7 +179,7 @@ def _is_three_level(words: Array) -> bool:
     return bool(others == np.uint64(0))
 
 
-@kernel(inline=True)
+@kernel(forceinline=True)
 def _gathered(word: np.uint64) -> np.int64:
     """Return the lowest bits of the eight bytes of a word as one byte.
 
@@ -188,7 +188,7 @@ def _gathered(word: np.uint64) -> np.int64:
     return np.int64(((word & np.uint64(0x0101010101010101)) * np.uint64(0x0102040810204080)) >> np.uint64(56))
 
 
-@kernel(inline=True)
+@kernel(forceinline=True)
 def _occupied_around(words: Array, row: int, word: int) -> np.int64:
     """Return which cells of a word and its two neighbours are occupied.
 

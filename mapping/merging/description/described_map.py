@@ -207,7 +207,7 @@ def _face(levels: Array, cells: Array, reach: int, normals: Array) -> None:
             normals[i, 0], normals[i, 1] = x / length, y / length
 
 
-@kernel(inline=True)
+@kernel(forceinline=True)
 def faces_away(levels: Array, column: float, row: float, ahead_x: float, ahead_y: float) -> bool:
     """Return whether this map's wall at a place [cells] faces the opposite side.
 

@@ -79,7 +79,7 @@ def _collect(labels: Array, cells: Array) -> None:
                     count += 1
 
 
-@kernel(inline=True)
+@kernel(forceinline=True)
 def _meets(labels: Array, row: int, column: int, down: int, right: int) -> bool:
     """Whether a cell and that beside it are of two regions."""
     if labels[row, column] == NONE or row + down >= labels.shape[0] or column + right >= labels.shape[1]:

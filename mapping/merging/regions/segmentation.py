@@ -146,7 +146,7 @@ def _flood(
     return count
 
 
-@kernel(inline=True)
+@kernel(forceinline=True)
 def _root(parent: Array, basin: int) -> int:
     """Return the basin into which one has merged; the path is halved."""
     while parent[basin] != basin:
@@ -155,7 +155,7 @@ def _root(parent: Array, basin: int) -> int:
     return basin
 
 
-@kernel(inline=True)
+@kernel(forceinline=True)
 def _met(parent: Array, peak: Array, one: int, other: int, height: float, rule: SplitRule) -> int:
     """Merge two basins that meet, unless a door keeps them apart; returns that of the first one."""
     if one == other or _is_door(height, min(peak[one], peak[other]), rule):
@@ -165,7 +165,7 @@ def _met(parent: Array, peak: Array, one: int, other: int, height: float, rule: 
     return high
 
 
-@kernel(inline=True)
+@kernel(forceinline=True)
 def _is_door(height: float, peak: float, rule: SplitRule) -> bool:
     """Whether a passage keeps two basins apart, by its clearance and the peak of the narrower one."""
     return bool(height <= rule.half_door and peak >= rule.least_radius and height <= rule.door_share * peak)

@@ -1,11 +1,11 @@
 """Costs of the paths from one cell to all others, by sweeps over the rows of a map.
 
-The costs are those of a search that spreads over all that a body can reach (``search_all``), to the unit: of
-the cheapest path each, whatever the order in which cells are visited. Rows are swept down and up in turn. In
-a sweep the costs of 16 cells at once are lowered by those of the row before and of the cells before them in
-their row; only where something has changed is anything computed again. Indoors a cell is visited some three
-times, at a tenth of the time that a queue of single cells takes (a chamfer distance, Borgefors, Computer
-Vision, Graphics, and Image Processing 1986, repeated until no wall is left to go round).
+The costs are those of a search over all reachable cells (``search_all``), to the unit: those of the cheapest
+paths, whatever the order in which cells are visited. Rows are swept down and up in turn. A sweep lowers the
+costs of 16 cells at once by those of the row before and of the cells before them in their row; only changed
+areas are computed again. Indoors a cell is visited some three times, at a tenth of the time that a queue of
+single cells takes (a chamfer distance, Borgefors, Computer Vision, Graphics, and Image Processing 1986,
+repeated until no wall is left to go round).
 """
 
 from typing import Any, NamedTuple
@@ -13,9 +13,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.mapping.kernels.bit_words import first_bit, last_bit
 from lidarium.mapping.kernels.compilation import Array, kernel
-from lidarium.mapping.kernels.lanes.cost_lanes import (
+from lidarium.mapping.kernels.simd.costs import (
     FAR,
     FITS,
     LANES,
@@ -23,8 +22,9 @@ from lidarium.mapping.kernels.lanes.cost_lanes import (
     relax_backwards,
     relax_forwards,
 )
-from lidarium.mapping.kernels.views import int32_table_at, scratch_vector, uint8_grid_at, word_grid_at
-from lidarium.mapping.planning.clearance_updates import Window
+from lidarium.mapping.kernels.simd.words import first_bit, last_bit
+from lidarium.mapping.kernels.views import grid_at, scratch_vector
+from lidarium.mapping.planning.clearance import Window
 from lidarium.mapping.planning.search.search_state import (
     COLUMN_BITS,
     LARGEST_BUDGET,
@@ -40,22 +40,22 @@ DOWN, UP = range(2)
 """Directions of a sweep."""
 
 ALL_THREE = 0b111
-"""A block and both beside it."""
+"""A block and both its neighbours."""
 
 
-@kernel(inline=True)
-def words_of(blocks: int) -> int:
-    """Return how many words hold a bit for each block and for one beside either end."""
+@kernel(forceinline=True)
+def _words_of(blocks: int) -> int:
+    """Return the number of words that hold a bit for each block and for one beyond either end."""
     return (blocks + 2 + 63) // 64
 
 
 class SweepMemory:
-    """Scratch memory for sweeps in kernels, one piece for each thread.
+    """Scratch memory for sweeps in kernels, one piece per thread.
 
     Attributes
     ----------
     table : (pieces, 5) int64
-        Where each piece lies, for the kernels.
+        Addresses of the pieces, for the kernels.
     """
 
     def __init__(self, pieces: int) -> None:
@@ -64,17 +64,11 @@ class SweepMemory:
         self._arrays: list[tuple[NDArray[Any], ...]] = []
 
     def fit(self, rows: int, columns: int) -> None:
-        """Make room for sweeps over maps of so many rows and columns.
-
-        Raises
-        ------
-        ValueError
-            Where the columns are no multiple of 16.
-        """
+        """Provide memory for maps of this size; raise ValueError if the columns are no multiple of 16."""
         if columns % LANES:
             raise ValueError(f"the map has {columns} columns; want a multiple of {LANES}")
         blocks = columns // LANES
-        cells, words = (rows + 2) * (blocks + 2) * LANES, 2 * (rows + 2) * words_of(blocks)
+        cells, words = (rows + 2) * (blocks + 2) * LANES, 2 * (rows + 2) * _words_of(blocks)
         if cells > self._cells or words > self._words:
             self._provide(max(cells, self._cells), max(words, self._words))
 
@@ -92,7 +86,7 @@ class SweepMemory:
             self.table[piece] = [array.ctypes.data for array in arrays]
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Pickle the sizes alone: copies have memory of their own."""
+        """Pickle only the sizes: copies have memory of their own."""
         return _memory_of, (len(self.table), self._cells, self._words)
 
 
@@ -109,15 +103,15 @@ class SweptCosts(NamedTuple):
     Attributes
     ----------
     costs : (rows + 2, 16 (blocks + 2)) int32
-        Of the cheapest path to each cell [units], ``FAR`` where there is none.
+        Of the cheapest path to each cell [units], ``FAR`` if there is none.
     straight, diagonal : like costs, int32
-        Half the cost of a step into or out of a cell [units]; any cost where the body does not fit.
+        Half the cost of a step into or out of a cell [units]; any cost if the body does not fit.
     kinds : like costs, uint8
         Bits ``FREE``, ``FITS`` and ``ROOMY``.
     waiting : (2 (rows + 2), words) uint64
         Scratch: bits of the blocks that wait for the next sweep down, and up; bit 1 is the first block's.
     row_low, column_low : int
-        Where the window begins.
+        First row and column of the window.
     """
 
     costs: NDArray[np.int32]
@@ -131,27 +125,27 @@ class SweptCosts(NamedTuple):
 
 @kernel
 def costs_in(memory: Array, window: Window) -> SweptCosts:
-    """View a piece of memory as that of sweeps over a window of a map (kernel).
+    """View a piece of memory as that of sweeps over a window (kernel).
 
-    The window is extended to columns that are multiples of 16.
+    The window is extended to multiples of 16 columns.
     """
     rows, first = window[1] - window[0], window[2] // LANES
     blocks = (window[3] + LANES - 1) // LANES - first
     width = (blocks + 2) * LANES
     return SweptCosts(
-        int32_table_at(memory[COSTS_AT], rows + 2, width),
-        int32_table_at(memory[STRAIGHT_AT], rows + 2, width),
-        int32_table_at(memory[DIAGONAL_AT], rows + 2, width),
-        uint8_grid_at(memory[KINDS_AT], rows + 2, width),
-        word_grid_at(memory[WAITING_AT], 2 * (rows + 2), words_of(blocks)),
+        grid_at(memory[COSTS_AT], rows + 2, width, np.int32),
+        grid_at(memory[STRAIGHT_AT], rows + 2, width, np.int32),
+        grid_at(memory[DIAGONAL_AT], rows + 2, width, np.int32),
+        grid_at(memory[KINDS_AT], rows + 2, width, np.uint8),
+        grid_at(memory[WAITING_AT], 2 * (rows + 2), _words_of(blocks), np.uint64),
         window[0],
         first * LANES,
     )
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def prepare_costs(swept: SweptCosts, log_odds: Array, closeness: Array, passage: Passage) -> None:
-    """Look up what the steps of a body cost over the window of a map (kernel)."""
+    """Look up the costs of a body's steps over the window of a map (kernel)."""
     body = scratch_vector(5, np.int64)
     _describe(passage, body)
     grids = swept.kinds.ctypes.data, swept.straight.ctypes.data, swept.diagonal.ctypes.data
@@ -159,13 +153,13 @@ def prepare_costs(swept: SweptCosts, log_odds: Array, closeness: Array, passage:
     swept.kinds[0], swept.kinds[-1] = 0, 0
     for i in range(1, swept.kinds.shape[0] - 1):
         row = swept.row_low + i - 1
-        # Of the border beside the row the next cells are looked at.
+        # Blocks read one cell of the border on either side of the row.
         swept.kinds[i, LANES - 1], swept.kinds[i, width - LANES] = 0, 0
         for block in range(LANES, width - LANES, LANES):
-            at, place = i * width + block, row * log_odds.shape[1] + swept.column_low + block - LANES
+            at, index = i * width + block, row * log_odds.shape[1] + swept.column_low + block - LANES
             look_up_costs(
-                log_odds.ctypes.data + place,
-                closeness.ctypes.data + 2 * place,
+                log_odds.ctypes.data + index,
+                closeness.ctypes.data + 2 * index,
                 body.ctypes.data,
                 grids[0] + at,
                 grids[1] + 4 * at,
@@ -173,9 +167,9 @@ def prepare_costs(swept: SweptCosts, log_odds: Array, closeness: Array, passage:
             )
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def _describe(passage: Passage, body: Array) -> None:
-    """Write what ``look_up_costs`` wants to know of a body, (5,)."""
+    """Write the numbers of a body, (5,), that ``look_up_costs`` takes."""
     costs = passage.half_costs
     length, plain, tight = costs.shape[1], 0, costs.shape[1] - 1
     while plain + 1 < length and costs[0, plain + 1] == costs[0, 0] and costs[1, plain + 1] == costs[1, 0]:
@@ -185,14 +179,11 @@ def _describe(passage: Passage, body: Array) -> None:
     body[0], body[1], body[2], body[3], body[4] = costs.ctypes.data, length, plain, tight, passage.roomy
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def spread_costs(swept: SweptCosts, row: int, column: int) -> bool:
     """Find the costs of the cheapest paths from a cell, see the module (kernel).
 
-    Returns
-    -------
-    bool
-        Whether the body fits in that cell, which has to lie in the window; if not, nothing is reached.
+    Returns whether the body fits in that cell and the cell lies in the window; if not, nothing is reached.
     """
     swept.costs[:], swept.waiting[:] = FAR, 0
     i, k = row - swept.row_low + 1, column - swept.column_low + LANES
@@ -210,11 +201,11 @@ def spread_costs(swept: SweptCosts, row: int, column: int) -> bool:
     return True
 
 
-@kernel(inline=True, borrowing=True)
+@kernel(forceinline=True, nrt=False)
 def _let_wait(waiting: Array, way: int, row: int, block: int, which: int) -> None:
-    """Let some of three neighbouring blocks of a row wait for the next sweep.
+    """Mark some of three neighbouring blocks of a row as waiting for the next sweep.
 
-    ``which`` has a bit for the block before, for the block and for the one behind it.
+    ``which`` has a bit for the block before, for the block and for the one after it.
     """
     at, bit = way * (waiting.shape[0] // 2) + row, block & 63
     waiting[at, block >> 6] |= np.uint64(which) << np.uint64(bit)
@@ -222,9 +213,9 @@ def _let_wait(waiting: Array, way: int, row: int, block: int, which: int) -> Non
         waiting[at, (block >> 6) + 1] |= np.uint64(which) >> np.uint64(64 - bit)
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def _sweep(swept: SweptCosts, way: int) -> int:
-    """Visit the blocks that wait, row by row; return how many there were."""
+    """Visit the blocks that wait, row by row; return their number."""
     rows, waiting, visited = swept.costs.shape[0] - 2, swept.waiting, 0
     for r in range(1, rows + 1):
         row = r if way == DOWN else rows + 1 - r
@@ -238,9 +229,12 @@ def _sweep(swept: SweptCosts, way: int) -> int:
     return visited
 
 
-@kernel(inline=True, borrowing=True)
+@kernel(forceinline=True, nrt=False)
 def _visit(swept: SweptCosts, way: int, row: int, block: int) -> int:
-    """Lower the costs of a block, if there is one, and let those wait that this concerns; count it."""
+    """Lower the costs of a block, if it exists, and mark affected blocks as waiting.
+
+    Returns the number of visited blocks.
+    """
     width = swept.costs.shape[1]
     if not 0 <= block < width // LANES - 2:
         return 0
@@ -263,11 +257,11 @@ def _visit(swept: SweptCosts, way: int, row: int, block: int) -> int:
 
 
 @kernel
-def take_costs(swept: SweptCosts, remaining: Array, parent: Array, touched: Array, least: int) -> None:
-    """Take over the costs of a search by ``search_all`` (kernel)."""
+def take_costs(swept: SweptCosts, remaining: Array, parent: Array, touched: Array, minimum: int) -> None:
+    """Copy the costs of a search by ``search_all`` (kernel)."""
     swept.costs[:] = FAR
     for i in range(len(touched)):
         row, column = touched[i] >> ROW_SHIFT, touched[i] & COLUMN_BITS
         left = remaining[row, column]
-        if left >= least and parent[row, column] < LEAVING:
+        if left >= minimum and parent[row, column] < LEAVING:
             swept.costs[row - swept.row_low + 1, column - swept.column_low + LANES] = LARGEST_BUDGET - left

@@ -1,1 +1,1 @@
-"""Tours of teams past the frontiers of a map."""
+"""Tours past places of a map, of one robot or of a team."""

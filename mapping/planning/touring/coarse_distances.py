@@ -1,7 +1,7 @@
 """Lengths of paths over a grid of coarse cells.
 
-An order of visits needs many lengths of paths, and none of them to the centimetre. A coarse cell is open
-where a body may stand anywhere in it; lengths are those over open cells, straight and diagonal.
+An order of visits needs many lengths of paths, none of them to the centimetre. A coarse cell is open if a
+body may stand anywhere in it; lengths are those over open cells, straight and diagonal.
 """
 
 import math
@@ -18,7 +18,7 @@ STRAIGHT, DIAGONAL = 5, 7
 """Lengths of the steps to the neighbours of a cell, in fifths of its side."""
 
 NEAR_START = 0.2
-"""Bodies set out from where they fit within this [m]."""
+"""Bodies start from the nearest cells in which they fit, up to this distance [m]."""
 
 _BUCKETS = DIAGONAL + 1
 
@@ -26,7 +26,7 @@ UNREACHED = np.iinfo(np.int32).max
 
 
 class CoarseGrid(NamedTuple):
-    """Where a body may stand, in coarse cells.
+    """Coarse cells in which a body may stand.
 
     Attributes
     ----------
@@ -38,8 +38,8 @@ class CoarseGrid(NamedTuple):
         The map's cell at which coarse cell (0, 0) begins.
     side : float
         Side of a coarse cell [m].
-    most : int
-        Closeness up to which the body may stand in a cell of the map.
+    max_closeness : int
+        Maximum closeness of a cell of the map in which the body may stand.
     """
 
     is_open: NDArray[np.bool_]
@@ -47,10 +47,10 @@ class CoarseGrid(NamedTuple):
     row: int
     column: int
     side: float
-    most: int
+    max_closeness: int
 
     def cell_of(self, cell: tuple[int, int]) -> tuple[int, int]:
-        """Return the coarse cell of a cell of the map, the nearest where it has none."""
+        """Return the coarse cell of a cell of the map, or the nearest one beyond the grid."""
         rows, columns = self.is_open.shape
         row, column = (int(cell[0]) - self.row) // self.factor, (int(cell[1]) - self.column) // self.factor
         return min(max(row, 0), rows - 1), min(max(column, 0), columns - 1)
@@ -63,7 +63,7 @@ def coarse_grid(
     side: float = 0.1,
     starts: NDArray[np.int64] | None = None,
 ) -> CoarseGrid:
-    """Return where a body of a radius may stand on a map.
+    """Return the coarse cells in which a body of a radius may stand on a map.
 
     Parameters
     ----------
@@ -75,29 +75,29 @@ def coarse_grid(
         Radius of the body [m].
     side : float
         Side of a coarse cell [m], rounded to whole cells. As bodies keep their radius from both sides of a
-        wall, coarse cells of less than half a body's width never join what the wall parts.
+        wall, coarse cells of less than half a body's width never join the two sides of a wall.
     starts : (n, 2) int64, optional
-        The map's cells (row, column) from which bodies set out: what the map's own cells do not join to any
-        of them is left out. Coarse cells may join it where a gap is too narrow by less than their side.
+        The map's cells (row, column) from which bodies start: cells that are not connected to any of them on
+        the map are excluded. Coarse cells may connect them if a gap is too narrow by less than their side.
     """
     factor = max(round(side / clearance.resolution), 1)
-    most = clearance.limit - limit_of(radius, clearance.resolution)
-    fits = (log_odds < 0) & (clearance.closeness <= most)
+    max_closeness = clearance.limit - limit_of(radius, clearance.resolution)
+    fits = (log_odds < 0) & (clearance.closeness <= max_closeness)
     if starts is not None:
         fits = _joined(fits, starts, math.ceil(NEAR_START / clearance.resolution))
     is_open, row, column = _opened(log_odds, fits, factor)
-    return CoarseGrid(is_open, factor, int(row), int(column), factor * clearance.resolution, most)
+    return CoarseGrid(is_open, factor, int(row), int(column), factor * clearance.resolution, max_closeness)
 
 
 def place_in(
     grid: CoarseGrid, log_odds: NDArray[np.int8], clearance: ClearanceField, cell: tuple[int, int]
 ) -> tuple[int, int]:
-    """Return the map's cell (row, column) with most clearance in an open coarse cell.
+    """Return the map's cell (row, column) with maximum clearance in an open coarse cell.
 
     Parameters
     ----------
     grid : CoarseGrid
-        Where a body may stand.
+        Coarse cells of the map.
     log_odds : (rows, columns) int8
         The map: < 0 free.
     clearance : ClearanceField
@@ -120,21 +120,21 @@ def distances_from(
     Parameters
     ----------
     grid : CoarseGrid
-        Where a body may stand.
+        Coarse cells of the map.
     starts : (n, 2) int64
         Coarse cells (row, column); they count as open.
     maximum : float
-        Longer paths are left out [m].
+        Maximum length of a path [m].
 
     Returns
     -------
     (n, rows, columns) int32
-        Lengths in fifths of the side of a coarse cell; ``UNREACHED`` where there is no path.
+        Lengths in fifths of the side of a coarse cell; ``UNREACHED`` if there is no path.
     """
-    most = UNREACHED - _BUCKETS if math.isinf(maximum) else int(maximum / grid.side * STRAIGHT)
+    max_length = UNREACHED - _BUCKETS if math.isinf(maximum) else int(maximum / grid.side * STRAIGHT)
     lengths = np.empty((len(starts), *grid.is_open.shape), np.int32)
     nowhere = np.zeros((0, 2), np.int64)
-    _spread(grid.is_open, np.ascontiguousarray(starts, np.int64), nowhere, False, most, lengths)
+    _spread(grid.is_open, np.ascontiguousarray(starts, np.int64), nowhere, False, max_length, lengths)
     return lengths
 
 
@@ -146,7 +146,7 @@ def distances_among(
     Parameters
     ----------
     grid : CoarseGrid
-        Where a body may stand.
+        Coarse cells of the map.
     places : (n, 2) int64
         Open coarse cells (row, column).
     others : (m, 2) int64
@@ -157,7 +157,7 @@ def distances_among(
     (n, n) int32
         Lengths between places, as in ``distances_from``.
     (n, rows, columns) int32
-        Lengths from each place, as far as they are no longer than those to ``others``; others may be
+        Lengths from each place, if they are no longer than those to ``others``; else they may be
         ``UNREACHED``.
     """
     lengths = np.empty((len(places), *grid.is_open.shape), np.int32)
@@ -169,7 +169,10 @@ def distances_among(
 
 
 def _joined(fits: NDArray[np.bool_], starts: NDArray[np.int64], reach: int) -> NDArray[np.bool_]:
-    """Return what is joined to what fits within so many cells of a start; all where nothing fits there."""
+    """Return the cells connected to those that fit within ``reach`` cells of a start.
+
+    All cells, if nothing fits there.
+    """
     count, labels = cv2.connectedComponents(fits.astype(np.uint8), connectivity=8, ltype=cv2.CV_32S)
     is_kept = np.zeros(count, np.bool_)
     for row, column in starts:
@@ -181,7 +184,7 @@ def _joined(fits: NDArray[np.bool_], starts: NDArray[np.int64], reach: int) -> N
 
 @kernel
 def _opened(log_odds: Array, fits: Array, factor: int) -> tuple[NDArray[np.bool_], int, int]:
-    """Return which coarse cells are open, cut to those around what is known."""
+    """Return the open coarse cells, cropped to the known area, and its first row and column."""
     rows, columns = log_odds.shape
     row_low, row_high, column_low, column_high = rows, 0, columns, 0
     for row in range(rows):
@@ -209,14 +212,16 @@ def _opened(log_odds: Array, fits: Array, factor: int) -> tuple[NDArray[np.bool_
 
 
 @kernel
-def _spread(is_open: Array, starts: Array, others: Array, is_among: bool, most: int, lengths: Array) -> None:
+def _spread(
+    is_open: Array, starts: Array, others: Array, is_among: bool, max_length: int, lengths: Array
+) -> None:
     """Spread lengths from each start over open cells.
 
-    Where ``is_among``, it ends when all cells of the lengths up to the farthest target's are reached. Targets
-    are the others and the starts that follow: paths are as long there as back.
+    If ``is_among``, it ends when all cells up to the length of the farthest target are reached. Targets are
+    the others and the starts that follow: paths have the same length in both directions.
     """
     rows, columns = is_open.shape
-    # A border and what is closed have length -1, so that no path is shorter.
+    # The border and closed cells have length -1, so that no path is shorter.
     width = columns + 2
     fresh = np.full((rows + 2, width), -1, np.int32)
     for row in range(rows):
@@ -236,7 +241,13 @@ def _spread(is_open: Array, starts: Array, others: Array, is_among: bool, most: 
                 is_target[(row + 1) * width + column + 1] = True
             wanted = is_target.sum()
         _spread_from(
-            (starts[k, 0] + 1) * width + starts[k, 1] + 1, width, is_target, wanted, most, queues, spread
+            (starts[k, 0] + 1) * width + starts[k, 1] + 1,
+            width,
+            is_target,
+            wanted,
+            max_length,
+            queues,
+            spread,
         )
         for row in range(rows):
             for column in range(columns):
@@ -246,11 +257,11 @@ def _spread(is_open: Array, starts: Array, others: Array, is_among: bool, most: 
 
 @kernel
 def _spread_from(
-    start: int, width: int, is_target: Array, wanted: int, most: int, queues: Array, spread: Array
+    start: int, width: int, is_target: Array, wanted: int, max_length: int, queues: Array, spread: Array
 ) -> None:
-    """Spread lengths from a cell, the cells of equal length after each other.
+    """Spread lengths from a cell, one length after the other.
 
-    Where targets are wanted, it ends when all cells of the lengths up to the farthest one's are reached.
+    If targets are wanted, it ends when all cells up to the length of the farthest one are reached.
     """
     steps = np.array([1, width, -1, -width, width + 1, width - 1, 1 - width, -1 - width])
     # A bucket holds cells of one length, and none of them twice.
@@ -259,7 +270,7 @@ def _spread_from(
     queues[0, 0] = start
     counts[0] = 1
     length, empty, found = 0, 0, 0
-    while empty < _BUCKETS and length <= most and (wanted == 0 or found < wanted):
+    while empty < _BUCKETS and length <= max_length and (wanted == 0 or found < wanted):
         bucket = length % _BUCKETS
         count = counts[bucket]
         counts[bucket] = 0

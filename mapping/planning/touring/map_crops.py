@@ -1,4 +1,4 @@
-"""Pieces of a map as seen from a place in a direction, for networks."""
+"""Pieces of a map around a cell, rotated to a direction, for networks."""
 
 import math
 
@@ -18,20 +18,20 @@ def map_crops(
     side: int,
     step: float,
 ) -> NDArray[np.int8]:
-    """Return a square piece of a map around each of some cells, turned in a direction.
+    """Return a square piece of a map around each of some cells, rotated to a direction.
 
     Parameters
     ----------
     log_odds : (rows, columns) int8
-        The map: < 0 free, 0 unknown, > 0 occupied; all around it is unknown.
+        The map: < 0 free, 0 unknown, > 0 occupied; cells beyond it are unknown.
     resolution : float
         Side of its cells [m].
     cells : (n, 2) int64
-        Cells (row, column) from which the pieces are seen.
+        Cells (row, column) of the pieces.
     directions : (n,) float64
-        Where each looks [rad].
+        Direction of each piece [rad].
     side : int
-        Pieces have so many squares a side.
+        Number of squares per side of a piece.
     step : float
         Side of a square [m].
 
@@ -39,8 +39,7 @@ def map_crops(
     -------
     (n, side, side) int8
         Rows go ahead, a quarter of them lie behind the cell; columns go to the left, half of them lie to its
-        right. Squares are ``OCCUPIED`` where anything in them is, else ``FREE`` where anything is, else
-        ``UNKNOWN``.
+        right. Squares are ``OCCUPIED`` if any of their cells is, else ``FREE`` if any is, else ``UNKNOWN``.
     """
     crops = np.empty((len(cells), side, side), np.int8)
     samples = max(round(step / resolution), 1)
@@ -71,7 +70,7 @@ def _crop(log_odds: Array, cells: Array, directions: Array, scale: tuple[float, 
 
 @kernel
 def _level(log_odds: Array, rows: Array, columns: Array, rises: Array, runs: Array) -> int:
-    """Return what is in a square, by samples along its sides."""
+    """Return the level of a square, by samples along its sides."""
     level = UNKNOWN
     for i in range(len(rows)):
         for j in range(len(rises)):

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.mapping.kernels.compilation import Array, kernel
-from lidarium.mapping.planning.frontiers import Clusters, FrontierMap
+from lidarium.mapping.planning.frontiers.frontier_map import Clusters, FrontierMap
 from lidarium.mapping.sparse.swept_body import SweptBody
 
 SEEN, UNKNOWN, BLOCKED = -1, 0, 1

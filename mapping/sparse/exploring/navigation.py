@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.mapping.planning.frontiers import Clusters
+from lidarium.mapping.planning.frontiers.frontier_map import Clusters
 from lidarium.mapping.sparse.exploring.ground_map import BLOCKED, SEEN, UNKNOWN, GroundMap
 from lidarium.mapping.sparse.exploring.routes import (
     PlannedRoute,

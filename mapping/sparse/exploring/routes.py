@@ -209,12 +209,12 @@ def shortened_on_ground(index: BoxIndex, path: Array, body: Array, levels: Array
         place = max(farther, place + 1)
 
 
-@kernel(inline=True)
+@kernel(forceinline=True)
 def _apart(a: Array, b: Array) -> float:
     return math.hypot(b[0] - a[0], b[1] - a[1])
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def _farthest_straight(
     index: BoxIndex, path: Array, place: int, last: int, body: Array, levels: Array, frame: Array
 ) -> int:
@@ -226,7 +226,7 @@ def _farthest_straight(
     return place
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def _is_known(levels: Array, frame: Array, a: Array, b: Array) -> bool:
     """Whether no cell on a line, sampled twice a cell, is unknown."""
     cell = frame[2]

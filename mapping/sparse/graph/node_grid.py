@@ -59,7 +59,7 @@ def grid_of_nodes(nodes: NDArray[np.float64]) -> NodeGrid:
     return NodeGrid(points, low, np.array([cell]), shape, starts, members)
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def nearest_nodes(grid: NodeGrid, point: Array, found: Array, gaps: Array, without: int) -> int:
     """Find the nodes that are nearest to a point.
 
@@ -101,7 +101,7 @@ def nearest_nodes(grid: NodeGrid, point: Array, found: Array, gaps: Array, witho
     return number
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def _take_cell(
     grid: NodeGrid, place: int, point: Array, found: Array, gaps: Array, number: int, without: int
 ) -> int:

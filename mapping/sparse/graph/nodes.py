@@ -68,7 +68,7 @@ def _reduce(points: Array, radius: float, order: Array) -> Array:
     return means[:found]
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def _first_at(rows: Array, columns: Array, row: int, column: int) -> int:
     """Return the first place at or behind a cell, in lists sorted by row and column."""
     low, high = 0, rows.shape[0]

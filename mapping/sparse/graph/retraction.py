@@ -105,7 +105,7 @@ def _retract(index: BoxIndex, nodes: Array, body: Array) -> Array:
     return moved
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def _nearest_blocking(index: BoxIndex, node: Array, body: Array, gap: Array) -> bool:
     """Write from the nearest blocking box to a node, x and y and their length; False where none blocks."""
     radius, cell = body[RADIUS], index.cell[0]

@@ -92,7 +92,7 @@ def _cut(points: Array, starts: Array, pad: float, least: float) -> tuple[Array,
     return parts, gains[:cuts]
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def _best_plane(points: Array, members: Array, pad: float, bounds: Array) -> tuple[int, float, float]:
     """Return axis and place of the plane that leaves least room, and the gain; -1 where that is too small."""
     whole, around = bounds[BINS], bounds[BINS + 1]
@@ -116,7 +116,7 @@ def _best_plane(points: Array, members: Array, pad: float, bounds: Array) -> tup
     return best_axis, best_plane, _room(whole, pad) - least
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def _room_of(bounds: Array, pad: float, around: Array) -> Any:  # noqa: ANN401
     """Return the volume of the box around boxes (B, 6) [m3]; that box is written as well."""
     _begin(around)
@@ -126,28 +126,28 @@ def _room_of(bounds: Array, pad: float, around: Array) -> Any:  # noqa: ANN401
     return _room(around, pad)
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def _begin(box: Array) -> None:
     """Make a box that holds nothing."""
     for axis in range(3):
         box[axis], box[axis + 3] = np.inf, -np.inf
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def _widen(box: Array, low: Array, high: Array) -> None:
     for axis in range(3):
         box[axis] = min(box[axis], low[axis])
         box[axis + 3] = max(box[axis + 3], high[axis])
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def _room(box: Array, pad: float) -> Any:  # noqa: ANN401
     if box[0] > box[3]:
         return 0.0
     return (box[3] - box[0] + pad) * (box[4] - box[1] + pad) * (box[5] - box[2] + pad)
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def _part(values: Array, order: Array, first: int, last: int, plane: float, other: Array) -> int:
     """Sort those below a plane before the others, each in their order; return where the others begin."""
     low, high = first, 0

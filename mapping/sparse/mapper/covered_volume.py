@@ -6,7 +6,7 @@ MOST_PIECES = 512
 """Pieces that wait to be looked at, at most."""
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def uncovered_volume(
     around: Array, slack: float, boxes: Array, limit: float, pieces: Array, nexts: Array
 ) -> float:
@@ -50,7 +50,7 @@ def uncovered_volume(
     return uncovered
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def _share_space(piece: Array, box: Array, slack: float) -> bool:
     for axis in range(3):
         if piece[axis] >= box[axis + 3] + slack or piece[axis + 3] <= box[axis] - slack:
@@ -58,7 +58,7 @@ def _share_space(piece: Array, box: Array, slack: float) -> bool:
     return True
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def _cut(pieces: Array, nexts: Array, place: int, box: Array, slack: float, following: int) -> int:
     """Put what a box leaves of a piece in its place and behind; return the next place."""
     low_x, low_y, low_z = pieces[place, 0], pieces[place, 1], pieces[place, 2]

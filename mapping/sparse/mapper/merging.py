@@ -152,7 +152,7 @@ def _last_owners(owners: Array) -> Array:
     return found
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def _may_merge(one: Array, other: Array, slack: float, around: Array) -> bool:
     """Write the box around two; return whether they touch and make up enough of it."""
     both = 1.0
@@ -167,7 +167,7 @@ def _may_merge(one: Array, other: Array, slack: float, around: Array) -> bool:
     return bool(covered >= LEAST_COVER * _volume(around, slack))
 
 
-@kernel(inline=True)
+@kernel(forceinline=True)
 def _volume(box: Array, slack: float) -> float:
     volume = 1.0
     for axis in range(3):
@@ -175,13 +175,13 @@ def _volume(box: Array, slack: float) -> float:
     return volume
 
 
-@kernel(inline=True)
+@kernel(forceinline=True)
 def _copy(box: Array, target: Array) -> None:
     for part in range(6):
         target[part] = box[part]
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def _gather(
     boxes: Array,
     owners: Array,
@@ -221,7 +221,7 @@ def _gather(
     return number if total >= (1.0 - TOLERANCE) * _volume(around, slack) else 0
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def _covers_free(one: Array, other: Array, nodes: Array, around: Array) -> bool:
     """Whether the box around two lies over a free code over which neither lies."""
     place = _first_from(nodes, around[0])
@@ -233,12 +233,12 @@ def _covers_free(one: Array, other: Array, nodes: Array, around: Array) -> bool:
     return False
 
 
-@kernel(inline=True)
+@kernel(forceinline=True)
 def _lies_over(box: Array, x: float, y: float) -> bool:
     return bool(box[0] <= x <= box[3] and box[1] <= y <= box[4])
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def _first_from(nodes: Array, x: float) -> int:
     """Return the first place of nodes, sorted by x, that is not below x."""
     low, high = 0, nodes.shape[0]

@@ -15,7 +15,7 @@ from lidarium.mapping.kernels.compilation import Array, kernel
 NO_NODE = -1
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def push(heap: Array, keys: Array, size: int, node: int, key: float) -> int:
     """Put a node into a binary heap of nodes by their keys; return its size."""
     place = size
@@ -29,7 +29,7 @@ def push(heap: Array, keys: Array, size: int, node: int, key: float) -> int:
     return size + 1
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def pop(heap: Array, keys: Array, size: int) -> int:
     """Take the least node out of a binary heap, which is that of place 0; return its size."""
     size -= 1
@@ -106,7 +106,7 @@ def shortest_path(
     return path, best_cost
 
 
-@kernel(inline=True)
+@kernel(forceinline=True)
 def _estimate(node: Array, goal: Array) -> float:
     """Return a lower bound of the cost from a node to the goal."""
     return math.sqrt((node[0] - goal[0]) ** 2 + (node[1] - goal[1]) ** 2 + (node[2] - goal[2]) ** 2)

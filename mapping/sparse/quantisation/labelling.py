@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.mapping.kernels.compilation import Array, kernel
-from lidarium.mapping.kernels.lanes.point_lanes import TILE, nearest_in_tile
+from lidarium.mapping.kernels.simd.codes import TILE, nearest_in_tile
 from lidarium.mapping.sparse.quantisation.tiles import GROUP, Tiles
 
 NO_SQUARES = np.empty((0, TILE), np.float32)
@@ -73,7 +73,7 @@ def _candidates(codes: NDArray[np.float32]) -> Candidates:
     return Candidates(room, np.arange(count + 1, dtype=np.int32), np.empty((2, count + 1), np.float32))
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def _label(
     tiles: Tiles,
     candidates: tuple[Candidates, Candidates, Candidates],
@@ -110,7 +110,7 @@ def _label(
                 _add_points(tiles.points[tile], tiles.weights[tile], own, sums)
 
 
-@kernel(inline=True, borrowing=True)
+@kernel(forceinline=True, nrt=False)
 def _narrow(box: Array, candidates: Candidates, count: int, kept: Candidates) -> int:
     """Keep those of ``count`` candidates that may be nearest in a box; return how many.
 
@@ -130,7 +130,7 @@ def _narrow(box: Array, candidates: Candidates, count: int, kept: Candidates) ->
     return found
 
 
-@kernel(inline=True, borrowing=True)
+@kernel(forceinline=True, nrt=False)
 def _bound(box: Array, codes: Array, count: int, bounds: Array) -> None:
     """Bound the squared distances from codes to a box, from below and from above."""
     low, high = box[0], box[1]
@@ -145,7 +145,7 @@ def _bound(box: Array, codes: Array, count: int, bounds: Array) -> None:
         bounds[1, j] = x * x + y * y + z * z
 
 
-@kernel(inline=True, borrowing=True)
+@kernel(forceinline=True, nrt=False)
 def _add_points(points: Array, weights: Array, labels: Array, sums: Array) -> None:
     """Add the points of a tile to the sums of their codes."""
     for lane in range(TILE):

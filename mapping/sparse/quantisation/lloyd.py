@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.mapping.kernels.compilation import Array, kernel
-from lidarium.mapping.kernels.lanes.point_lanes import TILE
+from lidarium.mapping.kernels.simd.codes import TILE
 from lidarium.mapping.sparse.quantisation.labelling import NO_SQUARES, label_points
 from lidarium.mapping.sparse.quantisation.seeding import Nearest, come_nearer, measure, nearest_of_none
 from lidarium.mapping.sparse.quantisation.tiles import Tiles

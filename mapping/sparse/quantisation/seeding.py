@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.mapping.kernels.compilation import Array, kernel
-from lidarium.mapping.kernels.lanes.point_lanes import TILE, nearest_in_tile
+from lidarium.mapping.kernels.simd.codes import TILE, nearest_in_tile
 from lidarium.mapping.kernels.views import scratch_vector
 from lidarium.mapping.sparse.quantisation.tiles import GROUP, Tiles
 
@@ -89,7 +89,7 @@ def drawn_codes(
     return codes, nearest
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def draw_codes(tiles: Tiles, draws: Array, codes: Array, nearest: Nearest) -> int:
     """Draw a code for each number in [0, 1); return for how many there were places."""
     shares = scratch_vector(TILE, np.float64)
@@ -113,7 +113,7 @@ def draw_codes(tiles: Tiles, draws: Array, codes: Array, nearest: Nearest) -> in
     return len(draws)
 
 
-@kernel(inline=True, borrowing=True)
+@kernel(forceinline=True, nrt=False)
 def _reached(shares: Array, wanted: float) -> tuple[int, float]:
     """Return in which share, never an empty one, a running sum is, and what is left."""
     chosen, left = 0, 0.0
@@ -126,7 +126,7 @@ def _reached(shares: Array, wanted: float) -> tuple[int, float]:
     return chosen, left
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def come_nearer(tiles: Tiles, code: Array, number: int, nearest: Nearest) -> None:
     """Let the points that a new code is nearer to change to it."""
     numbers = scratch_vector(1, np.int32)
@@ -155,7 +155,7 @@ def come_nearer(tiles: Tiles, code: Array, number: int, nearest: Nearest) -> Non
             nearest.group_errors[group], nearest.group_worst[group] = error, worst
 
 
-@kernel(inline=True, borrowing=True)
+@kernel(forceinline=True, nrt=False)
 def _least_square(box: Array, code: Array) -> Any:  # noqa: ANN401
     """Return a lower bound of squared distances from a code to a box [m2]."""
     zero = np.float32(0.0)
@@ -165,7 +165,7 @@ def _least_square(box: Array, code: Array) -> Any:  # noqa: ANN401
     return x * x + y * y + z * z
 
 
-@kernel(inline=True, borrowing=True)
+@kernel(forceinline=True, nrt=False)
 def _error_of(weights: Array, squares: Array) -> tuple[float, Any]:
     """Return the sum of a tile's weighted squares, and the greatest square.
 
@@ -184,7 +184,7 @@ def _error_of(weights: Array, squares: Array) -> tuple[float, Any]:
     return (first + second) + (third + fourth), worst
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def measure(tiles: Tiles, nearest: Nearest) -> None:
     """Make the sums and greatest ones of squares anew."""
     for group in range(len(tiles.group_boxes)):

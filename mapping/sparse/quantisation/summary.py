@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.mapping.kernels.compilation import Array, kernel
-from lidarium.mapping.kernels.lanes.point_lanes import TILE
+from lidarium.mapping.kernels.simd.codes import TILE
 from lidarium.mapping.kernels.views import scratch_grid, scratch_vector
 from lidarium.mapping.sparse.quantisation.seeding import Nearest
 from lidarium.mapping.sparse.quantisation.tiles import Tiles
@@ -91,7 +91,7 @@ def summary_of(tiles: Tiles, codes: NDArray[np.float32], nearest: Nearest) -> Su
     return summary
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def _sum_up(tiles: Tiles, count: int, codes: Array, nearest: Nearest, summary: Summary) -> None:
     """Add every point to the sums of its code, tiles of one code at once."""
     distances, offsets = scratch_vector(TILE, np.float32), scratch_grid(3, TILE, np.float64)
@@ -129,7 +129,7 @@ def _sum_up(tiles: Tiles, count: int, codes: Array, nearest: Nearest, summary: S
                 summary.moments[number, moment] += own[moment]
 
 
-@kernel(inline=True, borrowing=True)
+@kernel(forceinline=True, nrt=False)
 def _stretch(box: Array, low: Array, high: Array) -> None:
     """Stretch a box so that it holds another one."""
     for axis in range(3):
@@ -137,7 +137,7 @@ def _stretch(box: Array, low: Array, high: Array) -> None:
         box[1, axis] = max(box[1, axis], high[axis])
 
 
-@kernel(inline=True, borrowing=True)
+@kernel(forceinline=True, nrt=False)
 def _set_moments(offsets: Array, lane: int, mass: float, own: Array) -> None:
     """Set the moments of a point."""
     x, y, z = offsets[0, lane], offsets[1, lane], offsets[2, lane]
@@ -146,7 +146,7 @@ def _set_moments(offsets: Array, lane: int, mass: float, own: Array) -> None:
     own[6], own[7], own[8] = own[0] * y, own[0] * z, own[1] * z
 
 
-@kernel(inline=True, borrowing=True)
+@kernel(forceinline=True, nrt=False)
 def _add_all(weights: Array, distances: Array, offsets: Array, errors: Array, moments: Array) -> None:
     """Add the distances and moments of a tile's points to those of a code."""
     far, a, b, c, aa, bb, cc, ab, ac, bc = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0

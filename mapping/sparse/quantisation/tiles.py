@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.mapping.kernels.compilation import Array, kernel
-from lidarium.mapping.kernels.lanes.point_lanes import TILE
+from lidarium.mapping.kernels.simd.codes import TILE
 from lidarium.mapping.sparse.quantisation.morton import CELLS, SPREAD, morton_order
 
 GROUP = 16
@@ -119,7 +119,7 @@ def _fill_tiles(points: Array, weights: Array, order: Array, count: int) -> tupl
     return sides, masses, sums, boxes
 
 
-@kernel(inline=True)
+@kernel(forceinline=True)
 def _sum_tile(sides: Array, masses: Array, sums: Array, box: Array) -> None:
     """Set the sums and the box of a tile, three axes side by side."""
     x_low = x_high = sides[0, 0]

@@ -8,7 +8,7 @@ from lidarium.agents.learned.features import OPTION_FEATURES, SITUATION_FEATURES
 from lidarium.agents.tours.planning import Tourist, first_options, tour_options
 from lidarium.agents.tours.settings import TourSettings
 from lidarium.envs.onboard.navigation import NavigationMap
-from lidarium.mapping.planning.touring.team_tours import with_first
+from lidarium.mapping.planning.touring.tours import with_first
 
 RESOLUTION = 0.05
 PROGRESS = {"time": 30.0, "known": 20.0, "rate": 0.5}

@@ -9,8 +9,7 @@ import pytest
 
 from lidarium.envs.engine import first_reset
 from lidarium.envs.engine.first_reset import LIST
-from lidarium.mapping.kernels.first_start.listed_kernels import decode_type
-from lidarium.mapping.kernels.first_start.side_by_side import SWITCH
+from lidarium.mapping.kernels.first_start import SWITCH, decode_type
 
 SCRIPT = """
 import json, sys
@@ -20,7 +19,7 @@ first_reset.LIST = first_reset.Path(sys.argv[1])
 first_reset.compile_first_reset()
 first_reset.compile_first_reset()
 """
-BIT = {"name": "lidarium.mapping.kernels.bit_words:first_bit", "signature": ["uint64"], "needs": []}
+BIT = {"name": "lidarium.mapping.kernels.work_queue:take_next", "signature": ["int64:1C"], "needs": []}
 
 
 def test_every_listed_kernel_can_be_compiled_for_its_types_after_what_it_calls():
@@ -54,7 +53,7 @@ def start(tmp_path):
 
 def test_an_empty_cache_is_filled_once_and_the_wait_explained(start, tmp_path):
     assert start().count("the first reset compiles kernels in 2 processes") == 1
-    assert any("first_bit" in path.name for path in (tmp_path / "caches").rglob("*.nbc"))
+    assert any("take_next" in path.name for path in (tmp_path / "caches").rglob("*.nbc"))
     assert not (tmp_path / "caches" / first_reset.LOCK).exists()
     assert start() == ""
 

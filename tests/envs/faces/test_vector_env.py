@@ -19,7 +19,7 @@ from lidarium.envs.floors.catalogue.names import load_floor
 from lidarium.envs.floors.floor import Floor, Solid
 from lidarium.envs.settings.lidar import Lidar
 from lidarium.envs.settings.making import make_settings
-from lidarium.mapping.grids.scan_geometry import MOST_BEAMS
+from lidarium.mapping.grids.scan_geometry import MAX_BEAMS
 from lidarium.mapping.kernels.compilation import available_threads
 
 ROOM = Floor(
@@ -470,7 +470,7 @@ def test_actions_of_rows_that_do_not_act_are_ignored():
 
 @pytest.mark.parametrize("threads", [1, 2])
 def test_scans_of_as_many_beams_as_there_may_be_find_room_on_the_stacks_of_all_threads(threads):
-    lidar = Lidar(beams=MOST_BEAMS, field_of_view=2.0 * math.pi, range_max=12.0, noise_floor=0.01)
+    lidar = Lidar(beams=MAX_BEAMS, field_of_view=2.0 * math.pi, range_max=12.0, noise_floor=0.01)
     batch = lidarium.vector_env(
         8,
         "apartment",

@@ -5,7 +5,7 @@ import pytest
 
 from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.settings.making import make_settings
-from lidarium.mapping.planning.footprint_masks import MARGIN_M, footprint_mask, passed
+from lidarium.mapping.planning.footprint import MARGIN_M, footprint_mask, passed
 
 RESOLUTION = 0.05
 

@@ -8,7 +8,7 @@ from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.onboard.radio.messages import DriveState, Target
 from lidarium.envs.settings.making import make_settings
 from lidarium.mapping.merging.fusion import FusedMap
-from lidarium.mapping.planning.frontier_kernels import FRONTIER, IGNORED
+from lidarium.mapping.planning.frontiers.frontier_map import FRONTIER, IGNORED
 
 RESOLUTION = 0.05
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from lidarium.envs.settings.lidar import LIDARS, MOST_RANGE_M, Lidar
-from lidarium.mapping.grids.scan_geometry import MOST_BEAMS
+from lidarium.mapping.grids.scan_geometry import MAX_BEAMS
 
 
 def test_either_part_of_the_noise_makes_a_laser_noisy():
@@ -35,7 +35,7 @@ def test_lasers_that_cannot_be_simulated_are_refused(options, message):
     "options",
     [
         {"beams": 0},
-        {"beams": MOST_BEAMS + 1},
+        {"beams": MAX_BEAMS + 1},
         {"field_of_view": 0.0},
         {"field_of_view": 7.0},
         {"range_min": 6.0},

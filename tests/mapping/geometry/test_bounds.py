@@ -24,7 +24,7 @@ def test_bounds_tell_themselves():
     assert str(above(0.0, 5.0)) == "above 0 and at most 5"
     assert str(within(0.0, 1e6)) == "of 0 or more and at most 1,000,000"
     assert within(1, 64).interval == "[1, 64]"
-    assert Bounds(0.0, 1.0, has_most=False).interval == "[0, 1)"
+    assert Bounds(0.0, 1.0, has_maximum=False).interval == "[0, 1)"
     assert not within(0.0, 1.0).hold(math.nan)
 
 
@@ -44,7 +44,7 @@ class Part:
 @dataclass(frozen=True)
 class Sample:
     count: Annotated[int, within(1, 5)] = 2
-    ratio: Annotated[float | None, share(has_most=False)] = 0.5
+    ratio: Annotated[float | None, share(has_maximum=False)] = 0.5
     name: str = "a"
     part: Annotated[Part, inner(depth=above(0.0, 2.0))] = field(default_factory=Part)
 

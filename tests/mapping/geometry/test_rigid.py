@@ -13,8 +13,8 @@ from lidarium.mapping.geometry.rigid import (
     fit,
     halfway,
     relative,
+    turned,
     wrapped,
-    yaw_of_quaternion,
 )
 
 POSES = st.builds(Transform, st.floats(-5, 5), st.floats(-5, 5), st.floats(-3.1, 3.1))
@@ -93,7 +93,20 @@ def test_arrays_of_poses_compose_as_transforms_do():
     np.testing.assert_allclose(composed(outer, relative(outer, found)), found, atol=1e-9)
 
 
-@pytest.mark.parametrize("theta", np.linspace(-3.1, 3.1, 9))
-@pytest.mark.parametrize("scale", [1.0, -1.0, 3.0])
-def test_the_yaw_of_a_quaternion_is_right_in_all_quadrants_and_for_both_signs(theta, scale):
-    assert yaw_of_quaternion(scale * math.sin(theta / 2), scale * math.cos(theta / 2)) == pytest.approx(theta)
+def test_a_quarter_turn_exchanges_the_axes():
+    found = turned(np.diag([1.0, 4.0, 9.0]), math.pi / 2.0)
+    np.testing.assert_allclose(found, np.diag([4.0, 1.0, 9.0]), atol=1e-12)
+
+
+def test_drawn_errors_have_the_turned_covariance():
+    generator = np.random.default_rng(1)
+    factor = generator.normal(size=(3, 3))
+    errors = generator.normal(size=(100_000, 3)) @ factor.T
+    elsewhere = np.column_stack([Transform(theta=0.7).apply(errors[:, :2]), errors[:, 2]])
+    expected = np.cov(elsewhere.T)
+    np.testing.assert_allclose(turned(factor @ factor.T, 0.7), expected, atol=0.03 * np.abs(expected).max())
+
+
+def test_turning_back_undoes_a_turn():
+    matrix = np.array([[2.0, 0.3, 0.1], [0.3, 1.0, -0.2], [0.1, -0.2, 0.5]])
+    np.testing.assert_allclose(turned(turned(matrix, 1.1), -1.1), matrix)

@@ -1,6 +1,9 @@
 """Crops of a map equal what numpy cuts, pools and turns, at every place, heading and scale."""
 
 import math
+import os
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -8,7 +11,7 @@ from cropped_maps import crop, pooled_levels, random_map
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lidarium.mapping.grids.map_crops import crop_levels
+from lidarium.mapping.grids.map_crops import crop_levels, turn_by_cells
 from lidarium.mapping.grids.occupancy import FREE, OCCUPIED, UNKNOWN, three_levels
 
 
@@ -120,3 +123,40 @@ def test_far_from_the_map_all_is_unknown():
     log_odds = np.full((64, 64), -5, np.int8)
     for row, column in ((-5000, 32), (32, -5000), (5000, 5000), (32, 5000)):
         assert (crop(log_odds, row, column, 0.3, [1, 4], 32) == UNKNOWN).all()
+
+
+@given(
+    row=st.integers(-60, 100),
+    column=st.integers(-60, 190),
+    heading=st.floats(-4.0, 4.0),
+    scales=st.lists(st.integers(1, 9), min_size=1, max_size=3),
+    blocks=st.integers(1, 10),
+    seed=st.integers(0, 99),
+)
+@settings(max_examples=200)
+def test_crops_of_whole_blocks_are_those_looked_up_cell_by_cell(row, column, heading, scales, blocks, seed):
+    log_odds = random_map(seed)
+    crops = crop(log_odds, row, column, heading, scales, 8 * blocks)
+    by_cells = crop(log_odds, row, column, heading, scales, 8 * blocks, turn_by_cells)
+    assert np.array_equal(crops, by_cells)
+
+
+def test_a_processor_that_cannot_look_up_in_registers_turns_the_same_crops(tmp_path):
+    code = (
+        "import sys, numpy as np; from lidarium.mapping.grids.map_crops import CAN_LOOK_UP_IN_REGISTERS, "
+        "crop_turned;"
+        "cells = np.random.default_rng(4).integers(-1, 2, (100, 128)).astype(np.int8);"
+        "crops = np.zeros((1, 64, 64), np.uint8); pools = np.array([(cells.ctypes.data, 100, 128)], "
+        "np.int64);"
+        "crop_turned(pools, 70.0, 30.0, 0.7, np.array([1]), crops); assert not CAN_LOOK_UP_IN_REGISTERS; "
+        "np.save(sys.argv[1], crops)"
+    )
+    without = {"NUMBA_ENABLE_AVX": "0", "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+    subprocess.run(
+        [sys.executable, "-c", code, str(tmp_path / "crops.npy")],
+        env={**os.environ, **without},
+        check=True,
+        timeout=120,
+    )
+    log_odds = np.random.default_rng(4).integers(-1, 2, (100, 128)).astype(np.int8)
+    assert np.array_equal(np.load(tmp_path / "crops.npy"), crop(log_odds, 30, 70, 0.7, [1], 64))

@@ -11,6 +11,12 @@ from hypothesis import strategies as st
 from lidarium.mapping.grids.scan_geometry import ScanGeometry, beam_directions
 from lidarium.mapping.grids.scan_polygon import (
     GRAZING,
+    _Outline,
+    _row_of,
+    _toggle_between,
+    _toggle_bit,
+    _toggle_edge,
+    _toggle_edges,
     fill_scan_polygon,
     scan_ends,
     window_rows,
@@ -161,3 +167,116 @@ def test_beams_that_say_nothing_leave_a_gap():
     assert not seen[50, 52:85].any()
     assert seen[50 + 12, 50 + 20]
     assert seen[50 - 12, 50 + 20]
+
+
+ROWS, WIDTH, PLACE = 128, 128, 62.3
+TURN = 0.01
+"""Of the laser, so that no beam runs along an axis [rad]."""
+
+
+def outline_of(lengths, steepness=1.0):
+    """An outline of beams all around a laser in the middle of a window."""
+    angles = ScanGeometry(beams=len(lengths), field_of_view=2.0 * math.pi).angles + TURN
+    unit = np.stack([np.cos(angles), np.sin(angles)])
+    directions = np.concatenate([unit, 1.0 / unit])
+    lengths = np.asarray(lengths, np.float64)
+    return _Outline(lengths, directions, PLACE + lengths * unit, PLACE, PLACE, steepness)
+
+
+def toggled(outline, at_once):
+    words = np.zeros((ROWS, WIDTH // 64), np.uint64)
+    if at_once:
+        rows = np.array([_row_of(y) for y in outline.ends[1].tolist()], np.int32)
+        _toggle_edges(words.ctypes.data, WIDTH, outline, rows)
+    else:
+        for k in range(len(outline.lengths) - 1):
+            _toggle_between(words.ctypes.data, WIDTH, outline, k, k + 1)
+    return words
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_all_edges_at_once_toggle_what_they_do_one_by_one(seed):
+    generator = np.random.default_rng(seed)
+    count = int(generator.integers(20, 400))
+    lengths = 20.0 + 15.0 * np.sin(np.arange(count) * 0.05) + generator.uniform(-2.0, 2.0, count)
+    lengths[generator.random(count) < 0.1] = 50.0
+    outline = outline_of(lengths, generator.choice([0.05, 1.0]))
+    once = toggled(outline, True)
+    assert once.any()
+    np.testing.assert_array_equal(once, toggled(outline, False))
+
+
+def test_between_a_near_and_a_far_end_the_outline_goes_along_the_far_beam():
+    # Beams from -pi on; those ahead are far, with an edge to their right and left.
+    lengths = np.full(64, 10.0)
+    lengths[24:40] = 40.0
+    outline = outline_of(lengths, 0.1)
+    words = toggled(outline, True)
+    last = np.zeros_like(words)
+    _toggle_between(last.ctypes.data, WIDTH, outline, 63, 0)
+    inside = np.logical_xor.accumulate(
+        np.unpackbits((words ^ last).view(np.uint8), bitorder="little").reshape(ROWS, WIDTH), axis=1
+    )
+    rows, columns = np.nonzero(inside)
+    x, y = columns + 0.5 - PLACE, rows + 0.5 - PLACE
+    beam = np.mod(np.arctan2(y, x) + math.pi - TURN, 2.0 * math.pi) / (2.0 * math.pi / 64)
+    # Nothing is claimed behind the near ends, up to the far beams themselves.
+    beyond = np.hypot(x, y) > 10.5
+    assert ((beam[beyond] > 24.0 - 0.05) & (beam[beyond] < 39.0 + 0.05)).all()
+    assert beyond.sum() > 500
+
+
+EDGE_ROWS = 24
+
+
+def bits_of(words):
+    return np.unpackbits(words.view(np.uint8), bitorder="little").reshape(EDGE_ROWS, WIDTH).astype(bool)
+
+
+def toggled_by(*edges):
+    words = np.zeros((EDGE_ROWS, WIDTH // 64), np.uint64)
+    for from_x, from_y, to_x, to_y in edges:
+        _toggle_edge(words.ctypes.data, WIDTH, from_x, from_y, to_x, to_y, _row_of(from_y), _row_of(to_y))
+    return bits_of(words)
+
+
+def test_a_bit_is_toggled_back_and_forth():
+    words = np.zeros((EDGE_ROWS, WIDTH // 64), np.uint64)
+    for expected in (True, False):
+        _toggle_bit(words.ctypes.data, 3 * WIDTH + 70)
+        assert bits_of(words)[3, 70] == expected
+        assert bits_of(words).sum() == expected
+
+
+def test_an_edge_toggles_the_first_cell_centre_to_its_right_in_each_row_that_it_crosses():
+    generator = np.random.default_rng(2)
+    for from_x, from_y, to_x, to_y in generator.uniform((1, 0, 1, 0), (120, 23, 120, 23), (80, 4)).tolist():
+        found = toggled_by((from_x, from_y, to_x, to_y))
+        expected = np.zeros_like(found)
+        for row in range(EDGE_ROWS):
+            middle = row + 0.5
+            if min(from_y, to_y) < middle <= max(from_y, to_y):
+                x = from_x + (middle - from_y) * (to_x - from_x) / (to_y - from_y)
+                expected[row, int(np.ceil(x - 0.5))] = True
+        np.testing.assert_array_equal(found, expected)
+
+
+@pytest.mark.parametrize(
+    "corners", [[(10, 3), (90, 5), (40, 20)], [(5.5, 2.5), (60.5, 2.5), (60.5, 15), (5.5, 15)]]
+)
+def test_edges_of_a_polygon_toggle_its_inside_row_by_row(corners):
+    # A cell whose centre lies on an edge is not right of it.
+    edges = [(*a, *b) for a, b in zip(corners, [*corners[1:], corners[0]], strict=True) if a[1] != b[1]]
+    inside = np.logical_xor.accumulate(toggled_by(*edges), axis=1)
+    for row in range(EDGE_ROWS):
+        for column in range(WIDTH):
+            x, y = column + 0.5, row + 0.5
+            met = [edge for edge in edges if min(edge[1], edge[3]) < y <= max(edge[1], edge[3])]
+            crossed = [ax + (y - ay) * (bx - ax) / (by - ay) < x for ax, ay, bx, by in met]
+            assert inside[row, column] == (sum(crossed) % 2 == 1)
+
+
+def test_corners_count_once_and_flat_edges_toggle_nothing():
+    assert _row_of(3.49) == 3
+    assert _row_of(3.5) == 4
+    assert not toggled_by((3.0, 4.6, 90.0, 5.4)).any()

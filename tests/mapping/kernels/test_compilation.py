@@ -14,10 +14,7 @@ import pytest
 from lidarium.benchmarks.speed.cases.cached_start import read_only_environment
 from lidarium.mapping.kernels import cache_folders, compilation
 from lidarium.mapping.kernels.compilation import kernel, use_threads
-from lidarium.mapping.kernels.views import (
-    scratch_grid,
-    scratch_vector,
-)
+from lidarium.mapping.kernels.views import scratch_grid, scratch_vector
 
 ROOT = Path(compilation.__file__).resolve().parents[2]
 SOURCES = {
@@ -35,7 +32,7 @@ def odd_sums(values):
     return total, math.isnan(values[0] / values[0])
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def sum_by_scratch(values):
     twice, rows = scratch_vector(values.shape[0], np.float64), scratch_grid(3, values.shape[0], np.int32)
     for k in range(values.shape[0]):
@@ -151,7 +148,7 @@ def test_kernels_are_made_by_the_one_decorator_only():
             assert "fastmath" not in text, path
 
 
-@pytest.mark.parametrize("name", compilation.CHOICES)
+@pytest.mark.parametrize("name", compilation.NUMBA_SETTINGS)
 def test_settings_of_numba_that_change_the_code_have_a_cache_of_their_own(monkeypatch, name):
     before = compilation._sources_hash()
     monkeypatch.setattr(numba.core.config, name, 1 - int(getattr(numba.core.config, name) or 0))
@@ -164,7 +161,7 @@ def test_indices_are_checked_where_that_is_asked_for(tmp_path):
         "import numpy as np\n"
         "from lidarium.mapping.kernels.compilation import kernel\n"
         "from lidarium.mapping.kernels.views import scratch_vector, vector_at\n"
-        "@kernel(borrowing=True)\n"
+        "@kernel(nrt=False)\n"
         "def beyond(address, place):\n"
         "    scratch = scratch_vector(4, np.float64)\n"
         "    scratch[place % 4] = 1.0\n"

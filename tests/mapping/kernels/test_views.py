@@ -3,46 +3,37 @@
 import numpy as np
 
 from lidarium.mapping.kernels.compilation import kernel
-from lidarium.mapping.kernels.views import (
-    bytes_at,
-    int8_grid_at,
-    int32_table_at,
-    scratch_grid,
-    scratch_vector,
-    uint8_grid_at,
-    uint16_grid_at,
-    word_grid_at,
-)
+from lidarium.mapping.kernels.views import grid_at, scratch_grid, scratch_vector, vector_at
 
 
 @kernel
 def read_all(address, rows, columns):
-    as_bytes = bytes_at(address, rows * columns)
+    as_bytes = vector_at(address, rows * columns, np.uint8)
     return (
         as_bytes.sum(),
-        int8_grid_at(address, rows, columns).sum(),
-        uint8_grid_at(address, rows, columns)[rows - 1, columns - 1],
+        grid_at(address, rows, columns, np.int8).sum(),
+        grid_at(address, rows, columns, np.uint8)[rows - 1, columns - 1],
     )
 
 
 @kernel
 def write_words(address, rows, columns):
-    grid = word_grid_at(address, rows, columns)
+    grid = grid_at(address, rows, columns, np.uint64)
     for row in range(rows):
         grid[row, row % columns] = np.uint64(2**63)
 
 
 @kernel
 def sum_table(address, rows):
-    return int32_table_at(address, rows, 3).sum()
+    return grid_at(address, rows, 3, np.int32).sum()
 
 
 @kernel
 def sum_grid(address, rows, columns):
-    return uint16_grid_at(address, rows, columns).sum()
+    return grid_at(address, rows, columns, np.uint16).sum()
 
 
-@kernel(borrowing=True)
+@kernel(nrt=False)
 def sum_by_scratch(values):
     twice, rows = scratch_vector(values.shape[0], np.float64), scratch_grid(3, values.shape[0], np.int32)
     for k in range(values.shape[0]):

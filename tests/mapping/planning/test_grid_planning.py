@@ -8,11 +8,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from searched_beliefs import RESOLUTION, SEEDS, made, open_start, oracle, random_belief
+from smoothed_paths import shortened
 
 from lidarium.mapping.planning.footprint import Footprint
 from lidarium.mapping.planning.grid_planning import Until, cells_of, centres_of, plan, search
-from lidarium.mapping.planning.path_smoothing import shortened
-from lidarium.mapping.planning.search.search_space import SearchSpace
+from lidarium.mapping.planning.search.path_search import SearchSpace
 
 
 @settings(max_examples=40)

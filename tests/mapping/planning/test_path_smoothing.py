@@ -4,10 +4,10 @@ import math
 
 import numpy as np
 from searched_beliefs import RESOLUTION, made
+from smoothed_paths import line_keeps_clearance, shortened, waypoints
 
 from lidarium.mapping.planning.footprint import Footprint
 from lidarium.mapping.planning.grid_planning import plan
-from lidarium.mapping.planning.path_smoothing import line_keeps_clearance, shortened, waypoints
 
 
 def test_a_free_line_becomes_two_waypoints_and_corners_few_more():

@@ -9,8 +9,8 @@ from collections import namedtuple
 import pytest
 from numba import types
 
-from lidarium.mapping.kernels.first_start.listed_kernels import compile_kernel, decode_type, encode_type
-from lidarium.mapping.planning.search.search_targets import _grown
+from lidarium.mapping.kernels.first_start import compile_kernel, decode_type, encode_type
+from lidarium.mapping.planning.search.search_state import _grown
 from lidarium.scripts.process import first_start
 from lidarium.scripts.process.first_start import LIST
 

@@ -42,7 +42,7 @@ class OdometryUncertainty:
     distance_noise: Positive = 0.03
     turn_noise: Positive = 0.04
     turn_noise_of_distance: Positive = 0.03
-    fading: Annotated[float, share(has_most=False)] = 0.0005
+    fading: Annotated[float, share(has_maximum=False)] = 0.0005
     most_deviations: FromZero = 2.0
 
     def __post_init__(self) -> None:

@@ -15,7 +15,7 @@ from lidarium.envs.simulation.depth.face_drawing import (
     view_sides,
 )
 from lidarium.envs.simulation.depth.frames import place_camera, view_numbers
-from lidarium.mapping.kernels.lanes.beam_lanes import PIXEL_LANES
+from lidarium.mapping.kernels.simd.faces import PIXELS
 
 CAMERA = DepthCamera(columns=37, rows=29, depth_max=8.0, field_of_view=1.0)
 VIEW = view_numbers(CAMERA)
@@ -74,7 +74,7 @@ def covered(corners):
 
 
 def blank(depth=CAMERA.depth_max):
-    width = -(-CAMERA.columns // PIXEL_LANES) * PIXEL_LANES
+    width = -(-CAMERA.columns // PIXELS) * PIXELS
     return np.full((CAMERA.rows, width), 1.0 / depth, np.float32)
 
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lidarium.mapping.kernels.lanes.cost_lanes import FAR, LANES
+from lidarium.mapping.kernels.simd.costs import FAR, LANES
 from lidarium.mapping.planning.clearance import ClearanceField
 from lidarium.mapping.planning.footprint import Footprint, passage_of
 from lidarium.mapping.planning.search.path_search import (

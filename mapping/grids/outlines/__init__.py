@@ -1,1 +1,0 @@
-"""Outlines of what scans have seen, as bits that their edges toggle."""

@@ -1,0 +1,195 @@
+"""Compiles listed kernels in several processes at a first start, each after those that it calls.
+
+Lists name kernels by module and the types of their arguments. This module also runs as a process that
+compiles: it reads one kernel per line, and answers each with a line.
+"""
+
+import importlib
+import json
+import os
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator, Sequence
+from queue import SimpleQueue
+from typing import Any
+
+SWITCH = "LIDARIUM_FIRST_START"
+"""Environment variable: ``off`` compiles each kernel at its first call."""
+
+Entry = dict[str, Any]
+"""A kernel: ``name`` as ``module:name``, and ``signature``, a list of encoded types."""
+
+
+# -- Kernels of lists --------------------------------------------------------------------------------------
+
+
+def compile_kernel(entry: Entry) -> None:
+    """Compile a kernel for the types of its arguments, and cache it.
+
+    Raises ValueError, AttributeError or ImportError if there is no such kernel or type.
+    """
+    module, name = entry["name"].split(":")
+    compiled = getattr(importlib.import_module(module), name)
+    compiled.compile(tuple(decode_type(each) for each in entry["signature"]))
+
+
+def _numba_types() -> Any:  # noqa: ANN401
+    """Return numba's module of types, which has no hints."""
+    from numba.core import types
+
+    return types
+
+
+def encode_type(argument: Any) -> Any:  # noqa: ANN401
+    """Return the numba type of an argument as strings, lists and dicts.
+
+    Scalars are their names; arrays ``dtype:dimensions+layout``, with ``:readonly`` if they are; tuples lists;
+    named tuples ``{"class": "module:name", "of": list}``. Raises ValueError for other types.
+    """
+    types = _numba_types()
+    if isinstance(argument, types.Array):
+        return f"{argument.dtype}:{argument.ndim}{argument.layout}" + (
+            "" if argument.mutable else ":readonly"
+        )
+    if isinstance(argument, types.BaseNamedTuple):
+        made = argument.instance_class
+        return {
+            "class": f"{made.__module__}:{made.__qualname__}",
+            "of": [encode_type(each) for each in argument.types],
+        }
+    if isinstance(argument, types.BaseTuple):
+        return [encode_type(each) for each in argument.types]
+    if isinstance(argument, types.Number | types.Boolean):
+        return str(argument)
+    raise ValueError(
+        f"the type {argument!r} of a kernel's argument cannot be written; want numbers or arrays"
+    )
+
+
+def decode_type(text: Any) -> Any:  # noqa: ANN401
+    """Return the type that ``encode_type`` wrote."""
+    types = _numba_types()
+    if isinstance(text, dict):
+        module, name = text["class"].split(":")
+        made = getattr(importlib.import_module(module), name)
+        return types.BaseTuple.from_types([decode_type(each) for each in text["of"]], made)
+    if isinstance(text, list):
+        return types.BaseTuple.from_types([decode_type(each) for each in text])
+    dtype, *shape = text.split(":")
+    scalar = {"bool": types.boolean}.get(dtype) or getattr(types, dtype)
+    if not shape:
+        return scalar
+    return types.Array(scalar, int(shape[0][:-1]), shape[0][-1], readonly=shape[1:] == ["readonly"])
+
+
+# -- Processes ---------------------------------------------------------------------------------------------
+
+
+def compile_in_processes(entries: Sequence[Entry], processes: int) -> Iterator[str]:
+    """Compile kernels in a number of processes; yield each one's name as it is done.
+
+    Entries have ``needs`` as well, the indices of the entries that they call. The longest come first.
+    """
+    plan, names = _Plan(entries), SimpleQueue[str | None]()
+    workers = [_start_worker() for _ in range(min(processes, len(entries)))]
+    threads = [
+        threading.Thread(target=_drive, args=(worker, plan, entries, names), daemon=True)
+        for worker in workers
+    ]
+    for thread in threads:
+        thread.start()
+    try:
+        ended = 0
+        while ended < len(threads):
+            name = names.get()
+            if name is None:
+                ended += 1
+            else:
+                yield name
+    finally:
+        plan.stop()
+        for worker in workers:
+            worker.kill()
+            worker.wait()
+
+
+class _Plan:
+    """The listed kernels that are left; shared by the threads that wait for processes."""
+
+    def __init__(self, entries: Sequence[Entry]) -> None:
+        self._entries = entries
+        self._left = list(range(len(entries)))
+        self._done: set[int] = set()
+        self._changed = threading.Condition()
+        self._is_stopped = False
+
+    def take(self) -> int | None:
+        """Return the first kernel whose callees are compiled, once there is one; None if all are taken."""
+        with self._changed:
+            while self._left and not self._is_stopped:
+                for number in self._left:
+                    if self._done.issuperset(self._entries[number]["needs"]):
+                        self._left.remove(number)
+                        return number
+                self._changed.wait()
+            return None
+
+    def finish(self, number: int) -> None:
+        """Note that a kernel was compiled, or could not be."""
+        with self._changed:
+            self._done.add(number)
+            self._changed.notify_all()
+
+    def stop(self) -> None:
+        """Give out no more kernels."""
+        with self._changed:
+            self._is_stopped = True
+            self._changed.notify_all()
+
+
+def _start_worker() -> "subprocess.Popen[str]":
+    return subprocess.Popen(
+        [sys.executable, "-m", "lidarium.mapping.kernels.first_start"],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        env={**os.environ, SWITCH: "off"},
+        text=True,
+    )
+
+
+def _drive(
+    worker: "subprocess.Popen[str]", plan: _Plan, entries: Sequence[Entry], names: "SimpleQueue[str | None]"
+) -> None:
+    """Give a process one kernel after the other."""
+    assert worker.stdin is not None
+    assert worker.stdout is not None
+    with worker.stdin, worker.stdout:
+        while (number := plan.take()) is not None:
+            try:
+                worker.stdin.write(json.dumps(entries[number]) + "\n")
+                worker.stdin.flush()
+                is_answered = worker.stdout.readline() != ""
+            except (OSError, ValueError):  # the process has ended
+                is_answered = False
+            plan.finish(number)
+            if not is_answered:
+                break
+            names.put(entries[number]["name"])
+    names.put(None)
+
+
+def main() -> None:
+    """Compile the kernels named on standard input; those that fail are left to their first call."""
+    for line in sys.stdin:
+        try:
+            compile_kernel(json.loads(line))
+            answer = "compiled"
+        except Exception as error:
+            answer = f"left out: {type(error).__name__}"
+        print(answer, flush=True)
+
+
+if __name__ == "__main__":
+    main()

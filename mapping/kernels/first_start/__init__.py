@@ -1,1 +1,0 @@
-"""Kernels compiled side by side where a first start has none."""

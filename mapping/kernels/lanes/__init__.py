@@ -1,1 +1,0 @@
-"""Operations on vectors of points, beams or pixels, in the code that LLVM compiles."""

@@ -1,0 +1,341 @@
+"""Open tours past places: the shortest one of a robot, and those of a team that shares the places.
+
+The tours of a team are one sequence: indices of places, and between the tours of two robots a number above
+all indices. So one set of moves orders the places of a robot and moves places to other robots.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.mapping.kernels.compilation import Array, kernel
+
+_BEGINNINGS = 4
+"""Number of tours that are improved, each from another of the nearest places."""
+
+_LONGEST_PIECE = 3
+"""Maximum number of places of a piece that is moved within a tour or to another one."""
+
+_LESS = 1e-9
+
+
+@kernel
+def shortest_tour(first: NDArray[np.float64], between: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Return the order, (n,) int64, in which an approximately shortest open tour visits all places.
+
+    Tours continue at the nearest place from each of the nearest beginnings, and are improved by reversing
+    pieces (2-opt; Croes 1958) and by moving pieces (Or 1976) until neither helps. Explorers that plan tours
+    and drive to the first place have shorter paths than those that go to the nearest one (Kulich, Faigl and
+    Preucil 2011).
+
+    Parameters
+    ----------
+    first : (n,) float64
+        Cost of the path from the robot to each place; finite.
+    between : (n, n) float64
+        Cost of the paths between places; finite and symmetric.
+    """
+    count = first.shape[0]
+    best, best_length = np.arange(count), np.inf
+    nearest = np.argsort(first, kind="mergesort")
+    tour, trial = np.empty(count, np.int64), np.empty(count, np.int64)
+    for beginning in range(min(_BEGINNINGS, count)):
+        _go_to_nearest(nearest[beginning], between, tour)
+        length = _length(tour, first, between)
+        while True:
+            shorter = _shorten_by_turns(tour, trial, first, between, length)
+            shorter = _shorten_by_moves(tour, trial, first, between, shorter)
+            if shorter >= length - _LESS:
+                break
+            length = shorter
+        if length < best_length - _LESS:
+            best[:], best_length = tour, length
+    return best
+
+
+@kernel
+def _length(tour: Array, first: Array, between: Array) -> float:
+    length = first[tour[0]]
+    for k in range(1, tour.shape[0]):
+        length += between[tour[k - 1], tour[k]]
+    return float(length)
+
+
+@kernel
+def _go_to_nearest(beginning: int, between: Array, tour: Array) -> None:
+    """Write the tour that continues at the nearest remaining place."""
+    count = tour.shape[0]
+    is_left = np.ones(count, np.bool_)
+    tour[0], is_left[beginning] = beginning, False
+    for k in range(1, count):
+        nearest = -1
+        for place in range(count):
+            if is_left[place] and (
+                nearest < 0 or between[tour[k - 1], place] < between[tour[k - 1], nearest]
+            ):
+                nearest = place
+        tour[k], is_left[nearest] = nearest, False
+
+
+@kernel
+def _shorten_by_turns(tour: Array, trial: Array, first: Array, between: Array, length: float) -> float:
+    """Reverse every piece that makes the tour shorter; return its length."""
+    count = tour.shape[0]
+    for start in range(count):
+        for end in range(start + 2, count + 1):
+            trial[:] = tour
+            trial[start:end] = tour[start:end][::-1]
+            shorter = _length(trial, first, between)
+            if shorter < length - _LESS:
+                tour[:], length = trial, shorter
+    return length
+
+
+@kernel
+def _shorten_by_moves(tour: Array, trial: Array, first: Array, between: Array, length: float) -> float:
+    """Move every short piece to a position that makes the tour shorter; return its length."""
+    count = tour.shape[0]
+    rest = np.empty(count, np.int64)
+    for size in range(1, min(_LONGEST_PIECE, count - 1) + 1):
+        for start in range(count - size + 1):
+            piece = tour[start : start + size].copy()
+            left = count - size
+            rest[:start], rest[start:left] = tour[:start], tour[start + size :]
+            for place in range(left + 1):
+                trial[:place], trial[place : place + size], trial[place + size :] = (
+                    rest[:place],
+                    piece,
+                    rest[place:left],
+                )
+                shorter = _length(trial, first, between)
+                if shorter < length - _LESS:
+                    tour[:], length = trial, shorter
+                    break
+    return length
+
+
+class TourWeights(NamedTuple):
+    """Weights of lengths, whose sum is the cost of tours.
+
+    Attributes
+    ----------
+    longest : float
+        Weight of the longest tour.
+    total : float
+        Weight of the sum of the tours.
+    waiting : float
+        Weight of the path until each place is visited, times the place's worth.
+    """
+
+    longest: float
+    total: float
+    waiting: float
+
+
+@kernel
+def team_tours(
+    first: NDArray[np.float64],
+    between: NDArray[np.float64],
+    worth: NDArray[np.float64],
+    weights: TourWeights,
+) -> NDArray[np.int64]:
+    """Return the places that each robot of a team visits, in order: approximately the best open tours.
+
+    Places are inserted one by one at the lowest cost, the cheapest first; then pieces are reversed (2-opt;
+    Croes 1958) and moved, within a tour or to another robot's (Or 1976), until neither helps.
+
+    Parameters
+    ----------
+    first : (robots, n) float64
+        Cost of the path from each robot to each place; finite.
+    between : (n, n) float64
+        Cost of the paths between places; finite.
+    worth : (n,) float64
+        Worth of each place.
+    weights : TourWeights
+        Weights of the cost.
+
+    Returns
+    -------
+    (n + robots - 1,) int64
+        Indices of places, robot after robot; n and above between the places of two robots.
+    """
+    robots, count = first.shape
+    sequence = np.empty(count + robots - 1, np.int64)
+    for robot in range(robots - 1):
+        sequence[robot] = count + robot
+    _insert_all(sequence, first, between, worth, weights)
+    trial, rest = np.empty_like(sequence), np.empty_like(sequence)
+    cost = _cost(sequence, len(sequence), first, between, worth, weights)
+    while True:
+        better = _turn_pieces(sequence, trial, first, between, worth, weights, cost)
+        better = _move_pieces(sequence, (trial, rest), first, between, worth, weights, better)
+        if better >= cost - _LESS:
+            return sequence
+        cost = better
+
+
+@kernel
+def tours_cost(
+    sequence: NDArray[np.int64],
+    first: NDArray[np.float64],
+    between: NDArray[np.float64],
+    worth: NDArray[np.float64],
+    weights: TourWeights,
+) -> float:
+    """Return the cost of tours [m]; parameters as in ``costs_of_firsts``."""
+    return float(_cost(sequence, sequence.shape[0], first, between, worth, weights))
+
+
+@kernel
+def costs_of_firsts(
+    sequence: NDArray[np.int64],
+    robot: int,
+    first: NDArray[np.float64],
+    between: NDArray[np.float64],
+    worth: NDArray[np.float64],
+    weights: TourWeights,
+) -> NDArray[np.float64]:
+    """Return the extra cost of tours if a robot visits each place first, (n,).
+
+    All other places keep their order. The extra cost may be 0 or less if places are equal, or tours are not
+    the best ones.
+
+    Parameters
+    ----------
+    sequence : (n + robots - 1,) int64
+        The tours, as ``team_tours`` returns them.
+    robot : int
+        The robot whose tour begins with the place.
+    first, between, worth, weights
+        As in ``team_tours``.
+    """
+    count, size = first.shape[1], sequence.shape[0]
+    costs = np.empty(count)
+    base = _cost(sequence, size, first, between, worth, weights)
+    for place in range(count):
+        changed = with_first(sequence, robot, place, count)
+        costs[place] = _cost(changed, size, first, between, worth, weights) - base
+    return costs
+
+
+@kernel
+def with_first(sequence: NDArray[np.int64], robot: int, place: int, count: int) -> NDArray[np.int64]:
+    """Return tours past ``count`` places in which a robot visits one of them first.
+
+    All other places keep their order. ``sequence`` (count + robots - 1,) int64 are the tours, as
+    ``team_tours`` returns them.
+    """
+    changed = np.empty_like(sequence)
+    size, tour = 0, 0
+    if robot == 0:
+        changed[0], size = place, 1
+    for number in sequence:
+        if number == place:
+            continue
+        changed[size] = number
+        size += 1
+        if number >= count:
+            tour += 1
+            if tour == robot:
+                changed[size] = place
+                size += 1
+    return changed
+
+
+@kernel
+def _cost(
+    sequence: Array, size: int, first: Array, between: Array, worth: Array, weights: TourWeights
+) -> float:
+    """Return the cost of the tours of the first ``size`` numbers of a sequence."""
+    count = first.shape[1]
+    robot, last = 0, -1
+    length, longest, total, waiting = 0.0, 0.0, 0.0, 0.0
+    for k in range(size):
+        place = sequence[k]
+        if place >= count:
+            robot, last = robot + 1, -1
+            longest, total, length = max(longest, length), total + length, 0.0
+            continue
+        length += first[robot, place] if last < 0 else between[last, place]
+        waiting += worth[place] * length
+        last = place
+    longest, total = max(longest, length), total + length
+    return float(weights.longest * longest + weights.total * total + weights.waiting * waiting)
+
+
+@kernel
+def _insert_all(sequence: Array, first: Array, between: Array, worth: Array, weights: TourWeights) -> None:
+    """Insert all places into empty tours, each time the one with the lowest cost."""
+    robots, count = first.shape
+    size = robots - 1
+    is_left = np.ones(count, np.bool_)
+    trial = np.empty_like(sequence)
+    for _ in range(count):
+        minimum, chosen, at = np.inf, -1, 0
+        for place in range(count):
+            if not is_left[place]:
+                continue
+            for position in range(size + 1):
+                trial[:position] = sequence[:position]
+                trial[position] = place
+                trial[position + 1 : size + 1] = sequence[position:size]
+                cost = _cost(trial, size + 1, first, between, worth, weights)
+                if cost < minimum - _LESS:
+                    minimum, chosen, at = cost, place, position
+        for k in range(size, at, -1):
+            sequence[k] = sequence[k - 1]
+        sequence[at], is_left[chosen] = chosen, False
+        size += 1
+
+
+@kernel
+def _turn_pieces(
+    sequence: Array,
+    trial: Array,
+    first: Array,
+    between: Array,
+    worth: Array,
+    weights: TourWeights,
+    cost: float,
+) -> float:
+    """Reverse every piece that makes the tours better; return their cost."""
+    size = sequence.shape[0]
+    for start in range(size):
+        for end in range(start + 2, size + 1):
+            trial[:] = sequence
+            trial[start:end] = sequence[start:end][::-1]
+            better = _cost(trial, size, first, between, worth, weights)
+            if better < cost - _LESS:
+                sequence[:], cost = trial, better
+    return cost
+
+
+@kernel
+def _move_pieces(
+    sequence: Array,
+    scratch: tuple[Array, Array],
+    first: Array,
+    between: Array,
+    worth: Array,
+    weights: TourWeights,
+    cost: float,
+) -> float:
+    """Move short pieces to positions that make the tours better; return their cost."""
+    trial, rest = scratch
+    size = sequence.shape[0]
+    for length in range(1, min(_LONGEST_PIECE, size - 1) + 1):
+        for start in range(size - length + 1):
+            piece = sequence[start : start + length].copy()
+            left = size - length
+            rest[:start], rest[start:left] = sequence[:start], sequence[start + length :]
+            for position in range(left + 1):
+                trial[:position] = rest[:position]
+                trial[position : position + length] = piece
+                trial[position + length :] = rest[position:left]
+                better = _cost(trial, size, first, between, worth, weights)
+                if better < cost - _LESS:
+                    sequence[:], cost = trial, better
+                    break
+    return cost
