@@ -1,8 +1,7 @@
 """Outlines of the shapes of SVG drawings, as polylines.
 
-References
-----------
-W3C, Scalable Vector Graphics (SVG) 2, chapters 8 to 10 and appendix B.2 (arcs).
+``svgelements`` computes transforms, curves and arcs. Commands are split here: its parser makes an object of
+each line, which takes four times as long, and leaves out what it does not understand.
 """
 
 import math
@@ -12,6 +11,7 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 from numpy.typing import NDArray
+from svgelements import Arc, CubicBezier, Matrix, PathSegment, QuadraticBezier
 
 from lidarium.envs.floors.importers.common import MOST_POINTS
 
@@ -21,6 +21,8 @@ Polyline = NDArray[np.float64]
 CURVE_PARTS = 16
 """Straight parts of a curve, and of a quarter of a circle."""
 
+_SHARES = np.arange(1, CURVE_PARTS + 1) / CURVE_PARTS
+
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _NUMBERS = re.compile(_NUMBER)
 _COMMANDS = re.compile(r"([MmZzLlHhVvCcSsQqTtAa])([^MmZzLlHhVvCcSsQqTtAa]*)")
@@ -28,7 +30,6 @@ _COMMANDS = re.compile(r"([MmZzLlHhVvCcSsQqTtAa])([^MmZzLlHhVvCcSsQqTtAa]*)")
 _ARCS = re.compile(
     rf"({_NUMBER})[\s,]*({_NUMBER})[\s,]*({_NUMBER})[\s,]*([01])[\s,]*([01])[\s,]*({_NUMBER})[\s,]*({_NUMBER})"
 )
-_TRANSFORM = re.compile(r"(matrix|translate|scale|rotate|skewX|skewY)\s*\(([^)]*)\)")
 _WANTS = {"M": 2, "L": 2, "H": 1, "V": 1, "C": 6, "S": 4, "Q": 4, "T": 2, "A": 7}
 _WANTS |= {command.lower(): count for command, count in _WANTS.items()}
 
@@ -45,31 +46,9 @@ def length(text: str | None, otherwise: float = 0.0) -> float:
 
 
 def transform_of(element: Element) -> NDArray[np.float64]:
-    """Return how an element lies in the one around it, (3, 3)."""
-    whole = np.eye(3)
-    for kind, text in _TRANSFORM.findall(element.get("transform", "")):
-        whole = whole @ _matrix(kind, numbers(text))
-    return whole
-
-
-def _matrix(kind: str, given: list[float]) -> NDArray[np.float64]:
-    values = [*given, *[0.0] * 6]
-    if kind == "matrix":
-        a, b, c, d, e, f = values[:6]
-    elif kind == "translate":
-        a, b, c, d, e, f = 1.0, 0.0, 0.0, 1.0, values[0], values[1]
-    elif kind == "scale":
-        a, b, c, d, e, f = values[0], 0.0, 0.0, values[1] if len(given) > 1 else values[0], 0.0, 0.0
-    elif kind == "rotate":
-        angle = math.radians(values[0])
-        a, b, c, d = math.cos(angle), math.sin(angle), -math.sin(angle), math.cos(angle)
-        x, y = values[1], values[2]
-        e, f = x - a * x - c * y, y - b * x - d * y
-    else:
-        slope = math.tan(math.radians(values[0]))
-        a, d, e, f = 1.0, 1.0, 0.0, 0.0
-        b, c = (0.0, slope) if kind == "skewX" else (slope, 0.0)
-    return np.array([[a, c, e], [b, d, f], [0.0, 0.0, 1.0]])
+    """Return the transform of an element into the one around it, (3, 3)."""
+    found = Matrix(element.get("transform", ""))
+    return np.array([[found.a, found.c, found.e], [found.b, found.d, found.f], [0.0, 0.0, 1.0]], np.float64)
 
 
 def outlines(element: Element, kind: str) -> list[Polyline]:
@@ -170,38 +149,19 @@ def _part(
     ends = [complex(*given[k : k + 2]) + base for k in range(0, len(given), 2)]
     if kind in "ST":
         ends = [here if control is None else 2.0 * here - control, *ends]
-    return _bezier([here, *ends]), ends[-2]
-
-
-def _bezier(controls: list[complex]) -> list[complex]:
-    """Return points of a Bezier curve behind its first, by Bernstein's polynomials."""
-    degree = len(controls) - 1
-    shares = np.arange(1, CURVE_PARTS + 1) / CURVE_PARTS
-    curve = sum(
-        math.comb(degree, k) * shares**k * (1.0 - shares) ** (degree - k) * control
-        for k, control in enumerate(controls)
-    )
-    return list(np.asarray(curve).tolist())
+    curve = CubicBezier(here, *ends) if kind in "CS" else QuadraticBezier(here, *ends)
+    return _along(curve, _SHARES), ends[-2]
 
 
 def _arc(here: complex, given: list[float], end: complex) -> list[complex]:
-    """Return points of an elliptic arc behind its first, from its ends."""
-    wide, high, turn = abs(given[0]), abs(given[1]), np.exp(1j * math.radians(given[2]))
-    if wide == 0.0 or high == 0.0 or here == end:
+    """Return points of an elliptic arc after its first, from its ends."""
+    if given[0] == 0.0 or given[1] == 0.0 or here == end:
         return [end]
-    middle = (here - end) / 2.0 / turn
-    x, y = middle.real / wide, middle.imag / high
-    grown = max(math.hypot(x, y), 1.0)
-    wide, high, x, y = wide * grown, high * grown, x / grown, y / grown
-    # On the circle to which the ellipse is shrunk: from its centre to the middle of the chord.
-    root = math.sqrt(max(1.0 / (x * x + y * y) - 1.0, 0.0))
-    sign = -1.0 if bool(given[3]) == bool(given[4]) else 1.0
-    centre = complex(sign * root * y, -sign * root * x)
-    first, last = np.angle(complex(x, y) - centre), np.angle(complex(-x, -y) - centre)
-    swept = (last - first) % (2.0 * math.pi)
-    if not given[4]:
-        swept -= 2.0 * math.pi
-    parts = max(math.ceil(abs(swept) / (0.5 * math.pi) * CURVE_PARTS), 1)
-    unit = np.exp(1j * (first + swept * np.arange(1, parts + 1) / parts)) + centre
-    curve = (here + end) / 2.0 + turn * (wide * unit.real + 1j * high * unit.imag)
-    return [*curve[:-1].tolist(), end]
+    arc = Arc(here, *given[:5], end)
+    parts = max(math.ceil(abs(arc.sweep) / (0.5 * math.pi) * CURVE_PARTS), 1)
+    return [*_along(arc, np.arange(1, parts) / parts), end]
+
+
+def _along(curve: PathSegment, shares: NDArray[np.float64]) -> list[complex]:
+    points: list[complex] = (curve.npoint(shares) @ (1.0, 1.0j)).tolist()
+    return points
