@@ -14,17 +14,17 @@ from lidarium.mapping.files.guarded_reading import READING_ERRORS, read_bytes, r
 if TYPE_CHECKING:
     from PIL.ImageFile import ImageFile
 
-MOST_IMAGE_BYTES = 1 << 29
+MAX_IMAGE_BYTES = 1 << 29
 """Longest file of a picture."""
 
-MOST_PIXELS = 25_000_000
+MAX_PIXELS = 25_000_000
 """Most pixels of a picture, 5,000 x 5,000: a floor is made of them in a second and 300 MB."""
 
-MOST_COLOURED = 12_000_000
+MAX_COLOURED = 12_000_000
 """Most pixels of a picture that may have colours, 4,000 x 3,000: they take twice as long."""
 
-LEAST_PIXELS, PIXELS_PER_BYTE = 1 << 22, 1000
-"""A picture may have the first many pixels, and so many for each of its bytes: none is packed closer."""
+MIN_PIXELS, PIXELS_PER_BYTE = 1 << 22, 1000
+"""Pixels that any image may have, and pixels for each byte of the file."""
 
 _GREY = frozenset(("1", "L", "I", "I;16", "I;16B"))
 """Modes of Pillow with one channel, as PNG and PGM have them."""
@@ -52,7 +52,7 @@ def read_image(path: Path) -> NDArray[Any]:
         If it is a folder, not an image, or of float pixels that are neither shares nor greys.
     """
     path = Path(path)
-    content = read_bytes(path, MOST_IMAGE_BYTES)
+    content = read_bytes(path, MAX_IMAGE_BYTES)
     header = _header(content)
     pixels = None
     if header is not None:
@@ -63,10 +63,10 @@ def read_image(path: Path) -> NDArray[Any]:
         return _greys_of_floats(path, pixels)
     if pixels is None or pixels.dtype not in (np.uint8, np.uint16):
         raise ValueError(f"{path} is not an image that can be read; want png, pgm, bmp, jpg or tif")
-    white, most = _unscaled_white(content), np.iinfo(pixels.dtype).max
-    if white is None or white == most:
+    white, maximum = _unscaled_white(content), np.iinfo(pixels.dtype).max
+    if white is None or white == maximum:
         return pixels
-    return np.minimum(np.rint(pixels * (most / max(white, 1))), most).astype(pixels.dtype)
+    return np.minimum(np.rint(pixels * (maximum / max(white, 1))), maximum).astype(pixels.dtype)
 
 
 def _greys_of_floats(path: Path, pixels: NDArray[Any]) -> NDArray[np.uint16]:
@@ -113,11 +113,11 @@ def _check_size(header: "ImageFile", content: bytes) -> None:
     """Raise ValueError if an image is too large to be decoded."""
     width, height = header.size
     is_grey = header.mode in _GREY and header.format in ("PNG", "PPM")
-    allowed = MOST_PIXELS if is_grey else MOST_COLOURED
-    most = min(allowed, max(LEAST_PIXELS, PIXELS_PER_BYTE * len(content)))
-    if not (width > 0 and height > 0 and width * height <= most):
+    allowed = MAX_PIXELS if is_grey else MAX_COLOURED
+    maximum = min(allowed, max(MIN_PIXELS, PIXELS_PER_BYTE * len(content)))
+    if not (width > 0 and height > 0 and width * height <= maximum):
         raise ValueError(
-            f"it has {width:,} x {height:,} pixels in {len(content):,} bytes; want at most {most:,}"
+            f"it has {width:,} x {height:,} pixels in {len(content):,} bytes; want at most {maximum:,}"
         )
 
 

@@ -25,12 +25,12 @@ from robustness.samples import make_samples
 from robustness.uses import use
 from robustness.worker import outcome_of, read_all
 
-from lidarium.mapping.files.images import MOST_COLOURED, MOST_PIXELS
+from lidarium.mapping.files.images import MAX_COLOURED, MAX_PIXELS
 from lidarium.mapping.files.laser_logs import LaserLog
 from lidarium.mapping.grids.scan_geometry import ScanGeometry
 
 MOST_BYTES = 1 << 20
-MOST_SIDE, COLOURED_SIDE = math.isqrt(MOST_PIXELS), math.isqrt(MOST_COLOURED)
+MOST_SIDE, COLOURED_SIDE = math.isqrt(MAX_PIXELS), math.isqrt(MAX_COLOURED)
 TRIES = 2
 """How often a file that took too much is read again."""
 

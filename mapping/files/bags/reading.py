@@ -11,28 +11,27 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.mapping.files.bags.messages import BAG_SUFFIXES, LASER_SCAN, ODOMETRY, decoder
-from lidarium.mapping.files.guarded_reading import reading, reason
+from lidarium.mapping.files.guarded_reading import printable, reading, reason
 from lidarium.mapping.files.laser_logs import LaserLog, made_usable, symmetric_scans
-from lidarium.mapping.files.names import printable
 from lidarium.mapping.files.trajectories import interpolated
 
 _TF, _STATIC = "/tf", "/tf_static"
 
 
 @dataclass(slots=True)
-class Messages:
-    """What of a bag makes a log.
+class _Messages:
+    """The messages of a bag that make a log.
 
     Attributes
     ----------
     scans : list
         Messages of the chosen topic.
     odometry_stamps, odometry : list
-        When odometry was read [s], and what it was: x, y, theta [m, rad].
+        Stamps of the odometry [s], and its poses x, y, theta [m, rad].
     base : str
         Frame of the robot's body as the odometry names it.
     static : dict
-        Where frames are fixed on others: x, y, theta by parent and child [m, rad].
+        Poses of frames fixed on others: x, y, theta by parent and child [m, rad].
     moving : dict
         Stamps and poses of frames that move on others, by parent and child.
     """
@@ -90,10 +89,10 @@ def read_bag_log(path: Path, topic: str | None = None) -> LaserLog:
         return made_usable(_log(path, messages), str(path))
 
 
-def _messages(path: Path, topic: str | None) -> Messages:
+def _messages(path: Path, topic: str | None) -> _Messages:
     from lidarium.mapping.files.bags.storages import open_storages
 
-    found = Messages()
+    found = _Messages()
     with open_storages(path) as storages:
         types = {name: kind for storage in storages for name, kind in storage.types.items()}
         scans = _chosen(path, [name for name, kind in types.items() if kind == LASER_SCAN], topic)
@@ -148,7 +147,7 @@ def _same_beginning(a: Iterable[str], b: Iterable[str]) -> Iterator[str]:
         yield left
 
 
-def _note_transforms(found: Messages, content: Any, *, is_static: bool) -> None:  # noqa: ANN401
+def _note_transforms(found: _Messages, content: Any, *, is_static: bool) -> None:  # noqa: ANN401
     for each in content.transforms:
         frames = _frame(each.header.frame_id), _frame(each.child_frame_id)
         pose = _in_plane(each.transform.translation, each.transform.rotation)
@@ -158,7 +157,7 @@ def _note_transforms(found: Messages, content: Any, *, is_static: bool) -> None:
             found.moving.setdefault(frames, []).append((_seconds(each.header.stamp), pose))
 
 
-def _log(path: Path, messages: Messages) -> LaserLog:
+def _log(path: Path, messages: _Messages) -> LaserLog:
     scans, skipped = messages.scans, dict[str, int]()
     if not scans:
         raise ValueError(f"{path} holds no scans; want messages of {LASER_SCAN}")
@@ -205,8 +204,8 @@ def _log(path: Path, messages: Messages) -> LaserLog:
     )
 
 
-def _odometry(messages: Messages) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return when odometry was read, ascending, and what it was (n, 3)."""
+def _odometry(messages: _Messages) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the stamps of the odometry, ascending, and its poses (n, 3)."""
     stamps, poses = messages.odometry_stamps, messages.odometry
     if not stamps:
         for (parent, child), moves in messages.moving.items():

@@ -28,8 +28,13 @@ from rosbags.serde import SerdeError
 from rosbags.typesys import TypesysError
 
 from lidarium.mapping.files.bags.messages import BAG_SUFFIXES, READ, normalized
-from lidarium.mapping.files.guarded_reading import MOST_FILE_BYTES, most_unpacked, open_guarded, read_text
-from lidarium.mapping.files.names import printable
+from lidarium.mapping.files.guarded_reading import (
+    MAX_FILE_BYTES,
+    max_unpacked,
+    open_guarded,
+    printable,
+    read_text,
+)
 
 WANTED = "want a whole bag of ROS: .mcap, .db3, .bag, or a folder of these"
 """The cure that errors name."""
@@ -106,9 +111,9 @@ def open_storages(path: Path) -> Iterator[list[Storage]]:
     for file in files:
         with open_guarded(file) as opened:
             size += os.fstat(opened.fileno()).st_size
-        if size > MOST_FILE_BYTES:
-            raise ValueError(f"{path} has {size:,} bytes and more; want at most {MOST_FILE_BYTES:,}")
-    allowed = most_unpacked(size)
+        if size > MAX_FILE_BYTES:
+            raise ValueError(f"{path} has {size:,} bytes and more; want at most {MAX_FILE_BYTES:,}")
+    allowed = max_unpacked(size)
     unpacked = _Budget(
         _MAP_RATIO * allowed, f"{path} has more than {_MAP_RATIO * allowed:,} bytes when unpacked; want fewer"
     )
