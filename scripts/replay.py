@@ -41,7 +41,7 @@ class Replay(FilmFiles, Command):
     Works for records of other versions too, with less to be seen
     """
     mcap: Path | None = None
-    """run the record again and write what was sensed as a bag of ROS 2 (extra mcap)"""
+    """run the record again and write what was sensed as a bag of ROS 2 (extra bags)"""
 
 
 def execute(command: Replay) -> Answer:

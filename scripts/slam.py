@@ -30,10 +30,10 @@ class Slam(Command):
     """
 
     log: Positional[Path]
-    """CARMEN log, .npz file or bag of ROS 2.
+    """CARMEN log, .npz file or bag of ROS 1 or 2.
 
     CARMEN logs (.log, .clf, also .gz) have FLASER or ROBOTLASER1 lines; .npz holds ranges, stamp and
-    pose_odom; bags are .mcap files with LaserScan messages (extra mcap).
+    pose_odom; bags are .mcap, .db3 or .bag files with LaserScan messages, or folders of these (extra bags).
     """
     topic: str | None = None
     """topic of the scans, where a bag has several"""
@@ -144,12 +144,12 @@ def settings_of(command: Slam) -> "SlamSettings":
 
 
 def _read(command: Slam) -> "LaserLog":
-    from lidarium.mapping.files.bags.reading import read_mcap_log
+    from lidarium.mapping.files.bags.reading import is_bag, read_bag_log
     from lidarium.mapping.files.carmen_logs import read_carmen_log
     from lidarium.mapping.files.npz_logs import read_npz_log
 
-    if command.log.suffix == ".mcap":
-        return read_mcap_log(command.log, command.topic)
+    if is_bag(command.log):
+        return read_bag_log(command.log, command.topic)
     if command.log.suffix == ".npz":
         return read_npz_log(command.log)
     return read_carmen_log(

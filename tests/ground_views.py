@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 
-from lidarium.mapping.point_clouds.intrinsics import Intrinsics
-from lidarium.mapping.sparse.exploring.ground_camera import GroundCamera
+from lidarium.mapping.point_clouds.cameras import Intrinsics
+from lidarium.mapping.sparse.exploring.ground import GroundCamera
 
 FAR_M = 8.0
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from lidarium.mapping.sparse.exploring.ground_map import ground_map
+from lidarium.mapping.sparse.exploring.ground import ground_map
 from lidarium.mapping.sparse.exploring.navigation import sparse_navigation
 from lidarium.mapping.sparse.swept_body import SweptBody
 

@@ -11,13 +11,13 @@ from lidarium.envs.floors.floor import Floor
 from lidarium.envs.floors.raster import Raster
 
 OUTSIDE_BORDER = 0.5
-"""An area that has such a share of the picture's border may be what lies around a building or a track."""
+"""An area that has such a share of the picture's border may be the surroundings of a building or a track."""
 
 BUILDING_SHARE = 0.5
-"""It is, where an enclosed area spans such a share of the rectangle of all that it surrounds."""
+"""It is, if an enclosed area spans such a share of the rectangle of all that it surrounds."""
 
-LEAST_OTHER_M2 = 1.0
-"""Other areas of a picture are kept where one has this size [m2]: robots may start there."""
+MIN_OTHER_M2 = 1.0
+"""Other areas of a picture are kept if one has this size [m2]: robots may start there."""
 
 
 def floor_of_area(
@@ -39,14 +39,9 @@ def floor_of_area(
     origin, resolution : (float, float), float
         Lower left corner of cell (0, 0) and side of a cell [m].
     seed_cell : (row, column) or None
-        A cell of the area that stays free; None for the largest, or the widest where that lies around it.
+        A cell of the area that stays free; None for the largest, or the widest if that lies around it.
     starts : (K, 3) float64 or None
         Starts that the file proposes [m, rad].
-
-    Raises
-    ------
-    ValueError
-        If the seed cell is not free.
     """
     count, *found, _ = cv2.connectedComponentsWithStats(
         free.astype(np.uint8), connectivity=4, ltype=cv2.CV_32S
@@ -64,7 +59,7 @@ def floor_of_area(
         np.pad(solid, 1, constant_values=1), (corner[0] - resolution, corner[1] - resolution), resolution
     )
     others = np.delete(statistics[1:count, cv2.CC_STAT_AREA], label - 1)
-    has_others = others.max(initial=0) * resolution**2 >= LEAST_OTHER_M2
+    has_others = others.max(initial=0) * resolution**2 >= MIN_OTHER_M2
     areas = Raster((~free).astype(np.uint8), origin, resolution) if has_others else None
     proposed = np.zeros((0, 3)) if starts is None else starts
     return Floor(name, bounds, cells=cells, starts=proposed, areas=areas, remark=remark)
@@ -73,7 +68,7 @@ def floor_of_area(
 def around(floor: Floor, places: NDArray[np.float64]) -> Floor:
     """Return the floor of the area in which the first of some places (n, 2 or more) lies [m].
 
-    It is the same floor where it has one area alone, or the place is in that or in a wall.
+    It is the same floor if it has one area alone, or the place is in that or in a wall.
     """
     if floor.areas is None:
         return floor
@@ -91,7 +86,7 @@ def around(floor: Floor, places: NDArray[np.float64]) -> Floor:
 
 
 def _chosen(labels: NDArray[Any], statistics: NDArray[Any]) -> tuple[int, str]:
-    """Return the number of the area that is the floor, and what is to be said of it."""
+    """Return the number of the area that is the floor, and a remark on it."""
     largest = int(np.argmax(statistics[:, cv2.CC_STAT_AREA]))
     border = np.concatenate([labels[0], labels[-1], labels[1:-1, 0], labels[1:-1, -1]])
     along = np.bincount(border, minlength=len(statistics)) / len(border)

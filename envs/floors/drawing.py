@@ -56,7 +56,7 @@ def fill_shapes(
     shapes : sequence of (E, 4) float64
         Edges x1, y1, x2, y2 of each shape [m]; together they close its rings.
     value : int
-        What the cells inside are set to.
+        Value of the cells inside.
     """
     if not len(shapes):
         return

@@ -1,4 +1,4 @@
-"""Faces of a floor: what a camera sees of walls, furniture, ground and ceiling.
+"""Faces of a floor that a camera sees: walls, furniture, ground and ceiling.
 
 A face is convex and has four corners; a triangle repeats one. Seen from the outside, its corners run
 counter-clockwise. Solids are prisms, so that their faces are sides, tops and undersides; bent outlines and
@@ -11,12 +11,11 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.envs.floors.floor import Floor
+from lidarium.envs.floors.floor import Floor, Solid
 from lidarium.envs.floors.raster import Raster, rectangles_of
-from lidarium.envs.floors.solid import Solid
 
 GROUND, CEILING, SURROUNDINGS, SECTION = -1, -2, -3, -4
-"""Numbers of what is no solid.
+"""Numbers of faces that belong to no solid.
 
 They are the ground, the ceiling, all outside of the bounds with the walls of images, and cuts of sections.
 """
@@ -71,18 +70,7 @@ class Faces:
 
 
 def faces_of(floor: Floor) -> Faces:
-    """Return all faces of a floor.
-
-    Parameters
-    ----------
-    floor : Floor
-        What stands there. Solids without a height reach its ceiling, as image walls do.
-
-    Returns
-    -------
-    Faces
-        Those of the ground, the ceiling, the bounds (seen from within), then those of the solids.
-    """
+    """Return all faces of a floor."""
     x_min, y_min, x_max, y_max = floor.bounds
     rectangle = np.array([(x_min, y_min), (x_max, y_min), (x_max, y_max), (x_min, y_max)])
     parts = [
@@ -102,9 +90,9 @@ def section_of(floor: Floor, height: float) -> Faces:
     Parameters
     ----------
     floor : Floor
-        What stands there.
+        Obstacles.
     height : float
-        Where it is cut [m]; what stands higher gets a top there, owned by ``SECTION``.
+        Height of the cut [m]; higher solids get a top there, owned by ``SECTION``.
     """
     x_min, y_min, x_max, y_max = floor.bounds
     rectangle = np.array([(x_min, y_min), (x_max, y_min), (x_max, y_max), (x_min, y_max)])
@@ -145,7 +133,7 @@ def convex_parts(solid: Solid) -> list[Points]:
     Returns
     -------
     list of (3 or more, 2) float64
-        Corners, counter-clockwise [m]: the outline itself where it is convex, else trapezoids.
+        Corners, counter-clockwise [m]: the outline itself if it is convex, else trapezoids.
     """
     ring = _counter_clockwise(solid.polygon)
     if not solid.holes and _is_convex(ring):
@@ -205,7 +193,7 @@ def _is_convex(ring: Points) -> bool:
 
 
 def _trapezoids(edges: Points) -> list[Points]:
-    """Cut what closed rings hold by the even-odd rule into trapezoids with level bases.
+    """Cut the inside of closed rings by the even-odd rule into trapezoids with level bases.
 
     Parameters
     ----------

@@ -1,26 +1,181 @@
-"""Floors: what stands in a building, in metres, and its rasters.
+"""Floors: the solids of a building, in metres, and its rasters.
 
-A floor is a set of solids (vertical prisms) or, where it comes from an image, a grid of solid cells; never
+A floor is a set of solids (vertical prisms) or, if it comes from an image, a grid of solid cells; never
 both. The laser sees the solids that cut its plane, the body touches those that cut its height.
 """
 
 import hashlib
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import cached_property
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.envs.floors.drawing import draw_segments, fill_shapes
-from lidarium.envs.floors.extent import check_extent
+from lidarium.envs.floors.drawing import draw_segments, fill_shapes, ring_edges
 from lidarium.envs.floors.raster import Raster, cells_within, frame_of, sampled
-from lidarium.envs.floors.solid import Solid, middle_line, width_of
+
+MAX_COORDINATE_M = 1e8
+"""Farthest that a floor may lie from the origin of its frame [m]."""
+
+MAX_EXTENT_M = 10_000.0
+"""Longest side of a floor [m]."""
+
+MAX_BEYOND_M = 1_000.0
+"""Farthest that the obstacles may reach beyond the bounds [m]."""
+
+MAX_OUTLINE_M = 500_000.0
+"""Longest sum of all outlines: each is followed cell by cell [m]."""
+
+MAX_PAIRS = 250_000
+"""Most walls times doors: each is compared with each."""
+
+MAX_CORNERS = 2_000_000
+"""Most corners of all outlines."""
+
+
+def check_extent(what: str, bounds: Iterable[float], rings: Iterable[NDArray[np.float64]] = ()) -> None:
+    """Check that a floor is not too large.
+
+    Parameters
+    ----------
+    what : str
+        The floor, for messages.
+    bounds : (x_min, y_min, x_max, y_max)
+        Rectangle that holds it [m].
+    rings : iterable of (N, 2) float64
+        Closed outlines of the obstacles [m].
+    """
+    low_x, low_y, high_x, high_y = bounds
+    side, farthest = max(high_x - low_x, high_y - low_y), max(map(abs, (low_x, low_y, high_x, high_y)))
+    if not (side <= MAX_EXTENT_M and farthest <= MAX_COORDINATE_M):
+        raise ValueError(
+            f"{what} has a side of {side:g} m, up to {farthest:g} m from its origin; want at most "
+            f"{MAX_EXTENT_M:,.0f} m, up to {MAX_COORDINATE_M:,.0f} m: check its scale"
+        )
+    outlines = [np.asarray(ring, np.float64) for ring in rings if len(ring)]
+    if not outlines:
+        return
+    corners = np.concatenate(outlines)
+    if not (
+        (corners >= [low_x - MAX_BEYOND_M, low_y - MAX_BEYOND_M]).all()
+        and (corners <= [high_x + MAX_BEYOND_M, high_y + MAX_BEYOND_M]).all()
+    ):
+        raise ValueError(
+            f"{what} has something that stands more than {MAX_BEYOND_M:,.0f} m beyond its bounds; want "
+            "all of it within: check its scale"
+        )
+    ends = np.cumsum([len(ring) for ring in outlines])
+    following = np.arange(1, len(corners) + 1)
+    following[ends - 1] = np.concatenate([[0], ends[:-1]])
+    steps = corners[following] - corners
+    if len(corners) > MAX_CORNERS or float(np.hypot(steps[:, 0], steps[:, 1]).sum()) > MAX_OUTLINE_M:
+        raise ValueError(
+            f"{what} has more than {MAX_CORNERS:,} corners or {MAX_OUTLINE_M:,.0f} m of walls; want "
+            "fewer: check its scale, or part it"
+        )
+
+
+def check_pairs(what: str, walls: int, doors: int) -> None:
+    """Check that comparing all walls with all doors does not take too long."""
+    if walls * doors > MAX_PAIRS:
+        raise ValueError(f"{what} has {walls:,} walls and {doors:,} doors; want a product of {MAX_PAIRS:,}")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Solid:
+    """A vertical prism.
+
+    Attributes
+    ----------
+    polygon : (N, 2) float64
+        Corners x, y in metres, at least three, in order, without repetition of the first.
+    z_low, z_high : float
+        Height range [m]; ``math.inf`` for a wall that reaches the ceiling.
+    holes : tuple of (M, 2) float64
+        Rings inside the polygon that are not solid [m].
+    """
+
+    polygon: NDArray[np.float64]
+    z_low: float = 0.0
+    z_high: float = math.inf
+    holes: tuple[NDArray[np.float64], ...] = ()
+
+    def __post_init__(self) -> None:
+        if not self.z_low < self.z_high:
+            raise ValueError(
+                f"solid from z_low={self.z_low} to z_high={self.z_high} m has no height; want z_low < z_high"
+            )
+        object.__setattr__(self, "polygon", _ring("polygon", self.polygon))
+        object.__setattr__(self, "holes", tuple(_ring("hole", hole) for hole in self.holes))
+
+    @property
+    def edges(self) -> NDArray[np.float64]:
+        """Edges x1, y1, x2, y2 of the polygon and its holes, (E, 4) float64 [m]."""
+        return np.concatenate([ring_edges(ring) for ring in (self.polygon, *self.holes)])
+
+    def cuts(self, z_low: float, z_high: float) -> bool:
+        """Return whether the solid cuts a height range [m].
+
+        It is a plane if ``z_low == z_high``.
+        """
+        if z_low == z_high:
+            return self.z_low <= z_low < self.z_high
+        return self.z_low < z_high and self.z_high > z_low
+
+
+def _following(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return of each corner the next one; `np.roll` takes five times as long for so few."""
+    return np.concatenate([values[1:], values[:1]])
+
+
+def _area(polygon: NDArray[np.float64]) -> float:
+    x, y = (polygon - polygon[0]).T
+    return abs(float(np.dot(x, _following(y)) - np.dot(y, _following(x)))) / 2.0
+
+
+def _width_of(polygon: NDArray[np.float64]) -> float:
+    """Return the width of a polygon.
+
+    It is that of its smallest rectangle or, for a bent strip, of the strip.
+    """
+    edges = _following(polygon) - polygon
+    perimeter = float(np.hypot(*edges.T).sum())
+    rectangle = min(cv2.minAreaRect((polygon - polygon[0]).astype(np.float32))[1])
+    turns = edges[:, 0] * _following(edges[:, 1]) - edges[:, 1] * _following(edges[:, 0])
+    convex = bool((turns >= -1e-12).all() or (turns <= 1e-12).all())
+    return rectangle if convex or perimeter == 0.0 else min(rectangle, 2.0 * _area(polygon) / perimeter)
+
+
+def _middle_line(polygon: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the segments that replace a thin polygon.
+
+    They are the middle line of four corners, else the outline.
+    """
+    if len(polygon) != 4:
+        return ring_edges(polygon)
+    middles = (polygon + _following(polygon)) / 2.0
+    lengths = np.hypot(*(_following(polygon) - polygon).T)
+    k = 0 if lengths[0] + lengths[2] <= lengths[1] + lengths[3] else 1
+    return np.concatenate([middles[k], middles[k + 2]])[None]
+
+
+def _ring(kind: str, ring: NDArray[np.float64]) -> NDArray[np.float64]:
+    corners = np.ascontiguousarray(ring, dtype=np.float64)
+    if corners.ndim != 2 or corners.shape[0] < 3 or corners.shape[1] != 2 or not np.isfinite(corners).all():
+        raise ValueError(
+            f"{kind} has shape {corners.shape} or values that are not finite; want at least 3 points (x, y) "
+            "in metres"
+        )
+    return corners
+
 
 MAX_RASTER_CELLS = 200_000_000
 
 CEILING = 2.5
-"""Height of a ceiling where a floor says nothing [m]."""
+"""Height of a ceiling if the floor does not state it [m]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,20 +189,20 @@ class Floor:
     bounds : (x_min, y_min, x_max, y_max)
         Rectangle that holds the floor [m]; everything outside is solid.
     solids : tuple of Solid
-        What stands there; empty where ``cells`` is given.
+        Obstacles; empty if ``cells`` is given.
     cells : Raster or None
         Solid cells of a floor that comes from an image, at the image's own resolution.
     starts : (K, 3) float64
         Proposed starts x, y, theta [m, rad], far apart from each other; may be empty (then starts are drawn
         by seed).
     goal : (x, y) or None
-        Where robots with a goal should go [m].
+        Goal of robots that have one [m].
     ceiling : float
         Height of the ceiling, to which solids without a height reach [m].
     areas : Raster or None
         Solid cells of a picture with several free areas, of which one is the floor; see ``areas.around``.
     remark : str
-        What was assumed of a picture that does not say it.
+        Assumptions on an image that does not state them.
     """
 
     name: str
@@ -109,17 +264,6 @@ class Floor:
             Side of a cell [m].
         z_low, z_high : float
             Height range [m]; equal for the plane of a laser.
-
-        Returns
-        -------
-        Raster
-            The cells.
-
-        Raises
-        ------
-        ValueError
-            If the resolution is not positive, the height range is upside down, or the raster has more than
-            `MAX_RASTER_CELLS` cells.
         """
         if not (math.isfinite(resolution) and resolution > 0.0):
             raise ValueError(f"resolution is {resolution} m; want a positive number")
@@ -138,9 +282,9 @@ class Floor:
             fill_shapes(solid, origin, resolution, [part.edges for part in standing], 1)
             # Strips narrower than a cell's diagonal may miss centres and leak between diagonal neighbours.
             thin = [
-                middle_line(part.polygon)
+                _middle_line(part.polygon)
                 for part in standing
-                if not part.holes and width_of(part.polygon) < math.sqrt(2.0) * resolution
+                if not part.holes and _width_of(part.polygon) < math.sqrt(2.0) * resolution
             ]
             if thin:
                 draw_segments(solid, origin, resolution, np.concatenate(thin), 1)
@@ -158,7 +302,7 @@ class Floor:
 
     @cached_property
     def sha256(self) -> str:
-        """Hash of what stands there, the starts and the goal, to a micrometre.
+        """Hash of the obstacles, the starts and the goal, to a micrometre.
 
         The name does not count.
         """
@@ -205,7 +349,7 @@ class Floor:
 def _hash_numbers(
     digest: "hashlib._Hash", label: str, numbers: "NDArray[np.float64] | tuple[float, ...]"
 ) -> None:
-    """Add numbers in millionths; what is infinite keeps its sign."""
+    """Add numbers in millionths; infinite ones keep their sign."""
     scaled = np.clip(np.rint(np.asarray(numbers, dtype=np.float64).ravel() * 1e6), -(2.0**62), 2.0**62)
     digest.update(f"{label}:{scaled.size};".encode())
     digest.update(scaled.astype("<i8").tobytes())

@@ -18,7 +18,7 @@ FloorName = str | Path | Floor
 """A name of the catalogue, a set, a folder, a file, or a floor."""
 
 Floors = FloorName | Sequence[Any] | Mapping[Any, float] | Callable[[np.random.Generator], Any]
-"""What an environment takes as its floor; see `FloorChoice`."""
+"""Floors that an environment takes; see `FloorChoice`."""
 
 
 class FloorChoice:
@@ -39,11 +39,6 @@ class FloorChoice:
         Whether there are many.
     has_goal : bool
         Whether the floor has a goal; of many, whether the first one has. That of a callable has none.
-
-    Raises
-    ------
-    ValueError, FileNotFoundError
-        Where there is no such floor, none at all, or a weight is not a positive number.
     """
 
     def __init__(self, floor: Floors, image_resolution: float | None = None) -> None:
@@ -85,13 +80,7 @@ class FloorChoice:
         return FloorChoice(floor, self._resolution_of(floor))
 
     def load(self, generator: np.random.Generator) -> Floor:
-        """Return the floor of the next episode.
-
-        Raises
-        ------
-        ValueError, FileNotFoundError
-            Where the floor that was drawn cannot be used.
-        """
+        """Return the floor of the next episode."""
         if self._source is not None:
             return self.instead(self._source(generator)).load(generator)
         spec = self._specs[self._draw(generator)]
@@ -131,7 +120,7 @@ def _expanded(floor: FloorName) -> tuple[FloorName, ...]:
     """Return the floors of a set or of a folder; any other floor alone."""
     if isinstance(floor, str) and floor.startswith(SET_PREFIX):
         return set_floors(floor.removeprefix(SET_PREFIX))
-    return folder_floors(Path(floor)) if not isinstance(floor, Floor) and _is_folder(floor) else (floor,)
+    return _folder_floors(Path(floor)) if not isinstance(floor, Floor) and _is_folder(floor) else (floor,)
 
 
 def _is_folder(floor: Any) -> bool:  # noqa: ANN401
@@ -141,15 +130,10 @@ def _is_folder(floor: Any) -> bool:  # noqa: ANN401
     return isinstance(floor, str) and ("/" in floor or "\\" in floor) and Path(floor).is_dir()
 
 
-def folder_floors(folder: Path) -> tuple[Path, ...]:
+def _folder_floors(folder: Path) -> tuple[Path, ...]:
     """Return the files of a folder that have the name of a floor, in the order of their names.
 
     Pictures beside the description of a ROS map of the same name belong to it.
-
-    Raises
-    ------
-    ValueError
-        Where the folder has none.
     """
     suffixes = tuple(suffix for known in FORMATS.values() for suffix in known.suffixes)
     files = sorted(path for path in folder.iterdir() if path.name.lower().endswith(suffixes))

@@ -1,10 +1,4 @@
-"""Where a disc fits on a raster, and its reachable free space.
-
-That is the space that the disc's footprint covers from its starts.
-
-What follows from the raster and the disc alone is kept with rasters that are read-only, as runs, for all
-episodes that share one.
-"""
+"""Free space of a floor: components that a body can reach, and measures of buildings."""
 
 import math
 from collections.abc import Callable
@@ -15,8 +9,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.envs.floors.floor import Raster
-from lidarium.envs.floors.runs import Runs
+from lidarium.envs.floors.floor import Floor, Raster
+from lidarium.envs.floors.raster import Runs
 from lidarium.mapping.kernels.compilation import kernel
 
 KEPT = 8
@@ -33,7 +27,7 @@ class Components:
     Attributes
     ----------
     labels : (rows, columns) uint8, uint16 or uint32
-        Number of the component of each cell, from 1; 0 where the disc does not fit.
+        Number of the component of each cell, from 1; 0 if the disc does not fit.
     areas : (components + 1,) int64
         Cells of each component, and in front those of none.
     """
@@ -43,7 +37,7 @@ class Components:
 
 
 def configuration_space(raster: Raster, radius: float) -> NDArray[np.bool_]:
-    """Return where the centre of a disc may be.
+    """Return the free positions of the centre of a disc.
 
     It is cells whose centre is no nearer than the radius to any solid cell's square.
 
@@ -57,12 +51,7 @@ def configuration_space(raster: Raster, radius: float) -> NDArray[np.bool_]:
     Returns
     -------
     (rows, columns) bool
-        True where the disc fits. Exact, not an approximation by distances between centres.
-
-    Raises
-    ------
-    ValueError
-        If the radius is negative or not finite.
+        True if the disc fits. Exact, not an approximation by distances between centres.
     """
     reach = _cells_of(raster, radius)
     space = np.zeros(raster.solid.shape, dtype=np.bool_)
@@ -109,11 +98,6 @@ def reachable_free_space(raster: Raster, radius: float, starts: NDArray[np.float
     (rows, columns) bool
         Free cells whose centre is within the radius of a cell centre of the configuration space, in its
         4-connected components that hold a start. Read-only.
-
-    Raises
-    ------
-    ValueError
-        If the robot does not fit at a start (nor at a cell beside it).
     """
     found = components(raster, radius)
     kept = sorted(
@@ -151,9 +135,9 @@ def cell_of(raster: Raster, point: NDArray[np.float64]) -> tuple[int, int]:
 def component_near(
     raster: Raster, labels: NDArray[np.unsignedinteger[Any]], start: NDArray[np.float64], radius: float
 ) -> int:
-    """Return the component at a start, or at the nearest cell beside it.
+    """Return the component at a start, or at the nearest cell.
 
-    The nearest cell is used where rounding to cells puts the start outside.
+    The nearest cell is used if rounding to cells puts the start outside.
     """
     i, j = cell_of(raster, start)
     if raster.solid[i, j]:
@@ -182,7 +166,7 @@ def _frozen(array: NDArray[Any]) -> NDArray[Any]:
 
 
 def _kept(raster: Raster, key: tuple[Any, ...], make: Callable[[], NDArray[Any]]) -> Runs:
-    """Return what a raster keeps, or make it.
+    """Return the kept result of a raster, or make it.
 
     A raster that can be written to keeps nothing.
     """
@@ -250,3 +234,79 @@ def _dilate_rows(mask: NDArray[np.bool_], widths: NDArray[np.int64], result: NDA
             if i + di >= 0:
                 for j in range(columns):
                     result[i, j] |= row[j] <= width
+
+
+MEASURED_RADIUS = 0.30
+"""Radius of the robot whose loops are counted [m]."""
+
+HALF_DOOR = 0.55
+"""Half the widest opening that separates two rooms [m]."""
+
+_RESOLUTION = 0.05
+_BODY_HEIGHT = 2.0
+
+
+@dataclass(frozen=True, slots=True)
+class BuildingMeasures:
+    """Figures of a building.
+
+    Attributes
+    ----------
+    area_m2 : float
+        Free floor area, neither under walls nor under furniture [m²].
+    loops : int
+        Independent cycles on which a robot of radius 0.30 m can drive around walls; furniture is not counted.
+    clutter : float
+        Share of the area between the walls that is under furniture, all that ends below the ceiling.
+    rooms : int
+        Spaces that openings up to 1.1 m wide separate, halls and corridors included.
+    """
+
+    area_m2: float
+    loops: int
+    clutter: float
+    rooms: int
+
+
+def measure_building(floor: Floor) -> BuildingMeasures:
+    """Measure a floor at a resolution of 0.05 m."""
+    walls = floor
+    if floor.solids:
+        walls = Floor(
+            floor.name, floor.bounds, tuple(solid for solid in floor.solids if solid.z_high == np.inf)
+        )
+    empty = walls.raster(_RESOLUTION, 0.0, _BODY_HEIGHT)
+    full = floor.raster(_RESOLUTION, 0.0, _BODY_HEIGHT)
+    space = configuration_space(empty, MEASURED_RADIUS)
+    if not space.any():
+        raise ValueError(f"floor {floor.name!r} has no room for a robot of radius {MEASURED_RADIUS} m")
+    largest = _largest_part(space)
+    inside = _containing(empty.solid == 0, largest)
+    wide = (
+        cv2.distanceTransform(1 - empty.solid, cv2.DIST_L2, cv2.DIST_MASK_PRECISE) * _RESOLUTION > HALF_DOOR
+    )
+    between_walls = int(inside.sum())
+    free = int((inside & (full.solid == 0)).sum())
+    return BuildingMeasures(
+        area_m2=round(free * _RESOLUTION**2, 3),
+        loops=_holes(largest),
+        clutter=round(1.0 - free / between_walls, 4),
+        rooms=cv2.connectedComponents((wide & inside).astype(np.uint8), connectivity=4)[0] - 1,
+    )
+
+
+def _largest_part(cells: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    _, parts, stats, _ = cv2.connectedComponentsWithStats(cells.astype(np.uint8), connectivity=4)
+    return np.asarray(parts == 1 + np.argmax(stats[1:, cv2.CC_STAT_AREA]))
+
+
+def _containing(cells: NDArray[np.bool_], part: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return the connected part of `cells` that holds `part`."""
+    _, parts = cv2.connectedComponents(cells.astype(np.uint8), connectivity=4)
+    return np.asarray(parts == parts[part][0])
+
+
+def _holes(part: NDArray[np.bool_]) -> int:
+    """Holes of a connected part of the plane: its independent cycles."""
+    framed = np.pad(~part, 1, constant_values=True)
+    return int(cv2.connectedComponents(framed.astype(np.uint8), connectivity=8)[0]) - 2

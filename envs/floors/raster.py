@@ -7,7 +7,48 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.envs.floors.runs import Runs
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Runs:
+    """The cells of a grid, row after row, as runs of equal ones.
+
+    Attributes
+    ----------
+    values : (runs,) array
+        Value of the cells of each run; of the grid's type.
+    lengths : (runs,) int32
+        Number of they are.
+    shape : (rows, columns)
+        Of the grid.
+    """
+
+    values: NDArray[Any]
+    lengths: NDArray[np.int32]
+    shape: tuple[int, int]
+
+    @classmethod
+    def of(cls, grid: NDArray[Any]) -> "Runs":
+        """Pack a grid (rows, columns)."""
+        cells = grid.ravel()
+        begins = np.concatenate([[0], np.flatnonzero(cells[1:] != cells[:-1]) + 1])
+        lengths = np.diff(begins, append=cells.size).astype(np.int32)
+        return cls(cells[begins], lengths, (grid.shape[0], grid.shape[1]))
+
+    def grid(self) -> NDArray[Any]:
+        """Unpack the grid, read-only."""
+        grid = np.repeat(self.values, self.lengths).reshape(self.shape)
+        grid.flags.writeable = False
+        return grid
+
+    def counts(self) -> NDArray[np.int64]:
+        """Count the cells of each value, from 0 to the largest; values are whole numbers."""
+        return np.bincount(self.values, weights=self.lengths).astype(np.int64)
+
+    @property
+    def nbytes(self) -> int:
+        """How much memory the runs take."""
+        return self.values.nbytes + self.lengths.nbytes
+
 
 # Origins of rasters are whole multiples of this [m], so that belief grids of every usual resolution line up
 # with them.
@@ -22,13 +63,13 @@ class Raster:
     Attributes
     ----------
     solid : (rows, columns) uint8
-        1 where the cell is solid; row 0 at the lowest y. The outermost ring of cells is solid.
+        1 if the cell is solid; row 0 at the lowest y. The outermost ring of cells is solid.
     origin : (x, y)
         Lower left corner of cell (0, 0) [m].
     resolution : float
         Side of a cell [m].
     kept : dict of Runs
-        What was made of the cells, where they are read-only, see ``free_space``.
+        Results that were computed from the cells if they are read-only, see ``free_space``.
     """
 
     solid: NDArray[np.uint8]
@@ -38,7 +79,7 @@ class Raster:
 
     @property
     def nbytes(self) -> int:
-        """How much memory the cells take, and what is kept of them."""
+        """Memory of the cells and of the results kept with them [bytes]."""
         return self.solid.nbytes + sum(runs.nbytes for runs in list(self.kept.values()))
 
 

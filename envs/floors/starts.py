@@ -49,12 +49,6 @@ def draw_starts(
     -------
     (count, 3) float64
         x, y, theta per robot [m, rad].
-
-    Raises
-    ------
-    ValueError
-        If the robot fits nowhere, a proposed start is inside a wall, the proposed starts are disconnected for
-        this robot, or more robots are asked for than fit.
     """
     if count < 1:
         raise ValueError(f"number of robots is {count}; want at least 1")
@@ -90,12 +84,6 @@ def check_starts(raster: Raster, radius: float, starts: NDArray[np.float64]) -> 
         Radius of the robot [m].
     starts : (N, 3) float64
         x, y, theta per robot [m, rad].
-
-    Raises
-    ------
-    ValueError
-        If the robot does not fit at a start, two robots overlap, or a start cannot be reached from the first
-        one.
     """
     labels = components(raster, radius).labels
     first = 0
@@ -132,11 +120,6 @@ def check_goal(raster: Raster, goal: tuple[float, float]) -> None:
         Solid cells at the body's height.
     goal : (x, y)
         [m]
-
-    Raises
-    ------
-    ValueError
-        If it does not.
     """
     rows, columns = raster.solid.shape
     row = math.floor((goal[1] - raster.origin[1]) / raster.resolution)

@@ -6,9 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.mapping.geometry.rigid import Transform
-from lidarium.mapping.sparse.exploring.ground_camera import GroundCamera
-from lidarium.mapping.sparse.exploring.navigation import SparseNavigation, on_ground
-from lidarium.mapping.sparse.exploring.routes import PlannedRoute
+from lidarium.mapping.sparse.exploring.ground import GroundCamera
+from lidarium.mapping.sparse.exploring.navigation import PlannedRoute, SparseNavigation, on_ground
 from lidarium.mapping.sparse.exploring.views import Sight, View
 
 

@@ -15,10 +15,8 @@ from lidarium.mapping.geometry.rigid import Transform, composed, relative
 from lidarium.mapping.grids.growing_array import GrowingArray
 from lidarium.mapping.localization.dead_reckoning.localizer import KeyScans
 from lidarium.mapping.localization.matching.wall_direction import wall_direction, within_quarter
-from lidarium.mapping.point_clouds.intrinsics import points_of_depth
-from lidarium.mapping.sparse.exploring.ground_camera import GroundCamera
-from lidarium.mapping.sparse.exploring.seen_ground import SeenGround
-from lidarium.mapping.sparse.exploring.seen_through import are_seen_through
+from lidarium.mapping.point_clouds.cameras import points_of_depth
+from lidarium.mapping.sparse.exploring.ground import GroundCamera, SeenGround, are_seen_through
 from lidarium.mapping.sparse.floor_plane import FloorPlane
 from lidarium.mapping.sparse.mapper.incremental import IncrementalMapper
 from lidarium.mapping.sparse.settings import MapperSettings

@@ -14,9 +14,8 @@ from lidarium.envs.simulation.kernels.arrays import ENDED
 from lidarium.envs.simulation.simulation import Simulation
 from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.localization.dead_reckoning.localizer import KeyScans
-from lidarium.mapping.sparse.exploring.ground_map import ground_map
+from lidarium.mapping.sparse.exploring.ground import ground_map, joined_ground
 from lidarium.mapping.sparse.exploring.navigation import SparseNavigation, sparse_navigation
-from lidarium.mapping.sparse.exploring.seen_ground import joined_ground
 
 BODY_MARGIN_M = 0.1
 """What is so near to the body of another robot is taken to be that robot [m]."""

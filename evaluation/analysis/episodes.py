@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from lidarium.evaluation.suites.episodes_file import TIMINGS, read_lines
-from lidarium.mapping.files.names import printable
+from lidarium.mapping.files.guarded_reading import printable
 from lidarium.mapping.geometry.bounds import Rule, shown, within
 
 Row = dict[str, Any]

@@ -8,7 +8,7 @@ from matplotlib import rc_context
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
-from lidarium.mapping.files.names import printable
+from lidarium.mapping.files.guarded_reading import printable
 
 
 @contextmanager

@@ -45,7 +45,7 @@ def write_bag(path: Path, record: EpisodeRecord, floor: str | Floor | None = Non
     Raises
     ------
     ValueError
-        Where the record cannot run again, or bags cannot be written (extra ``mcap``).
+        Where the record cannot run again, or bags cannot be written (extra ``bags``).
     OSError
         Where nothing can be written there.
     """

@@ -2,7 +2,7 @@
 
 import re
 
-from lidarium.mapping.files.names import printable
+from lidarium.mapping.files.guarded_reading import printable
 
 _SPECIAL = re.compile(r"([\\`*\[\]<>|$~])")
 _WRITTEN = re.compile(r"`([^`]*)`|\\([\\`*\[\]<>|$~])|&amp;")

@@ -6,7 +6,7 @@ from html import escape
 from lidarium.agents.report import PolicyReport
 from lidarium.envs.drawing.frame_parts import team_colours
 from lidarium.evaluation.episodes.watching import WatchedExploration
-from lidarium.mapping.files.names import printable
+from lidarium.mapping.files.guarded_reading import printable
 
 MOST_EVENTS = 6
 """Most events that are listed, the latest first."""

@@ -1,3 +1,1 @@
-"""Files of maps, logs, trajectories."""
-
-from typing import Any
+"""Files of maps, logs, trajectories and bags."""

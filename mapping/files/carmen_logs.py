@@ -1,35 +1,351 @@
-"""Logs of the CARMEN robot navigation toolkit: text, a message a line.
+"""Logs of the CARMEN robot navigation toolkit: text, one message per line, plain or gzipped.
 
-They are plain or gzipped.
+FLASER and ROBOTLASER1 (scans), ODOM (odometry) and PARAM (the pose of the laser) are read. The line of a scan
+has its odometry, too. GridFastSLAM, which is recognised by its NEFF lines, replaces it in scans and in the
+first ODOM after each; in its logs odometry is the sum of the motions from ODOM to ODOM without those first
+ones, and a scan has the stamp of the ODOM before it.
 
-Read are FLASER and ROBOTLASER1 (scans), ODOM (odometry) and PARAM (where the laser is). A scan's odometry
-stands in its own line. GridFastSLAM, which says so by NEFF lines, puts its own result there, in scans and in
-the first ODOM after each; in its logs odometry is the sum of the motions from ODOM to ODOM, without those
-first ones, and a scan is stamped with the ODOM before it.
+A header states the field of view, the step from beam to beam and the number of beams, two of which suffice.
+If they contradict each other, the number of beams is certain, and the field of view is believed.
 """
 
 import gzip
+import math
 import zlib
 from collections import Counter
 from collections.abc import Iterator
+from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.mapping.files.carmen.directions import give_directions, on_one_grid
-from lidarium.mapping.files.carmen.lines import Content, Scan, parameter, read_line
 from lidarium.mapping.files.guarded_reading import read_lines, reading
 from lidarium.mapping.files.laser_logs import LaserLog, made_usable, symmetric_scans
 from lidarium.mapping.files.trajectories import interpolated
 from lidarium.mapping.geometry.rigid import composed, relative
+
+SICK_BEAMS = {
+    101: (100.0, 1.0),
+    180: (180.0, 1.0),
+    181: (180.0, 1.0),
+    201: (100.0, 0.5),
+    360: (180.0, 0.5),
+    361: (180.0, 0.5),
+    400: (100.0, 0.25),
+    401: (100.0, 0.25),
+}
+"""Field of view and step [degrees] of a SICK LMS by its number of beams."""
+
+WHOLE_TURN = 2.0 * math.pi
+
+_JUMP_SHARE = 0.2
+"""Neighbouring returns that differ by more than this share are of two surfaces."""
+
+
+class _Beams(NamedTuple):
+    """Directions of the beams of a scan.
+
+    Attributes
+    ----------
+    angle_min, increment : float
+        Of the first beam against the heading, and from beam to beam [rad].
+    remark : str
+        Parts of the header that were ignored; empty if there are none.
+    """
+
+    angle_min: float
+    increment: float
+    remark: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class _FieldOfView:
+    """Statements on a laser whose scans have no angles.
+
+    Attributes
+    ----------
+    wanted : float or None
+        Field of view that the user gives [rad].
+    stated, step : float or None
+        Field of view and step by the parameters of the log [rad].
+    """
+
+    wanted: float | None = None
+    stated: float | None = None
+    step: float | None = None
+
+    def beams(self, count: int) -> _Beams:
+        """Return the directions of a number of beams: the user's, the log's, a SICK's, or half a turn."""
+        if self.wanted is not None:
+            return _spread(self.wanted, count)
+        if self.stated is not None and self.step is not None and _agrees(self.stated, self.step, count):
+            return _Beams(-0.5 * self.stated, self.step)
+        if count in SICK_BEAMS:
+            view, step = (math.radians(angle) for angle in SICK_BEAMS[count])
+            return _Beams(-0.5 * view, step)
+        if self.stated is not None:
+            return _spread(self.stated, count)
+        return _spread(
+            math.pi,
+            count,
+            f"scans of {count} beams, as no SICK has, without a field of view: 180 degrees are assumed; "
+            "--field-of-view says another",
+        )
+
+
+def _stated_beams(start: float, view: float, step: float, count: int) -> _Beams:
+    """Return the directions that a header states.
+
+    Parameters
+    ----------
+    start, view, step : float
+        Direction of the first beam, field of view, and angle from beam to beam [rad]; negative steps are
+        those of a laser that is mounted upside down.
+    count : int
+        Number of beams.
+    """
+    if view == 0.0 or abs(view) > 1.01 * WHOLE_TURN or _agrees(abs(view), abs(step), count):
+        return _Beams(start, step)
+    is_circle = abs(abs(view) - WHOLE_TURN) < 1e-3
+    size = abs(view) / (count if is_circle else max(count - 1, 1))
+    return _Beams(
+        start,
+        math.copysign(size, view),
+        f"steps of {step:g} rad contradict {count} beams over {view:g} rad: {size:.6g} rad are assumed",
+    )
+
+
+def _agrees(view: float, step: float, count: int) -> bool:
+    """Return whether a number of beams at a step cover a field of view, its last beam counted or not."""
+    return step > 0.0 and abs((count - 0.5) * step - view) < step
+
+
+def _from_right_to_left(ranges: list[float], beams: _Beams) -> tuple[list[float], _Beams]:
+    """Return a scan whose beams run counter-clockwise: that of an upside-down laser is reversed."""
+    if beams.increment >= 0.0:
+        return ranges, beams
+    last = beams.angle_min + (len(ranges) - 1) * beams.increment
+    return ranges[::-1], _Beams(last, -beams.increment, "scans run clockwise, as of a laser upside down")
+
+
+def _resampled(ranges: NDArray[np.float32], beams: _Beams, wanted: _Beams, count: int) -> NDArray[np.float32]:
+    """Return a scan at other directions.
+
+    Between two returns of one surface the range is interpolated; else the nearest beam counts. Directions
+    beyond the scan are invalid.
+
+    Parameters
+    ----------
+    ranges : (n,) float32
+        The scan [m]; inf for no return, nan for an invalid beam.
+    beams, wanted : Beams
+        Its directions, and those that are wanted.
+    count : int
+        Number of wanted directions.
+    """
+    own = len(ranges)
+    is_circle = own * beams.increment > WHOLE_TURN - 0.5 * beams.increment
+    place = (wanted.angle_min + np.arange(count) * wanted.increment - beams.angle_min) / beams.increment
+    if is_circle:
+        place %= WHOLE_TURN / beams.increment
+    before = np.floor(place + 1e-9).astype(np.int64)
+    share = np.maximum(place - before, 0.0)
+    is_seen = is_circle | ((place > -0.5) & (place < own - 0.5))
+    index = np.array([before, before + 1])
+    left, right = ranges[index % own if is_circle else np.clip(index, 0, own - 1)].astype(np.float64)
+    with np.errstate(invalid="ignore"):
+        is_one = np.abs(left - right) <= _JUMP_SHARE * np.minimum(left, right)
+        between = (1.0 - share) * left + share * right
+    found = np.where(is_one & np.isfinite(between), between, np.where(share < 0.5, left, right))
+    return np.where(is_seen, found, np.nan).astype(np.float32)
+
+
+def _spread(view: float, count: int, remark: str = "") -> _Beams:
+    return _Beams(-0.5 * view, view / max(count - 1, 1), remark)
+
+
+_QUIET = ("#", "NEFF", "PARAM", "SYNC", "MARKER", "RLASER", "REMISSION", "TRUEPOS")
+"""Messages that hold nothing that is needed here."""
+
+
+@dataclass(slots=True, eq=False)
+class _Scan:
+    """A line with a scan; without beams if the line has no angles."""
+
+    ranges: list[float]
+    stamp: float
+    robot_pose: list[float]
+    laser_pose: list[float]
+    beams: _Beams | None
+    max_range: float
+    has_angles: bool = True
+
+
+@dataclass(slots=True, eq=False)
+class _Content:
+    """The content of the lines of a log.
+
+    A scan comes with the number of ODOM lines before it.
+    """
+
+    scans: list[tuple[_Scan, int]] = field(default_factory=list)
+    odometry: list[tuple[list[float], float]] = field(default_factory=list)
+    parameters: dict[str, str] = field(default_factory=dict)
+    is_corrected: bool = False
+    skipped: Counter[str] = field(default_factory=Counter)
+    remarks: Counter[str] = field(default_factory=Counter)
+
+
+def _read_line(line: str, content: _Content) -> None:
+    """Add the content of a line to the content; a damaged line is counted."""
+    words = line.split()
+    if not words or words[0].startswith("#"):
+        return
+    try:
+        match words[0]:
+            case "FLASER":
+                content.scans.append((_flaser(words), len(content.odometry)))
+            case "ROBOTLASER1":
+                content.scans.append((_robotlaser(words), len(content.odometry)))
+            case "ODOM":
+                content.odometry.append(
+                    (_numbers(words[1:4], 3), float(words[9] if len(words) > 9 else words[-1]))
+                )
+            case "PARAM" if len(words) > 2:
+                content.parameters[words[1]] = words[2]
+            case "NEFF":
+                content.is_corrected = True
+            case kind if kind not in _QUIET:
+                content.skipped[f"{kind[:30]} lines"] += 1
+    except (ValueError, IndexError, OverflowError):
+        content.skipped[f"damaged {words[0]} lines"] += 1
+
+
+def _numbers(words: list[str], count: int) -> list[float]:
+    values = list(map(float, words))
+    if len(values) != count or not all(map(math.isfinite, values)):
+        raise ValueError(f"{words} are not {count} numbers")
+    return values
+
+
+def _flaser(words: list[str]) -> _Scan:
+    """Read a ``FLASER`` line, of which old logs lack the last two values.
+
+    It is ``FLASER n ranges laser_pose robot_pose stamp host logger_stamp``.
+    """
+    beams = int(words[1])
+    ranges, tail = list(map(float, words[2 : 2 + beams])), words[2 + beams :]
+    if beams < 1 or len(ranges) != beams:
+        raise ValueError("too few ranges")
+    laser_pose, robot_pose = _numbers(tail[:3], 3), _numbers(tail[3:6], 3)
+    return _Scan(ranges, float(tail[6]), robot_pose, laser_pose, None, math.nan, has_angles=False)
+
+
+def _robotlaser(words: list[str]) -> _Scan:
+    """Read the values of a robot-laser message.
+
+    They are type, start, field of view, step, longest range, accuracy, mode, n, ranges, m, remissions,
+    laser, robot, and the rest.
+
+    These are five numbers on the drive, the stamp, the host and the logger's stamp.
+    """
+    start, view, step, max_range = _numbers(words[2:6], 4)
+    beams = int(words[8])
+    ranges = list(map(float, words[9 : 9 + beams]))
+    remissions = int(words[9 + beams])
+    tail = words[10 + beams + remissions :]
+    if beams < 1 or len(ranges) != beams:
+        raise ValueError("too few ranges")
+    directions = _stated_beams(start, view, step, beams)
+    laser_pose, robot_pose = _numbers(tail[:3], 3), _numbers(tail[3:6], 3)
+    return _Scan(ranges, float(tail[11]), robot_pose, laser_pose, directions, max_range)
+
+
+def _parameter(content: _Content, name: str) -> float | None:
+    """Return a parameter of the log; None if it has none, or no number."""
+    try:
+        value = float(content.parameters[name])
+    except (KeyError, ValueError):
+        return None
+    return value if math.isfinite(value) else None
+
+
+SICK_MAX_M = 80.0
+"""From this range on, a SICK LMS reports the absence of a return [m]."""
+
+
+def _give_directions(content: _Content, field_of_view: float | None) -> None:
+    """Give each scan the directions of its beams, from right to left."""
+    fov, step = (_parameter(content, f"laser_front_laser_{name}") for name in ("fov", "resolution"))
+    view = _FieldOfView(
+        field_of_view,
+        None if fov is None or not 0.0 < fov <= 360.0 else math.radians(fov),
+        None if step is None else math.radians(step),
+    )
+    assumed = cache(view.beams)
+    for scan, _ in content.scans:
+        stated = scan.beams or assumed(len(scan.ranges))
+        scan.ranges, beams = _from_right_to_left(scan.ranges, stated)
+        scan.beams = beams._replace(remark="") if beams.remark else beams
+        for remark in {stated.remark, beams.remark} - {""} if stated.remark or beams.remark else ():
+            content.remarks[remark] += 1
+
+
+def _on_one_grid(content: _Content) -> tuple[list[tuple[_Scan, int]], _Beams, NDArray[np.float32], float]:
+    """Return the scans that are kept, the directions of most, the ranges in these, and the longest one.
+
+    Scans whose own line has other directions are resampled; a scan without any that has fewer beams than most
+    is damaged.
+    """
+    groups = Counter((len(scan.ranges), scan.beams) for scan, _ in content.scans)
+    (count, beams), _ = groups.most_common(1)[0]
+    assert beams is not None
+    kept = [each for each in content.scans if len(each[0].ranges) == count or each[0].has_angles]
+    if len(kept) < len(content.scans):
+        content.skipped[f"scans that have not {count} beams as most"] = len(content.scans) - len(kept)
+    highest = _max_range(kept)
+    ranges = np.empty((len(kept), count), np.float32)
+    is_other = np.array([(len(scan.ranges), scan.beams) != (count, beams) for scan, _ in kept])
+    same = [scan.ranges for (scan, _), other in zip(kept, is_other, strict=True) if not other]
+    ranges[~is_other] = _marked(np.array(same, np.float32), highest)
+    for place in np.flatnonzero(is_other):
+        scan = kept[place][0]
+        assert scan.beams is not None
+        own = _marked(np.array(scan.ranges, np.float32), highest)
+        ranges[place] = _resampled(own, scan.beams, beams, count)
+    if is_other.any():
+        content.remarks[f"scans whose beams are not {count} as of most are resampled"] = int(is_other.sum())
+    return kept, beams, ranges, highest
+
+
+def _marked(ranges: NDArray[np.float32], highest: float) -> NDArray[np.float32]:
+    """Mark invalid ranges: nan if the beam is invalid, inf if nothing returned."""
+    ranges[~(ranges > 0.0)] = np.nan
+    with np.errstate(invalid="ignore"):
+        ranges[ranges >= highest * (1.0 - 1e-6)] = np.inf
+    return ranges
+
+
+def _max_range(scans: list[tuple[_Scan, int]]) -> float:
+    """Return the range that means no return [m]."""
+    first = scans[0][0]
+    if math.isfinite(first.max_range) and first.max_range > 0.0:
+        return first.max_range
+    known = np.array([value for scan, _ in scans for value in scan.ranges], np.float32)
+    known = known[np.isfinite(known)]
+    highest = float(known.max()) if known.size and known.max() > 0.0 else 1.0
+    return min(highest, SICK_MAX_M)
+
 
 REPEATED_M = 1e-4
 """By how much a pose and its copy in another line may differ, in metres and radians."""
 
 SAME_STAMP_S = 1e-6
 
-MOST_LINE_BYTES = 1 << 20
+MAX_LINE_BYTES = 1 << 20
 """Longest line of a log; one of 16,384 ranges has some 150,000 bytes."""
 
 
@@ -42,12 +358,12 @@ def read_carmen_log(path: Path, field_of_view: float | None = None) -> LaserLog:
         The file; with ``.gz`` at its end it is unpacked.
     field_of_view : float or None
         Angle between the first and the last beam of FLASER lines [rad], which carry none; else that of the
-        log's parameters, or of a SICK with so many beams.
+        log's parameters, or of a SICK with a number of beams.
 
     Returns
     -------
     LaserLog
-        The scans in the directions of most. What was left out is counted in ``skipped``.
+        The scans in the directions of most. Omitted scans are counted in ``skipped``.
 
     Raises
     ------
@@ -57,26 +373,26 @@ def read_carmen_log(path: Path, field_of_view: float | None = None) -> LaserLog:
         If it holds no usable scan.
     """
     path = Path(path)
-    content = Content()
+    content = _Content()
     with reading(path, "a CARMEN log"):
         for line in _lines(path, content.skipped):
-            read_line(line, content)
+            _read_line(line, content)
         if not content.scans:
             raise ValueError(f"{path} holds no scans; want a CARMEN log with FLASER or ROBOTLASER1 lines")
-        give_directions(content, field_of_view)
+        _give_directions(content, field_of_view)
         return made_usable(_log(path, content), str(path))
 
 
 def _lines(path: Path, skipped: Counter[str]) -> Iterator[str]:
-    """Yield the lines of a file; where it is cut off or damaged, those before."""
+    """Yield the lines of a file; if it is cut off or damaged, those before."""
     try:
-        yield from read_lines(path, MOST_LINE_BYTES)
+        yield from read_lines(path, MAX_LINE_BYTES)
     except (EOFError, zlib.error, gzip.BadGzipFile):
         skipped["rest of a file that is cut off or damaged"] += 1
 
 
-def _log(path: Path, content: Content) -> LaserLog:
-    kept, beams, ranges, highest = on_one_grid(content)
+def _log(path: Path, content: _Content) -> LaserLog:
+    kept, beams, ranges, highest = _on_one_grid(content)
     try:
         wide, geometry, axis = symmetric_scans(ranges, beams.angle_min, beams.increment, (0.0, highest))
     except ValueError as error:
@@ -138,11 +454,11 @@ def _has_odometry(before: NDArray[np.int64], is_own: NDArray[np.bool_]) -> bool:
 
 
 def _chained(
-    readings: NDArray[np.float64], scans: list[tuple[Scan, int]]
+    readings: NDArray[np.float64], scans: list[tuple[_Scan, int]]
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
     """Return the sum of the motions between readings, and which are odometry.
 
-    The first reading after a scan is the scan's pose, from which odometry goes on; where that line is
+    The first reading after a scan is the scan's pose, from which odometry goes on; if that line is
     missing, the scan's own stands for it.
     """
     is_own, previous = np.ones(len(readings), np.bool_), readings[np.maximum(np.arange(len(readings)) - 1, 0)]
@@ -167,7 +483,7 @@ def _at_scans(
 ) -> NDArray[np.float64]:
     """Return the odometry of scans (n,), of which ``before`` readings came before each, (n, 3) [m, rad].
 
-    A scan has the stamp of the reading before it. Where that line is missing, odometry is interpolated.
+    A scan has the stamp of the reading before it. If that line is missing, odometry is interpolated.
     """
     odometry = chained[np.maximum(before - 1, 0)]
     own = np.flatnonzero(is_own)
@@ -182,11 +498,11 @@ def _at_scans(
     return odometry
 
 
-def _mounting(content: Content, first: Scan) -> NDArray[np.float64]:
+def _mounting(content: _Content, first: _Scan) -> NDArray[np.float64]:
     """Return the laser's pose on the robot.
 
-    It is from the parameters, or, where the first scan's line has two poses, from them.
+    It is from the parameters, or, if the first scan's line has two poses, from them.
     """
     if "robot_frontlaser_offset" in content.parameters:
-        return np.array([parameter(content, "robot_frontlaser_offset") or 0.0, 0.0, 0.0])
+        return np.array([_parameter(content, "robot_frontlaser_offset") or 0.0, 0.0, 0.0])
     return relative(np.array(first.robot_pose), np.array(first.laser_pose))

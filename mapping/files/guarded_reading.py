@@ -1,7 +1,7 @@
-"""The one way in which files are opened: regular ones only, no more bytes than there is memory for.
+"""Guarded reading of files: regular files only, of a bounded size, within the memory there is.
 
-Whatever a reader raises on bytes that are damaged, or made to harm, comes out as ``ValueError`` with the name
-of the file and what to want.
+Sizes of arrays are read from headers before memory is allocated. Errors that readers raise on damaged or
+harmful bytes become ``ValueError``, which names the file and the cure.
 """
 
 import errno
@@ -9,27 +9,32 @@ import gc
 import gzip
 import io
 import lzma
+import math
 import os
 import stat
 import struct
 import threading
 import tokenize
+import unicodedata
 import zipfile
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO
 from xml.etree.ElementTree import ParseError
 
-MOST_FILE_BYTES = 1 << 31
+import numpy as np
+from numpy.typing import NDArray
+
+MAX_FILE_BYTES = 1 << 31
 """Longest file that is read."""
 
-MOST_MESSAGE = 500
+MAX_MESSAGE = 500
 """Longest message of an error [characters]."""
 
-LEAST_UNPACKED, UNPACKED_RATIO = 4 << 20, 16
-"""A packed file may have the first many bytes when unpacked, or so many times its own."""
+MIN_UNPACKED, UNPACKED_RATIO = 4 << 20, 16
+"""Maximum size of a packed file when unpacked [bytes]: the first number, or a multiple of its own size."""
 
 READING_ERRORS = (
     ArithmeticError,
@@ -52,41 +57,22 @@ READING_ERRORS = (
     zipfile.LargeZipFile,
     zlib.error,
 )
-"""What readers raise on damaged bytes: those of gzip, zips, arrays, JSON, YAML, TOML, XML, and our own."""
+"""Errors of readers on damaged bytes: of gzip, zips, arrays, JSON, YAML, TOML, XML, and our own."""
 
 
 def check_file(path: Path) -> None:
-    """Raise FileNotFoundError where nothing is, ValueError where no regular file is."""
+    """Raise FileNotFoundError if nothing is, ValueError if no regular file is."""
     with open_guarded(path):
         pass
 
 
 @contextmanager
-def open_guarded(path: Path, most: int = MOST_FILE_BYTES) -> Iterator[BinaryIO]:
+def open_guarded(path: Path, maximum: int = MAX_FILE_BYTES) -> Iterator[BinaryIO]:
     """Open a regular file of bounded size to read its bytes.
 
-    A pipe is not waited for, and a device is not read from: what was opened is checked, not its name.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    most : int
-        How many bytes it may have.
-
-    Yields
-    ------
-    BinaryIO
-        The open file.
-
-    Raises
-    ------
-    FileNotFoundError
-        Where nothing is.
-    ValueError
-        Where it is a folder, a pipe or a device, or too large.
+    A pipe is not waited for, and a device is not read from: the open file is checked, not its name.
     """
-    name = shortened(str(path), MOST_MESSAGE - 100)
+    name = shortened(str(path), MAX_MESSAGE - 100)
     try:
         handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
     except (FileNotFoundError, NotADirectoryError) as error:
@@ -104,8 +90,8 @@ def open_guarded(path: Path, most: int = MOST_FILE_BYTES) -> Iterator[BinaryIO]:
         if not stat.S_ISREG(found.st_mode):
             what = "a folder" if stat.S_ISDIR(found.st_mode) else "a pipe or a device"
             raise ValueError(f"{name} is {what}; want a file")
-        if found.st_size > most:
-            raise ValueError(f"{name} has {found.st_size:,} bytes; want at most {most:,}")
+        if found.st_size > maximum:
+            raise ValueError(f"{name} has {found.st_size:,} bytes; want at most {maximum:,}")
     except ValueError:
         os.close(handle)
         raise
@@ -113,34 +99,22 @@ def open_guarded(path: Path, most: int = MOST_FILE_BYTES) -> Iterator[BinaryIO]:
         yield file
 
 
-def read_bytes(path: Path, most: int = MOST_FILE_BYTES) -> bytes:
-    """Read a file as it is.
-
-    Raises
-    ------
-    FileNotFoundError, ValueError
-        As ``open_guarded``.
-    """
-    with open_guarded(path, most) as file:
-        content = file.read(most + 1)
+def read_bytes(path: Path, maximum: int = MAX_FILE_BYTES) -> bytes:
+    """Read a file as it is."""
+    with open_guarded(path, maximum) as file:
+        content = file.read(maximum + 1)
     # A file that grows, or one of /proc, reports less than it holds.
-    if len(content) > most:
-        raise ValueError(f"{path} has more than {most:,} bytes; want at most so many")
+    if len(content) > maximum:
+        raise ValueError(f"{path} has more than {maximum:,} bytes; want at most so many")
     return content
 
 
-def read_unpacked(path: Path, most: int = MOST_FILE_BYTES) -> bytes:
-    """Read a file, unpacked where its name ends in .gz.
-
-    Raises
-    ------
-    FileNotFoundError, ValueError
-        As ``open_guarded``, and where it is damaged, or has too many bytes when unpacked.
-    """
-    content = read_bytes(path, most)
+def _read_unpacked(path: Path, maximum: int = MAX_FILE_BYTES) -> bytes:
+    """Read a file, unpacked if its name ends in .gz."""
+    content = read_bytes(path, maximum)
     if path.suffix.lower() != ".gz":
         return content
-    allowed = min(most_unpacked(len(content)), most)
+    allowed = min(max_unpacked(len(content)), maximum)
     with reading(path, "a whole packed file, but damaged or truncated"):
         pieces, length = [], 0
         with gzip.GzipFile(fileobj=io.BytesIO(content)) as unpacked:
@@ -152,16 +126,10 @@ def read_unpacked(path: Path, most: int = MOST_FILE_BYTES) -> bytes:
         return b"".join(pieces)
 
 
-def read_text(path: Path, most: int = MOST_FILE_BYTES) -> str:
-    """Read a text file (UTF-8), unpacked where its name ends in .gz.
-
-    Raises
-    ------
-    FileNotFoundError, ValueError
-        As ``read_unpacked``, and where it is no text.
-    """
+def read_text(path: Path, maximum: int = MAX_FILE_BYTES) -> str:
+    """Read a text file (UTF-8), unpacked if its name ends in .gz."""
     try:
-        return read_unpacked(path, most).decode("utf-8-sig")
+        return _read_unpacked(path, maximum).decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise ValueError(f"{path} is not a text file: {error.reason} at byte {error.start}") from error
 
@@ -170,24 +138,10 @@ def read_lines(path: Path, longest: int) -> Iterator[str]:
     """Yield the lines of a text file, plain or packed, one after the other.
 
     Bytes that are no text become replacement characters.
-
-    Parameters
-    ----------
-    path : Path
-        The file; with ``.gz`` at its end it is unpacked.
-    longest : int
-        Most bytes of a line.
-
-    Raises
-    ------
-    ValueError
-        Where a line is longer, or the file has too many bytes when unpacked.
-    EOFError, zlib.error, gzip.BadGzipFile
-        Where it is cut off or damaged; the lines before have been yielded.
     """
     with open_guarded(path) as file:
         is_packed = path.suffix.lower() == ".gz"
-        allowed = most_unpacked(os.fstat(file.fileno()).st_size) if is_packed else MOST_FILE_BYTES
+        allowed = max_unpacked(os.fstat(file.fileno()).st_size) if is_packed else MAX_FILE_BYTES
         length = 0
         # Lines of a packed file are found ten times as fast in a buffer.
         with io.BufferedReader(gzip.GzipFile(fileobj=file)) if is_packed else file as lines:
@@ -200,13 +154,13 @@ def read_lines(path: Path, longest: int) -> Iterator[str]:
                 yield line.decode("utf-8", "replace")
 
 
-def most_unpacked(packed: int) -> int:
+def max_unpacked(packed: int) -> int:
     """Return how many bytes a packed file may have when unpacked."""
-    return max(LEAST_UNPACKED, UNPACKED_RATIO * packed)
+    return max(MIN_UNPACKED, UNPACKED_RATIO * packed)
 
 
 class _Collection:
-    """The garbage collector, which stands still while any thread parses a file.
+    """The garbage collector, which is paused while any thread parses a file.
 
     It looks at all that a parser makes, again and again: half of the time of a log of many lines.
     """
@@ -237,47 +191,118 @@ _COLLECTION = _Collection()
 
 @contextmanager
 def reading(path: Path | None, what: str, cure: str = "") -> Iterator[None]:
-    """Turn whatever parsers raise into ``ValueError`` with the name of the file and what it should be.
-
-    Parameters
-    ----------
-    path : Path or None
-        The file; None where messages name it already, and only their length and kind are checked.
-    what : str
-        What it should be: ``a whole episode record``.
-    cure : str
-        What to do about it.
-
-    Raises
-    ------
-    ValueError
-        In place of all of ``READING_ERRORS``. Those that name the file already are left as they are.
-    """
+    """Turn errors of parsers into ``ValueError`` with the name of the file and its expected content."""
     try:
         with _COLLECTION.paused():
             yield
     except READING_ERRORS as error:
         text = reason(error)
         named = path is None or text.startswith(str(path))
-        if named and isinstance(error, ValueError) and len(str(error)) <= MOST_MESSAGE:
+        if named and isinstance(error, ValueError) and len(str(error)) <= MAX_MESSAGE:
             raise
         whole = text if named else f"{path} is not {what}: {text}"
         raise ValueError(shortened(f"{whole}; {cure}" if cure and not named else whole)) from error
 
 
 def reason(error: BaseException) -> str:
-    """Return what an error says, in one line that is not too long."""
+    """Return the message of an error, in one line that is not too long."""
     if isinstance(error, RecursionError):
         return "it is nested too deeply"
     if isinstance(error, MemoryError):
         return "it needs more memory than there is"
     text = str(error.args[0]) if isinstance(error, KeyError) and error.args else str(error)
-    return shortened(" ".join(text.split()) or type(error).__name__, MOST_MESSAGE - 100)
+    return shortened(" ".join(text.split()) or type(error).__name__, MAX_MESSAGE - 100)
 
 
-def shortened(text: str, most: int = MOST_MESSAGE) -> str:
-    """Return a text with its middle left out where it is too long."""
-    if len(text) <= most:
+def shortened(text: str, maximum: int = MAX_MESSAGE) -> str:
+    """Return a text with its middle left out if it is too long."""
+    if len(text) <= maximum:
         return text
-    half = (most - 5) // 2
+    half = (maximum - 5) // 2
     return f"{text[:half]} ... {text[-half:]}"
+
+
+MIN_ARRAYS = 128 << 20
+"""Minimum limit of the total size of the arrays of an archive [bytes]."""
+
+MAX_MEMBERS = 1000
+"""Most members of an archive."""
+
+_MAGIC = b"\x93NUMPY"
+_KINDS = "biufcSU"
+
+
+class GuardedArchive:
+    """A zip of arrays and texts, read member by member as long as there is room.
+
+    Parameters
+    ----------
+    content : bytes
+        The whole file.
+    """
+
+    def __init__(self, content: bytes) -> None:
+        self._archive = zipfile.ZipFile(io.BytesIO(content))
+        members = self._archive.infolist()
+        if len(members) > MAX_MEMBERS:
+            raise ValueError(f"it has {len(members):,} members; want at most {MAX_MEMBERS:,}")
+        self._left = min(max(MIN_ARRAYS, max_unpacked(len(content))), MAX_FILE_BYTES)
+        self.names = [member.filename for member in members]
+
+    def read(self, name: str) -> bytes:
+        """Return the bytes of a member, checked against its checksum."""
+        member = self._archive.getinfo(name)
+        if member.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+            raise ValueError(f"{name} is packed in a way that is not read; want stored or deflated")
+        if member.file_size > self._left:
+            raise ValueError(
+                f"{name} has {member.file_size:,} bytes when unpacked; there is room for {self._left:,}"
+            )
+        self._left -= member.file_size
+        return self._archive.read(member)
+
+    def array(self, name: str) -> NDArray[Any]:
+        """Return the array of a member by its name, with or without ``.npy``."""
+        return _array_of(self.read(name if name in self.names else f"{name}.npy"))
+
+
+def read_arrays(path: Path, what: str) -> NDArray[Any] | dict[str, NDArray[Any]]:
+    """Read an ``.npy`` or ``.npz`` file."""
+    content = read_bytes(path)
+    with reading(path, what):
+        if content[: len(_MAGIC)] == _MAGIC:
+            return _array_of(content)
+        archive = GuardedArchive(content)
+        return _named_arrays(archive, archive.names)
+
+
+def _named_arrays(archive: GuardedArchive, names: Iterable[str]) -> dict[str, NDArray[Any]]:
+    """Return the arrays of an archive by their names without ``.npy``."""
+    return {name.removesuffix(".npy"): archive.array(name) for name in names}
+
+
+def _array_of(content: bytes) -> NDArray[Any]:
+    """Return the array of the bytes of an ``.npy`` file."""
+    file = io.BytesIO(content)
+    major, _ = np.lib.format.read_magic(file)
+    read_header = {1: np.lib.format.read_array_header_1_0, 2: np.lib.format.read_array_header_2_0}.get(major)
+    if read_header is None:
+        raise ValueError(f"its array is of version {major}; want 1 or 2")
+    shape, is_fortran, kind = read_header(file)
+    if kind.kind not in _KINDS or kind.itemsize == 0:
+        raise ValueError(f"its array is of {kind}; want numbers")
+    size, there = math.prod(shape) * kind.itemsize, len(content) - file.tell()
+    if min(shape, default=0) < 0 or size != there:
+        raise ValueError(f"its array claims {size:,} bytes of shape {shape}, there are {there:,}")
+    flat = np.frombuffer(content, kind, offset=file.tell())
+    return np.array(flat.reshape(shape, order="F" if is_fortran else "C"), order="C")
+
+
+UNKNOWN = "\N{REPLACEMENT CHARACTER}"
+
+
+def printable(name: str) -> str:
+    """Return a name in which bytes that are no UTF-8, and control characters, are replaced."""
+    return "".join(
+        UNKNOWN if unicodedata.category(letter) in ("Cc", "Cs", "Co") else letter for letter in name
+    )

@@ -1,13 +1,18 @@
-"""Occupancy maps as files: the map format of ROS (yaml and image).
+"""Occupancy maps as files: the map format of ROS (an image with a YAML header), and plain grey images.
+
+Thresholds of a header, or the middle of black and white, often take the grey of unknown cells for free: nav2
+writes unknown as 205 with a ``free_thresh`` of 0.25, other mappers write 204, 206, 127 or 128. Such a grey
+stands alone: hardly any pixel has a neighbouring grey, and free cells are brighter.
 
 References
 ----------
-The interpretation of pixels follows ROS map_server (trinary, scale, raw), http://wiki.ros.org/map_server.
+ROS map_server (interpretation of pixels: trinary, scale, raw), http://wiki.ros.org/map_server.
 """
 
 import logging
 import math
 import os
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path, PureWindowsPath
@@ -17,27 +22,127 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
-from lidarium.mapping.files.guarded_reading import shortened
-from lidarium.mapping.files.guarded_yaml import read_yaml
+from lidarium.mapping.files.guarded_reading import read_text, reading, shortened
 from lidarium.mapping.files.images import read_image
-from lidarium.mapping.files.map_levels import (
-    FREE as FREE,
-)
-from lidarium.mapping.files.map_levels import (
-    OCCUPIED,
-    UNKNOWN,
-    levels_by_blocks,
-    levels_of,
-    raw_levels,
-)
-from lidarium.mapping.files.mending.unknown_greys import MAP_SERVER_GREYS, MIDDLE_GREYS, unknown_grey
 from lidarium.mapping.files.output import write_whole
 from lidarium.mapping.geometry.bounds import Rule, shown, within
 
-RESOLUTION = Rule(float, bounds=within(1e-4, 100.0, "a positive number"))
-"""What the side of a cell has to be [m]."""
+OCCUPIED, UNKNOWN, FREE = 0, 127, 255
+_BLOCK_PIXELS = 1 << 20
 
-MOST_COORDINATE_M = 1e8
+
+def _shades(pixels: NDArray[Any]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the mean of the colour channels in 0..255 and the opacity in 0..1."""
+    scaled = pixels.astype(np.float64) * (255.0 / np.iinfo(pixels.dtype).max)
+    if scaled.ndim == 2:
+        return scaled, np.ones((1, 1))
+    if scaled.shape[2] in (2, 4):
+        return scaled[..., :-1].mean(axis=2), scaled[..., -1] / 255.0
+    return scaled.mean(axis=2), np.ones((1, 1))
+
+
+def _levels_by_blocks(
+    pixels: NDArray[Any], rule: Callable[[NDArray[np.float64]], NDArray[np.uint8]], sees_through: bool
+) -> NDArray[np.uint8]:
+    """Return the levels of pixels by a rule for shades, block by block, as shades take much memory.
+
+    ``sees_through`` makes unknown pixels that are not opaque.
+    """
+    levels = np.empty(pixels.shape[:2], np.uint8)
+    rows = max(_BLOCK_PIXELS // max(pixels.shape[1], 1), 1)
+    for row in range(0, len(pixels), rows):
+        shades, opacity = _shades(pixels[row : row + rows])
+        levels[row : row + rows] = rule(shades)
+        if sees_through:
+            levels[row : row + rows][np.broadcast_to(opacity < 1.0, shades.shape)] = UNKNOWN
+    return levels
+
+
+def _levels_of(
+    shades: NDArray[np.float64], *, negate: bool, low: float, high: float, unknown: int | None = None
+) -> NDArray[np.uint8]:
+    """Return the levels of shades in trinary mode: below and above the thresholds.
+
+    ``unknown`` is a grey that stands for it whatever the thresholds.
+    """
+    occupancy = (shades if negate else 255.0 - shades) / 255.0
+    levels = np.full(shades.shape, UNKNOWN, dtype=np.uint8)
+    levels[occupancy > high] = OCCUPIED
+    levels[occupancy < low] = FREE
+    if unknown is not None:
+        levels[np.abs(shades - unknown) < 0.5] = UNKNOWN
+    return levels
+
+
+def _raw_levels(shades: NDArray[np.float64], low: float, high: float) -> NDArray[np.uint8]:
+    """Read pixels as occupancy in percent; above 100 is unknown."""
+    levels = np.full(shades.shape, UNKNOWN, dtype=np.uint8)
+    levels[(shades > high * 100.0) & (shades <= 100.0)] = OCCUPIED
+    levels[shades < low * 100.0] = FREE
+    return levels
+
+
+MAX_YAML_BYTES = 1 << 14
+"""Longest header, some fifty times the usual one: parsing takes long."""
+
+
+class _PlainLoader(yaml.SafeLoader):
+    """Loads values alone: an alias could stand for more than there is memory for."""
+
+    def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:  # noqa: ANN401
+        if self.check_event(yaml.events.AliasEvent):
+            raise ValueError("it has an alias (*); want values alone")
+        return super().compose_node(parent, index)
+
+
+def _read_yaml(path: Path) -> Any:  # noqa: ANN401
+    """Read a header."""
+    text = read_text(path, MAX_YAML_BYTES)
+    with reading(path, "a yaml file"):
+        try:
+            return yaml.load(text, _PlainLoader)
+        except yaml.YAMLError as error:
+            raise ValueError(str(error)) from error
+
+
+MAP_SERVER_GREYS = range(204, 207)
+MIDDLE_GREYS = range(126, 130)
+ALONE = 10
+"""Minimum ratio of the pixels of the grey to those of its neighbouring greys."""
+
+MIN_SHARE = 1e-3
+"""Least share of the pixels that have it."""
+
+BRIGHTER = 8
+"""Minimum difference by which free cells are brighter."""
+
+
+def unknown_grey(pixels: NDArray[Any], candidates: tuple[range, ...]) -> int | None:
+    """Return the grey that means unknown, or None.
+
+    Parameters
+    ----------
+    pixels : (rows, columns) or (rows, columns, channels) uint8 or uint16
+        The picture; its first channel counts.
+    candidates : tuple of range
+        Which greys it may be, the likelier ones first.
+    """
+    grey = pixels if pixels.ndim == 2 else pixels[..., 0]
+    eight = grey if grey.dtype == np.uint8 else (grey // 257).astype(np.uint8)
+    counts = np.bincount(eight.ravel(), minlength=256)
+    for greys in candidates:
+        likeliest = max(greys, key=lambda level: counts[level])
+        beside = int(counts[likeliest - 3 : likeliest + 4].sum() - counts[likeliest])
+        is_alone = counts[likeliest] > max(ALONE * beside, MIN_SHARE * counts.sum())
+        if is_alone and counts[likeliest + BRIGHTER :].sum() > 0:
+            return int(likeliest)
+    return None
+
+
+RESOLUTION = Rule(float, bounds=within(1e-4, 100.0, "a positive number"))
+"""Allowed sides of a cell [m]."""
+
+MAX_COORDINATE_M = 1e8
 """Farthest that a map may lie from the origin of its frame [m]."""
 
 _LOG = logging.getLogger(__name__)
@@ -71,12 +176,12 @@ def read_ros_map(yaml_path: Path) -> MapImage:
     Parameters
     ----------
     yaml_path : Path
-        The yaml file; its image is found beside it.
+        The yaml file; its image is in the same folder.
 
     Returns
     -------
     MapImage
-        The map. In scale and raw mode too, what is between the thresholds is unknown. In trinary mode the
+        The map. In scale and raw mode too, cells between the thresholds are unknown. In trinary mode the
         grey that map_saver writes for unknown is unknown whatever the thresholds.
 
     Raises
@@ -102,8 +207,8 @@ def read_ros_map(yaml_path: Path) -> MapImage:
     # map_saver of nav2 writes unknown as 205, which its free_thresh of 0.25 calls free.
     may_mistake = mode == "trinary" and not negate
     unknown = unknown_grey(pixels, (MAP_SERVER_GREYS,)) if may_mistake else None
-    rule = raw_levels if mode == "raw" else partial(levels_of, negate=negate, unknown=unknown)
-    levels = levels_by_blocks(pixels, lambda shades: rule(shades, low=low, high=high), mode == "scale")
+    rule = _raw_levels if mode == "raw" else partial(_levels_of, negate=negate, unknown=unknown)
+    levels = _levels_by_blocks(pixels, lambda shades: rule(shades, low=low, high=high), mode == "scale")
     return MapImage(
         np.ascontiguousarray(levels[::-1]), _origin(yaml_path, header), _resolution(yaml_path, header)
     )
@@ -138,8 +243,8 @@ def read_grey_map(path: Path, resolution: float) -> MapImage:
         raise ValueError(f"{path}: resolution is {resolution} m; want {RESOLUTION.wanted}")
     pixels = read_image(Path(path))
     unknown = unknown_grey(pixels, (MAP_SERVER_GREYS, MIDDLE_GREYS))
-    rule = partial(levels_of, negate=False, low=0.196, high=0.65, unknown=unknown)
-    levels = levels_by_blocks(pixels, rule, True)
+    rule = partial(_levels_of, negate=False, low=0.196, high=0.65, unknown=unknown)
+    levels = _levels_by_blocks(pixels, rule, True)
     return MapImage(np.ascontiguousarray(levels[::-1]), (0.0, 0.0, 0.0), resolution)
 
 
@@ -153,7 +258,7 @@ def write_ros_map(
     Parameters
     ----------
     folder : Path
-        Where to write; made if absent.
+        Folder to write to; made if absent.
     name : str
         Stem of both files.
     levels : (rows, columns) uint8
@@ -212,7 +317,7 @@ def cropped(
 ) -> tuple[NDArray[np.uint8], tuple[float, float]]:
     """Return the known part of a map and its lower left corner [m].
 
-    The part includes a margin [cells] where the map has one.
+    The part includes a margin [cells] if the map has one.
 
     Parameters
     ----------
@@ -233,7 +338,7 @@ def cropped(
 
 
 def _read_header(path: Path) -> dict[str, Any]:
-    header = read_yaml(path)
+    header = _read_yaml(path)
     if not isinstance(header, dict):
         raise ValueError(f"{path} has no keys; want the yaml file of a ROS map with {', '.join(_REQUIRED)}")
     missing = [key for key in _REQUIRED if key not in header]
@@ -243,9 +348,9 @@ def _read_header(path: Path) -> dict[str, Any]:
 
 
 def _image_path(yaml_path: Path, name: str) -> Path:
-    """Return where the image of a map is.
+    """Return the path of the image of a map.
 
-    Where the header names a place that is none on this machine, the file of that name beside the header is
+    If the header names a path that does not exist, the file of that name in the folder of the header is
     used, with a warning to the log.
     """
     named = yaml_path.parent / name
@@ -283,9 +388,9 @@ def _origin(path: Path, header: dict[str, Any]) -> tuple[float, float, float]:
         x, y, yaw = (float(value) for value in header["origin"])
     except (TypeError, ValueError, OverflowError):
         x = y = yaw = math.nan
-    if not (np.isfinite([x, y, yaw]).all() and max(abs(x), abs(y), abs(yaw)) <= MOST_COORDINATE_M):
+    if not (np.isfinite([x, y, yaw]).all() and max(abs(x), abs(y), abs(yaw)) <= MAX_COORDINATE_M):
         raise ValueError(
             f"{path}: origin is {shown(header['origin'])}; want [x, y, yaw] in metres and radians, "
-            f"{MOST_COORDINATE_M:,.0f} at most"
+            f"{MAX_COORDINATE_M:,.0f} at most"
         )
     return x, y, yaw

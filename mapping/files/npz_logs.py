@@ -6,7 +6,7 @@ It is an npz archive with these arrays (times n, beams b), of which the first th
 - ``angle_min`` (), ``angle_increment`` (): direction of the first beam against the heading, and from beam to
   beam [rad];
 - ``stamp`` (n,): when the last beam was taken [s];
-- ``pose_odom`` (n, 3): x, y, theta of dead reckoning then, nan where unknown [m, rad];
+- ``pose_odom`` (n, 3): x, y, theta of dead reckoning then, nan if unknown [m, rad];
 - ``max_range`` (), ``min_range`` (): [m];
 - ``beam_interval`` (): time from beam to beam, 0 for a scan taken at once [s];
 - ``laser_pose`` (3,): x, y, theta of the laser on the robot [m, rad];
@@ -25,8 +25,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.mapping.files.guarded_arrays import read_arrays
-from lidarium.mapping.files.guarded_reading import reading
+from lidarium.mapping.files.guarded_reading import read_arrays, reading
 from lidarium.mapping.files.laser_logs import LaserLog, made_usable, symmetric_scans
 from lidarium.mapping.files.output import write_whole
 from lidarium.mapping.geometry.bounds import shown
@@ -137,13 +136,7 @@ def _table(
 
 
 def write_npz_log(path: Path, log: LaserLog) -> None:
-    """Write a log in our own format, whole or not at all.
-
-    Raises
-    ------
-    OSError
-        Where nothing can be written there.
-    """
+    """Write a log in our own format, whole or not at all."""
     geometry = log.geometry
     arrays: dict[str, Any] = {
         "ranges": log.ranges,

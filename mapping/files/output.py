@@ -15,7 +15,7 @@ _BESIDE = re.compile(r"\.(?P<name>.+)\.[0-9a-f]{8}")
 def errors_named(path: Path) -> Iterator[None]:
     """Give errors of the system that name no file the name of the one that is written.
 
-    A full disk, for instance, is reported of an open file, whose name the system does not know.
+    A full disk, for instance, is reported of an open file, whose name the system does not report.
     """
     try:
         yield
@@ -26,25 +26,10 @@ def errors_named(path: Path) -> Iterator[None]:
 
 
 def write_whole(path: Path, content: bytes, *, is_lasting: bool = True) -> None:
-    """Write a file beside and rename it, so that nobody ever reads half of it.
+    """Write a temporary file and rename it, so that nobody ever reads half of it.
 
-    Of several writers the last one stays. Who may read it is as the user's mask says. A link of that name is
+    Of several writers the last one stays. Who may read it is determined by the umask. A link of that name is
     replaced, not followed.
-
-    Parameters
-    ----------
-    path : Path
-        The file; its folder is there.
-    content : bytes
-        What it shall hold.
-    is_lasting : bool
-        Whether to wait until it is on the disk: some disks report only then that they are full. For all but
-        what can be made again.
-
-    Raises
-    ------
-    OSError
-        Where nothing can be written there.
     """
     beside = path.with_name(f".{path.name}.{secrets.token_hex(4)}")
     # Made here rather than by tempfile, whose files are for their owner alone: the system applies the mask.
@@ -62,15 +47,7 @@ def write_whole(path: Path, content: bytes, *, is_lasting: bool = True) -> None:
 
 
 def remove_unfinished(folder: Path, suffixes: Sequence[str]) -> None:
-    """Remove what ``write_whole`` left where its process was killed.
-
-    Parameters
-    ----------
-    folder : Path
-        Where it wrote; nobody writes there now, and all files of its naming there are its own.
-    suffixes : sequence of str
-        How the files' names end, such as ``.npz``.
-    """
+    """Remove the files that ``write_whole`` left if its process was killed."""
     for path in folder.glob(".*"):
         named = _BESIDE.fullmatch(path.name)
         if named is not None and named["name"].endswith(tuple(suffixes)) and path.is_file():
@@ -81,11 +58,6 @@ def lock_file(handle: int, path: Path) -> None:
     """Take an open file for this process.
 
     The system gives it back when the process ends, however that comes about.
-
-    Raises
-    ------
-    ValueError
-        Where another process has taken it.
     """
     try:
         import fcntl
@@ -101,13 +73,7 @@ def lock_file(handle: int, path: Path) -> None:
 
 @contextmanager
 def only_writer(path: Path) -> Iterator[None]:
-    """Take a file that is there for this process.
-
-    Raises
-    ------
-    ValueError
-        Where another process has taken it.
-    """
+    """Take a file that is there for this process."""
     handle = os.open(path, os.O_RDONLY)
     try:
         lock_file(handle, path)

@@ -14,8 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.mapping.files.guarded_arrays import read_arrays
-from lidarium.mapping.files.guarded_reading import check_file, read_text, reading
+from lidarium.mapping.files.guarded_reading import check_file, read_arrays, read_text, reading
 from lidarium.mapping.files.output import write_whole
 from lidarium.mapping.geometry.bounds import Rule, shown, within
 from lidarium.mapping.splines.curve import make_curve
@@ -29,13 +28,13 @@ VERSION = 1
 SEEN = Rule(float, bounds=within(0.0, 2.0**53))
 """How often something may have been seen."""
 
-MOST_LENGTH_M = 10_000.0
+MAX_LENGTH_M = 10_000.0
 """Longest curve of a map [m]."""
 
-MOST_COORDINATE_M = 1e6
+MAX_COORDINATE_M = 1e6
 """Farthest that a curve may lie from the origin [m]."""
 
-MOST_JSON_BYTES = 64 << 20
+MAX_JSON_BYTES = 64 << 20
 UNIT = 0.001
 _STEPS = 65535
 _WEIGHT_STEP = 0.25
@@ -44,14 +43,7 @@ _WEIGHT_STEP = 0.25
 def write_spline_map(path: Path, spline_map: SplineMap) -> None:
     """Write a map as JSON or in compact form, whole or not at all.
 
-    JSON where the name ends in ``.json``, compact where it ends in ``.npz``.
-
-    Raises
-    ------
-    ValueError
-        Where the name ends otherwise.
-    OSError
-        Where nothing can be written there.
+    JSON if the name ends in ``.json``, compact if it ends in ``.npz``.
     """
     if path.suffix == ".json":
         write_whole(path, (json.dumps(_as_json(spline_map), indent=1) + "\n").encode())
@@ -64,34 +56,19 @@ def write_spline_map(path: Path, spline_map: SplineMap) -> None:
 
 
 def read_spline_map(path: Path, settings: SplineSettings | None = None) -> SplineMap:
-    """Read a map that `write_spline_map` wrote.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    settings : SplineSettings or None
-        Settings of further updates; files do not hold them.
-
-    Raises
-    ------
-    FileNotFoundError
-        Where there is none.
-    ValueError
-        Where it is no such file.
-    """
+    """Read a map that `write_spline_map` wrote."""
     check_file(path)
     with reading(path, "a spline map"):
         if path.suffix == ".json":
-            return _from_json(json.loads(read_text(path, MOST_JSON_BYTES)), settings)
+            return _from_json(json.loads(read_text(path, MAX_JSON_BYTES)), settings)
         arrays = read_arrays(path, "a spline map")
         if not isinstance(arrays, dict):
             raise ValueError("it is a single array")
-        return from_compact_arrays(arrays, settings)
+        return _from_compact_arrays(arrays, settings)
 
 
 def compact_arrays(spline_map: SplineMap) -> dict[str, NDArray[Any]]:
-    """Return the compact form: all that `from_compact_arrays` needs."""
+    """Return the compact form: all that `_from_compact_arrays` needs."""
     controls = [_kept_points(curve.spline) for curve in spline_map.curves]
     points = np.concatenate([np.empty((0, 2)), *controls, spline_map.corners.points, spline_map.peaks.points])
     low = points.min(axis=0) if len(points) else np.zeros(2)
@@ -125,14 +102,10 @@ def compact_bytes(spline_map: SplineMap) -> int:
     return sum(array.nbytes for array in compact_arrays(spline_map).values())
 
 
-def from_compact_arrays(arrays: dict[str, NDArray[Any]], settings: SplineSettings | None = None) -> SplineMap:
-    """Return the map of a compact form.
-
-    Raises
-    ------
-    ValueError
-        Where it is of another version, or its arrays do not fit together.
-    """
+def _from_compact_arrays(
+    arrays: dict[str, NDArray[Any]], settings: SplineSettings | None = None
+) -> SplineMap:
+    """Return the map of a compact form."""
     version, x, y, unit, corner_count, updates = arrays["frame"].tolist()
     if version != VERSION:
         raise ValueError(f"version is {version:g}; want {VERSION}")
@@ -197,10 +170,10 @@ def _checked(spline: Spline) -> Spline:
     """Return a curve that is no longer than walls are."""
     first, last = spline.domain
     farthest = float(np.abs(spline.control_points).max())
-    if not (last - first <= MOST_LENGTH_M and farthest <= MOST_COORDINATE_M):
+    if not (last - first <= MAX_LENGTH_M and farthest <= MAX_COORDINATE_M):
         raise ValueError(
             f"a curve is {last - first:g} m long, up to {farthest:g} m away; want at most "
-            f"{MOST_LENGTH_M:,.0f} m, up to {MOST_COORDINATE_M:,.0f} m"
+            f"{MAX_LENGTH_M:,.0f} m, up to {MAX_COORDINATE_M:,.0f} m"
         )
     return spline
 

@@ -14,7 +14,7 @@ from lidarium.mapping.files.guarded_reading import read_lines, reading
 from lidarium.mapping.files.output import write_whole
 from lidarium.mapping.geometry.rigid import composed, relative
 
-MOST_LINE_BYTES = 1 << 16
+MAX_LINE_BYTES = 1 << 16
 """Longest line of a file of numbers."""
 
 
@@ -22,11 +22,6 @@ def write_tum(path: Path, stamps: NDArray[np.float64], poses: NDArray[np.float64
     """Write stamps (n,) [s] and poses (n, 3), whole or not at all.
 
     Poses are x, y, theta [m, rad].
-
-    Raises
-    ------
-    OSError
-        Where nothing can be written there.
     """
     half = 0.5 * poses[:, 2]
     lines = [
@@ -43,14 +38,7 @@ def write_tum(path: Path, stamps: NDArray[np.float64], poses: NDArray[np.float64
 def read_tum(path: Path) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Read stamps (n,) [s], sorted, and poses x, y, theta (n, 3) [m, rad].
 
-    What leaves the plane is left out.
-
-    Raises
-    ------
-    FileNotFoundError
-        If the file is not there.
-    ValueError
-        If it holds no trajectory.
+    Coordinates out of the plane are ignored.
     """
     table = read_numbers(path, 8, "a trajectory (stamp x y z qx qy qz qw)")
     table = table[np.argsort(table[:, 0], kind="stable")]
@@ -60,19 +48,12 @@ def read_tum(path: Path) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
 
 
 def read_numbers(path: Path, columns: int, what: str) -> NDArray[np.float64]:
-    """Read a text file of so many numbers a line, plain or gzipped.
+    """Read a text file of a fixed number of numbers per line, plain or gzipped.
 
     ``#`` begins a remark.
-
-    Raises
-    ------
-    FileNotFoundError
-        If the file is not there.
-    ValueError
-        If it holds anything else, or nothing.
     """
     path = Path(path)
-    lines = read_lines(path, MOST_LINE_BYTES)
+    lines = read_lines(path, MAX_LINE_BYTES)
     with reading(path, what), warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)  # of a file without numbers, which is reported below
         table = np.loadtxt(lines, np.float64, ndmin=2)
@@ -106,7 +87,7 @@ def at_readings(
     poses, numbers : (scans, 3) float64 and (scans,) int64
         Poses that are known, and at which readings; never decreasing.
     readings : (readings, 3) float64
-        Odometry. What it misses from one known pose to the next is made up for little by little.
+        Odometry. Its error from one known pose to the next is corrected gradually.
     """
     steps = np.arange(len(readings))
     after = (
@@ -131,7 +112,7 @@ def last_before(
 ) -> NDArray[np.float64]:
     """Return the pose (times, 3) with the stamp nearest to each time.
 
-    Where the nearest stamp is farther than a tolerance [s], the pose with the last stamp before.
+    If the nearest stamp is farther than a tolerance [s], the pose with the last stamp before.
 
     Of poses with one and the same stamp the mean: a clock of few digits does not distinguish them.
     """

@@ -1,25 +1,27 @@
-"""Clouds of points."""
+"""Point clouds, and their voxels: at most one point for each cube of space."""
 
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from lidarium.mapping.kernels.compilation import Array, kernel
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PointCloud:
-    """Points in space, with what is known of each.
+    """Points in space, with weights and normals.
 
     Attributes
     ----------
     points : (N, 3) float32
         Coordinates [m].
     weights : (N,) float32 or None
-        How many points each stands for; None where each stands for itself.
+        Number of points that each represents; None if each represents itself.
     normals : (N, 3) float32 or None
         Unit vectors across the surface.
     source : str
-        Where they come from, for messages: the name of a file.
+        Source for messages: the name of a file.
     """
 
     points: NDArray[np.float32]
@@ -51,3 +53,70 @@ class PointCloud:
             None if self.normals is None else self.normals[places],
             self.source,
         )
+
+
+FRAME_EDGE, FLOOR_EDGE = 0.02, 0.05
+"""Edges of voxels for single frames, and for whole floors [m]."""
+
+MAX_CELLS = 1 << 20
+"""Most voxels along an axis, to each side of the middle."""
+
+
+def thinned(cloud: PointCloud, edge: float) -> PointCloud:
+    """Replace the points of each voxel by their weighted mean.
+
+    Parameters
+    ----------
+    cloud : PointCloud
+        Finite points.
+    edge : float
+        Edge of a voxel [m]; corners are at multiples of it.
+    """
+    if not 0.0 < edge < np.inf:
+        raise ValueError(f"edge of voxels is {edge}; want a number above 0")
+    if len(cloud) == 0:
+        return cloud
+    places = np.floor(cloud.points.astype(np.float64) / edge)
+    if not np.abs(places).max() < MAX_CELLS:
+        raise ValueError(
+            f"{cloud.source} has points that are not finite or more than {MAX_CELLS:,} voxels of {edge} m "
+            "away"
+        )
+    cells = places.astype(np.int64) + MAX_CELLS
+    keys = cells[:, 0] | cells[:, 1] << 21 | cells[:, 2] << 42
+    labels, count = numbered(keys)
+    weights = np.ones(len(cloud)) if cloud.weights is None else cloud.weights.astype(np.float64)
+    masses = np.bincount(labels, weights, count)
+    points = _sums(cloud.points, labels, weights, count) / masses[:, None]
+    normals = None
+    if cloud.normals is not None:
+        sums = _sums(cloud.normals, labels, weights, count)
+        lengths = np.linalg.norm(sums, axis=1, keepdims=True)
+        normals = (sums / np.where(lengths > 0.0, lengths, 1.0)).astype(np.float32)
+    return PointCloud(points.astype(np.float32), masses.astype(np.float32), normals, cloud.source)
+
+
+def _sums(values: Array, labels: Array, weights: Array, count: int) -> Array:
+    """Return weighted sums of (N, 3) values by label, (count, 3)."""
+    return np.stack([np.bincount(labels, weights * values[:, axis], count) for axis in range(3)], axis=1)
+
+
+@kernel
+def numbered(keys: Array) -> tuple[Array, int]:
+    """Return numbers of keys (N,) int64 in the order of their first, (N,), and their number."""
+    size = 2
+    while size < 2 * len(keys):
+        size *= 2
+    slots, labels = np.full(size, -1, np.int64), np.empty(len(keys), np.int64)
+    held, count = np.empty(len(keys), np.int64), 0
+    for i in range(len(keys)):
+        key = keys[i]
+        mixed = np.uint64(key) * np.uint64(0x9E3779B97F4A7C15)
+        slot = np.int64(mixed >> np.uint64(20)) & (size - 1)
+        while slots[slot] >= 0 and held[slots[slot]] != key:
+            slot = (slot + 1) & (size - 1)
+        if slots[slot] < 0:
+            slots[slot], held[count] = count, key
+            count += 1
+        labels[i] = slots[slot]
+    return labels, count

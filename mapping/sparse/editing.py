@@ -1,6 +1,6 @@
 """Sparse maps edited by hand: boxes added or removed, two maps joined.
 
-Removing cuts space out of boxes, so that what stands beside it stays.
+Removing cuts space out of boxes, so that neighbouring obstacles stay.
 """
 
 from dataclasses import replace
@@ -8,8 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.mapping.sparse.mapper.code_merging import merged_codes
-from lidarium.mapping.sparse.mapper.explained_points import are_near
+from lidarium.mapping.sparse.mapper.merging import are_near, merged_codes
 from lidarium.mapping.sparse.rigid_motions import checked_poses
 from lidarium.mapping.sparse.sparse_map import FreeCodes, OccupiedCodes, SparseMap, occupied_codes
 
@@ -26,19 +25,9 @@ def edited(
     sparse_map : SparseMap
         The map.
     add_boxes : (A, 2, 3) float64 or None
-        Low and high corners of what stands there as well [m].
+        Low and high corners of further obstacles [m].
     remove_boxes : (R, 2, 3) float64 or None
-        Low and high corners of the space in which nothing stands [m].
-
-    Returns
-    -------
-    SparseMap
-        The map, its codes recorded where they are now; those that are cut keep weight and normal.
-
-    Raises
-    ------
-    ValueError
-        Where boxes are not finite, or a low corner is not below its high one.
+        Low and high corners of the space that is free [m].
     """
     codes = sparse_map.current
     for box in _checked_boxes(remove_boxes, "remove_boxes"):
@@ -58,17 +47,6 @@ def join_maps(first: SparseMap, second: SparseMap, transform: NDArray[np.float64
         The maps.
     transform : (4, 4) float64
         Maps points of the second into the first.
-
-    Returns
-    -------
-    SparseMap
-        The frames of the first, then those of the second; boxes that add nothing are merged, free codes of
-        the second near those of the first left out. Floor and settings are those of the first.
-
-    Raises
-    ------
-    ValueError
-        Where the transform is no rigid motion.
     """
     motion = checked_poses(transform)
     second = second.moved(motion @ second.poses)

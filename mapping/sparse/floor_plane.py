@@ -1,10 +1,12 @@
-"""The plane of the floor, against which heights are measured."""
+"""The plane of the floor, and its search in a cloud."""
 
 import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+
+from lidarium.mapping.sparse.settings import FloorSettings
 
 
 @dataclass(frozen=True, slots=True)
@@ -14,7 +16,7 @@ class FloorPlane:
     Attributes
     ----------
     x, y, z : float
-        Unit normal, to the side on which things stand.
+        Unit normal, to the side of free space.
     offset : float
         Height of the origin above the plane [m].
     """
@@ -57,3 +59,103 @@ class FloorPlane:
             motion[1, 1] = motion[2, 2] = -1.0
         motion[2, 3] = self.offset
         return motion
+
+
+_MAX_POINTS = 4000
+_REFINEMENTS = 4
+_BLOCK = 64
+_BANDS = 50
+
+
+def find_floor(
+    points: NDArray[np.float64], settings: FloorSettings | None = None, seed: int = 0
+) -> FloorPlane:
+    """Find the plane of the floor.
+
+    Parameters
+    ----------
+    points : (N, 3) float64
+        A cloud, spread evenly: means of voxels [m].
+    settings : FloorSettings or None
+        Settings; defaults if None.
+    seed : int
+        Of the draws.
+    """
+    settings = settings or FloorSettings()
+    up = np.array([settings.up_x, settings.up_y, settings.up_z], np.float64)
+    up /= np.linalg.norm(up)
+    rng = np.random.default_rng(seed)
+    some = (
+        points if len(points) <= _MAX_POINTS else points[rng.choice(len(points), _MAX_POINTS, replace=False)]
+    )
+    best, share = _best_plane(some, up, settings, rng)
+    if best is None or share < max(settings.least_share, 3.0 / max(len(some), 3)):
+        raise ValueError(
+            f"no floor: the best plane within {math.degrees(settings.most_tilt):.3g} degrees of level has "
+            f"{share:.1%} of {len(points):,} points; want {settings.least_share:.1%}, "
+            "another way up, or a floor that is given"
+        )
+    return _refined(points, best, up, settings.distance_m)
+
+
+def _best_plane(
+    points: NDArray[np.float64], up: NDArray[np.float64], settings: FloorSettings, rng: np.random.Generator
+) -> tuple[FloorPlane | None, float]:
+    """Return the drawn plane with the most points, and its share of them."""
+    if len(points) < 3:
+        return None, 0.0
+    corners = points[_drawn(points @ up, settings.trials, rng)]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    lengths = np.linalg.norm(normals, axis=1)
+    is_plane = lengths > 1e-9
+    normals, corners = normals[is_plane] / lengths[is_plane, None], corners[is_plane, 0]
+    normals *= np.where(normals @ up < 0.0, -1.0, 1.0)[:, None]
+    is_level = normals @ up >= math.cos(settings.most_tilt)
+    normals, corners = normals[is_level], corners[is_level]
+    offsets = -np.einsum("ij,ij->i", normals, corners)
+    best, maximum = None, 0.0
+    for start in range(0, len(normals), _BLOCK):
+        part = slice(start, start + _BLOCK)
+        heights = points @ normals[part].T + offsets[part]
+        shares = (np.abs(heights) <= settings.distance_m).mean(axis=0)
+        shares[(heights < -2.0 * settings.distance_m).mean(axis=0) > settings.most_below] = 0.0
+        place = int(np.argmax(shares))
+        if shares[place] > maximum:
+            best, maximum = _plane(normals[start + place], offsets[start + place]), float(shares[place])
+    return best, maximum
+
+
+def _drawn(heights: NDArray[np.float64], trials: int, rng: np.random.Generator) -> NDArray[np.int64]:
+    """Draw three points a trial, (trials, 3), for every other one of about one height.
+
+    If little of a cloud is floor, three points of any height are hardly ever all on it.
+    """
+    count = len(heights)
+    places = rng.integers(0, count, (trials, 3))
+    reach = max(count // _BANDS, 1)
+    near = places[::2, :1] + rng.integers(-reach, reach + 1, (len(places[::2]), 2))
+    places[::2, 1:] = np.clip(near, 0, count - 1)
+    places[::2] = np.argsort(heights, kind="stable")[places[::2]]
+    return places
+
+
+def _refined(
+    points: NDArray[np.float64], plane: FloorPlane, up: NDArray[np.float64], distance: float
+) -> FloorPlane:
+    """Return the plane of least squares through the points on a plane."""
+    for _ in range(_REFINEMENTS):
+        near = points[np.abs(plane.heights(points)) <= distance]
+        if len(near) < 3:
+            break
+        middle = near.mean(axis=0)
+        values, vectors = np.linalg.eigh(np.cov((near - middle).T))
+        normal = vectors[:, 0] * (1.0 if vectors[:, 0] @ up >= 0.0 else -1.0)
+        if values[1] < 1e-9 or normal @ plane.normal < 0.9:
+            break
+        plane = _plane(normal, -float(normal @ middle))
+    return plane
+
+
+def _plane(normal: NDArray[np.float64], offset: float) -> FloorPlane:
+    x, y, z = (normal / np.linalg.norm(normal)).tolist()
+    return FloorPlane(x, y, z, float(offset))

@@ -9,13 +9,7 @@ _CORNERS = np.array(list(itertools.product((0, 1), repeat=3)))
 
 
 def checked_poses(poses: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return poses (F, 4, 4) or (4, 4) as float64.
-
-    Raises
-    ------
-    ValueError
-        Where one is no rigid motion.
-    """
+    """Return poses (F, 4, 4) or (4, 4) as float64."""
     found = np.asarray(poses, np.float64)
     if found.shape[-2:] != (4, 4) or found.ndim > 3:
         raise ValueError(f"pose has shape {found.shape}; want (4, 4)")

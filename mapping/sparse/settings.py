@@ -2,7 +2,7 @@
 
 References
 ----------
-Sparse mapper, sections 2, 4 and 15: what the thesis prints, and the defaults for what it leaves open.
+Sparse mapper, sections 2, 4 and 15: the values of the thesis, and defaults for those that it omits.
 """
 
 import math
@@ -59,16 +59,16 @@ class MapperSettings:
     mode : str
         ``default``, or ``thesis`` for codes as points, split by the height of their centroids.
     split : str
-        What belongs to the floor: points below ``floor_height_m``, points of level surfaces, or points that
+        Points of the floor: points below ``floor_height_m``, points of level surfaces, or points that
         are ``both``.
     floor_height_m : float
         Height above the floor's plane up to which points belong to it [m].
     most_slope : float
         Angle by which a level surface may lean [rad].
     robot_height_m, ceiling_margin_m : float
-        What is higher than their sum above the floor is left out [m].
+        Points higher than their sum above the floor are ignored [m].
     noise_depth_m : float
-        What is deeper below the floor is left out [m].
+        Points deeper below the floor are ignored [m].
     range_m : float or None
         Points farther from the sensor are left out [m]; None for none.
     voxel_m : float
@@ -79,13 +79,13 @@ class MapperSettings:
         Whether boxes that are mostly empty are cut, and boxes merged. Codes that are to be registered are
         not: a merged one says less of its surface.
     slack_m : float
-        Boxes merge where their union adds nothing that is farther from them than this [m].
+        Boxes merge if their union adds nothing that is farther from them than this [m].
     most_boxes : int
         A map with more boxes merges with a larger slack.
     merge_radius_m : float
         Free codes nearer to each other than this are merged [m].
     least_motion_m, least_turn : float
-        A frame is taken where the robot has moved or turned by so much since the last one [m, rad].
+        A frame is taken if the robot has moved or turned by so much since the last one [m, rad].
     seed : int
         Of all random draws.
     floor : FloorSettings

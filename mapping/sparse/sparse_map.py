@@ -1,6 +1,6 @@
 """A sparse map: occupied codes with their boxes, free codes, poses of frames.
 
-Codes are kept where they were when their frame was coded. What is asked for is moved by how the pose of the
+Codes keep the positions of the time at which their frame was coded. Results are moved by how the pose of the
 frame has been corrected since, so that corrections never add up.
 
 References
@@ -26,7 +26,7 @@ SQUARE_M2 = 0.05**2
 
 @dataclass(frozen=True, eq=False, slots=True, kw_only=True)
 class OccupiedCodes:
-    """Codes of what stands there.
+    """Codes of the obstacles.
 
     Attributes
     ----------
@@ -37,7 +37,7 @@ class OccupiedCodes:
     weights : (M,) float64
         Points of each code.
     normals : (M, 3) float64
-        Unit normals of the points' surfaces; zero where there is none.
+        Unit normals of the points' surfaces; zero if there is none.
     frames : (M,) int64
         Numbers of the frames that the codes come from.
     """
@@ -132,14 +132,14 @@ def free_codes(centres: NDArray[np.float64], frame: int = 0) -> FreeCodes:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class SparseMap:
-    """What a robot knows of a place.
+    """A robot's map of a place.
 
     Attributes
     ----------
     occupied : OccupiedCodes
-        Codes of what stands there, where they were recorded in the map.
+        Codes of the obstacles, at the recorded positions in the map.
     ground : FreeCodes
-        Codes of the floor, where they were recorded in the map.
+        Codes of the floor, at the recorded positions in the map.
     poses : (F, 4, 4) float64
         Poses of the frames in the map, as they are known now.
     recorded : (F, 4, 4) float64
@@ -201,35 +201,24 @@ class SparseMap:
         return self._placed(self.ground.centres, self.ground.frames)
 
     def moved(self, poses: NDArray[np.float64]) -> "SparseMap":
-        """Return the map with other poses (F, 4, 4) of its frames.
-
-        Raises
-        ------
-        ValueError
-            Where these are not as many rigid motions as there are frames.
-        """
+        """Return the map with other poses (F, 4, 4) of its frames."""
         return replace(self, poses=np.array(poses, np.float64))
 
     @property
     def current(self) -> OccupiedCodes:
-        """The occupied codes where they are now."""
+        """The occupied codes at their current positions."""
         return replace(self.occupied, boxes=self.boxes, centres=self.centres, normals=self.normals)
 
     def recorded_codes(self, codes: OccupiedCodes, sources: NDArray[np.int64]) -> OccupiedCodes:
-        """Return codes where they would have been recorded.
+        """Return codes at the positions at which they would have been recorded.
 
         Parameters
         ----------
         codes : OccupiedCodes
-            Codes where they are now.
+            Codes at their current positions.
         sources : (M,) int64
             Which code of the map each of them is, -1 for none: those of the map do not become larger by being
             moved there and back.
-
-        Returns
-        -------
-        OccupiedCodes
-            The codes, in their order.
         """
         if not self.is_corrected:
             return codes

@@ -1,7 +1,7 @@
 """Collision of an upright body, driven along straight segments, with boxes.
 
 The body is a cylinder. Boxes are sorted into columns of a grid over the plane, so that only those beside a
-segment are tested. A box blocks it where its rectangle is nearer to the segment than the body's radius and
+segment are tested. A box blocks it if its rectangle is nearer to the segment than the body's radius and
 its heights overlap those of the body there.
 
 References
@@ -69,7 +69,7 @@ class BoxIndex(NamedTuple):
     shape : (2,) int64
         Rows and columns.
     starts : (rows * columns + 1,) int64
-        Where the boxes of each column begin in ``members``.
+        Index of the first box of each column in ``members``.
     members : (M,) int64
         Numbers of boxes, column by column.
     """
@@ -82,7 +82,7 @@ class BoxIndex(NamedTuple):
     members: Annotated[Array, np.int64, 1]
 
 
-MOST_COLUMNS = 4_000_000
+MAX_COLUMNS = 4_000_000
 """Most columns of an index; a wider map has larger ones."""
 
 
@@ -102,7 +102,7 @@ def index_boxes(boxes: NDArray[np.float64], cell: float = 0.25) -> BoxIndex:
     else:
         low, high = flat[:, :2].min(axis=0), flat[:, 3:5].max(axis=0)
         extent = np.maximum(high - low, cell)
-        cell = max(cell, math.sqrt(float(extent.prod()) / MOST_COLUMNS))
+        cell = max(cell, math.sqrt(float(extent.prod()) / MAX_COLUMNS))
         origin = low
         shape = (np.floor(extent / cell).astype(np.int64) + 1)[::-1].copy()
     starts, members = _sort_boxes(flat, origin, cell, shape)
@@ -111,7 +111,7 @@ def index_boxes(boxes: NDArray[np.float64], cell: float = 0.25) -> BoxIndex:
 
 @kernel
 def _sort_boxes(boxes: Array, origin: Array, cell: float, shape: Array) -> tuple[Array, Array]:
-    """Return where the boxes of each column begin, and the boxes column by column."""
+    """Return the index of the first box of each column, and the boxes column by column."""
     rows, columns = shape[0], shape[1]
     counts = np.zeros(rows * columns + 1, np.int64)
     for fills in range(2):
@@ -162,7 +162,7 @@ def squared_gap(x1: float, y1: float, x2: float, y2: float, box: Array) -> Any: 
     if not is_apart and enter <= leave:
         return 0.0
     # Else the nearest points are an end of the segment or a corner of the rectangle.
-    least = min(_end_gap(x1, y1, box), _end_gap(x2, y2, box))
+    minimum = min(_end_gap(x1, y1, box), _end_gap(x2, y2, box))
     length = run_x * run_x + run_y * run_y
     if length > 0.0:
         for corner in range(4):
@@ -170,8 +170,8 @@ def squared_gap(x1: float, y1: float, x2: float, y2: float, box: Array) -> Any: 
             y = low_y if corner & 2 == 0 else high_y
             share = min(max(((x - x1) * run_x + (y - y1) * run_y) / length, 0.0), 1.0)
             gap_x, gap_y = x - x1 - share * run_x, y - y1 - share * run_y
-            least = min(least, gap_x * gap_x + gap_y * gap_y)
-    return least
+            minimum = min(minimum, gap_x * gap_x + gap_y * gap_y)
+    return minimum
 
 
 @kernel(forceinline=True)
@@ -188,7 +188,7 @@ def is_free(index: BoxIndex, a: Array, b: Array, body: Array) -> bool:
     Parameters
     ----------
     index : BoxIndex
-        What stands there.
+        Obstacles.
     a, b : (3,) float64
         Ends of the segment on the floor [m]; the same for a body that stands.
     body : (3,) float64

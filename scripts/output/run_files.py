@@ -90,7 +90,7 @@ def _save_view(path: Path, episode: "Episode") -> None:
 def _write_sparse_maps(folder: Path, episode: "Episode") -> list[str]:
     """Write the sparse maps that robots have made, each with a picture of it and of the robot's trail."""
     from lidarium.evaluation.drawing.maps.sparse_picture import save_sparse_pictures
-    from lidarium.mapping.sparse.files.map_files import write_sparse_map
+    from lidarium.mapping.sparse.map_files import write_sparse_map
 
     files = []
     for row, mapper in sorted(episode.env.perception.sparse_maps.made.items()):

@@ -55,7 +55,7 @@ def execute(command: EditSparseMap) -> Answer:
     from lidarium.evaluation.drawing.maps.sparse_picture import save_sparse_pictures
     from lidarium.evaluation.episodes.output import check_writable
     from lidarium.mapping.sparse.editing import edited, join_maps
-    from lidarium.mapping.sparse.files.map_files import read_sparse_map, write_sparse_map
+    from lidarium.mapping.sparse.map_files import read_sparse_map, write_sparse_map
 
     if not (command.remove or command.add or command.join):
         raise ValueError("nothing is to be edited; want --add, --remove or --join")
@@ -99,7 +99,7 @@ def _boxes(name: str, texts: tuple[str, ...]) -> "NDArray[np.float64]":
 def _motion(text: str) -> "NDArray[np.float64]":
     """Return the rigid motion of x, y, yaw or x, y, z, yaw, (4, 4)."""
     from lidarium.mapping.geometry.rigid import Transform
-    from lidarium.mapping.point_clouds.frames import map_from_base
+    from lidarium.mapping.point_clouds.cameras import map_from_base
 
     numbers = numbers_of("--at", text, (3, 4))
     height = numbers[2] if len(numbers) == 4 else 0.0

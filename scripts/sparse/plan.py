@@ -44,9 +44,9 @@ def execute(command: Plan) -> Answer:
 
     from lidarium.evaluation.drawing.maps.sparse_picture import save_sparse_pictures
     from lidarium.evaluation.episodes.output import check_writable, write_json
-    from lidarium.mapping.sparse.files.map_files import read_sparse_map
-    from lidarium.mapping.sparse.graph.topological_graph import GraphSettings, build_graph
-    from lidarium.mapping.sparse.planning.requests import plan
+    from lidarium.mapping.sparse.graph import GraphSettings, build_graph
+    from lidarium.mapping.sparse.map_files import read_sparse_map
+    from lidarium.mapping.sparse.planning import plan
     from lidarium.mapping.sparse.swept_body import SweptBody
 
     if command.out is not None:

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from lidarium.mapping.point_clouds.intrinsics import Intrinsics
+    from lidarium.mapping.point_clouds.cameras import Intrinsics
     from lidarium.mapping.sparse.settings import MapperSettings
     from lidarium.mapping.sparse.sparse_map import SparseMap
 
@@ -66,7 +66,7 @@ def execute(command: SparseMapping) -> Answer:
     """
     from lidarium.evaluation.drawing.maps.sparse_picture import save_sparse_pictures
     from lidarium.evaluation.episodes.output import check_writable
-    from lidarium.mapping.sparse.files.map_files import write_sparse_map
+    from lidarium.mapping.sparse.map_files import write_sparse_map
 
     if not command.clouds:
         raise ValueError("no cloud is named; want at least one file")
@@ -132,9 +132,9 @@ def _clouds(command: SparseMapping) -> "Iterator[tuple[NDArray[np.floating], NDA
     """Yield the points of each cloud and its pose in the map."""
     import numpy as np
 
-    from lidarium.mapping.point_clouds.depth_images import read_pose
-    from lidarium.mapping.point_clouds.reading import read_cloud
-    from lidarium.mapping.sparse.mapper.floor_search import find_floor
+    from lidarium.mapping.point_clouds.cameras import read_pose
+    from lidarium.mapping.point_clouds.cloud_files import read_cloud
+    from lidarium.mapping.sparse.floor_plane import find_floor
     from lidarium.mapping.sparse.settings import FloorSettings
 
     x, y, z = numbers_of("--up", command.up, (3,))
@@ -150,7 +150,7 @@ def _clouds(command: SparseMapping) -> "Iterator[tuple[NDArray[np.floating], NDA
 
 
 def _intrinsics(command: SparseMapping) -> "Intrinsics | None":
-    from lidarium.mapping.point_clouds.intrinsics import Intrinsics
+    from lidarium.mapping.point_clouds.cameras import Intrinsics
 
     return (
         None

@@ -19,17 +19,18 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+from bag_forms import write_form
 from robustness.fuzz import MOST_MB, MOST_S
 from robustness.samples import make_samples
 from robustness.uses import use
 from robustness.worker import outcome_of, read_all
 
-from lidarium.mapping.files.images import MOST_COLOURED, MOST_PIXELS
+from lidarium.mapping.files.images import MAX_COLOURED, MAX_PIXELS
 from lidarium.mapping.files.laser_logs import LaserLog
 from lidarium.mapping.grids.scan_geometry import ScanGeometry
 
 MOST_BYTES = 1 << 20
-MOST_SIDE, COLOURED_SIDE = math.isqrt(MOST_PIXELS), math.isqrt(MOST_COLOURED)
+MOST_SIDE, COLOURED_SIDE = math.isqrt(MAX_PIXELS), math.isqrt(MAX_COLOURED)
 TRIES = 2
 """How often a file that took too much is read again."""
 
@@ -123,7 +124,7 @@ def _nested_blocks(deep: int, wide: int, last: str) -> str:
     return "".join(each.format(k, held) for k, held in enumerate([*inserts, last]))
 
 
-def _bag(scans: int, beams: int) -> bytes:
+def _bag(scans: int, beams: int, name: str = "bag.mcap") -> bytes:
     from lidarium.mapping.files.bags.writing import write_mcap_log
 
     stamps, poses = 0.1 * np.arange(scans), np.zeros((scans, 3))
@@ -138,7 +139,9 @@ def _bag(scans: int, beams: int) -> bytes:
     )
     with tempfile.TemporaryDirectory() as folder:
         write_mcap_log(Path(folder, "bag.mcap"), log)
-        return Path(folder, "bag.mcap").read_bytes()
+        if name != "bag.mcap":
+            write_form(Path(folder, name), Path(folder, "bag.mcap"))
+        return Path(folder, name).read_bytes()
 
 
 _LINE = "0 LINE 8 0 10 {} 20 {} 11 {} 21 {} "
@@ -233,11 +236,14 @@ CASES: dict[str, tuple[str, Callable[[], bytes]]] = {
     "curves of a DXF": ("dxf.dxf", lambda: _dxf("0 CIRCLE 8 0 10 5 20 5 40 900 " * 20_000 + _ROOM)),
     "a bag of many scans": ("bag.mcap", lambda: _bag(13_000, 8)),
     "a bag of many beams": ("bag.mcap", lambda: _bag(2000, 8000)),
+    "a bag of ROS 1": ("bag_bz2.bag", lambda: _bag(13_000, 8, "bag_bz2.bag")),
+    "a packed bag": ("bag.db3.zstd", lambda: _bag(13_000, 8, "bag.db3.zstd")),
+    "a bag in sqlite": ("bag.db3", lambda: _bag(500, 8, "bag.db3")),
     "curves": ("splines.json", lambda: _repeated('{"knots":[0,1],"points":[[0,0]]},', '{"curves":[', "{}]}")),
 }
 """By name: what the file is called, and how it is made."""
 
-_NEEDS = {".dxf": "ezdxf", ".mcap": "mcap_ros2"}
+_NEEDS = {".dxf": "ezdxf", ".mcap": "rosbags", ".bag": "rosbags", ".db3": "rosbags", ".zstd": "rosbags"}
 """Modules without which files are not read."""
 
 

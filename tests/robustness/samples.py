@@ -9,6 +9,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import yaml
+from bag_forms import write_form
 from drawn_decisions import drawn_decision
 
 import lidarium
@@ -220,8 +221,10 @@ def _logs(folder: Path) -> None:
         reading_of_scan=steps.astype(np.int64),
     )
     write_npz_log(folder / "log.npz", log)
-    if importlib.util.find_spec("mcap_ros2") is not None:  # the extra mcap
+    if importlib.util.find_spec("rosbags") is not None:  # the extra bags
         write_mcap_log(folder / "bag.mcap", log)
+        for name in ("bag.db3", "bag_lz4.bag", "bag_bz2.bag", "bag.db3.zstd"):
+            write_form(folder / name, folder / "bag.mcap")
     lines = ["PARAM robot_frontlaser_offset 0.1"]
     for scan, (x, y, theta), stamp in zip(ranges, poses, log.stamps, strict=True):
         pose = f"{x:.4f} {y:.4f} {theta:.4f}"

@@ -17,8 +17,8 @@ from lidarium.evaluation.report import write_report
 from lidarium.evaluation.report.plain_text import code, plain
 from lidarium.evaluation.suites.campaign import Campaign
 from lidarium.evaluation.suites.suite import Suite
+from lidarium.mapping.files.guarded_reading import printable
 from lidarium.mapping.files.map_files import write_ros_map
-from lidarium.mapping.files.names import printable
 
 NAMES = ["$\\frac{$", "a|b`c", "<script>alert(1)<", "x\x1b[31m", "_*[a](b)_", "\udcff\udcfe", "$", "名"]
 

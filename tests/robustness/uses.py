@@ -21,7 +21,7 @@ from lidarium.evaluation.record.replay import drive_again
 from lidarium.evaluation.suites.campaign import _kept_suite
 from lidarium.evaluation.suites.episodes_file import read_episodes
 from lidarium.evaluation.suites.suite import read_suite
-from lidarium.mapping.files.bags.reading import read_mcap_log
+from lidarium.mapping.files.bags.reading import read_bag_log
 from lidarium.mapping.files.carmen_logs import read_carmen_log
 from lidarium.mapping.files.laser_logs import LaserLog
 from lidarium.mapping.files.map_files import cropped, read_grey_map, read_ros_map
@@ -148,7 +148,7 @@ USES: dict[str, Callable[[Path], None]] = {
     "sdf": _floor,
     "movingai": _plan,
     "dxf": _floor,
-    "bag": lambda path: _log(read_mcap_log, path),
+    "bag": lambda path: _log(read_bag_log, path),
     "array": _array,
     "log": lambda path: _log(read_npz_log, path),
     "carmen": lambda path: _log(read_carmen_log, path),

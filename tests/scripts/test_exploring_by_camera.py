@@ -5,7 +5,7 @@ import json
 import pytest
 
 from lidarium.evaluation.suites.episodes_file import read_episodes
-from lidarium.mapping.sparse.files.map_files import read_sparse_map
+from lidarium.mapping.sparse.map_files import read_sparse_map
 from lidarium.scripts.main import main
 
 

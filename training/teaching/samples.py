@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.mapping.files.guarded_arrays import GuardedArchive
-from lidarium.mapping.files.guarded_reading import read_bytes, reading
+from lidarium.mapping.files.guarded_reading import GuardedArchive, read_bytes, reading
 from lidarium.mapping.files.output import write_whole
 from lidarium.training.decisions import MOST_OPTIONS, MOST_TEAMMATES, PER_OPTION, Decisions, stacked
 from lidarium.training.teaching.teacher import Lesson

@@ -17,7 +17,7 @@ from lidarium.benchmarks.studies.evaluation.machines import (
 from lidarium.benchmarks.studies.shared.kept import Progress, do_missing, kept_lines
 from lidarium.benchmarks.studies.shared.study import Study
 from lidarium.evaluation.statistics.resampling import MOST_VALUES
-from lidarium.mapping.files.guarded_reading import MOST_FILE_BYTES
+from lidarium.mapping.files.guarded_reading import MAX_FILE_BYTES
 
 EPISODES, PIECE = 100_000, 10_000
 NODE_SEEDS, NODE_ROUNDS, LONGER = 20, 3, 2
@@ -162,9 +162,9 @@ def page(folder: Path, command: str) -> str:
         report_mb=again["report_mb"],
         page_mb=again["page_bytes"] / 1e6,
         line_bytes=line_bytes,
-        most=MOST_FILE_BYTES / 1e9,
+        most=MAX_FILE_BYTES / 1e9,
         group=MOST_VALUES,
-        limit=round(MOST_FILE_BYTES / line_bytes, -4),
+        limit=round(MAX_FILE_BYTES / line_bytes, -4),
         mb_each=1e3 * again["report_mb"] / again["episodes"],
         gains="\n".join(
             _gain_row(count, compared) for count in sorted({each["episodes"] for each in compared})

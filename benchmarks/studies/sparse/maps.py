@@ -12,15 +12,14 @@ from lidarium.benchmarks.studies.sparse.grids import OctoMap, TreeSizes, laser_g
 from lidarium.benchmarks.studies.sparse.places import BODY, Place
 from lidarium.benchmarks.studies.sparse.survey import CAMERA, Frame, frames_of
 from lidarium.envs.settings.sensors.cameras import CAMERAS
-from lidarium.mapping.sparse.files.binary_form import binary_content
-from lidarium.mapping.sparse.files.text_form import text_content
-from lidarium.mapping.sparse.graph.thesis_graph import ThesisGraphSettings, build_thesis_graph
-from lidarium.mapping.sparse.graph.topological_graph import TopologicalGraph, build_graph
+from lidarium.mapping.sparse.graph import TopologicalGraph, build_graph
+from lidarium.mapping.sparse.map_files import binary_content, text_content
 from lidarium.mapping.sparse.mapper.full import map_cloud
 from lidarium.mapping.sparse.mapper.incremental import IncrementalMapper
-from lidarium.mapping.sparse.planning.requests import plan
+from lidarium.mapping.sparse.planning import plan
 from lidarium.mapping.sparse.settings import MapperSettings
 from lidarium.mapping.sparse.sparse_map import SparseMap
+from lidarium.mapping.sparse.thesis_graph import ThesisGraphSettings, build_thesis_graph
 
 FRAME_CODES, FULL_CODES = 256, 2048
 RANGE_M = 4.0

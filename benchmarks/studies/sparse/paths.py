@@ -13,9 +13,8 @@ from lidarium.benchmarks.studies.sparse.grids import LASER_M, laser_grid
 from lidarium.benchmarks.studies.sparse.maps import Planner, noisy_map, size_of, survey
 from lidarium.benchmarks.studies.sparse.optimum import ShortestPaths
 from lidarium.benchmarks.studies.sparse.places import BODY, CELL_M, PLACES, Place, load_place, requests_of
-from lidarium.mapping.sparse.graph.topological_graph import TopologicalGraph, build_graph
-from lidarium.mapping.sparse.planning.path_measures import measure_path
-from lidarium.mapping.sparse.planning.requests import plan
+from lidarium.mapping.sparse.graph import TopologicalGraph, build_graph
+from lidarium.mapping.sparse.planning import measure_path, plan
 from lidarium.mapping.sparse.swept_body import are_free
 
 PATHS_FILE = "places.jsonl"

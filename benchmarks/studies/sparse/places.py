@@ -8,7 +8,7 @@ from scipy import ndimage
 
 from lidarium.envs.floors.catalogue.names import load_floor
 from lidarium.envs.floors.floor import Floor
-from lidarium.mapping.sparse.planning.path_measures import points_along
+from lidarium.mapping.sparse.planning import points_along
 from lidarium.mapping.sparse.swept_body import SweptBody
 
 PLACES = ("robotics_laboratory", "signal_laboratory", "home_arena", "apartment")

@@ -15,10 +15,9 @@ from numpy.typing import NDArray
 from lidarium.benchmarks.studies.shared.kept import Progress, do_missing
 from lidarium.benchmarks.studies.sparse.places import load_place
 from lidarium.benchmarks.studies.sparse.survey import CAMERA, frames_of
-from lidarium.mapping.point_clouds.intrinsics import Intrinsics
-from lidarium.mapping.point_clouds.reading import read_cloud
-from lidarium.mapping.sparse.quantisation.quantiser import quantise
-from lidarium.mapping.sparse.quantisation.settings import QuantisationSettings
+from lidarium.mapping.point_clouds.cameras import Intrinsics
+from lidarium.mapping.point_clouds.cloud_files import read_cloud
+from lidarium.mapping.sparse.quantisation.quantiser import QuantisationSettings, quantise
 
 CODES = range(16, 513, 16)
 REPEATS, STEPS = 10, 7

@@ -14,8 +14,7 @@ from lidarium.envs.settings.sensors.cameras import CAMERAS, DepthCamera
 from lidarium.envs.simulation.depth.frames import image_of
 from lidarium.envs.simulation.depth.point_cloud import camera_pose
 from lidarium.mapping.geometry.rigid import Transform
-from lidarium.mapping.point_clouds.frames import map_from_base
-from lidarium.mapping.point_clouds.intrinsics import points_of_depth
+from lidarium.mapping.point_clouds.cameras import map_from_base, points_of_depth
 
 SPACING_M = 0.6
 """Between the points at which the robot turns [m]."""

@@ -1,3 +1,1 @@
 """Floors by name."""
-
-from typing import Any

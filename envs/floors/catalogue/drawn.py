@@ -1,19 +1,19 @@
 """Drawn floors: our own plans as short JSON files in `data/`.
 
-A file holds, all in metres and degrees, what it needs of::
+A file has some of these keys, in metres and degrees::
 
     {
       "name": "apartment",
       "about": "one sentence",
       "bounds": [0, 0, 11, 8],                 the outer walls' outer faces
       "outer_wall": 0.2,                       their thickness, inside of the bounds
-      "walls": [[0, 4, 8, 4, 0.2]],            middle line x, y, x, y; thickness where it is not 0.1
-      "doors": [[6, 4, 1.2]],                  middle of the gap; its width where it is not 0.9
+      "walls": [[0, 4, 8, 4, 0.2]],            middle line x, y, x, y; thickness; 0.1 by default
+      "doors": [[6, 4, 1.2]],                  middle of the gap; its width; 0.9 by default
       "blocks": [[3, 3, 5, 4]],                solid rectangles x, y, x, y
       "rooms": [[[0, 0], [3, 0], [3, 9]]],     outlines of free space; all else is solid, no outer walls
       "obstacles": [{"corners": [[1, 1], [2, 1], [2, 2]], "height": 1.2}],
-      "wall_height": 2.5,                      of walls, blocks and what surrounds rooms
-      "ceiling": 2.5,                          to which reaches what has no height
+      "wall_height": 2.5,                      of walls, blocks and the surroundings of rooms
+      "ceiling": 2.5,                          top of solids without a height
       "furniture": [["bed", 2, 7, 90, 1.6, 2.0]],    kind, middle, direction of its back; width, depth
       "starts": [[1, 1, 0]],                   x, y, heading
       "goal": [7, 7]
@@ -31,13 +31,11 @@ from pathlib import Path
 import numpy as np
 
 from lidarium.envs.floors.drawing import strip
-from lidarium.envs.floors.extent import check_pairs
-from lidarium.envs.floors.floor import CEILING, Floor, Solid
+from lidarium.envs.floors.floor import CEILING, Floor, Solid, check_pairs
 from lidarium.envs.floors.generation.furniture import place
-from lidarium.mapping.files.guarded_reading import read_text, reading
-from lidarium.mapping.files.names import printable
+from lidarium.mapping.files.guarded_reading import printable, read_text, reading
 
-MOST_JSON_BYTES = 1 << 20
+MAX_JSON_BYTES = 1 << 20
 DATA = Path(__file__).parent / "data"
 INNER_WALL = 0.1
 DOOR_WIDTH = 0.9
@@ -50,30 +48,13 @@ def drawn_names() -> tuple[str, ...]:
 
 
 def about_drawn(name: str) -> str:
-    """Tell in one sentence what a drawn floor is."""
+    """Return one sentence that describes a drawn floor is."""
     return str(json.loads((DATA / f"{name}.json").read_text(encoding="utf-8"))["about"])
 
 
 def load_drawn(path: Path) -> Floor:
-    """Read a drawn floor.
-
-    Parameters
-    ----------
-    path : Path
-        The JSON file.
-
-    Returns
-    -------
-    Floor
-
-    Raises
-    ------
-    FileNotFoundError
-        If there is no such file.
-    ValueError
-        If it is not a drawn floor; the message says what is wrong.
-    """
-    text = read_text(path, MOST_JSON_BYTES)
+    """Read a drawn floor."""
+    text = read_text(path, MAX_JSON_BYTES)
     with reading(path, "a drawn floor"):
         plan = json.loads(text)
         bounds = tuple(float(value) for value in plan["bounds"])

@@ -7,19 +7,68 @@ import difflib
 import hashlib
 import json
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from functools import lru_cache
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from lidarium.envs.floors.catalogue.drawn import DATA, about_drawn, drawn_names, load_drawn
 from lidarium.envs.floors.catalogue.store import floor_store, hash_of_code
-from lidarium.envs.floors.floor import Floor
+from lidarium.envs.floors.floor import Floor, Solid
+from lidarium.envs.floors.free_space import measure_building
 from lidarium.envs.floors.generation.buildings import KINDS, BuildingSettings, generate_building
-from lidarium.envs.floors.generation.packing import packed_floor, unpacked_floor
 from lidarium.envs.floors.importers import FORMATS, load_file
-from lidarium.envs.floors.measures import measure_building
 from lidarium.mapping.geometry.bounds import shown
+
+
+def _packed_floor(floor: Floor) -> dict[str, NDArray[Any]]:
+    """Return a floor as flat arrays.
+
+    Returns
+    -------
+    dict of arrays
+        ``name`` (UTF-8), ``bounds``, ``heights`` (S, 2), ``rings`` of each solid (S,), ``corners`` of each
+        ring (R,), ``points`` of all rings (N, 2), ``starts`` (K, 3), and ``goal``, (2,) or empty.
+    """
+    if floor.cells is not None:
+        raise ValueError(f"floor {floor.name!r} is made of cells; want one of solids")
+    rings = [ring for solid in floor.solids for ring in (solid.polygon, *solid.holes)]
+    return {
+        "name": np.frombuffer(floor.name.encode(), np.uint8),
+        "bounds": np.array(floor.bounds, np.float64),
+        "heights": np.array([(solid.z_low, solid.z_high) for solid in floor.solids], np.float64).reshape(
+            -1, 2
+        ),
+        "rings": np.array([1 + len(solid.holes) for solid in floor.solids], np.int64),
+        "corners": np.array([len(ring) for ring in rings], np.int64),
+        "points": np.concatenate([np.zeros((0, 2)), *rings]),
+        "starts": floor.starts,
+        "goal": np.array(floor.goal or (), np.float64),
+    }
+
+
+def _unpacked_floor(arrays: Mapping[str, NDArray[Any]]) -> Floor:
+    """Return the floor that `_packed_floor` packed; its solids are views of the arrays."""
+    ends = [0, *np.cumsum(arrays["corners"]).tolist()]
+    rings = iter([arrays["points"][first:last] for first, last in pairwise(ends)])
+    solids = tuple(
+        Solid(next(rings), z_low, z_high, tuple(next(rings) for _ in range(count - 1)))
+        for (z_low, z_high), count in zip(arrays["heights"].tolist(), arrays["rings"].tolist(), strict=True)
+    )
+    x_min, y_min, x_max, y_max = arrays["bounds"].tolist()
+    goal = arrays["goal"].tolist()
+    return Floor(
+        name=arrays["name"].tobytes().decode(),
+        bounds=(x_min, y_min, x_max, y_max),
+        solids=solids,
+        starts=arrays["starts"],
+        goal=(goal[0], goal[1]) if goal else None,
+    )
+
 
 SETS: dict[str, tuple[int, int]] = {
     "train": (1_000_000, 10_000),
@@ -50,13 +99,7 @@ def floor_names() -> tuple[str, ...]:
 
 
 def about_floor(name: str) -> str:
-    """Tell in one sentence what the drawn floor of that name is.
-
-    Raises
-    ------
-    ValueError
-        If there is no drawn floor of that name.
-    """
+    """Return one sentence that describes the drawn floor of that name is."""
     if name not in drawn_names():
         raise ValueError(_unknown(name))
     return about_drawn(name)
@@ -71,7 +114,7 @@ def load_floor(spec: str | Path | Floor, resolution: float | None = None) -> Flo
         A name of `floor_names`; ``building:SEED``, ``apartment:SEED``, ``office:SEED`` or ``corridors:SEED``;
         a path to a file of a format that the importers know; or a floor, which is returned as it is.
     resolution : float, optional
-        Side of a cell [m] of files that do not say theirs; files only.
+        Side of a cell [m] of files that do not state it; files only.
 
     Returns
     -------
@@ -119,23 +162,7 @@ def is_generated(spec: str) -> bool:
 
 
 def set_floors(name: str) -> tuple[str, ...]:
-    """Floors of a set as specs for `load_floor`.
-
-    Parameters
-    ----------
-    name : str
-        "train", "validation" or "test", with or without ``set:`` before it; ``test:40`` are the first 40
-        floors of it.
-
-    Returns
-    -------
-    tuple of str
-
-    Raises
-    ------
-    ValueError
-        If there is no such set, or not as many floors in it.
-    """
+    """Floors of a set as specs for `load_floor`."""
     short, colon, wanted = name.removeprefix("set:").partition(":")
     first, count = SETS[_set_name(short)]
     if colon:
@@ -148,52 +175,25 @@ def set_floors(name: str) -> tuple[str, ...]:
     return tuple(f"building:{seed}" for seed in range(first, first + count))
 
 
-def set_sha256(name: str) -> str:
-    """Look up the kept hash of a set: `hash_of_floors` of its first `HASHED_FLOORS`.
-
-    Raises
-    ------
-    ValueError
-        If there is no such set.
-    """
+def _set_sha256(name: str) -> str:
+    """Look up the kept hash of a set: `_hash_of_floors` of its first `HASHED_FLOORS`."""
     hashes = json.loads((DATA / "_sets.json").read_text(encoding="utf-8"))
     return str(hashes[_set_name(name)])
 
 
-def hash_of_floors(specs: Iterable[str]) -> str:
-    """Hash what some floors are: SHA-256 over the hashes of the floors, in order.
-
-    Parameters
-    ----------
-    specs : iterable of str
-        Floors as for `load_floor`.
-
-    Returns
-    -------
-    str
-        64 hexadecimal digits.
-    """
+def _hash_of_floors(specs: Iterable[str]) -> str:
+    """Hash floors: SHA-256 over the hashes of the floors, in order."""
     return hashlib.sha256("".join(load_floor(spec).sha256 for spec in specs).encode()).hexdigest()
 
 
 def describe_floor(floor: Floor) -> dict[str, Any]:
     """Describe a floor in figures.
 
-    Parameters
-    ----------
-    floor : Floor
-        Any floor.
-
     Returns
     -------
     dict
         ``name``, ``size_m`` [width, height], ``area_m2`` (free), ``loops``, ``clutter``, ``rooms``,
-        ``solids``, ``sha256``, ``remark``; what the four measures mean says `BuildingMeasures`.
-
-    Raises
-    ------
-    ValueError
-        If a robot of radius 0.30 m fits nowhere.
+        ``solids``, ``sha256``, ``remark``; the measures are explained in `BuildingMeasures`.
     """
     measures = measure_building(floor)
     x_min, y_min, x_max, y_max = floor.bounds
@@ -234,9 +234,9 @@ def _generated(kind: str, seed: int) -> Floor:
     store, key = floor_store(), f"floor {kind}:{seed} {hash_of_code(*MADE_BY)}"
     kept = store.load(key)
     if kept is not None:
-        return unpacked_floor(kept)
+        return _unpacked_floor(kept)
     floor = generate_building(seed, BuildingSettings(kind=kind))
-    store.save(key, packed_floor(floor))
+    store.save(key, _packed_floor(floor))
     return floor
 
 

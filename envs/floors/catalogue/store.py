@@ -1,6 +1,6 @@
 """A store on disk that all processes share.
 
-It has arrays that are expensive to make and small to keep, found by what determines them.
+It has arrays that are expensive to make and small to keep, found by their inputs.
 
 An entry is one file of compressed arrays. It is written beside and renamed, so that it appears whole; it
 carries a hash of its key and content, so that one that is damaged, cut short or another's is seen and made
@@ -8,7 +8,7 @@ again. Keys hold a hash of the code and libraries that make the arrays, so that 
 Only files with names of entries are read and removed, and nothing is reached through links.
 
 The entries lie in a few folders, each bounded by its share of the whole: a process that writes makes room in
-one of them without reading the others, and no process has to know what others write. The entry used
+one of them without reading the others, independent of what other processes write. The entry used
 longest ago goes first; who reads it meanwhile reads on.
 """
 
@@ -43,7 +43,7 @@ SIZE_VARIABLE = "LIDARIUM_FLOOR_STORE_MIB"
 """Environment variable: the most that the store takes on disk [MiB]."""
 
 DEFAULT_MIB = 1024.0
-"""The most that the store takes on disk where nothing is said [MiB]."""
+"""Default of the maximum size of the store on disk [MiB]."""
 
 PARTS = 16
 """Number of folders that the entries are spread over.
@@ -66,7 +66,7 @@ class Store:
     Parameters
     ----------
     folder : Path or None
-        Where the entries lie; None for a store that keeps nothing. A folder that cannot be written to is read
+        Folder of the entries; None for a store that keeps nothing. A folder that cannot be written to is read
         from.
     max_bytes : int
         The most that the entries take on disk.
@@ -78,7 +78,7 @@ class Store:
     def load(self, key: str) -> Arrays | None:
         """Return the arrays of a key, read-only.
 
-        None where there are none that are whole.
+        None if there are none that are whole.
         """
         if self.folder is None:
             return None
@@ -95,7 +95,7 @@ class Store:
         return _unpacked(content[head:])
 
     def save(self, key: str, arrays: Arrays) -> None:
-        """Keep arrays, where there is room and the folder can be written to."""
+        """Keep arrays, if there is room and the folder can be written to."""
         if self.folder is None:
             return
         packed = _packed(arrays)
@@ -124,13 +124,7 @@ class Store:
 
 
 def floor_store() -> Store:
-    """Return the store of floors, as the environment variables want it.
-
-    Raises
-    ------
-    ValueError
-        Where the size that the environment variable gives is not a number.
-    """
+    """Return the store of floors, as the environment variables want it."""
     return _store(os.environ.get(FOLDER_VARIABLE, ""), mebibytes(SIZE_VARIABLE, DEFAULT_MIB))
 
 
@@ -154,13 +148,7 @@ def _chosen(folder: str) -> Path:
 
 
 def mebibytes(variable: str, default: float) -> int:
-    """Read a size in MiB from an environment variable; returns bytes.
-
-    Raises
-    ------
-    ValueError
-        Where it is not a number of zero or more.
-    """
+    """Read a size in MiB from an environment variable; returns bytes."""
     text = os.environ.get(variable, "")
     try:
         size = float(text or default)
@@ -175,7 +163,7 @@ def mebibytes(variable: str, default: float) -> int:
 
 @lru_cache(maxsize=8)
 def hash_of_code(*sources: str) -> str:
-    """Hash what makes an entry's arrays.
+    """Hash the inputs of an entry's arrays.
 
     These are sources of the package, files or whole folders, with the libraries and the processor's kind.
     """
@@ -217,7 +205,7 @@ def _unpacked(packed: bytes) -> Arrays:
 
 
 def _on_disk(length: int) -> int:
-    """Return what a file of that length takes in the blocks of usual file systems."""
+    """Return the size of a file of that length in the blocks of usual file systems."""
     return -(-length // _BLOCK) * _BLOCK
 
 
@@ -249,7 +237,7 @@ def _files(folder: Path) -> list[tuple[float, int, Path]]:
 
 
 def _shrink(folder: Path, max_bytes: int) -> None:
-    """Remove what was used longest ago until a folder holds no more than that."""
+    """Remove the least recently used entries until a folder is not larger than that."""
     files = _files(folder)
     size = sum(size for _, size, _ in files)
     for _, length, path in sorted(files):

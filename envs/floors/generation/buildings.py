@@ -1,38 +1,175 @@
-"""Generated buildings: apartments, offices and corridor networks.
-
-They are drawn by seed from a few settings.
-
-A layout (rooms on a lattice) gives walls and doors; furniture is set into the rooms; then a disc of the
-service robot's radius is tried in all of it, and furniture that cuts off a part is left out. The same seed
-and settings give the same floor to the bit.
-"""
+"""Generated buildings: from a seed to a floor that a robot can pass."""
 
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
+from numpy.typing import NDArray
 
-from lidarium.envs.floors.floor import Floor
-from lidarium.envs.floors.generation.furnishing import furnish
+from lidarium.envs.floors.floor import Floor, Raster, Solid
+from lidarium.envs.floors.free_space import configuration_space
+from lidarium.envs.floors.generation.furniture import Furnished, furnish
 from lidarium.envs.floors.generation.layouts import (
-    Proportions,
-    apartment_layout,
-    corridor_layout,
-    office_layout,
-)
-from lidarium.envs.floors.generation.passability import draw_starts, passable
-from lidarium.envs.floors.generation.plans import (
     OUTSIDE,
     Labels,
+    Proportions,
+    Rectangle,
+    apartment_layout,
     cells,
     choose_doors,
+    corridor_layout,
     metres,
+    office_layout,
     outside_rectangles,
     room_areas,
     wall_rectangles,
 )
-from lidarium.envs.floors.generation.solids import rotated, solid_of
+
+
+def _solid_of(rectangle: Rectangle, z_high: float = math.inf) -> Solid:
+    """Return the solid on a rectangle, from the ground up to a height [m]."""
+    x_low, y_low, x_high, y_high = (round(value, 4) for value in rectangle)
+    return Solid(np.array([(x_low, y_low), (x_high, y_low), (x_high, y_high), (x_low, y_high)]), 0.0, z_high)
+
+
+def _rotated(floor: Floor, angle: float) -> Floor:
+    """Turn a floor about its corner and move it back to the first quadrant.
+
+    The corners that open are filled.
+    """
+    if angle == 0.0:
+        return floor
+    cosine, sine = math.cos(angle), math.sin(angle)
+    turn = np.array([[cosine, -sine], [sine, cosine]])
+    x_high, y_high = floor.bounds[2:]
+    corners = np.array([(0.0, 0.0), (x_high, 0.0), (x_high, y_high), (0.0, y_high)]) @ turn.T
+    shift = -corners.min(axis=0)
+    corners = corners + shift
+    extent = corners.max(axis=0)
+
+    def moved(points: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.asarray(np.round(points @ turn.T + shift, 4) + 0.0)
+
+    solids = [Solid(moved(solid.polygon), solid.z_low, solid.z_high) for solid in floor.solids]
+    for k in range(4):
+        a, b = corners[k], corners[(k + 1) % 4]
+        apex = next(
+            corner
+            for corner in ((a[0], b[1]), (b[0], a[1]))
+            if any(abs(corner[0] - x) < 1e-9 for x in (0.0, extent[0]))
+            and any(abs(corner[1] - y) < 1e-9 for y in (0.0, extent[1]))
+        )
+        if np.abs(a - apex).max() > 1e-3 and np.abs(b - apex).max() > 1e-3:
+            solids.append(Solid(np.asarray(np.round(np.array([a, b, apex]), 4) + 0.0, np.float64)))
+    headings = np.arctan2(np.sin(floor.starts[:, 2] + angle), np.cos(floor.starts[:, 2] + angle))
+    starts = np.asarray(np.column_stack([moved(floor.starts[:, :2]), np.round(headings, 4)]), np.float64)
+    return Floor(
+        floor.name,
+        (0.0, 0.0, round(float(extent[0]), 4), round(float(extent[1]), 4)),
+        tuple(solids),
+        starts=starts,
+    )
+
+
+ROBOT_RADIUS = 0.30
+"""Radius of the largest robot, which must be able to go everywhere [m]."""
+
+MARGIN = 0.05
+"""Clearance beyond that radius [m]."""
+
+START_CLEARANCE = 0.5
+"""Least distance of a start from all obstacles [m]."""
+
+STARTS = 3
+"""Number of starts a floor has."""
+
+_CHECK_RESOLUTION = 0.05
+
+
+def _passable(
+    bounds: Rectangle, walls: tuple[Solid, ...], furniture: list[Furnished], labels: Labels
+) -> tuple[list[Furnished], NDArray[np.bool_], tuple[float, float]] | None:
+    """Leave out furniture until a disc can go everywhere; also where a start may be.
+
+    None if no furniture is in the way.
+    """
+    resolution = _CHECK_RESOLUTION
+    while True:
+        blocks = walls + tuple(_solid_of(piece.footprint, 1.0) for piece in furniture)
+        raster = Floor("check", bounds, blocks).raster(resolution, 0.0, 0.5)
+        space, reachable = _space(raster, ROBOT_RADIUS + MARGIN)
+        tight, tight_reachable = _space(raster, ROBOT_RADIUS)
+        room = _room_of_cells(labels, raster.solid.shape, raster.origin, resolution)
+        reached = np.bincount(room[reachable & (room >= 0)], minlength=int(labels.max()) + 1) > 0
+        missed = {k for k, area in enumerate(room_areas(labels)) if area > 0 and not reached[k]}
+        # With the margin passages are wide enough; without it nooks appear that are cut off.
+        stray = (space & ~reachable) | (tight & ~tight_reachable)
+        if not missed and not stray.any():
+            clear = configuration_space(raster, START_CLEARANCE + MARGIN)
+            return furniture, clear if clear.any() else space, raster.origin
+        if not furniture:
+            return None
+        guilty = _guilty(furniture, stray, missed, raster.origin)
+        furniture = furniture[:guilty] + furniture[guilty + 1 :]
+
+
+def _space(raster: Raster, radius: float) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Return the positions at which a disc fits, and the largest connected part of that."""
+    space = configuration_space(raster, radius)
+    count, parts, stats, _ = cv2.connectedComponentsWithStats(space.astype(np.uint8), connectivity=4)
+    largest = 1 + int(np.argmax(stats[1:, cv2.CC_STAT_AREA])) if count > 1 else -1
+    return space, np.asarray(parts == largest)
+
+
+def _guilty(
+    furniture: list[Furnished], stray: NDArray[np.bool_], missed: set[int], origin: tuple[float, float]
+) -> int:
+    """Return the index of the last piece of furniture that obstructs the floor.
+
+    Such a piece is beside a part cut off or in a room that is not reached. Without one, the last piece is
+    returned.
+    """
+    reach = ROBOT_RADIUS + 3 * MARGIN
+    corner = np.tile(origin, 2) + np.array([reach, reach, -reach, -reach])
+    for k in range(len(furniture) - 1, -1, -1):
+        left, low, right, high = np.maximum(
+            (np.array(furniture[k].footprint) - corner) / _CHECK_RESOLUTION, 0.0
+        ).astype(int)
+        if furniture[k].room in missed or stray[low : high + 1, left : right + 1].any():
+            return k
+    return len(furniture) - 1
+
+
+def _room_of_cells(
+    labels: Labels, shape: tuple[int, ...], origin: tuple[float, float], resolution: float
+) -> Labels:
+    """Label of the room under each cell of a raster."""
+    index = []
+    for axis in (0, 1):
+        centres = origin[1 - axis] + (np.arange(shape[axis]) + 0.5) * resolution
+        index.append(np.clip(np.floor(centres / metres(1)).astype(int), 0, labels.shape[axis] - 1))
+    return labels[np.ix_(index[0], index[1])]
+
+
+def _draw_starts(
+    clear: NDArray[np.bool_], origin: tuple[float, float], generator: np.random.Generator
+) -> NDArray[np.float64]:
+    """Choose starts well off all walls, each as far as can be from the others.
+
+    Headings are drawn.
+    """
+    rows, columns = np.nonzero(clear)
+    places = (np.column_stack([columns, rows]) + 0.5) * _CHECK_RESOLUTION + origin
+    anywhere = places[int(generator.integers(len(places)))]
+    chosen = [places[int(np.argmax(((places - anywhere) ** 2).sum(axis=1)))]]
+    while len(chosen) < STARTS:
+        nearest = np.min([((places - place) ** 2).sum(axis=1) for place in chosen], axis=0)
+        chosen.append(places[int(np.argmax(nearest))])
+    headings = generator.uniform(-math.pi, math.pi, STARTS)
+    return np.round(np.column_stack([np.array(chosen), headings]), 4)
+
 
 KINDS = ("apartment", "office", "corridors")
 
@@ -49,7 +186,7 @@ _LAYOUTS: dict[str, Callable[[Proportions, np.random.Generator], Labels]] = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BuildingSettings:
-    """What to build. What is None is drawn by the seed.
+    """Parameters of a building. Those that are None are drawn from the seed.
 
     Attributes
     ----------
@@ -63,7 +200,7 @@ class BuildingSettings:
         corridors of offices) to 1. Drawn: 0 to 0.5.
     clutter : float or None
         Share of that area under furniture, 0 to 0.3. What finds no place is left out, so that about 0.2 is
-        reached where more is asked for. Drawn: 0.08 to 0.24; 0 to 0.1 for corridors.
+        reached if more is asked for. Drawn: 0.08 to 0.24; 0 to 0.1 for corridors.
     door_width : float
         Clear width of doors [m], 0.8 to 1.0.
     corridor_width : float or None
@@ -78,11 +215,6 @@ class BuildingSettings:
         smallest is at least 2, the largest at least 1.5 times that.
     rotation : float
         By which the floor is turned counter-clockwise [rad].
-
-    Raises
-    ------
-    ValueError
-        If a value is out of its range.
     """
 
     kind: str = "any"
@@ -122,26 +254,7 @@ class BuildingSettings:
 
 
 def generate_building(seed: int, settings: BuildingSettings | None = None) -> Floor:
-    """Build a floor.
-
-    Parameters
-    ----------
-    seed : int
-        Seed of all draws, not negative.
-    settings : BuildingSettings, optional
-        What to build; without it a building of any kind.
-
-    Returns
-    -------
-    Floor
-        One connected floor with three starts far apart, named by its kind and seed. Walls reach the ceiling,
-        furniture does not.
-
-    Raises
-    ------
-    ValueError
-        If the seed is negative, or no such building comes out, which very unusual settings may cause.
-    """
+    """Build a floor."""
     if seed < 0:
         raise ValueError(f"seed is {seed}; want zero or more")
     settings = settings or BuildingSettings()
@@ -153,7 +266,7 @@ def generate_building(seed: int, settings: BuildingSettings | None = None) -> Fl
             f"{kind}:{seed}", kind, proportions, clutter, settings, stages[4 * attempt : 4 * attempt + 4]
         )
         if floor is not None:
-            return rotated(floor, settings.rotation)
+            return _rotated(floor, settings.rotation)
     raise ValueError(
         f"no passable {kind} came out of seed {seed} and {settings}; try another seed, wider corridors or "
         "larger rooms"
@@ -168,9 +281,9 @@ def _attempt(
     settings: BuildingSettings,
     stages: list[np.random.SeedSequence],
 ) -> Floor | None:
-    """Draw one floor, or return None where its plan fails.
+    """Draw one floor, or return None if its plan fails.
 
-    A plan fails where a room has no door or a neck is too narrow for the robot.
+    A plan fails if a room has no door or a neck is too narrow for the robot.
     """
     layout, openings, pieces, places = stages
     labels = _layout(kind, proportions, settings, layout)
@@ -178,16 +291,16 @@ def _attempt(
     if doors is None:
         return None
     walls = tuple(
-        solid_of(r)
+        _solid_of(r)
         for r in outside_rectangles(labels) + wall_rectangles(labels, doors, settings.wall_thickness)
     )
     bounds = (0.0, 0.0, metres(labels.shape[1]), metres(labels.shape[0]))
     furniture = furnish(kind, labels, doors, clutter, settings.wall_thickness, np.random.default_rng(pieces))
-    found = passable(bounds, walls, furniture, labels)
+    found = _passable(bounds, walls, furniture, labels)
     if found is None:
         return None
     furniture, clear, origin = found
-    starts = draw_starts(clear, origin, np.random.default_rng(places))
+    starts = _draw_starts(clear, origin, np.random.default_rng(places))
     return Floor(
         name, bounds, walls + tuple(solid for piece in furniture for solid in piece.solids), starts=starts
     )
@@ -219,7 +332,7 @@ def _layout(
 ) -> Labels:
     """Draw a layout of the wanted area, with outer walls around it.
 
-    It is drawn again with its area corrected for what walls and cut corners took.
+    It is drawn again with its area corrected for the area of walls and cut corners.
     """
     wanted = proportions.area_m2
     margin = cells(settings.outer_wall_thickness)

@@ -1,27 +1,30 @@
-"""Furniture: pieces as solids with heights.
-
-A laser thus sees the legs of a table, and a tall body meets its top.
-
-A piece is described in its own frame: x to the right of who stands before it, y from its front (0) to its
-back (depth), which stands against a wall. Seats and low tables are closed down to the floor: what a low robot
-(below 0.6 m) would touch, a laser at 0.3 m sees; table tops, desks and basins meet taller bodies only. Pieces
-called open stand on legs or feet, as most real ones do: what is above them, a planar laser misses. Parts are
-boxes ``(x_low, y_low, x_high, y_high, z_low, z_high)``.
-"""
+"""Furniture of generated buildings: pieces, wishes of rooms, and free positions for them."""
 
 import math
+from bisect import bisect_left
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import accumulate
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lidarium.envs.floors.floor import Solid
+from lidarium.envs.floors.generation.layouts import (
+    CELL,
+    Boundary,
+    Door,
+    Labels,
+    Rectangle,
+    boundaries,
+    room_areas,
+)
 
 Box = tuple[float, float, float, float, float, float]
 
 
 @dataclass(frozen=True, slots=True)
-class Piece:
+class _Piece:
     """A kind of furniture.
 
     Attributes
@@ -188,38 +191,38 @@ def _couch(width: float, depth: float) -> list[Box]:
     return [(0.0, 0.0, width, depth, 0.60, 0.75), (0.15, 0.10, width - 0.15, depth - 0.10, 0.0, 0.60)]
 
 
-PIECES: dict[str, Piece] = {
-    "armchair": Piece((0.75, 0.90), (0.75, 0.85), _sofa),
-    "basin": Piece((0.50, 0.80), (0.40, 0.48), _basin),
-    "bathtub": Piece((1.60, 1.70), (0.70, 0.80), _block(0.57)),
-    "bed": Piece((1.40, 1.80), (2.05, 2.10), _bed),
-    "bench": Piece((1.00, 1.60), (0.35, 0.40), _bench),
-    "box": Piece((0.40, 0.80), (0.40, 0.60), _block(0.60)),
-    "cabinet": Piece((0.80, 1.60), (0.40, 0.45), _block(0.90)),
-    "chair": Piece((0.42, 0.45), (0.42, 0.45), _chair),
-    "couch": Piece((1.90, 2.00), (0.65, 0.75), _couch),
-    "counter": Piece((1.60, 2.80), (0.60, 0.62), _block(0.90)),
-    "desk": Piece((1.20, 1.60), (1.05, 1.10), _desk),
-    "desk group": Piece((2.80, 3.20), (2.10, 2.20), _desk_group),
-    "desk pair": Piece((1.40, 1.60), (2.10, 2.20), _desk_group),
-    "dining table": Piece((1.20, 1.80), (1.30, 1.40), _dining),
-    "fridge": Piece((0.60, 0.70), (0.60, 0.65), _block(1.80)),
-    "low table": Piece((0.95, 1.20), (0.50, 0.60), _low_table),
-    "meeting table": Piece((2.00, 3.60), (1.60, 1.80), _dining),
-    "nightstand": Piece((0.40, 0.50), (0.35, 0.40), _block(0.50)),
-    "open bed": Piece((1.40, 1.80), (2.05, 2.10), _open_bed),
-    "open chair": Piece((0.42, 0.45), (0.42, 0.45), _open_chair),
-    "open low table": Piece((0.95, 1.20), (0.50, 0.60), _open_low_table),
-    "open shelf": Piece((0.80, 1.80), (0.30, 0.40), _open_shelf),
-    "plant": Piece((0.35, 0.45), (0.35, 0.45), _block(1.30)),
-    "reception": Piece((1.80, 2.60), (0.70, 0.80), _block(1.10)),
-    "seats": Piece((1.20, 2.20), (0.55, 0.60), _seats),
-    "shelf": Piece((0.80, 1.80), (0.30, 0.40), _block(1.90)),
-    "single bed": Piece((0.90, 1.00), (2.05, 2.10), _bed),
-    "sofa": Piece((1.60, 2.30), (0.85, 0.95), _sofa),
-    "table": Piece((1.00, 1.40), (0.70, 0.80), _table),
-    "toilet": Piece((0.38, 0.40), (0.60, 0.70), _toilet),
-    "wardrobe": Piece((1.20, 2.20), (0.58, 0.62), _block(2.00)),
+PIECES: dict[str, _Piece] = {
+    "armchair": _Piece((0.75, 0.90), (0.75, 0.85), _sofa),
+    "basin": _Piece((0.50, 0.80), (0.40, 0.48), _basin),
+    "bathtub": _Piece((1.60, 1.70), (0.70, 0.80), _block(0.57)),
+    "bed": _Piece((1.40, 1.80), (2.05, 2.10), _bed),
+    "bench": _Piece((1.00, 1.60), (0.35, 0.40), _bench),
+    "box": _Piece((0.40, 0.80), (0.40, 0.60), _block(0.60)),
+    "cabinet": _Piece((0.80, 1.60), (0.40, 0.45), _block(0.90)),
+    "chair": _Piece((0.42, 0.45), (0.42, 0.45), _chair),
+    "couch": _Piece((1.90, 2.00), (0.65, 0.75), _couch),
+    "counter": _Piece((1.60, 2.80), (0.60, 0.62), _block(0.90)),
+    "desk": _Piece((1.20, 1.60), (1.05, 1.10), _desk),
+    "desk group": _Piece((2.80, 3.20), (2.10, 2.20), _desk_group),
+    "desk pair": _Piece((1.40, 1.60), (2.10, 2.20), _desk_group),
+    "dining table": _Piece((1.20, 1.80), (1.30, 1.40), _dining),
+    "fridge": _Piece((0.60, 0.70), (0.60, 0.65), _block(1.80)),
+    "low table": _Piece((0.95, 1.20), (0.50, 0.60), _low_table),
+    "meeting table": _Piece((2.00, 3.60), (1.60, 1.80), _dining),
+    "nightstand": _Piece((0.40, 0.50), (0.35, 0.40), _block(0.50)),
+    "open bed": _Piece((1.40, 1.80), (2.05, 2.10), _open_bed),
+    "open chair": _Piece((0.42, 0.45), (0.42, 0.45), _open_chair),
+    "open low table": _Piece((0.95, 1.20), (0.50, 0.60), _open_low_table),
+    "open shelf": _Piece((0.80, 1.80), (0.30, 0.40), _open_shelf),
+    "plant": _Piece((0.35, 0.45), (0.35, 0.45), _block(1.30)),
+    "reception": _Piece((1.80, 2.60), (0.70, 0.80), _block(1.10)),
+    "seats": _Piece((1.20, 2.20), (0.55, 0.60), _seats),
+    "shelf": _Piece((0.80, 1.80), (0.30, 0.40), _block(1.90)),
+    "single bed": _Piece((0.90, 1.00), (2.05, 2.10), _bed),
+    "sofa": _Piece((1.60, 2.30), (0.85, 0.95), _sofa),
+    "table": _Piece((1.00, 1.40), (0.70, 0.80), _table),
+    "toilet": _Piece((0.38, 0.40), (0.60, 0.70), _toilet),
+    "wardrobe": _Piece((1.20, 2.20), (0.58, 0.62), _block(2.00)),
 }
 """All kinds of furniture by name."""
 
@@ -240,15 +243,6 @@ def place(
         larger y.
     width, depth : float, optional
         Its size [m]; without it the middle of the kind's range.
-
-    Returns
-    -------
-    tuple of Solid
-
-    Raises
-    ------
-    ValueError
-        If there is no such kind.
     """
     if kind not in PIECES:
         raise ValueError(f"no furniture called {kind!r}; there are {', '.join(PIECES)}")
@@ -265,3 +259,351 @@ def place(
         )
         solids.append(Solid(np.round(corners @ turn.T + (x, y), 4) + 0.0, z_low, z_high))
     return tuple(solids)
+
+
+APARTMENT = {
+    "living": (
+        "sofa",
+        "low table",
+        "shelf",
+        "dining table",
+        "cabinet",
+        "armchair",
+        "shelf",
+        "plant",
+        "cabinet",
+        "chair",
+    ),
+    "bedroom": (
+        "bed",
+        "wardrobe",
+        "cabinet",
+        "nightstand",
+        "desk",
+        "shelf",
+        "armchair",
+        "plant",
+        "box",
+        "shelf",
+        "box",
+    ),
+    "child": ("single bed", "desk", "wardrobe", "shelf", "cabinet", "box", "box", "shelf", "box"),
+    "kitchen": ("counter", "fridge", "table", "counter", "cabinet", "chair", "chair", "shelf"),
+    "bath": ("bathtub", "toilet", "basin", "cabinet", "box"),
+    "store": ("shelf", "box", "shelf", "box", "cabinet", "box"),
+    "hall": ("shelf", "cabinet", "bench", "plant"),
+}
+OFFICE = {
+    "office": (
+        "desk",
+        "shelf",
+        "desk",
+        "cabinet",
+        "wardrobe",
+        "desk",
+        "plant",
+        "shelf",
+        "chair",
+        "cabinet",
+        "box",
+        "shelf",
+    ),
+    "open office": (
+        "desk group",
+        "desk pair",
+        "shelf",
+        "desk",
+        "cabinet",
+        "desk",
+        "shelf",
+        "wardrobe",
+        "plant",
+        "cabinet",
+        "desk",
+    ),
+    "meeting": ("meeting table", "cabinet", "shelf", "plant", "chair", "cabinet", "box", "chair"),
+    "washroom": ("toilet", "basin", "toilet", "cabinet"),
+    "store": ("shelf", "shelf", "box", "cabinet", "box", "shelf"),
+    "hall": (
+        "seats",
+        "plant",
+        "cabinet",
+        "bench",
+        "shelf",
+        "cabinet",
+        "sofa",
+        "bench",
+        "plant",
+        "seats",
+        "shelf",
+    ),
+}
+CORRIDORS = {
+    "hall": ("cabinet", "bench", "shelf", "plant", "box", "cabinet", "shelf", "seats", "box", "bench") * 4
+}
+
+
+def _room_wishes(
+    kind: str, areas: NDArray[np.float64], generator: np.random.Generator
+) -> list[tuple[str, ...]]:
+    """List the pieces that each room would like to hold, by label, from its use.
+
+    Parameters
+    ----------
+    kind : str
+        "apartment", "office" or "corridors".
+    areas : (rooms,) float64
+        Of the rooms [m²]; their use follows from these.
+    generator : np.random.Generator
+        Distribution of the uses of the rooms of an office.
+    """
+    if kind == "corridors":
+        return [CORRIDORS["hall"]]
+    if kind == "office":
+        uses = ["hall"] + [_office_use(area, generator.random()) for area in areas[1:]]
+        return [OFFICE[use] * (3 if use == "hall" else 1) for use in uses]
+    rooms = [int(room) for room in np.argsort(areas[1:], kind="stable") + 1]
+    uses = ["hall"] + ["child"] * len(rooms)
+    for room in rooms:
+        uses[room] = "store" if areas[room] < 5.5 else "child" if areas[room] < 11.0 else "bedroom"
+    uses[rooms[0]] = "bath"
+    if len(rooms) > 3:
+        uses[rooms[1]] = "bath" if areas[rooms[1]] < 4.5 and len(rooms) > 5 else "kitchen"
+        uses[rooms[2]] = "kitchen" if uses[rooms[1]] == "bath" else uses[rooms[2]]
+    if len(rooms) > 1:
+        uses[rooms[-1]] = "living"
+    return [APARTMENT[use] for use in uses]
+
+
+def _office_use(area: float, draw: float) -> str:
+    if area < 7.0:
+        return "washroom" if draw < 0.5 else "store"
+    if area < 16.0:
+        return "office" if draw < 0.85 else "store"
+    return "meeting" if draw < 0.3 else "office" if area < 22.0 else "open office"
+
+
+PASSAGE = 0.75
+"""Clear width before a piece and between two separate pieces [m].
+
+Pieces are separate if they do not stand side by side.
+"""
+
+DOOR_DEPTH = 0.95
+"""Depth of the clear rectangle at both sides of a door [m]."""
+
+ATTEMPTS = 10
+"""Draws of a place for one piece before it is left out."""
+
+FREE = frozenset({"desk group", "desk pair", "dining table", "low table", "meeting table", "table"})
+"""Free-standing pieces."""
+
+
+@dataclass(frozen=True, slots=True)
+class Furnished:
+    """A piece of furniture in its room: room label, footprint and solids."""
+
+    room: int
+    footprint: Rectangle
+    solids: tuple[Solid, ...]
+
+
+class FurniturePlaces:
+    """Free positions for furniture: walls by room, and areas that are taken or kept clear.
+
+    Parameters
+    ----------
+    labels : (rows, columns) int32
+        The plan.
+    doors : list of Door
+        Areas to keep clear.
+    wall_thickness : float
+        Of the walls between rooms [m].
+    """
+
+    def __init__(self, labels: Labels, doors: list[Door], wall_thickness: float) -> None:
+        self._labels = labels
+        self._half_wall = wall_thickness / 2
+        self._walls: dict[int, list[tuple[Boundary, bool]]] = {}
+        for boundary in boundaries(labels):
+            for room, above in ((boundary.low, False), (boundary.high, True)):
+                self._walls.setdefault(room, []).append((boundary, above))
+        self._clear: dict[int, list[Rectangle]] = {}
+        for door in doors:
+            rectangle = door.boundary.rectangle(door.start - 0.1, door.end + 0.1, DOOR_DEPTH, DOOR_DEPTH)
+            for room in (door.boundary.low, door.boundary.high):
+                self._clear.setdefault(room, []).append(rectangle)
+        self._taken: dict[int, list[tuple[Rectangle, Boundary | None]]] = {}
+        rows: dict[int, tuple[slice, slice]] = {}
+        for room in range(int(labels.max()) + 1):
+            inside = labels == room
+            row, column = np.flatnonzero(inside.any(axis=1)), np.flatnonzero(inside.any(axis=0))
+            if row.size:
+                rows[room] = (
+                    slice(int(row[0]), int(row[-1]) + 1),
+                    slice(int(column[0]), int(column[-1]) + 1),
+                )
+        self._extent = rows
+
+    def draw(
+        self, room: int, name: str, width: float, depth: float, generator: np.random.Generator
+    ) -> Furnished | None:
+        """Try a few places for a piece; None if none of them is free."""
+        for _ in range(ATTEMPTS):
+            wall: Boundary | None = None
+            if name in FREE:
+                rectangle, theta = self._free(room, width, depth, generator)
+            else:
+                against = self._against_wall(room, width, depth, generator)
+                if against is None:
+                    return None
+                rectangle, theta, wall = against
+            if self._is_free(room, rectangle, wall):
+                self._taken.setdefault(room, []).append((rectangle, wall))
+                x, y = (rectangle[0] + rectangle[2]) / 2, (rectangle[1] + rectangle[3]) / 2
+                return Furnished(room, rectangle, place(name, x, y, theta, width, depth))
+        return None
+
+    def _free(
+        self, room: int, width: float, depth: float, generator: np.random.Generator
+    ) -> tuple[Rectangle, float]:
+        rows, columns = self._extent[room]
+        turned = generator.random() < 0.5
+        across, along = (depth, width) if turned else (width, depth)
+        middle_x, middle_y = (columns.start + columns.stop) * CELL / 2, (rows.start + rows.stop) * CELL / 2
+        spare_x = max((columns.stop - columns.start) * CELL - across - 2 * PASSAGE, 0.0)
+        spare_y = max((rows.stop - rows.start) * CELL - along - 2 * PASSAGE, 0.0)
+        x = _snapped(middle_x - across / 2 + spare_x * generator.uniform(-0.5, 0.5))
+        y = _snapped(middle_y - along / 2 + spare_y * generator.uniform(-0.5, 0.5))
+        return (x, y, x + across, y + along), 0.0 if turned else math.pi / 2
+
+    def _against_wall(
+        self, room: int, width: float, depth: float, generator: np.random.Generator
+    ) -> tuple[Rectangle, float, Boundary] | None:
+        """Back to a wall, half of the time in a corner of it."""
+        walls = [wall for wall in self._walls[room] if wall[0].length >= width + 0.2]
+        if not walls:
+            return None
+        # Longer walls are taken more often: a point is drawn on all of them laid end to end.
+        ends = list(accumulate(wall[0].length for wall in walls))
+        boundary, above = walls[bisect_left(ends, generator.random() * ends[-1])]
+        offset = self._half_wall + 0.02 if boundary.low >= 0 and boundary.high >= 0 else 0.02
+        slack = boundary.length - width - 2 * (self._half_wall + 0.02)
+        share = min(max(2.0 * generator.random() - 0.5, 0.0), 1.0)
+        start = boundary.start + self._half_wall + 0.02 + slack * share
+        if above:
+            rectangle = boundary.rectangle(start, start + width, -offset, offset + depth)
+        else:
+            rectangle = boundary.rectangle(start, start + width, offset + depth, -offset)
+        side = 1.0 if above else 0.0
+        return rectangle, math.pi * side if boundary.vertical else math.pi * (0.5 - side), boundary
+
+    def _is_free(self, room: int, rectangle: Rectangle, wall: Boundary | None) -> bool:
+        """Whether a rectangle is free for a piece in a room.
+
+        It is inside the room with a passage before it, off the doors, and beside or well away from
+        all other pieces.
+        """
+        if not self._is_inside(room, _with_passage(rectangle, wall, room, self._half_wall)):
+            return False
+        if any(_gap(rectangle, clear) <= 0.0 for clear in self._clear.get(room, [])):
+            return False
+        return all(
+            _gap(rectangle, other) >= (0.02 if wall is not None and wall is other_wall else PASSAGE)
+            for other, other_wall in self._taken.get(room, [])
+        )
+
+    def _is_inside(self, room: int, rectangle: Rectangle) -> bool:
+        x_low, y_low, x_high, y_high = rectangle
+        if x_low < 0.0 or y_low < 0.0:
+            return False
+        rows = slice(int(y_low / CELL + 1e-6), math.ceil(y_high / CELL - 1e-6))
+        columns = slice(int(x_low / CELL + 1e-6), math.ceil(x_high / CELL - 1e-6))
+        if rows.stop > self._labels.shape[0] or columns.stop > self._labels.shape[1]:
+            return False
+        return bool((self._labels[rows, columns] == room).all())
+
+
+def _snapped(value: float) -> float:
+    return round(value / 0.05) * 0.05
+
+
+def _with_passage(rectangle: Rectangle, wall: Boundary | None, room: int, half_wall: float) -> Rectangle:
+    """Return the footprint and the passage that must lie in the room.
+
+    The passage is before a piece at a wall, and all around a free-standing one.
+    """
+    x_low, y_low, x_high, y_high = rectangle
+    more = PASSAGE + half_wall
+    if wall is None:
+        return (x_low - more, y_low - more, x_high + more, y_high + more)
+    before = wall.low == room
+    if wall.vertical:
+        return (x_low - more, y_low, x_high, y_high) if before else (x_low, y_low, x_high + more, y_high)
+    return (x_low, y_low - more, x_high, y_high) if before else (x_low, y_low, x_high, y_high + more)
+
+
+def _gap(a: Rectangle, b: Rectangle) -> float:
+    """Larger of the distances along x and y between two rectangles [m].
+
+    Negative if they overlap.
+    """
+    return max(a[0] - b[2], b[0] - a[2], a[1] - b[3], b[1] - a[3])
+
+
+SMALLEST_M2 = 0.1
+"""Furnishing ends when less than this is left to cover [m²]."""
+
+FULL = 4
+"""Pieces in a row without a place after which a room counts as full."""
+
+
+def furnish(
+    kind: str,
+    labels: Labels,
+    doors: list[Door],
+    clutter: float,
+    wall_thickness: float,
+    generator: np.random.Generator,
+) -> list[Furnished]:
+    """Furniture for all rooms of a plan, main pieces first.
+
+    Parameters
+    ----------
+    kind : str
+        "apartment", "office" or "corridors".
+    labels : (rows, columns) int32
+        The plan.
+    doors : list of Door
+        Areas to keep clear.
+    clutter : float
+        Share of the area of the rooms to cover.
+    wall_thickness : float
+        Of the walls between rooms [m].
+    generator : np.random.Generator
+        Source of all draws.
+    """
+    areas = room_areas(labels)
+    wishes = _room_wishes(kind, areas, generator)
+    places = FurniturePlaces(labels, doors, wall_thickness)
+    budget = clutter * float(areas.sum())
+    placed: list[Furnished] = []
+    misses = [0] * len(wishes)
+    for turn in range(2 * max(len(wish) for wish in wishes)):
+        for room in generator.permutation(len(wishes)):
+            if areas[room] == 0.0 or budget < SMALLEST_M2 or misses[room] == FULL:
+                continue
+            first, rest = wishes[room][: len(wishes[room]) // 2], wishes[room][len(wishes[room]) // 2 :]
+            name = first[turn] if turn < len(first) else rest[(turn - len(first)) % len(rest)]
+            width, depth = (
+                round(generator.uniform(*span) / 0.05) * 0.05
+                for span in (PIECES[name].width, PIECES[name].depth)
+            )
+            if width * depth / 2 > budget:
+                continue
+            found = places.draw(int(room), name, width, depth, generator)
+            misses[room] = 0 if found is not None else misses[room] + 1
+            if found is not None:
+                placed.append(found)
+                budget -= width * depth
+    return placed

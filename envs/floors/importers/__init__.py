@@ -8,6 +8,7 @@ from lidarium.envs.floors.floor import Floor
 from lidarium.envs.floors.importers import (
     amrl,
     arrays,
+    dxf,
     houseexpo,
     images,
     kth,
@@ -17,7 +18,6 @@ from lidarium.envs.floors.importers import (
     sdf,
     svg,
 )
-from lidarium.envs.floors.importers.dxf import drawing as dxf
 from lidarium.mapping.files.guarded_reading import check_file, reading
 from lidarium.mapping.files.map_files import RESOLUTION
 from lidarium.mapping.geometry.bounds import shown
@@ -37,7 +37,7 @@ class Format:
     load : callable
         Reads the file; gets the path and the resolution asked for, or None.
     has_scale : callable
-        Whether a file says itself how large it is, by its name.
+        Whether a file states its scale, by its name.
     """
 
     suffixes: tuple[str, ...]
@@ -92,13 +92,13 @@ def load_file(path: Path, resolution: float | None = None) -> Floor:
         The file: ROS map (yaml), dungeon or plain image, KTH XML, LIFULL or AMRL text, HouseExpo JSON, numpy
         array, MovingAI grid map, SVG or DXF drawing, SDF world.
     resolution : float or None
-        Side of a pixel [m] where the file does not say it: needed for plain images, numpy arrays,
+        Side of a pixel [m] if the file does not state it: needed for plain images, numpy arrays,
         grid maps and drawings.
 
     Returns
     -------
     Floor
-        The floor. Where it comes from pixels or rooms, its largest connected free area is free (of a dungeon:
+        The floor. If it comes from pixels or rooms, its largest connected free area is free (of a dungeon:
         that of the start) and all else is solid. It has starts only if the file has.
 
     Raises
@@ -122,7 +122,7 @@ def load_file(path: Path, resolution: float | None = None) -> Floor:
 
 
 def takes_resolution(path: Path) -> bool:
-    """Whether a file needs a resolution beside it, because it does not say its scale itself."""
+    """Whether a file needs a resolution beside it, because it does not state its scale."""
     with reading(path, "a floor"):
         known = _format_of(path)
         return known is not None and not known.has_scale(path)

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from lidarium.envs.floors.floor import Floor
 from lidarium.envs.floors.importers.common import floor_of_cells, refuse_resolution
-from lidarium.mapping.files.guarded_arrays import read_arrays
+from lidarium.mapping.files.guarded_reading import read_arrays
 from lidarium.mapping.files.map_files import RESOLUTION
 from lidarium.mapping.geometry.bounds import shown
 
@@ -15,7 +15,7 @@ _FREE_ABOVE = 127
 
 
 def has_scale(path: Path) -> bool:
-    """Whether an array says its scale itself: archives do, single arrays do not."""
+    """Whether an array states its scale: archives do, single arrays do not."""
     return path.suffix.lower() == ".npz"
 
 

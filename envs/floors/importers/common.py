@@ -13,16 +13,15 @@ from numpy.typing import NDArray
 
 from lidarium.envs.floors.areas import floor_of_area
 from lidarium.envs.floors.drawing import fill_shapes, strip, strip_edges
-from lidarium.envs.floors.extent import check_extent
-from lidarium.envs.floors.floor import Floor, Solid
+from lidarium.envs.floors.floor import Floor, Solid, check_extent
+from lidarium.mapping.files.guarded_reading import printable
 from lidarium.mapping.files.guarded_reading import read_text as read_guarded
-from lidarium.mapping.files.images import MOST_PIXELS
-from lidarium.mapping.files.names import printable
+from lidarium.mapping.files.images import MAX_PIXELS
 
-MOST_TEXT_BYTES = 32 << 20
+MAX_TEXT_BYTES = 32 << 20
 """Longest text of a floor, unpacked: parsed it takes some twenty times as much."""
 
-MOST_POINTS = 250_000
+MAX_POINTS = 250_000
 """Most points of a drawing."""
 
 Part = TypeVar("Part")
@@ -39,18 +38,12 @@ _MAX_OUTLINE_CELLS = 20_000_000  # 8,000 m2; wider drawings have coarser cells
 
 
 def read_text(path: Path) -> str:
-    """Return the text of a file, unpacked if its name ends in .gz.
-
-    Raises
-    ------
-    ValueError
-        If the packed file is damaged or truncated, too long, or it is not text.
-    """
-    return read_guarded(path, MOST_TEXT_BYTES)
+    """Return the text of a file, unpacked if its name ends in .gz."""
+    return read_guarded(path, MAX_TEXT_BYTES)
 
 
 def floor_name(path: Path) -> str:
-    """Return the file's name without what says its format."""
+    """Return the file's name without the ending of its format."""
     name = printable(path.name)
     for suffix in (".gz", ".txt", ".vectormap", ".xml", ".json"):
         if name.lower().endswith(suffix):
@@ -65,18 +58,12 @@ def refuse_resolution(path: Path, resolution: float | None) -> None:
 
 
 def few_enough(path: Path, parts: Iterable[Part], points_of: Callable[[Part], int]) -> Iterator[Part]:
-    """Yield parts of a drawing, as long as they have not too many points.
-
-    Raises
-    ------
-    ValueError
-        At the first part with which they have more than `MOST_POINTS`.
-    """
+    """Yield parts of a drawing, as long as they have not too many points."""
     points = 0
     for part in parts:
         points += points_of(part)
-        if points > MOST_POINTS:
-            raise ValueError(f"{path} has more than {MOST_POINTS:,} points; want a plan, or a picture of it")
+        if points > MAX_POINTS:
+            raise ValueError(f"{path} has more than {MAX_POINTS:,} points; want a plan, or a picture of it")
         yield part
 
 
@@ -102,14 +89,9 @@ def floor_of_cells(
         A cell of the area that stays free; None for the largest that is not outside.
     starts : (K, 3) float64 or None
         Starts that the file proposes [m, rad].
-
-    Raises
-    ------
-    ValueError
-        If no cell, or all, are free, or the seed cell is not.
     """
-    if free.size > MOST_PIXELS:
-        raise ValueError(f"{path} has {free.size:,} cells; want at most {MOST_PIXELS:,}")
+    if free.size > MAX_PIXELS:
+        raise ValueError(f"{path} has {free.size:,} cells; want at most {MAX_PIXELS:,}")
     if not free.any() or free.all():
         raise ValueError(
             f"{path} is {'all free' if free.any() else 'all solid'}; want a floor with free space and walls"
@@ -118,7 +100,7 @@ def floor_of_cells(
 
 
 def floor_of_lines(path: Path, walls: NDArray[np.float64], openings: NDArray[np.float64]) -> Floor:
-    """Return a floor of a line drawing; what the drawing does not enclose is solid.
+    """Return a floor of a line drawing; areas that are not enclosed are solid.
 
     Parameters
     ----------
@@ -150,12 +132,12 @@ def _box(low: NDArray[np.float64], high: NDArray[np.float64]) -> NDArray[np.floa
 def enclosed(
     path: Path, lines: NDArray[np.float64], low: NDArray[np.float64], high: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], ...]:
-    """Return the outlines of what lines enclose, between the lowest and the highest of their ends.
+    """Return the outlines of enclosed areas, between the lowest and the highest of their ends.
 
     The outlines run along the middle of the outer walls.
 
     Drawings have gaps in the outer wall. They are closed by widening the lines, step by step, until nearly as
-    much is enclosed as with the widest. What a smaller widening encloses keeps its finer outline.
+    much is enclosed as with the widest. Areas that a smaller widening encloses keep their finer outline.
     """
     widest = max(_GAPS) + WALL_THICKNESS
     size = high - low + 2.0 * widest

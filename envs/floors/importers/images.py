@@ -1,7 +1,7 @@
 """Images as floors: dungeons of the exploration literature, and plain pictures.
 
 Dungeons follow the reading rule of their projects (DRL_robot_exploration, ARiADNE and their kin): 0.1 m a
-pixel, grey above 150 is free, the start is the middle of a yellow block, which is grey 208 where the file has
+pixel, grey above 150 is free, the start is the middle of a yellow block, which is grey 208 if the file has
 no colours.
 """
 
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from lidarium.envs.floors.floor import Floor
 from lidarium.envs.floors.importers.common import floor_of_cells
 from lidarium.mapping.files.images import read_image
-from lidarium.mapping.files.mending.unknown_greys import MAP_SERVER_GREYS, MIDDLE_GREYS, unknown_grey
+from lidarium.mapping.files.map_files import MAP_SERVER_GREYS, MIDDLE_GREYS, unknown_grey
 
 SUFFIXES = (".png", ".pgm", ".bmp", ".jpg", ".jpeg", ".tif", ".tiff")
 
@@ -38,7 +38,7 @@ def is_dungeon(path: Path) -> bool:
 
 
 def load_dungeon(path: Path, resolution: float | None) -> Floor:
-    """Read a dungeon with its start; what cannot be reached from there is solid."""
+    """Read a dungeon with its start; unreachable cells are solid."""
     side = DUNGEON_RESOLUTION if resolution is None else resolution
     pixels = read_image(path)
     mark = _mark(pixels)[::-1]
@@ -85,9 +85,9 @@ def _mark(pixels: NDArray[Any]) -> NDArray[np.bool_]:
     The mark is yellow, or grey 208 in an image without colours.
     """
     if pixels.ndim == 3 and pixels.shape[2] >= 3:
-        most, rest = np.iinfo(pixels.dtype).max, [0] * (pixels.shape[2] - 3)
-        least, greatest = (0, 151, 151, *rest), (99, most, most, *(most for _ in rest))
-        yellow = cv2.inRange(pixels, np.array(least), np.array(greatest))
+        maximum, rest = np.iinfo(pixels.dtype).max, [0] * (pixels.shape[2] - 3)
+        minimum, greatest = (0, 151, 151, *rest), (99, maximum, maximum, *(maximum for _ in rest))
+        yellow = cv2.inRange(pixels, np.array(minimum), np.array(greatest))
         if yellow.any():
             return yellow > 0
     return np.asarray(_grey(pixels) == _MARK_GREY)

@@ -19,8 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.envs.floors.drawing import fill_shapes, ring_edges, strip, strip_edges
-from lidarium.envs.floors.extent import check_extent
-from lidarium.envs.floors.floor import MAX_RASTER_CELLS, Floor
+from lidarium.envs.floors.floor import MAX_RASTER_CELLS, Floor, check_extent
 from lidarium.envs.floors.importers.common import floor_of_cells, read_text, refuse_resolution
 from lidarium.mapping.geometry.bounds import shown
 

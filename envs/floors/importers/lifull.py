@@ -14,12 +14,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.envs.floors.extent import check_pairs
-from lidarium.envs.floors.floor import Floor
+from lidarium.envs.floors.floor import Floor, check_pairs
 from lidarium.envs.floors.importers.common import WALL_THICKNESS, floor_of_lines, read_text, refuse_resolution
 
 OPENING_WIDTH = 0.8
-MOST_PIXEL = 1e9
+MAX_PIXEL = 1e9
 """Farthest coordinate of an annotation [pixels]."""
 
 # Shorter pieces of wall than this beside an opening are slips of the annotation [m].
@@ -39,8 +38,8 @@ def load(path: Path, resolution: float | None) -> Floor:
         raise ValueError(
             f"{path} has {len(walls)} walls and {len(doors)} doors; want both, as doors give the scale"
         )
-    if np.abs(np.concatenate([walls, doors])).max() > MOST_PIXEL:
-        raise ValueError(f"{path} has coordinates beyond {MOST_PIXEL:g} pixels; want an annotation")
+    if np.abs(np.concatenate([walls, doors])).max() > MAX_PIXEL:
+        raise ValueError(f"{path} has coordinates beyond {MAX_PIXEL:g} pixels; want an annotation")
     scale = OPENING_WIDTH / float(np.median(widths))
     everything = np.concatenate([walls, doors])
     left, bottom = everything[:, [0, 2]].min(), everything[:, [1, 3]].max()
@@ -72,7 +71,7 @@ def _lines(path: Path) -> dict[str, list[list[float]]]:
 
 
 def _without_doors(wall: NDArray[np.float64], doors: NDArray[np.float64]) -> list[NDArray[np.float64]]:
-    """Return what is left of a wall between the doors that lie along it."""
+    """Return the rest of a wall between the doors that lie along it."""
     start, end = wall[:2], wall[2:]
     length = float(np.hypot(*(end - start)))
     if length == 0.0:

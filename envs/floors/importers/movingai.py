@@ -16,7 +16,7 @@ from lidarium.envs.floors.importers.common import floor_of_cells, read_text
 FREE, SOLID = ".GS", "@OTW"
 """Letters of cells: ground and swamp can be driven on; out of bounds, trees and water cannot."""
 
-_MOST_SIDE = 1 << 16
+_MAX_SIDE = 1 << 16
 
 
 def matches(path: Path) -> bool:
@@ -25,7 +25,7 @@ def matches(path: Path) -> bool:
 
 
 def has_scale(path: Path) -> bool:
-    """Return False: the file does not say how large a cell is."""
+    """Return False: the file does not state its scale."""
     return False
 
 
@@ -59,6 +59,6 @@ def load(path: Path, resolution: float | None) -> Floor:
 def _side(path: Path, lines: list[str], name: str) -> int:
     words = next((line.split() for line in lines if line.lower().startswith(name)), [])
     number = words[1] if len(words) == 2 and words[1].isascii() and words[1].isdigit() else ""
-    if not number or len(number) > 6 or not 0 < int(number) <= _MOST_SIDE:
-        raise ValueError(f"{path} has no good {name}; want a line '{name} N' with N from 1 to {_MOST_SIDE}")
+    if not number or len(number) > 6 or not 0 < int(number) <= _MAX_SIDE:
+        raise ValueError(f"{path} has no good {name}; want a line '{name} N' with N from 1 to {_MAX_SIDE}")
     return int(number)

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from lidarium.envs.floors.floor import Floor
 from lidarium.envs.floors.importers.common import floor_of_cells, refuse_resolution
-from lidarium.mapping.files.images import MOST_PIXELS
+from lidarium.mapping.files.images import MAX_PIXELS
 from lidarium.mapping.files.map_files import FREE, MapImage, read_ros_map
 
 SUFFIXES = (".yaml", ".yml")
@@ -48,8 +48,8 @@ def _turned(image: MapImage, free: NDArray[np.bool_]) -> tuple[NDArray[np.bool_]
     low, high = corners.min(axis=0), corners.max(axis=0)
     resolution = image.resolution / 2.0
     width, height = (math.ceil(side / resolution) for side in high - low)
-    if width * height > MOST_PIXELS:
-        raise ValueError(f"a map turned by {yaw} rad has {width:,} x {height:,} cells; want {MOST_PIXELS:,}")
+    if width * height > MAX_PIXELS:
+        raise ValueError(f"a map turned by {yaw} rad has {width:,} x {height:,} cells; want {MAX_PIXELS:,}")
     along_x = low[0] + (np.arange(width) + 0.5) * resolution
     turned = np.zeros((height, width), dtype=np.bool_)
     for first in range(0, height, _BLOCK_ROWS):

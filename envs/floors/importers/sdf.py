@@ -1,4 +1,4 @@
-"""Worlds and models of SDF, as Gazebo reads them: what models collide with are solids with their heights.
+"""Worlds and models of SDF, as Gazebo reads them: collisions of models are solids with their heights.
 
 References
 ----------
@@ -15,26 +15,25 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.envs.floors.extent import check_extent
-from lidarium.envs.floors.floor import Floor, Solid
+from lidarium.envs.floors.floor import Floor, Solid, check_extent
 from lidarium.envs.floors.importers.common import enclosed, floor_name, read_text, refuse_resolution
-from lidarium.mapping.files.names import printable
+from lidarium.mapping.files.guarded_reading import printable
 from lidarium.mapping.geometry.bounds import shown
 
 SUFFIXES = (".sdf", ".world")
 
 GROUND_M = 0.02
-"""What is lower than this is ground, no solid [m]."""
+"""Lower shapes are ground, not solids [m]."""
 
 _ROUND_PARTS = 32
-_MOST_NESTED = 16
+_MAX_NESTED = 16
 _OF_GAZEBO = ("sun", "ground_plane")
 """Models of Gazebo's own library that every world has: its light, and the ground."""
 
 _SHAPES = "box, cylinder, capsule, sphere, ellipsoid, polyline, plane"
 
 Pose = NDArray[np.float64]
-"""Where a frame is in the world, (4, 4)."""
+"""Pose of a frame in the world, (4, 4)."""
 
 
 def load(path: Path, resolution: float | None) -> Floor:
@@ -68,7 +67,7 @@ def _root(path: Path) -> Element:
 def _surroundings(
     path: Path, solids: list[Solid], low: NDArray[np.float64], high: NDArray[np.float64]
 ) -> tuple[Solid, ...]:
-    """Return what is around the walls, as a solid; none where they enclose nothing."""
+    """Return the surroundings of the walls as a solid; none if they enclose nothing."""
     edges = np.concatenate([solid.edges for solid in solids])
     try:
         rings = enclosed(path, edges, low, high)
@@ -79,9 +78,9 @@ def _surroundings(
 
 
 def _solids(path: Path, element: Element, around: Pose, depth: int) -> Iterator[Solid | None]:
-    """Yield the solids of an element and of what is in it."""
-    if depth > _MOST_NESTED:
-        raise ValueError(f"{path} has models nested more than {_MOST_NESTED} deep; want a world")
+    """Yield the solids of an element and of its children."""
+    if depth > _MAX_NESTED:
+        raise ValueError(f"{path} has models nested more than {_MAX_NESTED} deep; want a world")
     # A world that was saved while it ran says beside its models where they were then.
     saved = {model.get("name"): model for model in element.findall("state/model")}
     for child in element:
@@ -141,7 +140,7 @@ def _turn(axis: int, angle: float) -> NDArray[np.float64]:
 
 
 def _solid(path: Path, name: str, geometry: Element, pose: Pose) -> Solid | None:
-    """Return the prism around a shape; None for what is no obstacle, such as the ground."""
+    """Return the prism around a shape; None if it is not an obstacle, as the ground."""
     if geometry.find("plane") is not None or geometry.find("empty") is not None:
         return None
     points = _points(path, name, geometry) @ pose[:3, :3].T + pose[:3, 3]

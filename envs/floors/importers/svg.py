@@ -1,4 +1,4 @@
-"""Plans as SVG drawings: what is dark is solid, as in a picture, but at the drawing's own precision.
+"""Plans as SVG drawings: dark areas are solid, as in an image, but at the drawing's own precision.
 
 Lines are as wide as they are drawn, and at least so wide that nothing leaks through them.
 """
@@ -16,17 +16,168 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 from numpy.typing import NDArray
+from svgelements import Arc, CubicBezier, Matrix, PathSegment, QuadraticBezier
 
 from lidarium.envs.floors.drawing import fill_shapes, ring_edges, strip_edges
-from lidarium.envs.floors.extent import check_extent
-from lidarium.envs.floors.floor import Floor
-from lidarium.envs.floors.importers.common import few_enough, floor_of_cells, read_text
-from lidarium.envs.floors.importers.svg_paths import Polyline, length, outlines, transform_of
-from lidarium.mapping.files.images import MOST_PIXELS
+from lidarium.envs.floors.floor import Floor, check_extent
+from lidarium.envs.floors.importers.common import MAX_POINTS, few_enough, floor_of_cells, read_text
+from lidarium.mapping.files.images import MAX_PIXELS
 from lidarium.mapping.geometry.bounds import shown
 
+Polyline = NDArray[np.float64]
+"""Points x, y (n, 2) in the drawing's units; closed if the last is the first."""
+
+CURVE_PARTS = 16
+"""Straight parts of a curve, and of a quarter of a circle."""
+
+_SHARES = np.arange(1, CURVE_PARTS + 1) / CURVE_PARTS
+
+_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+_NUMBERS = re.compile(_NUMBER)
+_COMMANDS = re.compile(r"([MmZzLlHhVvCcSsQqTtAa])([^MmZzLlHhVvCcSsQqTtAa]*)")
+# Flags are single digits that may stand together with what follows.
+_ARCS = re.compile(
+    rf"({_NUMBER})[\s,]*({_NUMBER})[\s,]*({_NUMBER})[\s,]*([01])[\s,]*([01])[\s,]*({_NUMBER})[\s,]*({_NUMBER})"
+)
+_WANTS = {"M": 2, "L": 2, "H": 1, "V": 1, "C": 6, "S": 4, "Q": 4, "T": 2, "A": 7}
+_WANTS |= {command.lower(): count for command, count in _WANTS.items()}
+
+
+def _numbers(text: str) -> list[float]:
+    """Return the numbers of a text."""
+    return list(map(float, _NUMBERS.findall(text)))
+
+
+def _length(text: str | None, otherwise: float = 0.0) -> float:
+    """Return a length in the drawing's units; other units are taken for these."""
+    found = _numbers(text or "")
+    return found[0] if found else otherwise
+
+
+def _transform_of(element: Element) -> NDArray[np.float64]:
+    """Return the transform of an element into the one around it, (3, 3)."""
+    found = Matrix(element.get("transform", ""))
+    return np.array([[found.a, found.c, found.e], [found.b, found.d, found.f], [0.0, 0.0, 1.0]], np.float64)
+
+
+def outlines(element: Element, kind: str) -> list[Polyline]:
+    """Return the outlines of a shape; none if it is no shape."""
+
+    def value(name: str) -> float:
+        return _length(element.get(name))
+
+    if kind == "line":
+        return [np.array([[value("x1"), value("y1")], [value("x2"), value("y2")]])]
+    if kind == "rect":
+        x, y, width, height = (value(name) for name in ("x", "y", "width", "height"))
+        corners = [(x, y), (x + width, y), (x + width, y + height), (x, y + height), (x, y)]
+        return [np.array(corners)] if width > 0.0 and height > 0.0 else []
+    if kind in ("circle", "ellipse"):
+        wide, high = (value("r"),) * 2 if kind == "circle" else (value("rx"), value("ry"))
+        turns = np.linspace(0.0, 2.0 * math.pi, 4 * CURVE_PARTS + 1)
+        ring = np.stack([value("cx") + wide * np.cos(turns), value("cy") + high * np.sin(turns)], axis=1)
+        ring[-1] = ring[0]
+        return [ring] if wide > 0.0 and high > 0.0 else []
+    if kind in ("polyline", "polygon"):
+        given = _numbers(element.get("points", ""))
+        points = np.array(given[: len(given) // 2 * 2]).reshape(-1, 2)
+        if kind == "polygon" and len(points) > 2:
+            points = np.concatenate([points, points[:1]])
+        return [points] if len(points) > 1 else []
+    return list(_path(element.get("d", ""))) if kind == "path" else []
+
+
+def _commands(text: str) -> Iterator[tuple[str, list[float]]]:
+    """Yield each command of a path with the numbers that it wants."""
+    for command, words in _COMMANDS.findall(text):
+        wants = _WANTS.get(command, 0)
+        if command in "Aa":
+            given = [float(word) for arc in _ARCS.findall(words) for word in arc]
+        else:
+            given = _numbers(words)
+        if not wants:
+            yield command, []
+            continue
+        if not given or len(given) % wants:
+            raise ValueError(
+                f"a path has {command!r} with {len(given)} numbers; want {wants}, or more of them"
+            )
+        yield command, given[:wants]
+        for place in range(wants, len(given), wants):
+            # What follows a first point without a command of its own are lines.
+            yield {"M": "L", "m": "l"}.get(command, command), given[place : place + wants]
+
+
+def _path(text: str) -> Iterator[Polyline]:
+    """Yield the parts of a path."""
+    here = start = 0j
+    control: complex | None = None
+    points: list[complex] = []
+    for command, given in _commands(text):
+        if command in "Zz":
+            if points:
+                yield _points([*points, start])
+            here, points, control = start, [], None
+            continue
+        if command in "Mm":
+            if len(points) > 1:
+                yield _points(points)
+            here = complex(*given) + (here if command == "m" else 0j)
+            start, points, control = here, [here], None
+            continue
+        if len(points) > MAX_POINTS:
+            raise ValueError(f"a path has more than {MAX_POINTS:,} points; want a plan, or a picture of it")
+        if not points:
+            points = [here]
+        if command in "Ll":  # most are
+            points.append(complex(*given) + (here if command == "l" else 0j))
+            control = None
+        else:
+            added, control = _part(command, given, here, control)
+            points += added
+        here = points[-1]
+    if len(points) > 1:
+        yield _points(points)
+
+
+def _points(points: list[complex]) -> Polyline:
+    return np.array(points, np.complex128).view(np.float64).reshape(-1, 2)
+
+
+def _part(
+    command: str, given: list[float], here: complex, control: complex | None
+) -> tuple[list[complex], complex | None]:
+    """Return the points that a command adds, and the control point that a smooth curve mirrors."""
+    kind, base = command.upper(), here if command.islower() else 0j
+    if kind == "H":
+        return [complex(given[0] + base.real, here.imag)], None
+    if kind == "V":
+        return [complex(here.real, given[0] + base.imag)], None
+    if kind == "A":
+        return _arc(here, given, complex(given[5], given[6]) + base), None
+    ends = [complex(*given[k : k + 2]) + base for k in range(0, len(given), 2)]
+    if kind in "ST":
+        ends = [here if control is None else 2.0 * here - control, *ends]
+    curve = CubicBezier(here, *ends) if kind in "CS" else QuadraticBezier(here, *ends)
+    return _along(curve, _SHARES), ends[-2]
+
+
+def _arc(here: complex, given: list[float], end: complex) -> list[complex]:
+    """Return points of an elliptic arc after its first, from its ends."""
+    if given[0] == 0.0 or given[1] == 0.0 or here == end:
+        return [end]
+    arc = Arc(here, *given[:5], end)
+    parts = max(math.ceil(abs(arc.sweep) / (0.5 * math.pi) * CURVE_PARTS), 1)
+    return [*_along(arc, np.arange(1, parts) / parts), end]
+
+
+def _along(curve: PathSegment, shares: NDArray[np.float64]) -> list[complex]:
+    points: list[complex] = (curve.npoint(shares) @ (1.0, 1.0j)).tolist()
+    return points
+
+
 RESOLUTION = 0.025
-LEAST_WIDTH = 0.05
+MIN_WIDTH = 0.05
 """Least width of a line [m]."""
 
 _MARGIN = 0.5
@@ -70,7 +221,7 @@ _VALUE: Callable[[_Layer], int] = operator.itemgetter(0)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Shape:
-    """A shape of a drawing in metres, y up; what is none is not painted."""
+    """A shape of a drawing in metres, y up; None is not painted."""
 
     outlines: list[Polyline]
     is_solid_inside: bool | None
@@ -79,7 +230,7 @@ class _Shape:
 
 
 def has_scale(path: Path) -> bool:
-    """Return False: a drawing does not say how large what it shows is."""
+    """Return False: a drawing does not state its scale."""
     return False
 
 
@@ -104,9 +255,9 @@ def load(path: Path, resolution: float | None) -> Floor:
     low, high = points.min(axis=0) - _MARGIN, points.max(axis=0) + _MARGIN
     check_extent(str(path), (*low.tolist(), *high.tolist()), rings)
     columns, rows = (int(size) + 1 for size in (high - low) / RESOLUTION)
-    if rows * columns > MOST_PIXELS:
+    if rows * columns > MAX_PIXELS:
         raise ValueError(
-            f"{path} has {columns} x {rows} cells at {RESOLUTION} m, more than {MOST_PIXELS:,}; give "
+            f"{path} has {columns} x {rows} cells at {RESOLUTION} m, more than {MAX_PIXELS:,}; give "
             "a smaller --resolution"
         )
     solid, origin = np.zeros((rows, columns), np.uint8), (float(low[0]), float(low[1]))
@@ -121,13 +272,13 @@ def load(path: Path, resolution: float | None) -> Floor:
 
 
 def _layers(shape: _Shape) -> Iterator[_Layer]:
-    """Yield what a shape paints: its inside first, then its line."""
+    """Yield the painted parts of a shape: its inside first, then its line."""
     if shape.is_solid_inside is not None:
         rings = [ring_edges(outline) for outline in shape.outlines if len(outline) > 2]
         if rings:
             yield int(shape.is_solid_inside), np.concatenate(rings), np.zeros((0, 4)), 0.0
     if shape.is_solid_line is not None:
-        width = max(shape.width, LEAST_WIDTH) if shape.is_solid_line else shape.width
+        width = max(shape.width, MIN_WIDTH) if shape.is_solid_line else shape.width
         segments = [np.hstack([line[:-1], line[1:]]) for line in shape.outlines]
         yield int(shape.is_solid_line), None, np.concatenate(segments), width
 
@@ -144,7 +295,7 @@ def _shapes(
     style = _style(element, inherited, classes)
     if style["display"].strip() == "none":
         return
-    matrix = around @ transform_of(element) if "transform" in element.attrib else around
+    matrix = around @ _transform_of(element) if "transform" in element.attrib else around
     found = outlines(element, kind)
     if found and style["visibility"].strip() == "visible":
         placed = [outline @ matrix[:2, :2].T + matrix[:2, 2] for outline in found]
@@ -154,7 +305,7 @@ def _shapes(
             placed,
             None if kind == "line" else _is_dark(style["fill"]),
             _is_dark(style["stroke"]),
-            length(style["stroke-width"], 1.0) * scale,
+            _length(style["stroke-width"], 1.0) * scale,
         )
     for child in element:
         yield from _shapes(child, matrix, style, classes, depth + 1)
@@ -168,7 +319,7 @@ def _kind(element: Element) -> str:
 def _style(element: Element, inherited: Style, classes: dict[str, Style]) -> Style:
     """Return the style of an element.
 
-    Its own goes before those of its classes, these before its attributes, these before what is inherited.
+    Its own goes before those of its classes, these before its attributes, these before inherited ones.
     """
     if not classes and _HAS_STYLE.isdisjoint(element.attrib):
         return inherited
@@ -197,7 +348,7 @@ def _declared(text: str) -> Style:
 
 @functools.cache
 def _is_dark(colour: str) -> bool | None:
-    """Return whether a colour is dark; None where nothing is painted. Gradients and their like are dark."""
+    """Return whether a colour is dark; None if nothing is painted. Gradients and their like are dark."""
     from matplotlib.colors import to_rgb
 
     word = colour.strip().lower()

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.mapping.geometry.bounds import above, check_settings, within
-from lidarium.mapping.point_clouds.intrinsics import Intrinsics
+from lidarium.mapping.point_clouds.cameras import Intrinsics
 from lidarium.registry import Registry
 
 MOST_PIXELS = 2048

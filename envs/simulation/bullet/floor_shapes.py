@@ -11,9 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.envs.floors.faces import convex_parts
-from lidarium.envs.floors.floor import Floor
+from lidarium.envs.floors.floor import Floor, Solid
 from lidarium.envs.floors.raster import Raster, rectangles_of
-from lidarium.envs.floors.solid import Solid
 
 OUTER_WALL = 1.0
 """Thickness of the walls around the bounds [m]."""

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.envs.settings.sensors.cameras import DepthCamera
-from lidarium.mapping.point_clouds.intrinsics import points_of_depth
+from lidarium.mapping.point_clouds.cameras import points_of_depth
 
 
 def camera_pose(camera: DepthCamera) -> NDArray[np.float64]:

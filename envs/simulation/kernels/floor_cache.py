@@ -16,7 +16,7 @@ from weakref import WeakValueDictionary
 
 from lidarium.envs.floors.catalogue.store import Store, floor_store, hash_of_code, mebibytes
 from lidarium.envs.floors.floor import Floor
-from lidarium.envs.floors.runs import Runs
+from lidarium.envs.floors.raster import Runs
 from lidarium.envs.simulation.kernels.floor_tables import FloorTables
 
 SIZE_VARIABLE = "LIDARIUM_FLOOR_CACHE_MIB"

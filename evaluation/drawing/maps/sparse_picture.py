@@ -15,7 +15,7 @@ from lidarium.envs.drawing.shading import Viewpoint, shade
 from lidarium.envs.floors.faces import GROUND, Faces
 from lidarium.evaluation.drawing.picture_parts import INK
 from lidarium.evaluation.episodes.output import whole_file
-from lidarium.mapping.sparse.graph.topological_graph import TopologicalGraph
+from lidarium.mapping.sparse.graph import TopologicalGraph
 
 OUTERMOST = 0.005
 """Share of the codes on each side that may lie outside of a picture."""

@@ -12,7 +12,7 @@ from lidarium.evaluation.drawing.style import colours
 from lidarium.evaluation.report.plain_text import as_text
 from lidarium.evaluation.report.sections import Section
 from lidarium.evaluation.suites.trial import DEFAULT_VARIANT
-from lidarium.mapping.files.names import printable
+from lidarium.mapping.files.guarded_reading import printable
 
 _DIGITS = 4
 _OF_GROUP = ("times", "values", "comparisons", "coverage_over_time", "profiles", "by_floor")

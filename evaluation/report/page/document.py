@@ -11,7 +11,7 @@ from typing import Any
 
 from lidarium.evaluation.episodes.output import write_text
 from lidarium.evaluation.report.page.replay_content import Replay
-from lidarium.mapping.files.names import printable
+from lidarium.mapping.files.guarded_reading import printable
 
 FRONT_END = Path(__file__).parents[1] / "data" / "page.html"
 """The page without data."""

@@ -19,7 +19,7 @@ from lidarium.evaluation.record.replay import drive_again, first_difference, is_
 from lidarium.evaluation.report.page.map_layers import Layer, coarse, grid_around
 from lidarium.evaluation.report.page.packing import packed, signed_varints, varints
 from lidarium.evaluation.report.page.replay_sampler import ReplaySampler
-from lidarium.mapping.files.names import printable
+from lidarium.mapping.files.guarded_reading import printable
 from lidarium.mapping.grids.occupancy import FREE, OCCUPIED, UNKNOWN
 
 _MILLI = 1e3

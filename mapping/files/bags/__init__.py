@@ -1,1 +1,1 @@
-"""Bags of ROS 2: MCAP files, read without ROS."""
+"""Bags of ROS 1 and 2, read and written without ROS."""

@@ -1,47 +1,37 @@
-"""Reads the scans of bags of ROS 2, with their odometry, as a log."""
+"""Reads the scans of bags of ROS, with their odometry, as a log."""
 
 import math
-import os
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.mapping.files.bags import schemas
-from lidarium.mapping.files.guarded_reading import most_unpacked, open_guarded, reading
+from lidarium.mapping.files.bags.messages import BAG_SUFFIXES, LASER_SCAN, ODOMETRY, decoder
+from lidarium.mapping.files.guarded_reading import printable, reading, reason
 from lidarium.mapping.files.laser_logs import LaserLog, made_usable, symmetric_scans
-from lidarium.mapping.files.names import printable
 from lidarium.mapping.files.trajectories import interpolated
-
-_WANTED = "want a whole MCAP file of ROS 2 messages (ros2msg, CDR)"
-_RECORD_BYTES = 1 << 28
-_LEAST_BYTES = 64
-"""A bag has its magic bytes twice, a header and a footer."""
-
-_MAP_RATIO = 2
-"""Chunks hold maps, too, which pack better than what is read of them."""
 
 _TF, _STATIC = "/tf", "/tf_static"
 
 
 @dataclass(slots=True)
-class Messages:
-    """What of a bag makes a log.
+class _Messages:
+    """The messages of a bag that make a log.
 
     Attributes
     ----------
     scans : list
         Messages of the chosen topic.
     odometry_stamps, odometry : list
-        When odometry was read [s], and what it was: x, y, theta [m, rad].
+        Stamps of the odometry [s], and its poses x, y, theta [m, rad].
     base : str
         Frame of the robot's body as the odometry names it.
     static : dict
-        Where frames are fixed on others: x, y, theta by parent and child [m, rad].
+        Poses of frames fixed on others: x, y, theta by parent and child [m, rad].
     moving : dict
         Stamps and poses of frames that move on others, by parent and child.
     """
@@ -56,127 +46,76 @@ class Messages:
     )
 
 
-def read_mcap_log(path: Path, topic: str | None = None) -> LaserLog:
-    """Read a log from the scans of a bag.
+def is_bag(path: Path) -> bool:
+    """Whether a path is a bag by its name: a folder, or a file with the ending of one."""
+    return path.is_dir() or path.name.endswith(BAG_SUFFIXES)
+
+
+def read_bag_log(path: Path, topic: str | None = None) -> LaserLog:
+    """Read a log from the scans of a bag of ROS 1 or 2.
+
+    Odometry is read from the topic whose name begins most like that of the scans, else from the transforms
+    from a frame that ends with ``odom``. The laser's pose on the robot is read from ``/tf_static``.
 
     Parameters
     ----------
     path : Path
-        An MCAP file with messages of ROS 2 (ros2msg, CDR).
-    topic : str or None
-        The topic of the scans, where there are several.
-
-    Returns
-    -------
-    LaserLog
-        Odometry is that of the topic whose name is most like that of the scans; without one it is the
-        transform from a frame that ends with ``odom``. The laser's place on the robot is taken from
-        ``/tf_static``.
+        A file (``.mcap``, ``.db3``, ``.bag``, or the first two with ``.zstd``), or a folder with the files of
+        one bag.
+    topic : str, optional
+        The topic of the scans; needed if there is more than one.
 
     Raises
     ------
     FileNotFoundError
-        Where there is no such file.
+        If the file does not exist.
     ValueError
-        Where it is no whole bag, has no scans or several topics of them, or the extra ``mcap`` is not
+        If the bag is damaged, has no scans or several topics of them, or if the extra ``bags`` is not
         installed.
     """
     path = Path(path)
     try:
-        from mcap.exceptions import DecoderNotFoundError, McapError
-
-        # What the parser of message definitions raises has no public name.
-        from mcap_ros2._vendor.rosidl_adapter.parser import InvalidSpecification, InvalidValue
-        from zstandard import ZstdError
+        from lidarium.mapping.files.bags.storages import STORAGE_ERRORS, WANTED
     except ImportError as error:
-        raise ValueError('bags need mcap-ros2-support; pip install "lidarium[mcap]"') from error
-    with reading(path, "a whole bag", _WANTED):
+        raise ValueError(f'bags need the package {error.name}; pip install "lidarium[bags]"') from error
+    with reading(path, "a whole bag", WANTED):
         try:
             messages = _messages(path, topic)
-        except DecoderNotFoundError as error:
-            raise ValueError(f"{path} has messages of another kind ({error}); {_WANTED}") from error
-        except (McapError, ZstdError, InvalidSpecification, InvalidValue, NameError) as error:
+        except STORAGE_ERRORS as error:
             raise ValueError(
-                f"{path} is not a whole bag, it is cut off or damaged ({error}); {_WANTED}"
+                f"{path} is not a whole bag, it is cut off or damaged ({reason(error)}); {WANTED}"
             ) from error
     with reading(path, "a log"):
         return made_usable(_log(path, messages), str(path))
 
 
-def _messages(path: Path, topic: str | None) -> Messages:
-    from mcap.reader import SeekingReader
+def _messages(path: Path, topic: str | None) -> _Messages:
+    from lidarium.mapping.files.bags.storages import open_storages
 
-    found = Messages()
-    with open_guarded(path) as file:
-        if file.seek(0, os.SEEK_END) < _LEAST_BYTES:
-            raise ValueError(f"{path} is not a whole bag, it is cut off; {_WANTED}")
-        file.seek(0)
-        reader = SeekingReader(file, validate_crcs=True, record_size_limit=_RECORD_BYTES)
-        summary = reader.get_summary()
-        if summary is None:
-            raise ValueError(f"{path} has no index at its end, it is cut off; {_WANTED}")
-        allowed = most_unpacked(os.fstat(file.fileno()).st_size)
-        _check_chunks(path, file, summary, _MAP_RATIO * allowed)
-        topics: dict[str, set[str]] = {}
-        for channel in summary.channels.values():
-            schema = summary.schemas.get(channel.schema_id)
-            topics.setdefault("" if schema is None else schema.name, set()).add(channel.topic)
-        scans = _chosen(path, topics.get(schemas.LASER_SCAN, set()), topic)
-        odometry = _most_alike(scans, topics.get(schemas.ODOMETRY, set()))
-        wanted = [name for name in (scans, odometry, _TF, _STATIC) if name is not None]
-        for name, content in _decoded(path, reader, wanted, allowed):
-            if name == scans:
-                found.scans.append(content)
-            elif name == odometry:
-                found.odometry_stamps.append(_seconds(content.header.stamp))
-                pose = content.pose.pose
-                found.odometry.append(_in_plane(pose.position, pose.orientation))
-                found.base = content.child_frame_id
-            else:
-                _note_transforms(found, content, is_static=name == _STATIC)
+    found = _Messages()
+    with open_storages(path) as storages:
+        types = {name: kind for storage in storages for name, kind in storage.types.items()}
+        scans = _chosen(path, [name for name, kind in types.items() if kind == LASER_SCAN], topic)
+        odometry = _most_alike(scans, [name for name, kind in types.items() if kind == ODOMETRY])
+        wanted = [name for name in (scans, odometry, _TF, _STATIC) if name in types]
+        messages = [
+            (time, name, content, decoder(storage.is_ros1))
+            for storage in storages
+            for time, name, content in storage.messages(wanted)
+        ]
+    messages.sort(key=lambda each: each[0])
+    for _, name, raw, decode in messages:
+        content = decode(raw, types[name])
+        if name == scans:
+            found.scans.append(content)
+        elif name == odometry:
+            found.odometry_stamps.append(_seconds(content.header.stamp))
+            pose = content.pose.pose
+            found.odometry.append(_in_plane(pose.position, pose.orientation))
+            found.base = _frame(content.child_frame_id)
+        else:
+            _note_transforms(found, content, is_static=name == _STATIC)
     return found
-
-
-def _decoded(path: Path, reader: Any, wanted: list[str], allowed: int) -> Iterator[tuple[str, Any]]:  # noqa: ANN401
-    """Yield topic and content of messages in the order in which they were logged."""
-    from mcap.exceptions import DecoderNotFoundError
-    from mcap_ros2.decoder import DecoderFactory
-
-    # Sorted here: the reader's own queue takes half as long as decoding.
-    messages = []
-    for each in reader.iter_messages(wanted, log_time_order=False):
-        allowed -= len(each[2].data)
-        if allowed < 0:
-            raise ValueError(f"{path} packs its scans too well; want a bag of a robot")
-        messages.append(each)
-    messages.sort(key=lambda each: each[2].log_time)
-    factory, decoders = DecoderFactory(), {}
-    for schema, channel, message in messages:
-        if channel.id not in decoders:
-            decoders[channel.id] = factory.decoder_for(channel.message_encoding, schema)
-        decode = decoders[channel.id]
-        if decode is None:
-            raise DecoderNotFoundError(f"{channel.message_encoding}, {schema and schema.name}")
-        yield channel.topic, decode(message.data)
-
-
-def _check_chunks(path: Path, file: BinaryIO, summary: Any, allowed: int) -> None:  # noqa: ANN401
-    """Raise ValueError where chunks have too many bytes when unpacked, or another number than they say."""
-    import zstandard
-    from mcap.data_stream import ReadDataStream
-    from mcap.records import Chunk
-
-    unpacked = 0
-    for index in summary.chunk_indexes:
-        file.seek(index.chunk_start_offset + 9)  # behind the record's kind and length
-        chunk = Chunk.read(ReadDataStream(file))
-        size = chunk.uncompressed_size
-        if chunk.compression == "zstd" and zstandard.frame_content_size(chunk.data) not in (-1, size):
-            raise ValueError(f"{path} has a chunk of another size than it says; {_WANTED}")
-        unpacked += size
-        if unpacked > allowed:
-            raise ValueError(f"{path} has more than {allowed:,} bytes when unpacked; want fewer")
-    file.seek(0)
 
 
 def _chosen(path: Path, topics: Iterable[str], topic: str | None) -> str:
@@ -184,7 +123,7 @@ def _chosen(path: Path, topics: Iterable[str], topic: str | None) -> str:
     names = sorted(topics)
     listed = ", ".join(map(printable, names))
     if not names:
-        raise ValueError(f"{path} holds no scans; want a topic of {schemas.LASER_SCAN}")
+        raise ValueError(f"{path} holds no scans; want a topic of {LASER_SCAN}")
     if topic is not None and topic not in names:
         raise ValueError(f"{path} has no scans on topic {topic!r}; want one of {listed}")
     if topic is None and len(names) > 1:
@@ -208,9 +147,9 @@ def _same_beginning(a: Iterable[str], b: Iterable[str]) -> Iterator[str]:
         yield left
 
 
-def _note_transforms(found: Messages, content: Any, *, is_static: bool) -> None:  # noqa: ANN401
+def _note_transforms(found: _Messages, content: Any, *, is_static: bool) -> None:  # noqa: ANN401
     for each in content.transforms:
-        frames = each.header.frame_id, each.child_frame_id
+        frames = _frame(each.header.frame_id), _frame(each.child_frame_id)
         pose = _in_plane(each.transform.translation, each.transform.rotation)
         if is_static:
             found.static[frames] = pose
@@ -218,10 +157,10 @@ def _note_transforms(found: Messages, content: Any, *, is_static: bool) -> None:
             found.moving.setdefault(frames, []).append((_seconds(each.header.stamp), pose))
 
 
-def _log(path: Path, messages: Messages) -> LaserLog:
+def _log(path: Path, messages: _Messages) -> LaserLog:
     scans, skipped = messages.scans, dict[str, int]()
     if not scans:
-        raise ValueError(f"{path} holds no scans; want messages of {schemas.LASER_SCAN}")
+        raise ValueError(f"{path} holds no scans; want messages of {LASER_SCAN}")
     lengths = Counter(len(scan.ranges) for scan in scans)
     beams = lengths.most_common(1)[0][0]
     alike = [scan for scan in scans if len(scan.ranges) == beams]
@@ -245,7 +184,7 @@ def _log(path: Path, messages: Messages) -> LaserLog:
         ranges, angle_min, increment, (float(first.range_min), float(first.range_max))
     )
     readings_stamps, readings = _odometry(messages)
-    laser = messages.static.get((messages.base, first.header.frame_id), (0.0, 0.0, 0.0))
+    laser = messages.static.get((messages.base, _frame(first.header.frame_id)), (0.0, 0.0, 0.0))
     has_readings = len(readings_stamps) > 0
     return LaserLog(
         stamps=stamps,
@@ -265,8 +204,8 @@ def _log(path: Path, messages: Messages) -> LaserLog:
     )
 
 
-def _odometry(messages: Messages) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return when odometry was read, ascending, and what it was (n, 3)."""
+def _odometry(messages: _Messages) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the stamps of the odometry, ascending, and its poses (n, 3)."""
     stamps, poses = messages.odometry_stamps, messages.odometry
     if not stamps:
         for (parent, child), moves in messages.moving.items():
@@ -281,6 +220,11 @@ def _odometry(messages: Messages) -> tuple[NDArray[np.float64], NDArray[np.float
     table = table[order]
     table[:, 2] = np.unwrap(table[:, 2])
     return times[order], table
+
+
+def _frame(name: str) -> str:
+    """Return the name of a frame; ROS 1 allows a slash before it."""
+    return name.removeprefix("/")
 
 
 def _seconds(stamp: Any) -> float:  # noqa: ANN401

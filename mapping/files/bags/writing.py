@@ -1,4 +1,7 @@
-"""Writes bags: scans, odometry, transforms, maps and paths as messages of ROS 2."""
+"""Writes bags: scans, odometry, transforms, maps and paths as messages of ROS 2 in an MCAP file.
+
+``rosbags`` encodes the messages; ``mcap`` writes the file, with the checksums that ``rosbags`` leaves out.
+"""
 
 import io
 import math
@@ -10,18 +13,13 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from lidarium.mapping.files.bags import schemas
-from lidarium.mapping.files.bags.cdr import Cdr
+from lidarium.mapping.files.bags.messages import GRID, LASER_SCAN, ODOMETRY, PATH, TRANSFORMS, typestore
 from lidarium.mapping.files.laser_logs import LaserLog
 from lidarium.mapping.files.output import write_whole
 from lidarium.mapping.grids.occupancy import FREE, OCCUPIED, UNKNOWN
 from lidarium.mapping.grids.scan_geometry import ScanGeometry
 
-NANO = 1_000_000_000
-"""Nanoseconds in a second."""
-
-_NOTHING = [0.0] * 36
-"""Covariances that nobody knows."""
+_NANO = 1_000_000_000
 
 _LATCHED = "/tf_static"
 
@@ -30,24 +28,18 @@ _GRID_LEVELS[[OCCUPIED, UNKNOWN, FREE]] = 100, -1, 0
 
 
 class BagWriter:
-    """Writes messages to an open file; times are seconds.
+    """Writes messages to an open file; times are in seconds.
 
-    Parameters
-    ----------
-    file : BinaryIO
-        Where to.
-
-    Raises
-    ------
-    ValueError
-        Where the packages of the extra ``mcap`` are not installed.
+    Raises ValueError if the packages of the extra ``bags`` are not installed.
     """
 
     def __init__(self, file: BinaryIO) -> None:
         try:
             from mcap.writer import Writer
+
+            self._store = typestore()
         except ImportError as error:
-            raise ValueError('bags need the package mcap; pip install "lidarium[mcap]"') from error
+            raise ValueError(f'bags need the package {error.name}; pip install "lidarium[bags]"') from error
         self._writer: Any = Writer(file)
         self._writer.start(profile="ros2", library="lidarium")
         self._schemas: dict[str, int] = {}
@@ -67,19 +59,38 @@ class BagWriter:
         beam_interval_s: float = 0.0,
     ) -> None:
         """Write a scan; the time is that of its last beam, beams without return are inf [m]."""
-        message = _header(frame, time_s - beam_interval_s * (geometry.beams - 1))
         increment, beams = geometry.angle_increment, geometry.beams
-        message.numbers("f", geometry.angle_first, geometry.angle_first + increment * (beams - 1), increment)
-        message.numbers("f", beam_interval_s, beam_interval_s * beams, geometry.range_min, geometry.range_max)
-        message.array(np.asarray(ranges, np.float32)).array(np.zeros(0, np.float32))
-        self._write(topic, schemas.LASER_SCAN, time_s, message)
+        self._write(
+            topic,
+            LASER_SCAN,
+            time_s,
+            header=self._header(frame, time_s - beam_interval_s * (beams - 1)),
+            angle_min=geometry.angle_first,
+            angle_max=geometry.angle_first + increment * (beams - 1),
+            angle_increment=increment,
+            time_increment=beam_interval_s,
+            scan_time=beam_interval_s * beams,
+            range_min=geometry.range_min,
+            range_max=geometry.range_max,
+            ranges=np.asarray(ranges, np.float32),
+            intensities=np.zeros(0, np.float32),
+        )
 
     def odometry(self, topic: str, frame: str, child: str, time_s: float, pose: ArrayLike) -> None:
-        """Write where a robot is in a frame by its odometry: x, y, theta [m, rad]."""
-        message = _header(frame, time_s).text(child)
-        _put_pose(message, pose).numbers("d", *_NOTHING)
-        message.numbers("d", *[0.0] * 6).numbers("d", *_NOTHING)
-        self._write(topic, schemas.ODOMETRY, time_s, message)
+        """Write the pose of a robot in a frame by its odometry: x, y, theta [m, rad]."""
+        unknown, still = np.zeros(36), self._made("geometry_msgs/msg/Vector3", x=0.0, y=0.0, z=0.0)
+        twist = self._made("geometry_msgs/msg/Twist", linear=still, angular=still)
+        self._write(
+            topic,
+            ODOMETRY,
+            time_s,
+            header=self._header(frame, time_s),
+            child_frame_id=child,
+            pose=self._made(
+                "geometry_msgs/msg/PoseWithCovariance", pose=self._pose(pose), covariance=unknown
+            ),
+            twist=self._made("geometry_msgs/msg/TwistWithCovariance", twist=twist, covariance=unknown),
+        )
 
     def transform(
         self,
@@ -91,10 +102,20 @@ class BagWriter:
         height: float = 0.0,
         is_static: bool = False,
     ) -> None:
-        """Write where a frame is in another one: x, y, theta [m, rad], and its height [m]."""
-        message = _put_header(Cdr().numbers("I", 1), frame, time_s).text(child)
-        topic = _LATCHED if is_static else "/tf"
-        self._write(topic, schemas.TRANSFORMS, time_s, _put_pose(message, pose, height))
+        """Write the pose of a frame in another one: x, y, theta [m, rad], and its height [m]."""
+        position, orientation = _in_space(pose, height)
+        transform = self._made(
+            "geometry_msgs/msg/Transform",
+            translation=self._made("geometry_msgs/msg/Vector3", **position),
+            rotation=self._made("geometry_msgs/msg/Quaternion", **orientation),
+        )
+        stamped = self._made(
+            "geometry_msgs/msg/TransformStamped",
+            header=self._header(frame, time_s),
+            child_frame_id=child,
+            transform=transform,
+        )
+        self._write(_LATCHED if is_static else "/tf", TRANSFORMS, time_s, transforms=[stamped])
 
     def grid(
         self,
@@ -107,40 +128,69 @@ class BagWriter:
     ) -> None:
         """Write a map of three levels (0 occupied, 127 unknown, 255 free); row 0 has the lowest y."""
         rows, columns = levels.shape
-        message = _put_time(_header(frame, time_s), time_s)
-        message.numbers("f", resolution).numbers("I", columns, rows)
-        _put_pose(message, [*np.asarray(origin, np.float64), 0.0]).array(_GRID_LEVELS[levels])
-        self._write(topic, schemas.GRID, time_s, message)
+        info = self._made(
+            "nav_msgs/msg/MapMetaData",
+            map_load_time=self._time(time_s),
+            resolution=resolution,
+            width=columns,
+            height=rows,
+            origin=self._pose([*np.asarray(origin, np.float64), 0.0]),
+        )
+        data = _GRID_LEVELS[levels].ravel()
+        self._write(topic, GRID, time_s, header=self._header(frame, time_s), info=info, data=data)
 
     def path(
         self, topic: str, frame: str, time_s: float, times: Sequence[float], poses: NDArray[np.float64]
     ) -> None:
         """Write a path: poses (n, 3) with their times (n,) [m, rad, s]."""
-        message = _header(frame, time_s).numbers("I", len(poses))
-        for when, pose in zip(times, poses, strict=True):
-            _put_pose(_put_header(message, frame, when), pose)
-        self._write(topic, schemas.PATH, time_s, message)
-
-    def _write(self, topic: str, name: str, time_s: float, message: Cdr) -> None:
-        if name not in self._schemas:
-            self._schemas[name] = self._writer.register_schema(
-                name, "ros2msg", schemas.definition(name).encode()
+        stamped = [
+            self._made(
+                "geometry_msgs/msg/PoseStamped", header=self._header(frame, when), pose=self._pose(pose)
             )
+            for when, pose in zip(times, poses, strict=True)
+        ]
+        self._write(topic, PATH, time_s, header=self._header(frame, time_s), poses=stamped)
+
+    def _write(self, topic: str, name: str, time_s: float, **fields: Any) -> None:  # noqa: ANN401
+        if name not in self._schemas:
+            definition, _ = self._store.generate_msgdef(name, ros_version=2)
+            self._schemas[name] = self._writer.register_schema(name, "ros2msg", definition.encode())
         if topic not in self._channels:
             self._channels[topic] = self._writer.register_channel(topic, "cdr", self._schemas[name])
-        stamp = round(time_s * NANO)
-        self._writer.add_message(self._channels[topic], stamp, bytes(message), stamp)
+        content = self._store.serialize_cdr(self._made(name, **fields), name, little_endian=True)
+        stamp = round(time_s * _NANO)
+        self._writer.add_message(self._channels[topic], stamp, bytes(content), stamp)
+
+    def _made(self, name: str, **fields: Any) -> Any:  # noqa: ANN401
+        """Return a message of some type."""
+        return self._store.types[name](**fields)
+
+    def _header(self, frame: str, time_s: float) -> Any:  # noqa: ANN401
+        return self._made("std_msgs/msg/Header", stamp=self._time(time_s), frame_id=frame)
+
+    def _time(self, time_s: float) -> Any:  # noqa: ANN401
+        seconds, nanoseconds = divmod(max(round(time_s * _NANO), 0), _NANO)
+        return self._made("builtin_interfaces/msg/Time", sec=seconds, nanosec=nanoseconds)
+
+    def _pose(self, pose: ArrayLike) -> Any:  # noqa: ANN401
+        position, orientation = _in_space(pose)
+        return self._made(
+            "geometry_msgs/msg/Pose",
+            position=self._made("geometry_msgs/msg/Point", **position),
+            orientation=self._made("geometry_msgs/msg/Quaternion", **orientation),
+        )
+
+
+def _in_space(pose: ArrayLike, height: float = 0.0) -> tuple[dict[str, float], dict[str, float]]:
+    """Return the position and the quaternion of a pose x, y, theta [m, rad]."""
+    x, y, theta = (float(value) for value in np.asarray(pose, np.float64))
+    turn = {"x": 0.0, "y": 0.0, "z": math.sin(0.5 * theta), "w": math.cos(0.5 * theta)}
+    return {"x": x, "y": y, "z": height}, turn
 
 
 @contextmanager
 def bag(path: Path) -> Iterator[BagWriter]:
-    """Lend a writer of a bag, which is there whole or not at all.
-
-    Raises
-    ------
-    ValueError, OSError
-        Where bags cannot be written; where nothing can be written there.
-    """
+    """Open a bag for writing; the file is written whole or not at all."""
     content = io.BytesIO()
     writer = BagWriter(content)
     yield writer
@@ -151,21 +201,13 @@ def bag(path: Path) -> Iterator[BagWriter]:
 
 
 def write_mcap_log(path: Path, log: LaserLog, robot: str = "robot") -> None:
-    """Write a log of scans and odometry as a bag, whole or not at all.
+    """Write a log of scans and odometry as an MCAP file, whole or not at all.
 
-    Stamps are rounded to a nanosecond, angles of beams to single precision: a bag has no more.
-
-    Parameters
-    ----------
-    path : Path
-        The file, by custom an ``.mcap``.
-    log : LaserLog
-        What `read_npz_log` and its like return.
-    robot : str
-        First part of the names of topics and frames.
+    Stamps are rounded to nanoseconds, angles of beams to single precision. Names of topics and frames begin
+    with the name of the robot.
     """
     frames = {name: f"{robot}/{name}" for name in ("odom", "base_link", "laser")}
-    # Times of a bag begin at zero: messages of ROS have none before.
+    # Messages of ROS have no times before zero.
     times = log.stamps - min(float(log.stamps[0]), 0.0)
     readings = (log.readings_stamps - min(float(log.stamps[0]), 0.0), log.readings)
     if not len(log.readings_stamps) and log.odometry is not None:
@@ -182,22 +224,3 @@ def write_mcap_log(path: Path, log: LaserLog, robot: str = "robot") -> None:
             writer.scan(
                 f"/{robot}/scan", frames["laser"], float(time_s), ranges, log.geometry, log.beam_interval_s
             )
-
-
-def _header(frame: str, time_s: float) -> Cdr:
-    return _put_header(Cdr(), frame, time_s)
-
-
-def _put_header(message: Cdr, frame: str, time_s: float) -> Cdr:
-    return _put_time(message, time_s).text(frame)
-
-
-def _put_time(message: Cdr, time_s: float) -> Cdr:
-    seconds, nanoseconds = divmod(max(round(time_s * NANO), 0), NANO)
-    return message.numbers("i", seconds).numbers("I", nanoseconds)
-
-
-def _put_pose(message: Cdr, pose: ArrayLike, height: float = 0.0) -> Cdr:
-    """Put a position, and a rotation about the vertical as a quaternion x, y, z, w."""
-    x, y, theta = (float(value) for value in np.asarray(pose, np.float64))
-    return message.numbers("d", x, y, height, 0.0, 0.0, math.sin(0.5 * theta), math.cos(0.5 * theta))

@@ -1,1 +1,1 @@
-"""What a robot explores by its depth camera: ground seen, frontiers, views, routes."""
+"""Exploration by a depth camera: ground seen, frontiers, views, routes."""

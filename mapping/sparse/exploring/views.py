@@ -18,14 +18,14 @@ SIGHT_M = 0.02
 
 
 class Places(NamedTuple):
-    """Where a robot may stand to see.
+    """Positions for views.
 
     Attributes
     ----------
     points : (P, 3) float64
         Places on the ground, the cheapest to come to first [m].
     costs : (P,) float64
-        What it costs to come to each [m].
+        Cost of reaching each [m].
     headings : (P,) float64
         With which heading it comes there [rad].
     """
@@ -36,7 +36,7 @@ class Places(NamedTuple):
 
 
 class Sight(NamedTuple):
-    """How a robot sees, and what a view is worth.
+    """How a robot sees, and the value of a view.
 
     Attributes
     ----------
@@ -48,9 +48,9 @@ class Sight(NamedTuple):
     low, height : float
         Between these heights a line of sight must be free [m].
     turn_cost : float
-        What it costs to turn [m/rad].
+        Cost of turning [m/rad].
     gain : float
-        What a square metre of unknown ground in view is worth [m/m2].
+        Value of a square metre of unknown ground in view [m/m2].
     most_m2 : float
         Area from which on more is worth nothing [m2].
     least_m : float
@@ -71,18 +71,18 @@ class Sight(NamedTuple):
 
 
 class Unknown(NamedTuple):
-    """What is there to be seen.
+    """Ground that can be seen.
 
     Attributes
     ----------
     frontier : (F, 3) float64
-        Unknown ground beside what was seen [m].
+        Unknown ground adjacent to seen ground [m].
     length : float
-        Length of frontier for which each of these stands [m].
+        Length of frontier for which each of these counts [m].
     samples : (S, 3) float64
         Samples of all unknown ground [m].
     area : float
-        Area for which each of those stands [m2].
+        Area for which each of those counts [m2].
     """
 
     frontier: Annotated[Array, np.float64, 2]
@@ -93,16 +93,16 @@ class Unknown(NamedTuple):
 
 @dataclass(frozen=True, eq=False, slots=True)
 class View:
-    """What is to be seen from a place.
+    """The view from a position.
 
     Attributes
     ----------
     place : (3,) float64
-        Where to stand [m].
+        Position of the view [m].
     heading : float
         Heading of the robot there [rad].
     cost : float
-        What it costs to come there and to turn [m].
+        Cost of going there and turning [m].
     points : (K, 3) float64
         The unknown ground that is to be seen [m].
     """
@@ -114,24 +114,7 @@ class View:
 
 
 def best_view(index: BoxIndex, places: Places, unknown: Unknown, sight: Sight) -> View | None:
-    """Return the view whose cost less its worth is least.
-
-    Parameters
-    ----------
-    index : BoxIndex
-        What stands in the way of sight.
-    places : Places
-        Where the robot may stand.
-    unknown : Unknown
-        What is there to be seen.
-    sight : Sight
-        How it sees.
-
-    Returns
-    -------
-    View or None
-        None where no place sees enough of the frontier.
-    """
+    """Return the view whose cost less its worth is least."""
     if len(unknown.frontier) == 0 or len(places.costs) == 0:
         return None
     place, heading, cost = _best_view(index, places, unknown, sight)
@@ -147,12 +130,12 @@ def best_view(index: BoxIndex, places: Places, unknown: Unknown, sight: Sight) -
 
 @kernel
 def _best_view(index: BoxIndex, places: Places, unknown: Unknown, sight: Sight) -> tuple[int, float, float]:
-    """Return the number of the best place, the heading there and the cost; -1 where there is none."""
-    best, best_heading, best_cost, least = -1, 0.0, np.inf, np.inf
+    """Return the number of the best place, the heading there and the cost; -1 if there is none."""
+    best, best_heading, best_cost, minimum = -1, 0.0, np.inf, np.inf
     # Whole bins within the angle that is seen, to each side of the one in the middle.
     half = max(int(sight.half_angle * HEADINGS / (2.0 * math.pi) - 0.5), 0)
     for place in range(places.costs.shape[0]):
-        if places.costs[place] - sight.gain * sight.most_m2 >= least:
+        if places.costs[place] - sight.gain * sight.most_m2 >= minimum:
             break
         point = places.points[place]
         seen = _seen_from(index, point, unknown.frontier, sight, sight.near)
@@ -173,8 +156,8 @@ def _best_view(index: BoxIndex, places: Places, unknown: Unknown, sight: Sight) 
             turn = abs((heading - places.headings[place] + math.pi) % (2.0 * math.pi) - math.pi)
             cost = places.costs[place] + sight.turn_cost * turn
             value = cost - sight.gain * min(area, sight.most_m2)
-            if value < least:
-                best, best_heading, best_cost, least = place, heading, cost, value
+            if value < minimum:
+                best, best_heading, best_cost, minimum = place, heading, cost, value
     return best, best_heading, best_cost
 
 

@@ -8,19 +8,19 @@ Sparse mapper, section 1, *full reconstruction*.
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.mapping.sparse.floor_plane import FloorPlane
-from lidarium.mapping.sparse.mapper.code_cutting import cut_labels
-from lidarium.mapping.sparse.mapper.code_merging import merged_codes
-from lidarium.mapping.sparse.mapper.floor_search import find_floor
+from lidarium.mapping.sparse.floor_plane import FloorPlane, find_floor
 from lidarium.mapping.sparse.mapper.frame_coding import (
     code_counts,
     coded_as_points,
     coded_floor,
     codes_of_labels,
+    cut_labels,
     labelled_voxels,
     split_points,
+    usable_points,
+    voxels_of,
 )
-from lidarium.mapping.sparse.mapper.preprocessing import usable_points, voxels_of
+from lidarium.mapping.sparse.mapper.merging import merged_codes
 from lidarium.mapping.sparse.rigid_motions import checked_poses, moved_points
 from lidarium.mapping.sparse.settings import MapperSettings
 from lidarium.mapping.sparse.sparse_map import OccupiedCodes, SparseMap, occupied_codes
@@ -41,11 +41,11 @@ def map_cloud(
     points : (N, 3) float
         The cloud [m].
     k : int
-        How many codes, of floor and obstacles together; merging leaves fewer.
+        Number of codes, of floor and obstacles together; merging leaves fewer.
     settings : MapperSettings or None
-        How; the defaults where None.
+        Settings; defaults if None.
     pose : (4, 4) float64 or None
-        Pose of the cloud in the map, whose z axis points up; None where it is given in the map. For a cloud
+        Pose of the cloud in the map, whose z axis points up; None if it is given in the map. For a cloud
         that leans, ``find_floor(points).levelling()``.
     floor : FloorPlane or None
         The floor in the map; None to find it.
@@ -58,7 +58,7 @@ def map_cloud(
     Raises
     ------
     ValueError
-        Where there are no points, they are not in metres, there is no floor, or k is too small.
+        If there are no points, they are not in metres, there is no floor, or k is too small.
     """
     settings = settings or MapperSettings()
     pose = np.eye(4) if pose is None else checked_poses(pose)
@@ -85,7 +85,7 @@ def map_cloud(
 def _merged_obstacles(
     points: NDArray[np.float64], count: int, free: NDArray[np.float64], settings: MapperSettings
 ) -> OccupiedCodes:
-    """Return at most so many codes of obstacles: those that merging saves go to boxes that are cut."""
+    """Return at most a number of codes of obstacles: those that merging saves go to boxes that are cut."""
     if len(points) == 0:
         return occupied_codes(np.empty((0, 2, 3)))
     voxels, labels = labelled_voxels(points, count, settings, 0)

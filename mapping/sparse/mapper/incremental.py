@@ -1,4 +1,4 @@
-"""Maps that grow frame by frame, where the poses of the frames are known.
+"""Maps that grow frame by frame, from frames with known poses.
 
 Only points that the map does not hold yet are coded: those outside its boxes, and floor away from its free
 codes. So a place that is seen again adds nothing, and the map stays as large as the place.
@@ -13,18 +13,17 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.mapping.sparse.floor_plane import FloorPlane
-from lidarium.mapping.sparse.mapper.code_merging import merged_codes
-from lidarium.mapping.sparse.mapper.explained_points import are_covered, are_near
-from lidarium.mapping.sparse.mapper.floor_search import find_floor
+from lidarium.mapping.sparse.floor_plane import FloorPlane, find_floor
 from lidarium.mapping.sparse.mapper.frame_coding import (
     code_counts,
     coded_as_points,
     coded_floor,
     coded_obstacles,
     split_points,
+    usable_points,
+    voxels_of,
 )
-from lidarium.mapping.sparse.mapper.preprocessing import usable_points, voxels_of
+from lidarium.mapping.sparse.mapper.merging import are_covered, are_near, merged_codes
 from lidarium.mapping.sparse.rigid_motions import checked_poses, inverse_of, moved_points
 from lidarium.mapping.sparse.settings import MapperSettings
 from lidarium.mapping.sparse.sparse_map import FreeCodes, OccupiedCodes, SparseMap, free_codes, occupied_codes
@@ -38,14 +37,14 @@ class IncrementalMapper:
     k : int
         Codes of a frame, at most, of floor and obstacles together.
     settings : MapperSettings or None
-        How; where None, the defaults with a range of 4 m.
+        Settings; if None, the defaults with a range of 4 m.
     floor : FloorPlane or None
         The floor in the map; None to find it in the first frame.
 
     Raises
     ------
     ValueError
-        Where k is too small.
+        If k is too small.
     """
 
     def __init__(
@@ -58,13 +57,7 @@ class IncrementalMapper:
 
     @property
     def map(self) -> SparseMap:
-        """The map of all frames so far.
-
-        Raises
-        ------
-        ValueError
-            Where there is no frame yet.
-        """
+        """The map of all frames so far."""
         if self._map is None:
             raise ValueError("the map has no frame yet; want one to be added")
         return self._map
@@ -88,17 +81,6 @@ class IncrementalMapper:
             Points in the frame [m].
         pose : (4, 4) float64
             Pose of the frame in the map, whose z axis points up.
-
-        Returns
-        -------
-        bool
-            Whether the frame was taken.
-
-        Raises
-        ------
-        ValueError
-            Where the frame has no points or they are not in metres, where the pose is no rigid motion, and
-            where the first frame has no floor and none was given. The map is left as it was.
         """
         pose = checked_poses(pose)
         if not self.is_due(pose):

@@ -1,4 +1,4 @@
-"""Tiles of 64 points and groups of 16 tiles, each with its box."""
+"""Points sorted into tiles along the Morton curve, with bounds."""
 
 import math
 from typing import NamedTuple
@@ -8,7 +8,78 @@ from numpy.typing import NDArray
 
 from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.kernels.simd.codes import TILE
-from lidarium.mapping.sparse.quantisation.morton import CELLS, SPREAD, morton_order
+
+CELLS = 256
+"""Cells an axis."""
+
+_DIGIT = 12
+"""Bits that a pass sorts by; a key has two digits."""
+
+
+def _spread_bits() -> NDArray[np.uint32]:
+    """Return the bits of each cell's number, two places apart, (CELLS,)."""
+    cells = np.arange(CELLS, dtype=np.uint32)
+    spread = np.zeros(CELLS, np.uint32)
+    for bit in range(8):
+        spread |= (cells >> np.uint32(bit) & np.uint32(1)) << np.uint32(3 * bit)
+    return spread
+
+
+SPREAD = _spread_bits()
+
+
+@kernel
+def _morton_order(points: Array, low: Array, per_metre: float, spread: Array) -> Array:
+    """Return the places of points in Morton order, of equal cells the first first.
+
+    Parameters
+    ----------
+    points : (N, 3) float32
+        The points [m].
+    low : (3,) float64
+        Corner of the first cell [m]; points beyond the cells count to the outermost ones.
+    per_metre : float
+        Cells of a metre.
+    spread : (CELLS,) uint32
+        ``SPREAD``.
+
+    Returns
+    -------
+    (N,) int32
+        The places.
+    """
+    count, buckets = len(points), 1 << _DIGIT
+    keys = np.empty(count, np.uint32)
+    starts = np.zeros((2, buckets), np.int32)
+    last = np.float32(CELLS - 1)
+    scale, zero = np.float32(per_metre), np.float32(0.0)
+    x0, y0, z0 = np.float32(low[0]), np.float32(low[1]), np.float32(low[2])
+    for i in range(count):
+        x = int(min(max((points[i, 0] - x0) * scale, zero), last))
+        y = int(min(max((points[i, 1] - y0) * scale, zero), last))
+        z = int(min(max((points[i, 2] - z0) * scale, zero), last))
+        key = spread[x] | spread[y] << np.uint32(1) | spread[z] << np.uint32(2)
+        keys[i] = key
+        starts[0, key & np.uint32(buckets - 1)] += 1
+        starts[1, key >> np.uint32(_DIGIT)] += 1
+    for digit in range(2):
+        place = 0
+        for bucket in range(buckets):
+            found = starts[digit, bucket]
+            starts[digit, bucket] = place
+            place += found
+    halfway, order = np.empty(count, np.int32), np.empty(count, np.int32)
+    for i in range(count):
+        bucket = keys[i] & np.uint32(buckets - 1)
+        halfway[starts[0, bucket]] = i
+        starts[0, bucket] += 1
+    for j in range(count):
+        i = halfway[j]
+        bucket = keys[i] >> np.uint32(_DIGIT)
+        order[starts[1, bucket]] = i
+        starts[1, bucket] += 1
+    return order
+
 
 GROUP = 16
 """Tiles of a group."""
@@ -56,16 +127,6 @@ def tiles_of(points: NDArray[np.float32], weights: NDArray[np.float32] | None = 
         The points [m].
     weights : (N,) float32, optional
         Their weights, all 1 by default.
-
-    Returns
-    -------
-    Tiles
-        The tiles.
-
-    Raises
-    ------
-    ValueError
-        Where coordinates are not finite, or so large that they can be no metres.
     """
     totals, ends = _extent_of(points)
     if not (np.isfinite(totals).all() and np.abs(ends).max() <= FARTHEST):
@@ -77,7 +138,7 @@ def tiles_of(points: NDArray[np.float32], weights: NDArray[np.float32] | None = 
     reach = _SPREADS * np.sqrt(np.maximum(totals[1] / len(points) - mean * mean, 0.0))
     low, high = np.maximum(ends[0], mean - reach), np.minimum(ends[1], mean + reach)
     edge = max(float((high - low).max()), 1e-6)
-    order = morton_order(points, low, CELLS / edge, SPREAD)
+    order = _morton_order(points, low, CELLS / edge, SPREAD)
     given = np.empty(0, np.float32) if weights is None else weights
     count = math.ceil(len(points) / TILE)
     sides, masses, sums, boxes = _fill_tiles(points, given, order, count)

@@ -1,3 +1,5 @@
+"""Floors that are too large are refused."""
+
 import math
 
 import numpy as np
@@ -7,7 +9,110 @@ from hypothesis import strategies as st
 from matplotlib.path import Path as Outline
 from scipy import ndimage
 
-from lidarium.envs.floors.floor import Floor, Raster, Solid
+from lidarium.envs.floors.floor import (
+    MAX_BEYOND_M,
+    MAX_EXTENT_M,
+    MAX_OUTLINE_M,
+    Floor,
+    Raster,
+    Solid,
+    _middle_line,
+    _width_of,
+    check_extent,
+    check_pairs,
+)
+
+SQUARE = np.array([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)])
+
+
+def test_a_floor_up_to_the_limits_passes():
+    check_extent("hall", (0.0, 0.0, MAX_EXTENT_M, 1.0), [SQUARE, SQUARE[:0]])
+    check_extent("hall", (0.0, 0.0, 1.0, 1.0), [SQUARE - MAX_BEYOND_M])
+    check_pairs("hall", 500, 500)
+
+
+@pytest.mark.parametrize(
+    ("bounds", "rings", "message"),
+    [
+        ((0.0, 0.0, MAX_EXTENT_M + 1.0, 1.0), (), "hall has a side of 10001 m"),
+        ((2e8, 0.0, 2e8 + 1.0, 1.0), (), "up to 2e"),
+        ((0.0, 0.0, np.nan, 1.0), (), "hall has a side of nan"),
+        ((0.0, 0.0, 1.0, 1.0), [SQUARE, SQUARE + MAX_BEYOND_M + 1.0], "beyond its bounds"),
+        ((0.0, 0.0, 1.0, 1.0), [SQUARE * np.nan], "beyond its bounds"),
+    ],
+)
+def test_what_is_too_large_is_named(bounds, rings, message):
+    with pytest.raises(ValueError, match=message):
+        check_extent("hall", bounds, rings)
+
+
+def test_outlines_are_measured_around_each_ring_and_not_between_them():
+    far = (0.0, 0.0, 9000.0, 9000.0)
+    side = MAX_OUTLINE_M / 4 / 20
+    rings = [SQUARE * side] * 20
+    check_extent("hall", far, [ring * (1.0 - 1e-6) for ring in rings])
+    with pytest.raises(ValueError, match="m of walls"):
+        check_extent("hall", far, [*rings, SQUARE])
+    check_extent("hall", far, [SQUARE, SQUARE + 8000.0] * 100)
+
+
+def test_too_many_pairs_are_refused():
+    with pytest.raises(ValueError, match="501 walls and 500 doors"):
+        check_pairs("hall", 501, 500)
+
+
+SQUARE_OF_SOLID = np.array([(0.0, 0.0), (2.0, 0.0), (2.0, 2.0), (0.0, 2.0)])
+
+
+def strip_along(length, thickness, angle):
+    corners = np.array([(0.0, 0.0), (length, 0.0), (length, thickness), (0.0, thickness)])
+    cosine, sine = math.cos(angle), math.sin(angle)
+    return corners @ np.array([[cosine, sine], [-sine, cosine]]) + (100.0, -50.0)
+
+
+def test_a_solid_cuts_what_its_heights_overlap_with():
+    table = Solid(SQUARE_OF_SOLID, 0.7, 0.75)
+    assert table.cuts(0.0, 2.0)
+    assert not table.cuts(0.0, 0.7)
+    assert not table.cuts(0.75, 2.0)
+    assert table.cuts(0.7, 0.7)
+    assert not table.cuts(0.75, 0.75)
+
+
+def test_edges_are_those_of_polygon_and_holes():
+    solid = Solid(SQUARE_OF_SOLID, holes=(SQUARE_OF_SOLID / 4 + 0.5,))
+    assert solid.edges.shape == (8, 4)
+    lengths = np.hypot(*(solid.edges[:, 2:] - solid.edges[:, :2]).T)
+    assert lengths.sum() == pytest.approx(8.0 + 2.0)
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.4, 2.0])
+def test_a_strip_is_as_wide_as_it_is_thick_and_its_middle_line_runs_along_it(angle):
+    strip = strip_along(3.0, 0.1, angle)
+    assert _width_of(strip) == pytest.approx(0.1, rel=1e-3)
+    (line,) = _middle_line(strip)
+    assert np.hypot(*(line[2:] - line[:2])) == pytest.approx(3.0)
+    assert (line[:2] + line[2:]) / 2 == pytest.approx(strip.mean(axis=0))
+
+
+def test_a_bent_strip_is_as_wide_as_the_strip():
+    bent = np.array([(0, 0), (3, 0), (3, 3), (2.9, 3), (2.9, 0.1), (0, 0.1)], np.float64)
+    assert _width_of(bent) == pytest.approx(2 * 0.59 / 12.0, rel=1e-6)
+    assert len(_middle_line(bent)) == 6
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"z_low": 1.0, "z_high": 1.0}, "has no height; want z_low < z_high"),
+        ({"polygon": SQUARE_OF_SOLID[:2]}, "polygon has shape"),
+        ({"polygon": SQUARE_OF_SOLID * np.nan}, "not finite"),
+        ({"holes": (SQUARE_OF_SOLID[:, :1],)}, "hole has shape"),
+    ],
+)
+def test_what_is_no_prism_is_refused(given, message):
+    with pytest.raises(ValueError, match=message):
+        Solid(**{"polygon": SQUARE_OF_SOLID, **given})
 
 
 def rectangle(x, y, width, height, turn=0.0):

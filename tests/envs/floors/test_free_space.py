@@ -9,8 +9,15 @@ from hypothesis import strategies as st
 from scipy import ndimage
 
 from lidarium.envs.floors import free_space
-from lidarium.envs.floors.floor import Raster
-from lidarium.envs.floors.free_space import KEPT, components, configuration_space, reachable_free_space
+from lidarium.envs.floors.floor import Floor, Raster, Solid
+from lidarium.envs.floors.free_space import (
+    KEPT,
+    components,
+    configuration_space,
+    measure_building,
+    reachable_free_space,
+)
+from lidarium.envs.floors.generation.furniture import place
 from lidarium.envs.floors.starts import draw_starts
 from tests.envs.floors.rooms import two_rooms
 
@@ -104,8 +111,8 @@ def test_what_a_shared_raster_is_asked_again_is_kept_and_is_what_a_new_one_gives
     assert not second.flags.writeable
     np.testing.assert_array_equal(first, second)
     for radius in (0.18, 0.45):
-        for place in ((1.0, 1.0), (5.0, 2.0)):
-            at = np.array([place])
+        for point in ((1.0, 1.0), (5.0, 2.0)):
+            at = np.array([point])
             np.testing.assert_array_equal(
                 reachable_free_space(raster, radius, at), reachable_free_space(two_rooms(0.8), radius, at)
             )
@@ -138,3 +145,36 @@ def test_the_free_space_of_a_floor_in_use_is_not_made_again(monkeypatch):
     components(raster, 0.18)
     monkeypatch.setattr(free_space, "configuration_space", lambda *_: pytest.fail("made again"))
     components(raster, 0.18)
+
+
+def test_a_ring_around_a_block_is_one_loop_and_a_table_in_it_none():
+    block = place("wardrobe", 0.0, 0.0, 0.0)[0].polygon
+    walls = Floor("ring", (-3.0, -3.0, 3.0, 3.0), (type(place("box", 0.0, 0.0, 0.0)[0])(block),))
+    assert measure_building(walls).loops == 1
+    furnished = Floor("table", (-3.0, -3.0, 3.0, 3.0), place("box", 0.0, 0.0, 0.0))
+    assert measure_building(furnished).loops == 0
+    assert measure_building(furnished).clutter > 0.0
+
+
+def wall(x, y, width, height, **given):
+    return Solid(np.array([[x, y], [x + width, y], [x + width, y + height], [x, y + height]]), **given)
+
+
+def test_a_door_parts_two_rooms_and_a_wide_opening_does_not():
+    for gap, rooms in ((0.9, 2), (1.8, 1)):
+        half = (4.0 - gap) / 2
+        walls = (wall(3.9, 0.0, 0.2, half), wall(3.9, 4.0 - half, 0.2, half))
+        found = measure_building(Floor("two", (0.0, 0.0, 8.0, 4.0), walls))
+        assert (found.rooms, found.loops) == (rooms, 0)
+        assert found.area_m2 == pytest.approx(32.0 - 0.4 * half, rel=0.03)
+
+
+def test_clutter_is_what_furniture_covers():
+    floor = Floor("one", (0.0, 0.0, 4.0, 4.0), (wall(1.0, 1.0, 2.0, 1.0, z_high=0.5),))
+    assert measure_building(floor).clutter == pytest.approx(2.0 / 16.0, rel=0.05)
+    assert measure_building(Floor("none", (0.0, 0.0, 4.0, 4.0))).clutter == 0.0
+
+
+def test_a_floor_without_room_is_refused():
+    with pytest.raises(ValueError, match=r"floor 'narrow' has no room for a robot of radius 0\.3 m"):
+        measure_building(Floor("narrow", (0.0, 0.0, 0.4, 5.0)))

@@ -12,7 +12,7 @@ from lidarium.envs.settings.making import make_settings
 from lidarium.envs.settings.sensors.cameras import CAMERAS
 from lidarium.mapping.geometry.rigid import Transform, composed, relative
 from lidarium.mapping.localization.dead_reckoning.localizer import KeyScans
-from lidarium.mapping.sparse.exploring.ground_map import BLOCKED, SEEN
+from lidarium.mapping.sparse.exploring.ground import BLOCKED, SEEN
 from tests.ground_views import depth_image
 
 NOBODY = np.empty((0, 3))

@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-pytest.importorskip("mcap_ros2", reason="mcap-ros2-support is not installed: extra [mcap]")
+pytest.importorskip("rosbags", reason="rosbags is not installed: extra [bags]")
+pytest.importorskip("mcap_ros2", reason="mcap-ros2-support is not installed")
 
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
@@ -13,7 +14,7 @@ from mcap_ros2.decoder import DecoderFactory
 from lidarium.evaluation.record.bag import write_bag
 from lidarium.evaluation.record.replay import drive_again
 from lidarium.evaluation.truth.beliefs import maps_on_floor
-from lidarium.mapping.files.bags.reading import read_mcap_log
+from lidarium.mapping.files.bags.reading import read_bag_log
 from lidarium.mapping.files.npz_logs import write_npz_log
 from lidarium.mapping.geometry.rigid import composed
 from lidarium.scripts.main import main
@@ -47,7 +48,7 @@ def planar(place, turn):
 
 def test_scans_and_odometry_are_those_of_the_robots(episode):
     record, env, path = episode
-    log = read_mcap_log(path, "/robot_1/scan")
+    log = read_bag_log(path, "/robot_1/scan")
     assert len(log.stamps) == len(record.commands) + 1
     assert np.array_equal(log.ranges[-1], env.simulation.ranges[1])
     assert np.allclose(log.odometry[-1], env.simulation.odometry[1], atol=1e-9)
@@ -87,7 +88,7 @@ def test_maps_and_paths_at_the_end_are_those_of_the_episode(episode):
 
 def test_slam_on_the_bag_is_slam_on_the_log(episode, tmp_path):
     _, _, path = episode
-    write_npz_log(tmp_path / "log.npz", read_mcap_log(path, "/robot_0/scan"))
+    write_npz_log(tmp_path / "log.npz", read_bag_log(path, "/robot_0/scan"))
     assert main(["slam", str(path), "--topic", "/robot_0/scan", "--out", str(tmp_path / "bag")]) == 0
     assert main(["slam", str(tmp_path / "log.npz"), "--out", str(tmp_path / "log")]) == 0
     for name in ("trajectory.tum", "map.pgm", "map.yaml"):

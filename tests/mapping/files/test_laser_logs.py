@@ -1,4 +1,4 @@
-"""Scans of logs are symmetric and of one reach, whatever file they are from."""
+"""Stamps that are wild, repeat or restart."""
 
 import math
 
@@ -7,8 +7,52 @@ import pytest
 from recorded_logs import recording
 
 from lidarium.mapping.files.carmen_logs import read_carmen_log
-from lidarium.mapping.files.laser_logs import symmetric_scans
+from lidarium.mapping.files.laser_logs import _continued, _without_jumps, symmetric_scans
 from lidarium.mapping.files.npz_logs import read_npz_log
+
+
+@pytest.mark.parametrize("wild", [2e9, -5.0, math.nan])
+@pytest.mark.parametrize("at", [0, 7, 19])
+def test_one_wild_stamp_costs_one_scan_at_most(wild, at):
+    stamps = 100.0 + 0.5 * np.arange(20.0)
+    stamps[at] = wild
+    clock = _continued(stamps)
+    assert clock.restarts == 0
+    assert len(clock.kept) >= 19
+    assert (np.diff(clock.stamps) >= 0.0).all()
+    others = np.delete(np.arange(20), at)
+    np.testing.assert_array_equal(clock.stamps[np.isin(clock.kept, others)], stamps[others])
+
+
+def test_a_clock_that_restarts_is_continued():
+    true = 0.5 * np.arange(60.0)
+    stamps = true + 1000.0
+    stamps[20:] -= 1009.0
+    stamps[45:] -= 12.0
+    clock = _continued(stamps)
+    assert clock.restarts == 2
+    np.testing.assert_allclose(clock.stamps - clock.stamps[0], true)
+
+
+def test_order_is_all_that_a_clock_without_faults_is_asked_for():
+    stamps = np.array([3.0, 3.0, 3.5, 9.0, 4000.0])
+    clock = _continued(stamps)
+    np.testing.assert_array_equal(clock.stamps, stamps)
+    assert clock.restarts == 0
+
+
+def test_odometry_that_is_set_to_zero_goes_on(tmp_path):
+    stamps = 0.5 * np.arange(100.0)
+    true = np.stack([0.2 * np.arange(100.0), np.zeros(100), np.zeros(100)], axis=1)
+    reset = true.copy()
+    reset[60:, 0] -= reset[60, 0]
+    mended, jumps = _without_jumps(reset, stamps)
+    assert jumps == 1
+    np.testing.assert_allclose(mended, true, atol=1e-9)
+    for steady in (true, true * 10.0):
+        unchanged, jumps = _without_jumps(steady, stamps)
+        assert jumps == 0
+        assert unchanged is steady
 
 
 def test_files_that_are_not_there_are_named(tmp_path):

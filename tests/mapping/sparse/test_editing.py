@@ -5,8 +5,8 @@ import pytest
 from furnished_room import pose_at, room_points
 
 from lidarium.mapping.sparse.editing import edited, join_maps
-from lidarium.mapping.sparse.mapper.explained_points import are_covered
 from lidarium.mapping.sparse.mapper.full import map_cloud
+from lidarium.mapping.sparse.mapper.merging import are_covered
 from lidarium.mapping.sparse.sparse_map import SparseMap, free_codes, occupied_codes
 
 WALL = np.array([[[0.0, 0.0, 0.0], [4.0, 0.2, 1.0]]])

@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from lidarium.mapping.sparse.files.map_files import read_sparse_map, write_sparse_map
+from lidarium.mapping.sparse.map_files import read_sparse_map, write_sparse_map
 from lidarium.mapping.sparse.sparse_map import SparseMap, free_codes, occupied_codes
 from lidarium.scripts.main import main
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from furnished_room import room_points
 
-from lidarium.mapping.point_clouds.ply import write_ply
+from lidarium.mapping.point_clouds.cloud_files import write_ply
 from lidarium.mapping.point_clouds.point_cloud import PointCloud
-from lidarium.mapping.sparse.files.map_files import read_sparse_map
+from lidarium.mapping.sparse.map_files import read_sparse_map
 from lidarium.scripts.main import main
 
 

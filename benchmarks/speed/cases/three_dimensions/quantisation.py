@@ -19,13 +19,17 @@ from lidarium.envs.settings.robots import ROBOTS
 from lidarium.envs.settings.sensors.cameras import CAMERAS
 from lidarium.envs.simulation.depth.frames import image_of
 from lidarium.mapping.geometry.rigid import Transform
-from lidarium.mapping.point_clouds.frames import base_from_camera, map_from_base, moved
-from lidarium.mapping.point_clouds.intrinsics import Intrinsics, points_of_depth
+from lidarium.mapping.point_clouds.cameras import (
+    Intrinsics,
+    base_from_camera,
+    map_from_base,
+    moved,
+    points_of_depth,
+)
+from lidarium.mapping.point_clouds.cloud_files import read_cloud
 from lidarium.mapping.point_clouds.point_cloud import PointCloud
-from lidarium.mapping.point_clouds.reading import read_cloud
 from lidarium.mapping.sparse.quantisation.lloyd import nearest_codes
-from lidarium.mapping.sparse.quantisation.quantiser import quantise
-from lidarium.mapping.sparse.quantisation.settings import QuantisationSettings
+from lidarium.mapping.sparse.quantisation.quantiser import QuantisationSettings, quantise
 from lidarium.mapping.sparse.quantisation.tiles import tiles_of
 
 CORES = 1

@@ -9,9 +9,9 @@ from lidarium.benchmarks.speed.harness.lines import Line, shown
 from lidarium.benchmarks.speed.harness.report import run_alone
 from lidarium.benchmarks.speed.harness.timing import Contender, Effort, interleaved, rate, repeated
 from lidarium.envs.floors.catalogue.names import load_floor
-from lidarium.mapping.sparse.graph.obstacles import ChangingGraph
-from lidarium.mapping.sparse.graph.topological_graph import GraphSettings, TopologicalGraph, build_graph
-from lidarium.mapping.sparse.planning.requests import plan
+from lidarium.mapping.sparse.changing_graph import ChangingGraph
+from lidarium.mapping.sparse.graph import GraphSettings, TopologicalGraph, build_graph
+from lidarium.mapping.sparse.planning import plan
 from lidarium.mapping.sparse.swept_body import SweptBody
 
 CORES = 1

@@ -9,7 +9,7 @@ from lidarium.benchmarks.studies.sparse.places import BODY, CELL_M, CLEAR_M, Pla
 from lidarium.benchmarks.studies.sparse.survey import CAMERA, frames_of, stops_of
 from lidarium.envs.floors.catalogue.names import load_floor
 from lidarium.envs.floors.floor import Floor, Solid
-from lidarium.mapping.sparse.planning.path_measures import points_along
+from lidarium.mapping.sparse.planning import points_along
 
 
 @pytest.fixture(scope="module")

@@ -287,7 +287,7 @@ def imported(path):
             catalogue.MADE_BY,
             (
                 "envs/floors/generation/buildings.py",
-                "envs/floors/generation/packing.py",
+                "envs/floors/catalogue/names.py",
                 "envs/floors/catalogue/store.py",
             ),
         ),

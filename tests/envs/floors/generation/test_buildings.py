@@ -1,4 +1,4 @@
-"""Generated buildings are plausible, passable, repeatable, and what was asked for."""
+"""Boxes of a generated floor, and all of them turned."""
 
 import math
 
@@ -9,9 +9,96 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from lidarium.envs.floors.floor import Floor
-from lidarium.envs.floors.free_space import configuration_space
-from lidarium.envs.floors.generation.buildings import KINDS, BuildingSettings, generate_building
-from lidarium.envs.floors.measures import measure_building
+from lidarium.envs.floors.free_space import configuration_space, measure_building
+from lidarium.envs.floors.generation.buildings import (
+    KINDS,
+    START_CLEARANCE,
+    BuildingSettings,
+    _draw_starts,
+    _passable,
+    _rotated,
+    _solid_of,
+    generate_building,
+)
+from lidarium.envs.floors.generation.furniture import Furnished
+
+
+def test_rotation_turns_the_floor_and_keeps_its_figures():
+    straight = generate_building(4, BuildingSettings(kind="apartment"))
+    turned = generate_building(4, BuildingSettings(kind="apartment", rotation=0.5))
+    before, after = measure_building(straight), measure_building(turned)
+    assert (after.loops, after.rooms) == (before.loops, before.rooms)
+    assert after.area_m2 == pytest.approx(before.area_m2, rel=0.03)
+    assert np.allclose(turned.starts[:, 2] - straight.starts[:, 2], 0.5, atol=1e-3) or np.allclose(
+        np.cos(turned.starts[:, 2] - straight.starts[:, 2]), math.cos(0.5), atol=1e-3
+    )
+
+
+def test_a_box_stands_on_its_rectangle():
+    box = _solid_of((1.0, 2.0, 3.00004, 4.0), 1.5)
+    assert box.polygon.tolist() == [[1.0, 2.0], [3.0, 2.0], [3.0, 4.0], [1.0, 4.0]]
+    assert (box.z_low, box.z_high) == (0.0, 1.5)
+
+
+def test_corners_that_open_are_filled_and_the_floor_lies_in_the_first_quadrant():
+    straight = Floor(
+        "hall", (0.0, 0.0, 4.0, 2.0), (_solid_of((0.0, 0.0, 4.0, 0.1)),), starts=np.array([[1.0, 1.0, 3.0]])
+    )
+    turned = _rotated(straight, 0.5)
+    width, height = 4.0 * math.cos(0.5) + 2.0 * math.sin(0.5), 4.0 * math.sin(0.5) + 2.0 * math.cos(0.5)
+    assert turned.bounds == pytest.approx((0.0, 0.0, width, height), abs=1e-3)
+    assert len(turned.solids) == 1 + 4
+    free = float((turned.raster(0.025, 0.2, 0.2).solid == 0).sum()) * 0.025**2
+    assert free == pytest.approx(4.0 * 1.9, rel=0.02)
+    assert turned.starts[0, 2] == pytest.approx(3.5 - 2.0 * math.pi, abs=1e-3)
+    assert _rotated(straight, 0.0) is straight
+
+
+def test_starts_are_half_a_metre_off_all_that_stands_and_far_from_each_other():
+    for seed in range(12):
+        floor = generate_building(seed)
+        raster = floor.raster(0.025, 0.0, 2.0)
+        solid = np.argwhere(raster.solid)[:, ::-1] * raster.resolution + raster.origin
+        for start in floor.starts:
+            nearest = np.maximum(np.maximum(solid - start[:2], start[:2] - solid - raster.resolution), 0.0)
+            assert np.hypot(*nearest.T).min() >= START_CLEARANCE - 1e-6
+        apart = min(math.dist(floor.starts[i, :2], floor.starts[j, :2]) for i, j in ((0, 1), (0, 2), (1, 2)))
+        assert apart > 0.25 * math.dist(floor.bounds[:2], floor.bounds[2:])
+
+
+BOUNDS = (0.0, 0.0, 8.0, 4.0)
+LABELS = np.zeros((40, 80), np.int32)
+LABELS[:, 40:] = 1
+
+
+def piece(room, *rectangle):
+    return Furnished(room, rectangle, (_solid_of(rectangle, 1.0),))
+
+
+def walls(gap):
+    half = (4.0 - gap) / 2
+    return _solid_of((3.9, 0.0, 4.1, half)), _solid_of((3.9, 4.0 - half, 4.1, 4.0))
+
+
+def test_what_stands_in_a_door_is_left_out_and_the_rest_stays():
+    harmless, blocking = piece(0, 0.0, 0.0, 0.5, 0.5), piece(1, 4.2, 1.5, 4.6, 2.5)
+    kept, clear, origin = _passable(BOUNDS, walls(1.0), [harmless, blocking], LABELS)
+    assert kept == [harmless]
+    starts = _draw_starts(clear, origin, np.random.default_rng(0))
+    assert len(starts) == 3
+    assert np.abs(starts[:, 0] - 4.0).max() > 2.0
+
+
+def test_walls_without_a_door_cannot_be_mended():
+    assert _passable(BOUNDS, walls(0.0), [], LABELS) is None
+    assert _passable(BOUNDS, walls(0.5), [], LABELS) is None
+
+
+def test_a_nook_behind_a_piece_is_not_left_cut_off():
+    shelf = piece(1, 6.5, 0.0, 7.0, 4.0)
+    kept, _, _ = _passable(BOUNDS, walls(1.0), [shelf], LABELS)
+    assert kept == []
+
 
 ROBOT_RADIUS = 0.30
 

@@ -24,7 +24,7 @@ def test_a_floor_is_named_without_what_says_the_format(name, wanted):
 
 
 def test_parts_are_passed_on_up_to_the_most_points():
-    half = common.MOST_POINTS // 2
+    half = common.MAX_POINTS // 2
     parts = common.few_enough(Path("a.dxf"), ["a", "b", "c"], lambda part: half)
     assert [next(parts), next(parts)] == ["a", "b"]
     with pytest.raises(ValueError, match=r"a\.dxf has more than 250,000 points"):

@@ -5,8 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from lidarium.envs.floors.floor import Floor
-from lidarium.envs.floors.solid import Solid
+from lidarium.envs.floors.floor import Floor, Solid
 from lidarium.envs.settings.robots import ROBOTS
 
 pytest.importorskip("pybullet", reason="the extra bullet is not installed")

@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 
 import lidarium
-from lidarium.envs.floors.floor import Floor
+from lidarium.envs.floors.floor import Floor, Solid
 from lidarium.envs.floors.generation.furniture import place
-from lidarium.envs.floors.solid import Solid
 from lidarium.envs.settings.lidar import Lidar
 from lidarium.envs.settings.robots import ROBOTS
 from lidarium.envs.simulation.kernels.arrays import BROKEN_PHYSICS

@@ -5,8 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from lidarium.envs.floors.floor import Floor, Raster
-from lidarium.envs.floors.solid import Solid
+from lidarium.envs.floors.floor import Floor, Raster, Solid
 from lidarium.envs.simulation.bullet.floor_shapes import FloorShapes
 
 

@@ -1,4 +1,4 @@
-"""Bags are written as the library's own encoder does, or not at all."""
+"""Messages are written as another library encodes them, or not at all."""
 
 import io
 import math
@@ -6,12 +6,13 @@ import math
 import numpy as np
 import pytest
 
-pytest.importorskip("mcap_ros2", reason="mcap-ros2-support is not installed: extra [mcap]")
+pytest.importorskip("rosbags", reason="rosbags is not installed: extra [bags]")
+pytest.importorskip("mcap_ros2", reason="mcap-ros2-support is not installed")
 
 from mcap.reader import make_reader
 from mcap_ros2._dynamic import serialize_dynamic
 
-from lidarium.mapping.files.bags import schemas
+from lidarium.mapping.files.bags import messages
 from lidarium.mapping.files.bags.writing import BagWriter, bag
 from lidarium.mapping.grids.scan_geometry import ScanGeometry
 
@@ -31,10 +32,10 @@ def pose(x, y, theta, z=0.0):
 
 
 def expected_messages():
-    """Return messages as dicts, as the library's own encoder takes them."""
+    """Return messages as dicts, as `mcap_ros2` takes them."""
     nothing = dict.fromkeys("xyz", 0.0)
     return {
-        schemas.LASER_SCAN: {
+        messages.LASER_SCAN: {
             "header": header("odd", 2, 500_000_000),
             "angle_min": GEOMETRY.angle_first,
             "angle_max": -GEOMETRY.angle_first,
@@ -46,13 +47,13 @@ def expected_messages():
             "ranges": [0.5 * k for k in range(9)],
             "intensities": [],
         },
-        schemas.ODOMETRY: {
+        messages.ODOMETRY: {
             "header": header("odom", 2, 500_000_000),
             "child_frame_id": "base_link",
             "pose": {"pose": pose(1.0, -2.0, 0.5), "covariance": [0.0] * 36},
             "twist": {"twist": {"linear": nothing, "angular": nothing}, "covariance": [0.0] * 36},
         },
-        schemas.TRANSFORMS: {
+        messages.TRANSFORMS: {
             "transforms": [
                 {
                     "header": header("map", 2, 500_000_000),
@@ -64,7 +65,7 @@ def expected_messages():
                 }
             ]
         },
-        schemas.GRID: {
+        messages.GRID: {
             "header": header("map", 2, 500_000_000),
             "info": {
                 "map_load_time": {"sec": 2, "nanosec": 500_000_000},
@@ -75,7 +76,7 @@ def expected_messages():
             },
             "data": [100, -1, 0, 0, 0, -1],
         },
-        schemas.PATH: {
+        messages.PATH: {
             "header": header("map", 2, 500_000_000),
             "poses": [
                 {"header": header("map", 1, 0), "pose": pose(0.0, 1.0, 2.0)},
@@ -95,14 +96,18 @@ def write_all(writer):
 
 
 @pytest.mark.parametrize("name", list(expected_messages()))
-def test_bytes_are_those_of_the_library_s_own_encoder(name):
+def test_bytes_are_those_that_mcap_ros2_encodes_by_the_definition_in_the_bag(name):
     file = io.BytesIO()
     writer = BagWriter(file)
     write_all(writer)
     writer.finish()
     reader = make_reader(io.BytesIO(file.getvalue()))
-    (ours,) = [message.data for schema, _, message in reader.iter_messages() if schema.name == name]
-    encode = serialize_dynamic(name, schemas.definition(name))[name]
+    ((definition, ours),) = [
+        (schema.data.decode(), message.data)
+        for schema, _, message in reader.iter_messages()
+        if schema.name == name
+    ]
+    encode = serialize_dynamic(name, definition)[name]
     assert ours == bytes(encode(expected_messages()[name]))
 
 

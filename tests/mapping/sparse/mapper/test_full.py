@@ -5,9 +5,9 @@ import pytest
 from furnished_room import TABLE_TOP, furniture, room_points
 
 from lidarium.mapping.sparse.floor_plane import FloorPlane
-from lidarium.mapping.sparse.mapper.explained_points import are_covered
 from lidarium.mapping.sparse.mapper.frame_coding import split_points
 from lidarium.mapping.sparse.mapper.full import map_cloud
+from lidarium.mapping.sparse.mapper.merging import are_covered
 from lidarium.mapping.sparse.settings import FloorSettings, MapperSettings
 from lidarium.mapping.sparse.swept_body import SweptBody, are_free, index_boxes
 
@@ -103,7 +103,7 @@ def test_a_cloud_that_leans_is_mapped_where_it_was_levelled():
     angle = np.radians(20.0)
     lean = np.array([[1, 0, 0], [0, np.cos(angle), -np.sin(angle)], [0, np.sin(angle), np.cos(angle)]])
     leaning = ROOM @ lean.T
-    from lidarium.mapping.sparse.mapper.floor_search import find_floor
+    from lidarium.mapping.sparse.floor_plane import find_floor
 
     settings = FloorSettings(most_tilt=np.radians(40.0))
     pose = find_floor(leaning, settings).levelling()

@@ -5,9 +5,9 @@ import pytest
 from furnished_room import pose_at, room_points, seen_from
 
 from lidarium.mapping.sparse.floor_plane import FloorPlane
-from lidarium.mapping.sparse.mapper.explained_points import are_covered
 from lidarium.mapping.sparse.mapper.frame_coding import split_points
 from lidarium.mapping.sparse.mapper.incremental import IncrementalMapper
+from lidarium.mapping.sparse.mapper.merging import are_covered
 from lidarium.mapping.sparse.rigid_motions import moved_points
 from lidarium.mapping.sparse.settings import MapperSettings
 

@@ -6,19 +6,15 @@ import numpy as np
 import pytest
 
 from lidarium.mapping.files.images import read_image
-from lidarium.mapping.point_clouds.intrinsics import Intrinsics, points_of_depth
-from lidarium.mapping.sparse.files.binary_form import binary_content, parsed_binary
-from lidarium.mapping.sparse.files.text_form import text_content
-from lidarium.mapping.sparse.floor_plane import FloorPlane
-from lidarium.mapping.sparse.mapper.explained_points import are_covered
-from lidarium.mapping.sparse.mapper.floor_search import find_floor
+from lidarium.mapping.point_clouds.cameras import Intrinsics, points_of_depth
+from lidarium.mapping.sparse.floor_plane import FloorPlane, find_floor
+from lidarium.mapping.sparse.map_files import _parsed_binary, binary_content, text_content
 from lidarium.mapping.sparse.mapper.frame_coding import split_points
 from lidarium.mapping.sparse.mapper.full import map_cloud
 from lidarium.mapping.sparse.mapper.incremental import IncrementalMapper
-from lidarium.mapping.sparse.registration import register
+from lidarium.mapping.sparse.mapper.merging import are_covered
 from lidarium.mapping.sparse.rigid_motions import moved_points
 from lidarium.mapping.sparse.settings import FloorSettings, MapperSettings
-from lidarium.mapping.sparse.surface_codes import codes_of
 
 KINECT = Intrinsics(585.0, 585.0, 320.0, 240.0)
 # The first frame is the world; its camera looks along z, y is down, and it leans.
@@ -63,7 +59,7 @@ def test_the_kitchen_is_a_third_of_the_thesis_form(fused, level):
     content = binary_content(found)
     assert 3 * len(content) <= THESIS_BYTES * kept
     assert 5 * len(content) <= len(text_content(found))
-    after, _ = parsed_binary(content)
+    after, _ = _parsed_binary(content)
     assert are_covered(obstacles, after.boxes).all()
 
 
@@ -73,22 +69,6 @@ def test_frames_of_the_kitchen_become_a_small_map(kitchen, level):
     assert sum(taken) >= 3
     assert len(mapper.map.occupied) < 150 * sum(taken)
     assert len(mapper.map.ground) > 20
-
-
-def test_a_frame_of_the_kitchen_is_found_in_the_whole(kitchen, fused, level):
-    whole = codes_of(
-        map_cloud(
-            fused, 2048, MapperSettings(robot_height_m=3.0, merges=False), pose=level, floor=FloorPlane()
-        )
-    )
-    points, pose = next(frames(kitchen, level))
-    settings = MapperSettings(robot_height_m=3.0, range_m=4.0, merges=False)
-    frame = codes_of(map_cloud(points, 512, settings, pose=pose, floor=FloorPlane()))
-    guess = np.eye(4)
-    guess[:3, 3] = (0.06, -0.05, 0.03)
-    found = register(whole, frame, guess)
-    assert found.is_accepted, found.refusal
-    assert np.abs(found.transform[:3, 3]).max() < 0.05
 
 
 def test_octomap_leaves_of_a_building_have_a_floor(shared_data):

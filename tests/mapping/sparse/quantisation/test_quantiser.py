@@ -1,4 +1,4 @@
-"""Clouds are quantised: codes, labels, weights, budgets."""
+"""Settings of quantisation."""
 
 import time
 
@@ -6,10 +6,128 @@ import numpy as np
 import pytest
 from scattered_points import room, searched
 
-from lidarium.mapping.sparse.quantisation.quantiser import quantise
-from lidarium.mapping.sparse.quantisation.settings import METHODS, QuantisationSettings
+from lidarium.mapping.sparse.quantisation.lloyd import improved, nearest_codes, summary_of
+from lidarium.mapping.sparse.quantisation.quantiser import (
+    METHODS,
+    QuantisationSettings,
+    _exchanged,
+    _has_gpu,
+    _improved_on_gpu,
+    _merging_costs,
+    _quantisation_of,
+    _split_codes,
+    quantise,
+)
+from lidarium.mapping.sparse.quantisation.tiles import tiles_of
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ({"method": "median"}, r"method of quantisation is 'median'; want one of kmeans\+\+, kmeans, lbg"),
+        ({"mode": "printed"}, "want one of default, thesis"),
+        ({"device": "tpu"}, "want one of cpu"),
+        ({"budget_s": 0.0}, "budget_s of quantisation"),
+        ({"steps": -1}, "steps of quantisation"),
+    ],
+)
+def test_settings_that_make_no_sense_are_refused(wrong, message):
+    with pytest.raises(ValueError, match=message):
+        QuantisationSettings(**wrong)
+
+
+def test_codes_without_points_stay_in_the_thesis_mode_alone():
+    assert QuantisationSettings(mode="thesis").keeps_empty
+    assert not QuantisationSettings().keeps_empty
+
+
+def test_splitting_is_deterministic_and_doubles():
+    tiles = tiles_of(room())
+    codes = _split_codes(tiles, 64, 7)
+    assert codes.shape == (64, 3)
+    assert (codes == _split_codes(tiles, 64, 7)).all()
+    assert len(_split_codes(tiles, 1, 7)) == 1
+    for count in (0, 3, 48):
+        with pytest.raises(ValueError, match="want a power of two"):
+            _split_codes(tiles, count, 7)
+
+
+def test_exchanges_take_from_where_codes_are_crowded():
+    crowd = np.random.default_rng(0).normal(0.0, 0.01, (400, 3))
+    spread = np.random.default_rng(1).uniform((5, 0, 0), (9, 4, 0), (400, 3))
+    tiles = tiles_of(np.concatenate([crowd, spread]).astype(np.float32))
+    codes = np.array([[0, 0, 0], [0.01, 0, 0], [0, 0.01, 0], [7, 2, 0]], np.float32)
+    summary = summary_of(tiles, codes, nearest_codes(tiles, codes))
+    costs, partners = _merging_costs(codes, summary.masses)
+    assert (partners[:3] < 3).all()
+    assert costs[3] > costs[:3].max()
+    moved = _exchanged(codes, summary, 1)
+    assert (moved[:, 0] > 5).sum() == 2
+    assert nearest_codes(tiles, moved).group_errors.sum() < 0.8 * summary.errors[:, 1].sum()
+
 
 POINTS = room()
+
+
+def test_torch_gives_the_codes_of_the_processor_on_any_of_its_devices():
+    pytest.importorskip("torch")
+    tiles = tiles_of(POINTS)
+    devices = ("cpu", "cuda") if _has_gpu() else ("cpu",)
+    for device in devices:
+        found = _improved_on_gpu(tiles, POINTS[:40], 5, device=device)
+        assert found == pytest.approx(improved(tiles, POINTS[:40], 5), abs=1e-5)
+
+
+@pytest.mark.skipif(not _has_gpu(), reason="torch finds no GPU")
+def test_a_gpu_gives_the_same_quantisation():
+    found, wanted = (quantise(POINTS, 40, QuantisationSettings(device=name)) for name in ("cuda", "cpu"))
+    assert found.codes == pytest.approx(wanted.codes, abs=1e-5)
+
+
+@pytest.mark.skipif(_has_gpu(), reason="torch finds a GPU")
+def test_a_gpu_that_is_not_there_is_told():
+    with pytest.raises(RuntimeError, match="torch finds no GPU"):
+        quantise(POINTS, 4, QuantisationSettings(device="cuda"))
+    assert quantise(POINTS, 4, QuantisationSettings(device="auto")).counts.all()
+
+
+def quantised(points, codes, weights=None):
+    tiles, codes = tiles_of(points, weights), np.asarray(codes, np.float32)
+    return _quantisation_of(tiles, codes, nearest_codes(tiles, codes))
+
+
+def test_labels_are_in_the_callers_order():
+    points = room(900)
+    codes = points[[1, 50, 300, 899]]
+    np.testing.assert_array_equal(quantised(points, codes).labels, searched(points, codes)[0])
+
+
+def test_errors_are_weighted_means_over_all_points():
+    points = np.array([[1.0, 0, 0], [0.0, 2, 0], [10.0, 0, 0]], np.float32)
+    found = quantised(points, [[0.0, 0, 0], [10.0, 0, 0]], np.array([1.0, 1.0, 2.0]))
+    assert (found.phi1, found.phi2) == pytest.approx((3.0 / 4.0, 5.0 / 4.0))
+    assert found.counts.tolist() == [2, 1]
+    assert found.rho.tolist() == [2.0, 0.0]
+
+
+def test_a_code_without_points_is_its_own_box_without_a_normal():
+    found = quantised(room(100), [[0.0, 0, 0], [90.0, 80.0, 70.0]])
+    assert found.boxes[1].tolist() == [[90.0, 80.0, 70.0]] * 2
+    assert np.isnan(found.normals[1]).all()
+    assert found.counts.tolist() == [100, 0]
+
+
+def test_normals_point_upwards_and_two_points_have_none():
+    generator = np.random.default_rng(0)
+    floor = generator.uniform(-1.0, 1.0, (80, 3)) * [1.0, 1.0, 0.0]
+    wall = generator.uniform(-1.0, 1.0, (80, 3)) * [0.0, 1.0, 1.0] + [50.0, 0, 0]
+    two = np.array([[0.0, 90.0, 0.0], [1.0, 90.0, 0.0]])
+    points = np.concatenate([floor, wall, two]).astype(np.float32)
+    found = quantised(points, [[0.0, 0, 0], [50.0, 0, 0], [0.5, 90.0, 0.0]])
+    np.testing.assert_allclose(found.normals[:2], [(0.0, 0.0, 1.0), (1.0, 0.0, 0.0)], atol=1e-6)
+    assert np.isnan(found.normals[2]).all()
+
+
 NAN = np.where(np.arange(len(POINTS))[:, None] == 7, np.nan, POINTS)
 
 

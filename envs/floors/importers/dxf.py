@@ -1,0 +1,351 @@
+"""Reads DXF drawings as floors: lines, polylines and curves are walls.
+
+Inserted blocks are taken apart. The drawing's unit says how large it is.
+
+References
+----------
+Autodesk, DXF Reference: Group Codes in Numerical Order; ENTITIES Section.
+"""
+
+import io
+import logging
+import re
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.envs.floors.floor import MAX_COORDINATE_M, Floor
+from lidarium.envs.floors.importers.common import MAX_POINTS, MAX_TEXT_BYTES, floor_of_lines
+from lidarium.mapping.files.guarded_reading import READING_ERRORS, read_bytes
+
+KINDS = frozenset(("LINE", "LWPOLYLINE", "POLYLINE", "ARC", "CIRCLE", "ELLIPSE", "SPLINE"))
+"""Entities that are walls; texts, dimensions, hatches and the like are none."""
+
+COMPOUND = frozenset(("INSERT", "MLINE"))
+"""Entities that are made of others."""
+
+_KEPT = KINDS | COMPOUND | {"VERTEX", "ATTRIB", "SEQEND"}
+"""Entities that stay in the text, with the parts of compound ones."""
+
+# Handles, owner, marks of classes, layer, colours, line types and weights: they move nothing.
+_LOOKS = frozenset(("5", "330", "100", "8", "6", "62", "370", "420", "48"))
+_PLAIN = {
+    "LINE": _LOOKS | {"10", "20", "30", "11", "21", "31"},
+    "LWPOLYLINE": _LOOKS | {"90", "70", "43", "38", "10", "20"},
+    "POLYLINE": _LOOKS | {"66", "70", "10", "20", "30", "40", "41"},
+    "VERTEX": _LOOKS | {"70", "10", "20", "30"},
+}
+"""Codes of entities that are read here; with others, as a bulge or another plane, they are left."""
+
+_ENTITY = re.compile(r"^[ \t]*0[ \t]*\n[ \t]*[A-Z]", re.MULTILINE)
+
+Polyline = NDArray[np.float64]
+"""Points x, y (n, 2) in the drawing's units; closed if the last is the first."""
+
+
+@dataclass(slots=True)
+class _Sifted:
+    """A drawing in two parts.
+
+    Attributes
+    ----------
+    text : str
+        The rest, for a parser.
+    walls : list of (layer, (n, 2) float64)
+        Straight walls, with the layers that they are on.
+    """
+
+    text: str
+    walls: list[tuple[str, Polyline]] = field(default_factory=list)
+
+    @property
+    def entities(self) -> int:
+        """Number of entities are left, tables and blocks among them."""
+        return sum(1 for _ in _ENTITY.finditer(self.text))
+
+
+@dataclass(slots=True)
+class _Entity:
+    """An entity: its kind, its codes and values, and at which pair it begins."""
+
+    kind: str
+    codes: list[str]
+    values: list[str]
+    begin: int
+
+    def numbers(self, code: str) -> list[float]:
+        return [float(value) for each, value in zip(self.codes, self.values, strict=True) if each == code]
+
+    def value(self, code: str, otherwise: str) -> str:
+        """Return the value of a code that occurs at most once."""
+        return self.values[self.codes.index(code)].strip() if code in self.codes else otherwise
+
+    @property
+    def is_plain(self) -> bool:
+        return _PLAIN[self.kind].issuperset(self.codes)
+
+
+def _sift(text: str) -> _Sifted:
+    """Take straight walls out of a drawing's text, and leave out the other entities.
+
+    Malformed entities stay, for a parser to repair or to refuse.
+    """
+    rows = text.split("\n")
+    codes, values = [code.strip() for code in rows[0::2]], rows[1::2]
+    codes = codes[: len(values)]
+    found, is_left = _Sifted(text), np.ones(len(codes), np.bool_)
+    entities = list(_sifted_entities(codes, values))
+    ends = [entity.begin for entity in entities[1:]] + [entities[-1].begin] if entities else []
+    place = 0
+    while place < len(entities) - 1:  # the last one ends the section
+        count, wall = _wall(entities, place)
+        if wall is not None:
+            found.walls.append((entities[place].value("8", "0"), wall))
+        if wall is not None or entities[place].kind not in _KEPT:
+            is_left[entities[place].begin : ends[place + count - 1]] = False
+        place += count
+    if not is_left.all():
+        kept = [f"{rows[2 * k]}\n{rows[2 * k + 1]}" for k in np.flatnonzero(is_left)]
+        found.text = "\n".join([*kept, *rows[2 * len(codes) :]])
+    return found
+
+
+def _sifted_entities(codes: list[str], values: list[str]) -> Iterator[_Entity]:
+    """Yield the entities of the section ENTITIES, and its end."""
+    starts = [k for k, code in enumerate(codes) if code == "0"]
+    is_inside = False
+    for begin, end in zip(starts, [*starts, len(codes)][1:], strict=True):
+        kind = values[begin].strip()
+        if is_inside:
+            yield _Entity(kind, codes[begin + 1 : end], values[begin + 1 : end], begin)
+        if is_inside and kind in ("ENDSEC", "EOF"):
+            return
+        if kind == "SECTION":
+            is_inside = codes[begin + 1 : begin + 2] == ["2"] and values[begin + 1].strip() == "ENTITIES"
+
+
+def _wall(entities: list[_Entity], place: int) -> tuple[int, Polyline | None]:
+    """Return of how many entities one is made, and the wall that it is if it can be read here."""
+    entity, count = entities[place], 1
+    if entity.kind == "POLYLINE":
+        while place + count < len(entities) and entities[place + count].kind in ("VERTEX", "SEQEND"):
+            count += 1
+            if entities[place + count - 1].kind == "SEQEND":
+                break
+    if entity.kind not in ("LINE", "LWPOLYLINE", "POLYLINE") or not entity.is_plain:
+        return count, None
+    try:
+        return count, _READERS[entity.kind](entity, entities[place + 1 : place + count])
+    except (ValueError, OverflowError):
+        return count, None
+
+
+def _line(entity: _Entity, parts: list[_Entity]) -> Polyline:
+    (x1,), (y1,), (x2,), (y2,) = (entity.numbers(code) for code in ("10", "20", "11", "21"))
+    return np.array([(x1, y1), (x2, y2)])
+
+
+def _light_polyline(entity: _Entity, parts: list[_Entity]) -> Polyline | None:
+    return _polyline(entity.numbers("10"), entity.numbers("20"), entity.value("70", "0"), (0, 1, 128, 129))
+
+
+def _heavy_polyline(entity: _Entity, parts: list[_Entity]) -> Polyline | None:
+    vertices = [part for part in parts if part.kind == "VERTEX"]
+    is_whole = len(parts) == len(vertices) + 1
+    if not is_whole or not all(part.is_plain and part.value("70", "0") == "0" for part in vertices):
+        return None
+    x, y = ([number for part in vertices for number in part.numbers(code)] for code in ("10", "20"))
+    return _polyline(x, y, entity.value("70", "0"), (0, 1)) if len(x) == len(vertices) else None
+
+
+def _polyline(x: list[float], y: list[float], flags: str, plain: tuple[int, ...]) -> Polyline | None:
+    """Return a polyline; None if it has other flags than for closed, or numbers without a partner."""
+    if len(x) != len(y) or len(x) < 2 or int(flags) not in plain:
+        return None
+    points = np.array([x, y]).T
+    return np.concatenate([points, points[:1]]) if int(flags) & 1 else points
+
+
+_READERS = {"LINE": _line, "LWPOLYLINE": _light_polyline, "POLYLINE": _heavy_polyline}
+
+
+logging.getLogger("ezdxf").addHandler(logging.NullHandler())  # else it writes each repair to the console
+
+CURVE_ERROR_M = 0.01
+"""How far the straight parts of a curve may be off it [m]."""
+
+CURVE_SHARE = 1e-4
+"""How far they may be off at least, as a share of the size of the curve."""
+
+_METRES = {1: 0.0254, 2: 0.3048, 4: 0.001, 5: 0.01, 6: 1.0, 10: 0.9144, 14: 0.1}
+"""Metres of a unit by the number that $INSUNITS has for it."""
+
+_UNIT = re.compile(rb"\$INSUNITS\s+70\s+(\d{1,3})\s")
+
+_MIN_ALLOWED, _BYTES = {"wall": 25_000, "parsed": 4_000}, {"wall": 40, "parsed": 200}
+"""Number of straight walls and parsed entities any drawing may have, and of how many bytes one more.
+
+Those of CAD programs take more bytes; files with more of them take long, and are not plans.
+"""
+
+_DEEPEST = 16
+
+
+def has_scale(path: Path) -> bool:
+    """Return whether the drawing has a unit; the rest of it is not parsed for that."""
+    found = _UNIT.search(read_bytes(path, MAX_TEXT_BYTES))
+    return found is not None and int(found[1]) in _METRES
+
+
+def load(path: Path, resolution: float | None) -> Floor:
+    """Read a drawing; ``resolution`` is the length of a unit if the drawing has none [m].
+
+    Entities on layers that are off or frozen are left out, and so are those in paper space.
+    """
+    content = read_bytes(path, MAX_TEXT_BYTES)
+    if not content.rstrip(b"\r\n\0 ").endswith(b"EOF"):
+        raise ValueError(f"{path} has no EOF at its end; want a whole DXF drawing")
+    maximum = {part: max(minimum, len(content) // _BYTES[part]) for part, minimum in _MIN_ALLOWED.items()}
+    sifted = _sift(content.decode("utf-8", "surrogateescape").replace("\r\n", "\n"))
+    if sifted.entities > maximum["parsed"]:
+        raise ValueError(_too_dense(path, maximum["parsed"], "entities beside straight walls"))
+    document = _document(path, sifted)
+    unit = _unit(document)
+    if unit is not None and resolution is not None:
+        raise ValueError(
+            f"{path} has units of {unit:g} m, but a resolution of {resolution} m is given; want none"
+        )
+    if unit is None and resolution is None:
+        raise ValueError(f"{path} has no unit; give --resolution, the metres of a unit")
+    scale = resolution if unit is None else unit
+    assert scale is not None
+    with _damage(path):
+        walls = _walls(path, document, sifted, CURVE_ERROR_M / scale, maximum["parsed"])
+        limited = _limited(path, walls, min(maximum["wall"], MAX_POINTS))
+        segments = np.concatenate([np.zeros((0, 4)), *limited]) * scale
+    if not len(segments):
+        raise ValueError(f"{path} has no lines in model space; want a plan of {', '.join(sorted(KINDS))}")
+    if not np.isfinite(segments).all():
+        raise ValueError(f"{path} has lines that lead nowhere; want finite coordinates")
+    return floor_of_lines(path, segments, np.zeros((0, 4)))
+
+
+def _limited(path: Path, lines: Iterable[NDArray[np.float64]], maximum: int) -> Iterator[NDArray[np.float64]]:
+    """Yield the segments x1, y1, x2, y2 (n, 4) of polylines, as long as they are not too many."""
+    count = 0
+    for line in lines:
+        count += len(line) - 1
+        if count > maximum:
+            raise ValueError(_too_dense(path, maximum, "straight walls"))
+        yield np.hstack([line[:-1], line[1:]])
+
+
+def _too_dense(path: Path, maximum: int, parts: str) -> str:
+    return f"{path} has more than {maximum:,} {parts}, too many for its size; want a plan"
+
+
+def _document(path: Path, sifted: _Sifted) -> Any:  # noqa: ANN401
+    """Return the rest of a drawing; ezdxf is imported here, since few need it."""
+    try:
+        import ezdxf
+        from ezdxf import recover
+        from ezdxf.lldxf.const import DXFError
+    except ImportError as error:
+        raise ValueError('DXF drawings need ezdxf; pip install "lidarium[dxf]"') from error
+    try:
+        # Repairs take twice as long as reading what is whole.
+        return ezdxf.read(io.StringIO(sifted.text))
+    except (AssertionError, DXFError, *READING_ERRORS):
+        pass
+    with _damage(path):
+        return recover.read(io.BytesIO(sifted.text.encode("utf-8", "surrogateescape")))[0]
+
+
+@contextmanager
+def _damage(path: Path) -> Iterator[None]:
+    """Name the file if ezdxf finds that it is not a drawing."""
+    from ezdxf.lldxf.const import DXFError
+
+    try:
+        yield
+    except (AssertionError, DXFError) as error:
+        raise ValueError(f"{path} is not a DXF drawing: {error}") from error
+
+
+def _unit(document: Any) -> float | None:  # noqa: ANN401
+    return _METRES.get(int(document.header.get("$INSUNITS", 0)))
+
+
+def _walls(
+    path: Path,
+    document: Any,  # noqa: ANN401
+    sifted: _Sifted,
+    error: float,
+    maximum: int,
+) -> Iterator[NDArray[np.float64]]:
+    """Yield the walls as polylines (n, 2) in the drawing's units."""
+    from ezdxf.path import make_path
+
+    hidden = {layer for layer in {layer for layer, _ in sifted.walls} if not _shows(document, layer)}
+    yield from (wall for layer, wall in sifted.walls if layer not in hidden)
+    for entity in _entities(path, document, maximum):
+        if entity.dxftype() == "LINE":  # paths of them cost ten times as much
+            start, end = entity.dxf.start, entity.dxf.end
+            yield np.array([(start.x, start.y), (end.x, end.y)])
+            continue
+        for part in make_path(entity).sub_paths():
+            line = _flattened(path, part, error)
+            if len(line) > 1:
+                yield line
+
+
+def _flattened(path: Path, part: Any, error: float) -> NDArray[np.float64]:  # noqa: ANN401
+    """Return points (n, 2) of a curve."""
+    corners = np.array([tuple(point) for point in part.control_vertices()]).reshape(-1, 3)
+    # Where numbers are too coarse for it, parts of a curve never come near enough, and there is no end.
+    farthest = MAX_COORDINATE_M / CURVE_ERROR_M * error
+    if not (np.abs(corners) <= farthest).all():
+        raise ValueError(f"{path} has a curve that reaches beyond {MAX_COORDINATE_M:,.0f} m; want a plan")
+    size = float(np.ptp(corners, axis=0).max()) if len(corners) else 0.0
+    points = part.flattening(max(error, CURVE_SHARE * size))
+    return np.array([(point.x, point.y) for point in points]).reshape(-1, 2)
+
+
+def _entities(path: Path, document: Any, maximum: int) -> Iterator[Any]:  # noqa: ANN401
+    """Yield walls, with blocks taken apart.
+
+    A few blocks that hold each other a few times make more entities than there is time for; all are counted.
+    """
+    waiting, count = [iter(document.modelspace())], 0
+    while waiting:
+        entity = next(waiting[-1], None)
+        if entity is None:
+            waiting.pop()
+            continue
+        count += len(waiting) > 1
+        if count > maximum:
+            raise ValueError(f"{path} has blocks of more than {maximum:,} entities; want a plan")
+        kind = entity.dxftype()
+        if not _shows(document, entity.dxf.layer, is_insert=kind == "INSERT"):
+            continue
+        if kind in COMPOUND:
+            if len(waiting) > _DEEPEST:
+                raise ValueError(f"{path} has blocks nested more than {_DEEPEST} deep; want a plan")
+            has_rows = kind == "INSERT" and entity.mcount > 1
+            waiting.append(iter(entity.multi_insert() if has_rows else entity.virtual_entities()))
+        elif kind in KINDS:
+            yield entity
+
+
+def _shows(document: Any, name: str, *, is_insert: bool = False) -> bool:  # noqa: ANN401
+    """Return whether a layer shows its entities; entities of a block have their own layers."""
+    if name not in document.layers:
+        return True
+    layer = document.layers.get(name)
+    is_off = not is_insert and layer.is_off()
+    return not (is_off or layer.is_frozen())

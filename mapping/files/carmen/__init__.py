@@ -1,1 +1,0 @@
-"""What the lines of CARMEN logs say."""

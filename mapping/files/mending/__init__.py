@@ -1,1 +1,0 @@
-"""Mends what files of other programs say wrongly."""

@@ -1,1 +1,0 @@
-"""The topological graph of a sparse map."""

@@ -1,1 +1,0 @@
-"""Paths on the graph of a sparse map."""
