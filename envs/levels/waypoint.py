@@ -63,7 +63,8 @@ class WaypointLevel(Level):
         decision_period_s: float | None = None,
     ) -> None:
         super().__init__(perception, settings, shares_map, decision_period_s)
-        self.action_space = spaces.Box(-1.0, 1.0, (2,), np.float32)
+        self._points = spaces.Box(-1.0, 1.0, (2,), np.float32)
+        self.action_space = self._points
         self.period_s = settings.decision_period_s if decision_period_s is None else decision_period_s
         self.steps = max(round(self.period_s / settings.time_step), 1)
         self.driver = TeamDriver(perception, settings, shares_map)
@@ -78,6 +79,9 @@ class WaypointLevel(Level):
 
     def read(self, actions: Mapping[int, Any], names: list[str]) -> Ways:
         """Return targets and routes of rows."""
+        if self.action_space is not self._points:  # a level of a user's own, which decodes arrays
+            ways: Ways = super().read(actions, names)
+            return ways
         targets: list[Target | None] = [None] * self.rows
         routes: dict[int, Route] = {}
         for row, action in actions.items():
@@ -98,7 +102,10 @@ class WaypointLevel(Level):
         wanted = "two finite numbers within [-1, 1]"
         shares = check_rows(actions, (self.rows, 2), live, wanted).astype(np.float64)
         positions = self.perception.beliefs.believed[:, :2] - self.perception.offsets
-        targets = positions + np.clip(shares, -1.0, 1.0) * self._half_side
+        return self.ways_to(positions + np.clip(shares, -1.0, 1.0) * self._half_side, live)
+
+    def ways_to(self, targets: NDArray[np.float64], live: Mask) -> Ways:
+        """Return the ways of live rows to targets (rows, 2) in their map frames [m]."""
         return Ways(Orders(live.copy(), targets, np.full(self.rows, np.nan)), {})
 
     def _target(self, row: int, action: Any, name: str) -> Target:  # noqa: ANN401

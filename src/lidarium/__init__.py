@@ -27,6 +27,8 @@ if TYPE_CHECKING:
     from lidarium.envs.floors.catalogue.names import load_floor
     from lidarium.envs.floors.floor import Floor, Solid
     from lidarium.envs.levels import level
+    from lidarium.envs.levels.velocity import VelocityLevel
+    from lidarium.envs.levels.waypoint import WaypointLevel
     from lidarium.envs.observing.observables import observable
     from lidarium.envs.onboard.radio.messages import Order, OrderKind, Route, Target
     from lidarium.envs.settings.battery import Battery
@@ -71,6 +73,8 @@ _FACE: dict[str, str] = {
     "SparsePlanning": "lidarium.envs.faces.sparse_planning",
     "Stop": "lidarium.agents.policy",
     "Target": "lidarium.envs.onboard.radio.messages",
+    "VelocityLevel": "lidarium.envs.levels.velocity",
+    "WaypointLevel": "lidarium.envs.levels.waypoint",
     "env": "lidarium.envs.faces.makers",
     "level": "lidarium.envs.levels",
     "load_floor": "lidarium.envs.floors.catalogue.names",

@@ -23,6 +23,7 @@ REGISTRIES: dict[str, str] = {
     "radio": "lidarium.envs.settings.radio:RADIO",
     "battery": "lidarium.envs.settings.battery:BATTERIES",
     "realism": "lidarium.envs.settings.realism:REALISM",
+    "level": "lidarium.envs.levels:LEVELS",
     "localizer": "lidarium.mapping.localization.registry:LOCALIZERS",
     "floor_format": "lidarium.envs.floors.importers:FORMATS",
     "study": "lidarium.benchmarks.studies:STUDIES",
