@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
 if TYPE_CHECKING:
     from lidarium.envs.exploration import ExplorationEnv
@@ -34,6 +34,9 @@ class Command:
     """folder for the files that the command writes"""
     json: bool = False
     """print the result as JSON on standard output, and nothing else there"""
+
+    compiles: ClassVar[bool] = False
+    """Whether the command calls kernels, which the first start compiles."""
 
     def __post_init__(self) -> None:
         if self.seed < 0:
@@ -245,10 +248,3 @@ class Progress:
         if self._bar is not None:
             self._bar.close()
             self._bar = None
-
-
-def __getattr__(name: str) -> Any:  # noqa: ANN401
-    """Return a name that has moved; it warns."""
-    from lidarium.moved import moved_name
-
-    return moved_name(__name__, name)

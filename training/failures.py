@@ -2,7 +2,7 @@
 
 from typing import NoReturn
 
-from lidarium.evaluation.suites.workers import WorkerDiedError
+from lidarium.evaluation.processes import WorkerDiedError
 
 
 def raise_named(error: Exception, episode: str) -> NoReturn:

@@ -17,9 +17,8 @@ import torch
 
 import lidarium
 from lidarium.agents.learned.weights import load_weights, save_weights
-from lidarium.evaluation.episodes.output import clear_unfinished, write_json
 from lidarium.mapping.files.guarded_reading import read_text, reading
-from lidarium.mapping.files.output import only_writer, remove_unfinished
+from lidarium.mapping.files.output import clear_unfinished, only_writer, remove_unfinished, write_json
 from lidarium.mapping.geometry.bounds import shown
 from lidarium.training.progress import Progress
 from lidarium.training.settings import MOST_BYTES, TrainingSettings

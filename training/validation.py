@@ -9,13 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from lidarium.evaluation.episodes.output import write_json
 from lidarium.evaluation.suites.campaign import EPISODES_FILE, SUITE_FILE, Campaign
 from lidarium.evaluation.suites.content import MOST_SUITE_BYTES
 from lidarium.evaluation.suites.episodes_file import read_episodes
 from lidarium.evaluation.suites.suite import Suite
 from lidarium.evaluation.suites.trial import DEFAULT_VARIANT
 from lidarium.mapping.files.guarded_reading import read_text, reading
+from lidarium.mapping.files.output import write_json
 from lidarium.training.failures import raise_named
 from lidarium.training.progress import Progress
 from lidarium.training.settings import TrainingSettings

@@ -15,7 +15,7 @@ from lidarium.benchmarks.speed.harness.report import about, heading, with_effort
 from lidarium.benchmarks.speed.harness.timing import EFFORTS, Effort, interleaved, on_cores, repeated
 from lidarium.benchmarks.speed.scenes.floors import BenchFloor, straight_floor, turned_floor
 from lidarium.benchmarks.speed.step_parts import ROBOTS, StepParts
-from lidarium.evaluation.episodes.output import check_writable, write_text
+from lidarium.mapping.files.output import check_writable, write_text
 
 WHOLE, OBSERVATION, REST = (
     "whole step of the kernel",

@@ -27,7 +27,7 @@ from lidarium.envs.floors.catalogue.store import FOLDER_VARIABLE, SIZE_VARIABLE,
 from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.settings.making import make_settings
 from lidarium.envs.simulation.kernels.floor_cache import floor_tables
-from lidarium.evaluation.episodes.output import write_json
+from lidarium.mapping.files.output import write_json
 
 FLOORS = 10_000
 """The first so many floors of the set."""

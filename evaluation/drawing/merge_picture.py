@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from lidarium.envs.drawing.rendering import Colour, team_colours
 from lidarium.evaluation.drawing.maps.merge_panels import Panel, contradicting, panels_of
 from lidarium.evaluation.drawing.plain_words import plain_words
-from lidarium.evaluation.episodes.output import whole_file
+from lidarium.mapping.files.output import whole_file
 from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.grids.occupancy import FREE, OCCUPIED
 from lidarium.mapping.merging.bend.deforming import Deformed

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from lidarium.envs.drawing.frame_parts import team_colours
 from lidarium.evaluation.drawing.plain_words import plain_words
-from lidarium.evaluation.episodes.output import whole_file
+from lidarium.mapping.files.output import whole_file
 
 INK, FAINT, SOLID = "#1f2937", "#6b7280", "#b6bec9"
 DPI = 130

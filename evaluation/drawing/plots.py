@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
-from lidarium.evaluation.analysis.figures import TIMES, VALUES
+from lidarium.evaluation.analysis.figures import TIMES, Value
 from lidarium.evaluation.analysis.groups import Group, times_to
 from lidarium.evaluation.analysis.records import Entry, Key, coverage_at, record_key
 from lidarium.evaluation.drawing.picture_parts import FAINT, INK
@@ -97,17 +97,17 @@ def save_coverage(path: Path, group: Group, curves: Curves) -> None:
     )
 
 
-def save_boxes(path: Path, group: Group) -> None:
+def save_boxes(path: Path, group: Group, values: Sequence[Value]) -> None:
     """Draw box plots of times, paths and overlap by policy.
 
     Runs that missed a share are counted above their box.
     """
-    values = [
+    boxed = [
         value
-        for value in VALUES
-        if value.key in BOXED and not (value.key == "overlap_percent" and group.robots == 1)
+        for value in values
+        if value.column.key in BOXED and not (value.column.key == "overlap_percent" and group.robots == 1)
     ]
-    panels = len(TIMES) + len(values)
+    panels = len(TIMES) + len(boxed)
     policies = list(group.runs)
     # Names of policies stand aslant below the axes.
     height = 4.1 + 0.042 * max(map(len, policies))
@@ -133,9 +133,9 @@ def save_boxes(path: Path, group: Group) -> None:
                     color=INK,
                     linespacing=1.0,
                 )
-    for axes, value in zip(row_of_axes[len(TIMES) :], values, strict=True):
+    for axes, value in zip(row_of_axes[len(TIMES) :], boxed, strict=True):
         _draw_boxes(axes, [np.array([value.of(row) for row in rows]) for rows in group.runs.values()])
-        dress(axes, value.title, "", f"{value.title} [{value.unit}]")
+        dress(axes, value.column.title, "", f"{value.column.title} [{value.column.unit}]")
         axes.set_ylim(bottom=0.0)
     for axes in row_of_axes:
         axes.grid(visible=False, axis="x")

@@ -48,7 +48,7 @@ from lidarium.evaluation.drawing.picture_parts import (
     save_titled_figure,
     show_cells,
 )
-from lidarium.evaluation.metrics import path_lengths
+from lidarium.evaluation.metrics.progress import path_lengths
 from lidarium.evaluation.record.episode_record import EpisodeRecord
 from lidarium.mapping.grids.occupancy import FREE, OCCUPIED, UNKNOWN
 from lidarium.mapping.grids.speckle_filter import without_small_components
@@ -250,10 +250,3 @@ def _draw_legend(figure: Figure) -> None:
         labelcolor=INK,
         handlelength=1.2,
     )
-
-
-def __getattr__(name: str) -> Any:  # noqa: ANN401
-    """Return a name that has moved; it warns."""
-    from lidarium.moved import moved_name
-
-    return moved_name(__name__, name)

@@ -1,6 +1,6 @@
 """Marks of a supervisor's decisions on pictures, with those on films."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 
 import cv2
 import numpy as np
@@ -12,9 +12,11 @@ from lidarium.agents.report import GivenOrder
 from lidarium.envs.drawing.frame_parts import SHIFT, Frame, View, team_colours
 from lidarium.envs.exploration import ExplorationEnv
 from lidarium.envs.radio.messages import OrderKind
-from lidarium.evaluation.drawing.films.film import DrawOver
 from lidarium.evaluation.drawing.picture_parts import INK, hex_colours
 from lidarium.evaluation.episodes.events import in_floor_frame
+
+DrawOver = Callable[[ExplorationEnv, Frame, View], None]
+"""Draws on a frame, given the environment and the view of the floor."""
 
 SHOWN_S = 4.0
 """How long a film shows an order or a join [s]."""

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from lidarium.envs.exploration import ExplorationEnv
 from lidarium.evaluation.episodes.watching import Watcher
-from lidarium.evaluation.metrics import overlap
+from lidarium.evaluation.metrics.cells import overlap
 from lidarium.evaluation.truth.footprints import Footprints
 from lidarium.evaluation.truth.map_tally import MapTally
 from lidarium.evaluation.truth.team_counts import COUNTED, KNOWABLE, VALID

@@ -21,10 +21,9 @@ from lidarium.envs.station.reports import Report
 from lidarium.envs.wrappers.merged_maps import MergedMaps, MergeEvent, MergingSettings, true_frames
 from lidarium.envs.wrappers.sparse_planning import SparsePlanning
 from lidarium.evaluation.episodes.events import merge_event
-from lidarium.evaluation.episodes.interrupts import PatientInterrupt
 from lidarium.evaluation.episodes.watching import WatchedExploration
+from lidarium.evaluation.processes import PatientInterrupt
 from lidarium.mapping.merging.fusion import FusedMap
-from lidarium.moved import renamed_method
 
 Progress = Callable[[ExplorationEnv], None]
 
@@ -113,8 +112,6 @@ class RunningTeam:
         Return whether that reached it.
         """
         return self._env.station.send_map(self._env.possible_agents.index(agent), others)
-
-    tell = renamed_method("tell", "send_map")
 
     def forget_walls(self, agent: str, trail: NDArray[np.float64]) -> bool:
         """Send an agent where another robot drove, in its map frame.

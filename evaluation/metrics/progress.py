@@ -1,18 +1,20 @@
-"""How soon, in how many decisions and over what way a team gets where it should.
+"""Time, decisions, distance, collisions and memory: how a team gets to a share of the floor, and its cost.
 
-Runs that do not are censored, not dropped.
-
-Time is simulated time. Coverage over time is a step function: each value holds until the next.
+Runs that do not reach a share are censored, not dropped. Time is simulated time. Coverage over time is a step
+function: each value holds until the next.
 
 References
 ----------
 T_p: Xu et al., Explore-Bench (ICRA 2022), which takes wall time. D_p as the longest path of the team: MARVEL
 (Chiun et al., ICRA 2025) and IR2 (Tan et al., IROS 2024). N_p: decision steps as of IR2. AUC: as of MAexp's
 curves (Zhu et al., ICRA 2024). Restricted time: Royston and Parmar, Restricted mean survival time (BMC
-Medical Research Methodology, 2013).
+Medical Research Methodology, 2013). Balance: Explore-Bench, "std". Jain index: Jain, Chiu and Hawe, A
+quantitative measure of fairness (1984).
 """
 
 import math
+import sys
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -163,3 +165,97 @@ def path_lengths(track: NDArray[np.float64]) -> NDArray[np.float64]:
     """
     steps = np.diff(np.asarray(track, np.float64)[..., :2], axis=0)
     return np.asarray(np.hypot(steps[..., 0], steps[..., 1]).sum(axis=0))
+
+
+def balance(shares: ArrayLike) -> float:
+    """Return the population standard deviation of the robots' shares ``C_known,i``.
+
+    It is Explore-Bench's "std".
+
+    Parameters
+    ----------
+    shares : (robots,) float64
+        C_known of each robot's own map.
+    """
+    return float(np.std(np.asarray(shares, np.float64)))
+
+
+def path_balance(lengths: ArrayLike) -> float:
+    """Return the population standard deviation of the path lengths over their mean.
+
+    0 where nobody moved.
+
+    Parameters
+    ----------
+    lengths : (robots,) float64
+        Length of each robot's path [m].
+    """
+    mean = float(np.mean(np.asarray(lengths, np.float64)))
+    return float(np.std(np.asarray(lengths, np.float64))) / mean if mean > 0.0 else 0.0
+
+
+def jain_index(lengths: ArrayLike) -> float:
+    """Return Jain's index ``(sum L_i)^2 / (n sum L_i^2)``.
+
+    It is 1 where all robots drive alike, 1/n where one drives alone, and 1 where nobody moved.
+
+    Parameters
+    ----------
+    lengths : (robots,) float64
+        Length of each robot's path [m].
+    """
+    ways = np.asarray(lengths, np.float64)
+    squares = float((ways**2).sum())
+    return float(ways.sum()) ** 2 / (ways.size * squares) if squares > 0.0 else 1.0
+
+
+def collisions_per_km(collisions: int, lengths: ArrayLike) -> float | None:
+    """Return collisions over the kilometres that the team drove.
+
+    None where nobody moved.
+
+    Parameters
+    ----------
+    collisions : int
+        How often a contact began, all robots together.
+    lengths : (robots,) float64
+        Length of each robot's path [m].
+    """
+    driven = float(np.sum(np.asarray(lengths, np.float64)))
+    return 1e3 * collisions / driven if driven > 0.0 else None
+
+
+def collisions_per_episode(collisions: Sequence[int]) -> float | None:
+    """Return the mean number of collisions of an episode; None without episodes.
+
+    Parameters
+    ----------
+    collisions : sequence of int
+        Collisions of each episode.
+    """
+    return float(np.mean(collisions)) if len(collisions) else None
+
+
+def decision_percentiles(seconds: Sequence[float]) -> dict[str, float | None]:
+    """Return the median and 95th percentile of decision times in milliseconds.
+
+    They are None where there was no decision.
+    """
+    if not len(seconds):
+        return {"p50": None, "p95": None}
+    half, most = np.percentile(np.asarray(seconds, np.float64) * 1e3, [50.0, 95.0])
+    return {"p50": round(float(half), 4), "p95": round(float(most), 4)}
+
+
+def peak_megabytes() -> float | None:
+    """Return the most memory that this process has held so far [1e6 bytes].
+
+    None where the system does not say.
+    """
+    try:
+        import resource
+    except ImportError:
+        return None
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    # macOS reports bytes, the others kilobytes of 1024.
+    return float(peak if sys.platform == "darwin" else peak * 1024) / 1e6

@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.evaluation.episodes.output import whole_file
 from lidarium.evaluation.record.display import DisplayTrack, MapChanges
 from lidarium.evaluation.record.episode_record import TIME, EpisodeRecord, NewerFormatError, check_header
 from lidarium.mapping.files.guarded_arrays import GuardedArchive
 from lidarium.mapping.files.guarded_reading import read_bytes, reading
+from lidarium.mapping.files.output import whole_file
 
 _HEADER, _EVENTS = "header.json", "events.json"
 _ARRAYS = (

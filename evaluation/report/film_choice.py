@@ -10,7 +10,7 @@ from typing import Any
 
 from lidarium.evaluation.analysis.episodes import Row, pair_key_of, read_episodes, variant_of
 from lidarium.evaluation.analysis.records import FOLDER, read_records, record_key
-from lidarium.evaluation.drawing.films.track_film import MOST_SIDE_BY_SIDE
+from lidarium.evaluation.drawing.track_film import MOST_SIDE_BY_SIDE
 from lidarium.evaluation.suites.trial import DEFAULT_VARIANT
 
 

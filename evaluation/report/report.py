@@ -13,15 +13,16 @@ import numpy as np
 
 import lidarium
 from lidarium.evaluation.analysis.episodes import Episodes, Row, name_of, read_episodes
+from lidarium.evaluation.analysis.figures import values_of
 from lidarium.evaluation.analysis.groups import grouped
 from lidarium.evaluation.analysis.records import FOLDER, Entry, Key, read_records, record_key
-from lidarium.evaluation.episodes.output import check_writable, check_written, write_text
 from lidarium.evaluation.record import read_record
 from lidarium.evaluation.report.page.content import chosen_replays, page_content, rounded
 from lidarium.evaluation.report.page.document import write_page
 from lidarium.evaluation.report.page.replay_content import replay_of
 from lidarium.evaluation.report.plain_text import code, plain
 from lidarium.evaluation.report.sections import Section, describe_group
+from lidarium.mapping.files.output import check_writable, check_written, write_text
 
 REPLAYS = 30
 """Most episodes that the page replays."""
@@ -76,8 +77,8 @@ def write_report(
     episodes = read_episodes(directory)
     baseline = _baseline(episodes, baseline)
     records, warnings = read_records(directory, episodes.rows)
-    groups = grouped(episodes.rows)
-    sections = [describe_group(group, records, out, baseline, seed) for group in groups]
+    groups, values = grouped(episodes.rows), values_of(episodes.rows)
+    sections = [describe_group(group, values, records, out, baseline, seed) for group in groups]
     replayed = chosen_replays(groups, records, replays)
     warnings = [*episodes.warnings, *_about_names(episodes), *warnings, *_about_records(episodes, records)]
     result = {

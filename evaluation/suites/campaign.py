@@ -16,14 +16,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import lidarium
-from lidarium.evaluation.episodes.output import clear_unfinished, write_json
+from lidarium.evaluation.processes import shared_out
 from lidarium.evaluation.suites.content import MOST_SUITE_BYTES
 from lidarium.evaluation.suites.episodes_file import KEY, EpisodesFile
 from lidarium.evaluation.suites.suite import Suite
 from lidarium.evaluation.suites.trial import Trial
 from lidarium.evaluation.suites.trial_run import RECORDS_FOLDER, RecordNotWrittenError, run_trial
-from lidarium.evaluation.suites.workers import shared_out
 from lidarium.mapping.files.guarded_reading import read_text, reason
+from lidarium.mapping.files.output import clear_unfinished, write_json
 
 if TYPE_CHECKING:
     pass

@@ -4,6 +4,7 @@ A task whose worker or machine is lost is done again elsewhere; its result comes
 """
 
 import logging
+import os
 import signal
 import socket
 import tempfile
@@ -18,6 +19,7 @@ import lidarium
 from lidarium.evaluation.suites.suite import Suite
 from lidarium.evaluation.suites.trial import Trial
 from lidarium.evaluation.suites.trial_run import run_trial, write_record_bytes
+from lidarium.registry import IMPORTS_VARIABLE, import_own
 
 Task = TypeVar("Task")
 Result = TypeVar("Result")
@@ -63,7 +65,8 @@ def on_ray(
         remote = ray.remote(max_retries=-1, num_cpus=1)(_done)
         window = WAITING_PER_CORE * max(int(ray.cluster_resources().get("CPU", 1)), 1)
         pending = iter(tasks)
-        running = {remote.remote(work, task, lidarium.__version__): task for task in islice(pending, window)}
+        version, imports = lidarium.__version__, os.environ.get(IMPORTS_VARIABLE, "")
+        running = {remote.remote(work, task, version, imports): task for task in islice(pending, window)}
         while running:
             for ready in ray.wait(list(running), num_returns=1, timeout=POLL_S)[0]:
                 task = running.pop(ready)
@@ -72,7 +75,7 @@ def on_ray(
                     raise ValueError(str(result))
                 yield task, result
                 for following in islice(pending, 1):
-                    running[remote.remote(work, following, lidarium.__version__)] = following
+                    running[remote.remote(work, following, version, imports)] = following
     finally:
         ray.shutdown()
 
@@ -122,13 +125,14 @@ def _handlers_kept() -> Iterator[None]:
         signal.signal(signal.SIGTERM, kept)
 
 
-def _done(work: Callable[[Task], Result], task: Task, version: str) -> Result:
+def _done(work: Callable[[Task], Result], task: Task, version: str, imports: str) -> Result:
     """Do a task on a machine of the cluster, if it has the same version."""
     if lidarium.__version__ != version:
         raise OtherVersionError(
             f"machine {socket.gethostname()} of the cluster has lidarium {lidarium.__version__}, this is "
             f"{version}; install the same on all"
         )
+    import_own(name for name in imports.split(",") if name)
     return work(task)
 
 

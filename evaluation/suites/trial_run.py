@@ -7,12 +7,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from lidarium.agents.policy import settings_for
-from lidarium.evaluation.episodes.output import whole_file
 from lidarium.evaluation.suites.bounds import beside_bound
 from lidarium.evaluation.suites.episodes_file import KEY
 from lidarium.evaluation.suites.starts import drawn_starts
 from lidarium.evaluation.suites.suite import Suite
 from lidarium.evaluation.suites.trial import Trial
+from lidarium.mapping.files.output import whole_file
 
 if TYPE_CHECKING:
     from lidarium.evaluation.record import EpisodeRecord

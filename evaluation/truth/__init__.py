@@ -1,10 +1,1 @@
-"""What is true of a floor, for the figures of a run."""
-
-from typing import Any
-
-
-def __getattr__(name: str) -> Any:  # noqa: ANN401
-    """Return a name that has moved; it warns."""
-    from lidarium.moved import moved_name
-
-    return moved_name(__name__, name)
+"""Ground truth of an episode: free and occupied cells, who sensed and knows them."""

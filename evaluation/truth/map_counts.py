@@ -1,7 +1,7 @@
 """Kernels that count which cells of maps are right."""
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -224,10 +224,3 @@ def note_changes(windows: Array, changes: Array) -> None:
             min(changes[row, 2], windows[row, 2]),
             max(changes[row, 3], windows[row, 3]),
         )
-
-
-def __getattr__(name: str) -> Any:  # noqa: ANN401
-    """Return a name that has moved; it warns."""
-    from lidarium.moved import moved_name
-
-    return moved_name(__name__, name)

@@ -15,8 +15,7 @@ from lidarium.envs.floors.free_space import reachable_free_space
 from lidarium.envs.scoring.coverage import unpack_bits
 from lidarium.envs.scoring.score import counted_cells
 from lidarium.envs.simulation.disturbances.odometry import RADIUS
-from lidarium.evaluation.metrics import surface
-from lidarium.evaluation.metrics.shares import Mask
+from lidarium.evaluation.metrics.cells import Mask, surface
 
 
 @dataclass(frozen=True, slots=True, eq=False)

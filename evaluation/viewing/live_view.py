@@ -12,9 +12,9 @@ from lidarium.agents.report import GivenUp
 from lidarium.envs.drawing.views import CUT_M, false_colours
 from lidarium.envs.exploration import ExplorationEnv
 from lidarium.envs.radio.messages import Orders
-from lidarium.evaluation.episodes.interrupts import is_end_asked
-from lidarium.evaluation.episodes.supervision import joined_groups
+from lidarium.evaluation.episodes.events import joined_groups
 from lidarium.evaluation.episodes.watching import WatchedExploration, Watcher
+from lidarium.evaluation.processes import is_end_asked
 from lidarium.evaluation.viewing.controls import Controls, Layer, follow
 from lidarium.evaluation.viewing.maps import TeamMaps
 from lidarium.evaluation.viewing.moment import Moment, moment_of

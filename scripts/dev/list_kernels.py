@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from lidarium.mapping.kernels.first_start.listed_kernels import encode_type
-from lidarium.scripts.process.first_start import LIST, count_compiled
+from lidarium.scripts.first_start import LIST, count_compiled
 
 CHILD = "--child"
 
@@ -56,8 +56,8 @@ def run_and_list(caches: Path | None) -> list[dict[str, Any]]:
 
 
 def _child(folder: str) -> None:
+    from lidarium.scripts import first_start
     from lidarium.scripts.main import main
-    from lidarium.scripts.process import first_start
 
     first_start.compile_first = lambda is_quiet: None
     assert main(["run", "--out", f"{folder}/run"]) == 0

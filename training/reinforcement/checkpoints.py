@@ -12,9 +12,8 @@ from safetensors.numpy import load, save
 from torch import nn
 
 from lidarium.agents.learned.weights import load_weights, save_weights
-from lidarium.evaluation.episodes.output import write_json
 from lidarium.mapping.files.guarded_reading import read_bytes, read_text, reading, shortened
-from lidarium.mapping.files.output import write_whole
+from lidarium.mapping.files.output import write_json, write_whole
 from lidarium.training.torch_network import ExplorerNetwork
 
 MOMENTS = ("exp_avg", "exp_avg_sq")

@@ -11,10 +11,10 @@ from lidarium.agents.learned.decision import Chooser, choose_classic
 from lidarium.agents.learned.network import Network
 from lidarium.agents.learned.weights import load_weights, save_weights
 from lidarium.envs.exploration import ExplorationEnv
-from lidarium.evaluation.episodes.output import write_json
 from lidarium.evaluation.episodes.runner import run_episode
+from lidarium.evaluation.processes import shared_out
 from lidarium.evaluation.suites.starts import drawn_starts
-from lidarium.evaluation.suites.workers import shared_out
+from lidarium.mapping.files.output import write_json
 from lidarium.training.failures import raise_named
 from lidarium.training.places import first_number, place_of
 from lidarium.training.progress import Progress

@@ -28,7 +28,7 @@ from lidarium.benchmarks.speed.growth.report import (
 from lidarium.benchmarks.speed.harness.report import about
 from lidarium.benchmarks.speed.harness.timing import on_cores
 from lidarium.benchmarks.speed.scenes.floors import straight_floor
-from lidarium.evaluation.episodes.output import check_writable, write_json, write_text
+from lidarium.mapping.files.output import check_writable, write_json, write_text
 
 REPEATS = 15
 SIZES = (4, 16, 64, 256, 1024)

@@ -9,11 +9,11 @@ import numpy as np
 
 import lidarium
 from lidarium.envs.settings.making import make_settings
-from lidarium.evaluation.episodes.output import write_text
 from lidarium.evaluation.episodes.result import result_of
 from lidarium.evaluation.episodes.runner import run_episode
 from lidarium.evaluation.episodes.watching import WatchedExploration
 from lidarium.evaluation.record import EpisodeRecord, Recorder, write_record
+from lidarium.mapping.files.output import write_text
 
 FLOOR, TEAM, DURATION_S = "building:17", 3, 600.0
 POLICIES = ("nearest_frontier", "utility_frontier", "explore_lite")

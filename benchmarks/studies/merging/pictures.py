@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from lidarium.benchmarks.studies.merging.bank.bank import BankMap, Pair
 from lidarium.benchmarks.studies.merging.bank.drives import RESOLUTION
 from lidarium.benchmarks.studies.merging.trials import Outcome
-from lidarium.evaluation.episodes.output import whole_file
+from lidarium.mapping.files.output import whole_file
 from lidarium.mapping.grids.occupancy import FREE, OCCUPIED
 from lidarium.mapping.merging.fusion import FusedMap, fuse
 

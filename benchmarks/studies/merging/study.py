@@ -40,8 +40,8 @@ from lidarium.benchmarks.studies.merging.thesis_stages import (
 from lidarium.benchmarks.studies.merging.trials import METHODS, read_outcomes, try_pairs
 from lidarium.benchmarks.studies.shared.kept import Progress
 from lidarium.benchmarks.studies.shared.study import Study
-from lidarium.evaluation.episodes.output import write_json
-from lidarium.evaluation.suites.workers import shared_out
+from lidarium.evaluation.processes import shared_out
+from lidarium.mapping.files.output import write_json
 from lidarium.mapping.merging.settings import STRUCTURES, MergeSettings, merge_settings
 
 EXTRA_FILE = "extra.json"

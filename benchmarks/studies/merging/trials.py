@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 from lidarium.benchmarks.studies.merging.bank.bank import BankMap, Pair
 from lidarium.benchmarks.studies.merging.bank.drives import RESOLUTION
 from lidarium.benchmarks.studies.merging.peers import FEATURES, features_of, match_peers
-from lidarium.evaluation.episodes.output import write_json
-from lidarium.evaluation.suites.workers import shared_out
+from lidarium.evaluation.processes import shared_out
+from lidarium.mapping.files.output import write_json
 from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.grids.occupancy import UNKNOWN
 from lidarium.mapping.merging.agreement.validation import Agreement

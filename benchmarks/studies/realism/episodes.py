@@ -22,7 +22,7 @@ from lidarium.evaluation.episodes.history import History
 from lidarium.evaluation.episodes.result import result_of
 from lidarium.evaluation.episodes.runner import run_episode
 from lidarium.evaluation.episodes.watching import WatchedExploration, Watcher
-from lidarium.evaluation.metrics.maps import occupied_iou
+from lidarium.evaluation.metrics.cells import occupied_iou
 from lidarium.evaluation.metrics.poses import absolute_error, best_transform
 from lidarium.evaluation.truth.beliefs import team_log_odds
 from lidarium.evaluation.truth.true_map import truth_of

@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
 import lidarium
-from lidarium.evaluation.episodes.output import write_json
+from lidarium.evaluation.processes import shared_out
 from lidarium.evaluation.suites.episodes_file import KEY, EpisodesFile, read_episodes
-from lidarium.evaluation.suites.workers import shared_out
+from lidarium.mapping.files.output import write_json
 
 VERSION = "version"
 """Entry of a line: the version of lidarium that did the task."""

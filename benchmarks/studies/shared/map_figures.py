@@ -7,17 +7,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.envs.floors.floor import Floor
-from lidarium.evaluation.metrics import (
-    absolute_error,
+from lidarium.evaluation.metrics.curves import (
     curve_precision,
     end_point_bytes,
     grid_bytes,
     hits_of_beams,
-    moved,
     seen_walls,
     wall_error,
     wall_recall,
 )
+from lidarium.evaluation.metrics.poses import absolute_error, moved
 from lidarium.mapping.files.spline_files import compact_bytes
 from lidarium.mapping.geometry.rigid import relative
 from lidarium.mapping.grids.scan_geometry import ScanGeometry

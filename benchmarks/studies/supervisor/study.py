@@ -32,14 +32,14 @@ from lidarium.benchmarks.studies.supervisor.suites import (
     suites,
 )
 from lidarium.envs.exploration import ExplorationEnv
-from lidarium.evaluation.episodes.output import write_json
+from lidarium.evaluation.episodes.events import decision_lines
 from lidarium.evaluation.episodes.runner import run_episode
-from lidarium.evaluation.episodes.supervision import decision_lines
 from lidarium.evaluation.suites.campaign import Campaign
 from lidarium.evaluation.suites.episodes_file import KEY
 from lidarium.evaluation.suites.starts import drawn_starts
 from lidarium.evaluation.suites.suite import Suite
 from lidarium.evaluation.suites.trial import Trial
+from lidarium.mapping.files.output import write_json
 
 __all__ = ["page", "suites", "work"]
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from lidarium.envs.drawing.rendering import team_colours
 from lidarium.evaluation.drawing.plain_words import plain_words
-from lidarium.evaluation.episodes.output import whole_file
+from lidarium.mapping.files.output import whole_file
 from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.grids.occupancy import OCCUPIED
 from lidarium.mapping.merging.regions.graph import RegionGraph

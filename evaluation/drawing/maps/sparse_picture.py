@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from lidarium.envs.drawing.shading import Viewpoint, shade
 from lidarium.envs.floors.faces import GROUND, Faces
 from lidarium.evaluation.drawing.picture_parts import INK
-from lidarium.evaluation.episodes.output import whole_file
+from lidarium.mapping.files.output import whole_file
 from lidarium.mapping.sparse.graph.topological_graph import TopologicalGraph
 
 OUTERMOST = 0.005

@@ -4,11 +4,12 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 from lidarium.evaluation.analysis.episodes import Row, pair_key_of, variant_of
-from lidarium.evaluation.analysis.figures import TIMES, VALUES
+from lidarium.evaluation.analysis.figures import TIMES, Value
 from lidarium.evaluation.analysis.groups import Group
 from lidarium.evaluation.analysis.multiples import over_bound
 from lidarium.evaluation.analysis.records import Entry, Key, record_key
 from lidarium.evaluation.drawing.style import colours
+from lidarium.evaluation.episodes.result import METRICS
 from lidarium.evaluation.report.plain_text import as_text
 from lidarium.evaluation.report.sections import Section
 from lidarium.evaluation.suites.trial import DEFAULT_VARIANT
@@ -33,6 +34,7 @@ def page_content(
         The episodes that have a replay on the page, in the order of the replays.
     """
     policies = sorted({policy for section in sections for policy in section.group.runs})
+    values = sections[0].values
     place = {id(row): index for index, row in enumerate(replays)}
     return {
         "kind": "report",
@@ -41,9 +43,23 @@ def page_content(
         "warnings": [as_text(warning) for warning in report["warnings"]],
         "policies": dict(zip(policies, colours(len(policies)), strict=True)),
         "times": TIMES,
-        "values": {value.key: {"title": value.title, "unit": value.unit} for value in VALUES},
+        "values": {value.column.key: _described(value) for value in values},
         "groups": [_group(section) for section in sections],
-        "episodes": _columns([section.group for section in sections], policies, place),
+        "episodes": _columns([section.group for section in sections], policies, values, place),
+    }
+
+
+def _described(value: Value) -> dict[str, Any]:
+    """Return what tables of the page need to know of a column."""
+    column = value.column
+    return {
+        "title": printable(column.title),
+        "unit": printable(column.unit),
+        "digits": column.digits,
+        "direction": column.direction,
+        "summary": printable(METRICS[value.metric].summary.replace("`", "")),
+        "by_mean": column.by_mean,
+        "is_main": column.is_main,
     }
 
 
@@ -78,7 +94,7 @@ def rounded(content: Any) -> Any:  # noqa: ANN401
 
 
 def _columns(
-    groups: Sequence[Group], policies: Sequence[str], replays: dict[int, int]
+    groups: Sequence[Group], policies: Sequence[str], values: Sequence[Value], replays: dict[int, int]
 ) -> dict[str, list[Any]]:
     """Return all episodes as columns, names as their places in lists: thousands of lines stay small."""
     floors = {
@@ -92,19 +108,19 @@ def _columns(
             floors[str(row["floor"])],
             row["seed"],
             replays.get(id(row), -1),
-            *_figures(row),
+            *_figures(row, values),
         )
         for k, group in enumerate(groups)
         for policy, rows in group.runs.items()
         for row in rows
     ]
-    names = ("group", "policy", "floor", "seed", "replay", *TIMES, *(value.key for value in VALUES))
+    names = ("group", "policy", "floor", "seed", "replay", *TIMES, *(value.column.key for value in values))
     return {"floors": list(floors), **dict(zip(names, map(list, zip(*lines, strict=True)), strict=True))}
 
 
-def _figures(row: Row) -> list[float | None]:
+def _figures(row: Row, values: Sequence[Value]) -> list[float | None]:
     times = [None if row[key] is None else round(float(row[key]), 2) for key in TIMES]
-    return [*times, *(round(value.of(row), value.digits) for value in VALUES)]
+    return [*times, *(round(value.of(row), value.column.digits) for value in values)]
 
 
 def chosen_replays(groups: Iterable[Group], records: dict[Key, Entry], most: int) -> list[Row]:

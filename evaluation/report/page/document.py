@@ -9,9 +9,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from lidarium.evaluation.episodes.output import write_text
 from lidarium.evaluation.report.page.replay_content import Replay
 from lidarium.mapping.files.names import printable
+from lidarium.mapping.files.output import write_text
 
 FRONT_END = Path(__file__).parents[1] / "data" / "page.html"
 """The page without data."""

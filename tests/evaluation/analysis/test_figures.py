@@ -9,6 +9,7 @@ from lidarium.evaluation.analysis.figures import (
     further_keys,
     time_figure,
     value_figure,
+    values_of,
 )
 from lidarium.evaluation.analysis.groups import grouped
 
@@ -21,7 +22,7 @@ def test_a_time_that_none_reached_has_no_mean_but_a_success_rate(row):
 
 def test_numbers_under_other_keys_are_figures_too(row):
     runs = [row(seed=seed, sharing_lag_s=2.0 + seed, t50_s=None, auc=None) for seed in range(3)]
-    keys = further_keys(runs)
+    keys = further_keys(runs, values_of(runs))
     assert "sharing_lag_s" in keys
     assert "t50_s" in keys
     assert not {"auc", "seed", "robots", "interrupted", "t90_s", "version"} & set(keys)
@@ -38,7 +39,7 @@ def test_a_faster_policy_is_found_pair_by_pair(row):
         for seed, each in enumerate(slow)
     ]
     (group,) = grouped([*slow, *fast])
-    by_key = {each.key: each for each in compared(group, "slow", seed=0)}
+    by_key = {each.key: each for each in compared(group, values_of([*slow, *fast]), "slow", seed=0)}
     assert by_key["t90_s"].difference.estimate == pytest.approx(-5.95)
     assert by_key["t90_s"].difference.high < 0.0
     assert by_key["t90_s"].ratio.high < 1.0
@@ -52,15 +53,16 @@ def test_of_a_policy_that_never_gets_there_the_horizon_counts(row):
     never = [row("never", seed) for seed in range(10)]
     always = [row("always", seed, t90_s=30.0 + seed, t99_s=None) for seed in range(10)]
     (group,) = grouped([*never, *always])
-    by_key = {each.key: each for each in compared(group, "never", seed=0)}
+    by_key = {each.key: each for each in compared(group, values_of([*never, *always]), "never", seed=0)}
     assert by_key["t90_s"].difference.estimate == pytest.approx(34.5 - 100.0)
     assert by_key["t99_s"].difference is None
     assert by_key["t99_s"].wilcoxon.ties == 10
 
 
 def test_a_policy_without_a_pair_is_not_compared(row):
-    (group,) = grouped([row("a", 0), row("b", 1)])
-    assert compared(group, "a", seed=0) == []
+    rows = [row("a", 0), row("b", 1)]
+    (group,) = grouped(rows)
+    assert compared(group, values_of(rows), "a", seed=0) == []
 
 
 def test_the_interquartile_mean_of_a_value_leaves_out_what_lies_far_off():

@@ -8,10 +8,10 @@ from lidarium.envs.exploration import ExplorationEnv
 from lidarium.envs.floors.floor import Floor, Raster
 from lidarium.envs.scoring.coverage import unpack_bits
 from lidarium.envs.settings.making import make_settings
-from lidarium.evaluation import metrics
 from lidarium.evaluation.episodes.history import History
 from lidarium.evaluation.episodes.runner import run_episode
 from lidarium.evaluation.episodes.watching import WatchedExploration, Watcher
+from lidarium.evaluation.metrics import cells
 from lidarium.evaluation.truth.beliefs import free_as_held, maps_on_floor
 from lidarium.evaluation.truth.true_map import truth_of
 
@@ -37,10 +37,10 @@ class Whole(Watcher):
         self.rows.append(
             (
                 env.scorer.time,
-                metrics.free_coverage(unpack_bits(env.score.team_masks[0], known.shape[1]), truth.counted),
-                metrics.known_coverage(known, truth.knowable),
-                metrics.valid_coverage(known, truth.counted, truth.occupied),
-                *(metrics.free_coverage(own, truth.counted) for own in held),
+                cells.free_coverage(unpack_bits(env.score.team_masks[0], known.shape[1]), truth.counted),
+                cells.known_coverage(known, truth.knowable),
+                cells.valid_coverage(known, truth.counted, truth.occupied),
+                *(cells.free_coverage(own, truth.counted) for own in held),
             )
         )
 
@@ -107,9 +107,9 @@ def test_the_last_milestone_has_what_each_map_knew(known_starts):
     milestone = history.milestone(0.99)
     assert milestone.time_s == episode.env.scorer.time
     assert milestone.known_shares == pytest.approx(
-        [metrics.known_coverage(own != 0, truth.knowable) for own in maps]
+        [cells.known_coverage(own != 0, truth.knowable) for own in maps]
     )
-    assert milestone.overlap == metrics.overlap(episode.env.score.masks)
+    assert milestone.overlap == cells.overlap(episode.env.score.masks)
 
 
 def test_a_lone_robot_overlaps_with_nobody():

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from lidarium.evaluation.analysis.figures import compared, time_figure
+from lidarium.evaluation.analysis.figures import compared, time_figure, values_of
 from lidarium.evaluation.analysis.groups import grouped
 from lidarium.evaluation.report.tables import (
     NONE,
@@ -73,7 +73,8 @@ def test_comparisons_say_how_many_pairs_are_less_more_and_the_same(row):
         for seed in range(4)
     ]
     (group,) = grouped(runs)
-    lines = cells(comparisons_table(compared(group, "a", seed=0)))
+    values = values_of(runs)
+    lines = cells(comparisons_table(compared(group, values, "a", seed=0), values))
     (path,) = [line for line in lines if line[1] == "path of the team [m]"]
     assert path[0] == "`b`"
     assert path[2] == "4"

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from seen_truth import NEAR, begun, scribbled
 
-from lidarium.evaluation import metrics
+from lidarium.evaluation.metrics import cells
 from lidarium.evaluation.truth.beliefs import free_as_held, maps_on_floor
 from lidarium.evaluation.truth.map_tally import MapTally
 from lidarium.evaluation.truth.true_map import truth_of
@@ -35,7 +35,7 @@ def test_steps_between_two_counts_are_all_taken_in(options):
             found = tally.counts[-1:, 2] if tally.shares else tally.counts[:-1, 2]
             assert set(held.sum(axis=(1, 2)).tolist()) == set(found.tolist())
             assert tally.known_shares == pytest.approx(
-                [metrics.known_coverage(own != 0, truth.knowable) for own in maps]
+                [cells.known_coverage(own != 0, truth.knowable) for own in maps]
             )
 
 

@@ -16,7 +16,7 @@ from lidarium.benchmarks.studies.merging.bank.bank import (
 from lidarium.benchmarks.studies.merging.bank.floors import BankFloor
 from lidarium.benchmarks.studies.merging.bank.pairs import choose_pairs
 from lidarium.benchmarks.studies.shared.kept import Progress
-from lidarium.evaluation.episodes.output import write_json
+from lidarium.mapping.files.output import write_json
 
 DATA_FILE = "floors.json"
 
