@@ -45,11 +45,6 @@ def is_wrapped_interrupt(error: Exception) -> bool:
     """Whether an error is an interrupt that compiled code has passed on as a ``SystemError``.
 
     Numba calls the interpreter while a kernel returns; an interrupt that is raised there comes out so.
-
-    Parameters
-    ----------
-    error : Exception
-        Whatever was raised.
     """
     cause: BaseException | None = error
     while isinstance(cause, SystemError):
@@ -71,14 +66,9 @@ class PatientInterrupt:
     So is a first SIGTERM, where a ``Termination`` handles it. A second one raises at once.
 
     An exception that is thrown into the middle of anything leaves it in the middle: a world half stepped, or
-    Numba with a loader that has died for good, after which no kernel can be called. What is to be kept after
-    an interrupt is therefore broken off where it is whole. Outside the main thread, and where an application
-    handles a signal in its own way, nothing is changed.
-
-    Parameters
-    ----------
-    grace_s : float
-        For how long after the first signal further ones are taken for the same wish [s].
+    Numba with a loader that has died for good, after which no kernel can be called. Results that are kept
+    after an interrupt is therefore broken off if it is whole. Outside the main thread, and where an
+    application handles a signal in its own way, nothing is changed.
     """
 
     def __init__(self, grace_s: float = 0.0) -> None:
@@ -122,14 +112,9 @@ class PatientInterrupt:
 
 @contextmanager
 def heard_termination() -> Iterator[Any]:
-    """Let SIGTERM end what runs as Ctrl-C does.
+    """Let SIGTERM end the run as Ctrl-C does.
 
     Nothing changes outside the main thread, and where an application handles the signal in its own way.
-
-    Yields
-    ------
-    Termination
-        Whether the signal came.
     """
     termination = Termination()
     is_ours = (
@@ -148,14 +133,14 @@ def heard_termination() -> Iterator[Any]:
 def leave_at_the_next(code: int) -> None:
     """Let the next Ctrl-C or SIGTERM end this process at once.
 
-    What is to be kept is kept by now. Python would answer with lines on where it was.
+    Results are kept by now. Python would print a traceback.
     """
     if threading.current_thread() is not threading.main_thread():
         return
 
     def leave(number: int, frame: FrameType | None) -> None:
         with suppress(BaseException):  # whatever was under way when the signal came
-            kill_workers()
+            _kill_workers()
         os._exit(code)
 
     for number in (signal.SIGINT, signal.SIGTERM):
@@ -200,13 +185,6 @@ def end_workers(grace_s: float = END_GRACE_S, *, are_ending: bool = False) -> No
     """End all processes that this one has begun, and wait until they are gone.
 
     A process that is stopped does not hear that it is to end; it is killed.
-
-    Parameters
-    ----------
-    grace_s : float
-        Wall time in which they may end by themselves [s].
-    are_ending : bool
-        Whether they know already that they are to end.
     """
     processes = multiprocessing.active_children()
     if not are_ending:
@@ -221,7 +199,7 @@ def end_workers(grace_s: float = END_GRACE_S, *, are_ending: bool = False) -> No
             process.join()
 
 
-def kill_workers() -> None:
+def _kill_workers() -> None:
     """End all processes that this one has begun, at once, whatever they do."""
     for process in multiprocessing.active_children():
         with suppress(OSError):
@@ -231,7 +209,7 @@ def kill_workers() -> None:
 def stopped_workers() -> list[int]:
     """Return the numbers of workers that are stopped (SIGSTOP, Ctrl-Z).
 
-    None where the system does not say.
+    None if the system does not say.
     """
     numbers = [process.pid for process in multiprocessing.active_children() if process.pid is not None]
     return [number for number in numbers if _state(number) in _STOPPED]
@@ -250,7 +228,7 @@ Task = TypeVar("Task")
 Result = TypeVar("Result")
 
 _TRIM = getattr(ctypes.CDLL(None), "malloc_trim", None) if os.name == "posix" else None
-"""Gives freed memory back to the system, where the C library has that."""
+"""Gives freed memory back to the system, if the C library has that."""
 
 WAITING_PER_WORKER = 2
 """Tasks that are handed over before a worker is free, so that it never waits."""
@@ -266,7 +244,7 @@ CHECK_PERIOD_S = 10.0
 
 
 class WorkerDiedError(RuntimeError):
-    """Raised, as a task's result, where its process died whenever it was tried."""
+    """Raised, as a task's result, if its process died whenever it was tried."""
 
 
 def shared_out(
@@ -275,29 +253,6 @@ def shared_out(
     """Do tasks in this process or in several; yield each with its result when ready.
 
     One worker means this process, more mean processes of their own.
-
-    Parameters
-    ----------
-    work : callable
-        Does a task; a function of a module, as processes import it.
-    tasks : iterable
-        Tasks and results go between processes, so they can be pickled.
-    workers : int
-        How many processes.
-    is_apart : bool
-        Whether one worker, too, is a process of its own, in which libraries keep to one thread: for what is
-        timed.
-
-    Yields
-    ------
-    task, result
-        An exception that the task has raised is its result. A task whose process died has a
-        ``WorkerDiedError``; those that were under way beside it are done again.
-
-    Warns
-    -----
-    UserWarning
-        Where a worker is stopped from outside: its task waits until it is continued.
     """
     if workers <= 1 and not is_apart:
         for task in tasks:

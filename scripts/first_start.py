@@ -27,11 +27,6 @@ def compile_first(is_quiet: bool) -> None:
 
     Each process takes the next kernel of the list and keeps it in the cache, where this process finds it. A
     kernel that cannot be compiled so is left to its first call.
-
-    Parameters
-    ----------
-    is_quiet : bool
-        No bar, lines only.
     """
     from lidarium.mapping.kernels.compilation import kernel_cache
 
@@ -66,7 +61,7 @@ def _compiled(folder: Path, kernels: Sequence[Entry], processes: int) -> Iterato
             yield from range(before, count)
         is_whole = True
     except BrokenProcessPool:
-        return  # what is missing is compiled where it is called
+        return  # missing kernels are compiled at their first call
     finally:
         pool.shutdown(wait=is_whole, cancel_futures=True)
         if not is_whole:

@@ -1,4 +1,4 @@
-"""The command line: reads what is asked for, runs it, and converts the outcome into exit codes."""
+"""The command line: parses arguments, runs commands, and converts the outcome into exit codes."""
 
 import inspect
 import os
@@ -46,7 +46,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     is_process = arguments is None
     if is_process:
-        open_closed_streams()
+        _open_closed_streams()
     with heard_termination() as termination:
         try:
             code = _ended(arguments)
@@ -59,14 +59,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 leave_at_the_next(code)
             end_workers()
     if is_process:
-        flush_streams()
+        _flush_streams()
     return code
 
 
 def _ended(arguments: Sequence[str] | None) -> int:
     """Run a command; return its exit code, errors included."""
     if list(sys.argv[1:] if arguments is None else arguments) == ["--version"]:
-        print_result(f"lidarium {lidarium.__version__}\n")
+        _print_result(f"lidarium {lidarium.__version__}\n")
         return DONE
     try:
         return _answered(list(sys.argv[1:] if arguments is None else arguments))
@@ -103,7 +103,7 @@ def _answered(words: list[str]) -> int:
         if not words:
             notify(text.rstrip())
             return BAD_INPUT
-        print_result(text)
+        _print_result(text)
         return DONE
     if tuple(words[:2]) in _IN_TWO_WORDS:
         words[:2] = [_IN_TWO_WORDS[words[0], words[1]]]
@@ -117,7 +117,7 @@ def _answered(words: list[str]) -> int:
     if answer.result:
         from lidarium.mapping.files.output import as_json
 
-        print_result(as_json(answer.result) if command.json else answer.text + "\n")
+        _print_result(as_json(answer.result) if command.json else answer.text + "\n")
     return answer.code
 
 
@@ -144,7 +144,7 @@ def _options(execute: Callable[[Any], Answer], name: str, words: list[str]) -> C
     try:
         return tyro.cli(options, prog=f"lidarium {name}", args=words, config=config)
     except BrokenPipeError as error:  # nobody reads the help to its end
-        silence(sys.stdout)
+        _silence(sys.stdout)
         raise SystemExit(DONE) from error
 
 
@@ -154,7 +154,7 @@ def _message(error: Exception) -> str:
     return str(error) or type(error).__name__
 
 
-def open_closed_streams() -> None:
+def _open_closed_streams() -> None:
     """Give this process the standard streams that it was started without.
 
     They lead to nowhere. A file opened later would take their numbers else, and whatever is printed would be
@@ -170,7 +170,7 @@ def open_closed_streams() -> None:
             setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: SIM115
 
 
-def silence(stream: TextIO) -> None:
+def _silence(stream: TextIO) -> None:
     """Lead a stream to nowhere.
 
     Its reader has left, and Python would complain at exit.
@@ -181,29 +181,23 @@ def silence(stream: TextIO) -> None:
         os.close(nowhere)
 
 
-def print_result(text: str) -> None:
-    """Print a result on standard output.
-
-    Raises
-    ------
-    OSError
-        Where it cannot be written; a reader who has left is no error.
-    """
+def _print_result(text: str) -> None:
+    """Print a result on standard output."""
     try:
         sys.stdout.write(text)
         sys.stdout.flush()
     except BrokenPipeError:
-        silence(sys.stdout)
+        _silence(sys.stdout)
     except OSError as error:
-        silence(sys.stdout)
+        _silence(sys.stdout)
         message = f"the result cannot be written: {error.strerror}"
         raise OSError(error.errno, message, "standard output") from error
 
 
-def flush_streams() -> None:
-    """Write what is left in the buffers, as at exit, but without complaints."""
+def _flush_streams() -> None:
+    """Write the rest of the buffers, as at exit, but without complaints."""
     for stream in (sys.stdout, sys.stderr):
         try:
             stream.flush()
         except (OSError, ValueError):
-            silence(stream)
+            _silence(stream)

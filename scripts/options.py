@@ -17,18 +17,7 @@ if TYPE_CHECKING:
 
 
 def policy_options(assignments: Iterable[str]) -> dict[str, Any]:
-    """Return settings of a policy by name.
-
-    Parameters
-    ----------
-    assignments : iterable of str
-        ``KEY=VALUE`` each.
-
-    Raises
-    ------
-    ValueError
-        Where one sets nothing.
-    """
+    """Return settings of a policy by name."""
     from lidarium.envs.settings.making import value_of
 
     options: dict[str, Any] = {}
@@ -41,20 +30,7 @@ def policy_options(assignments: Iterable[str]) -> dict[str, Any]:
 
 
 def options_by_policy(assignments: Iterable[str], policies: Sequence[str]) -> dict[str, dict[str, Any]]:
-    """Return settings of several policies, by the names of policy and setting.
-
-    Parameters
-    ----------
-    assignments : iterable of str
-        ``POLICY.KEY=VALUE`` each.
-    policies : sequence of str
-        Who may be set.
-
-    Raises
-    ------
-    ValueError
-        Where one sets nothing, or a policy that is not there.
-    """
+    """Return settings of several policies, by the names of policy and setting."""
     options: dict[str, dict[str, Any]] = {}
     for assignment in assignments:
         name, dot, rest = assignment.partition("=")[0].rpartition(".")
@@ -75,11 +51,6 @@ def gathered(words: Sequence[str]) -> list[str]:
 
     ``--supervisor.KEY VALUE`` and ``--supervisor.KEY=VALUE`` become ``--supervisor KEY=VALUE ...`` at its
     end; dashes in a key are underscores.
-
-    Raises
-    ------
-    ValueError
-        Where a setting has no value.
     """
     rest: list[str] = []
     found: list[str] = []
@@ -98,18 +69,7 @@ def gathered(words: Sequence[str]) -> list[str]:
 
 
 def supervisor_options(assignments: Iterable[str]) -> dict[str, Any]:
-    """Return settings of the supervisor by name.
-
-    Parameters
-    ----------
-    assignments : iterable of str
-        ``KEY=VALUE`` each, as ``lidarium show supervisor`` lists the keys.
-
-    Raises
-    ------
-    ValueError
-        Where there is no such setting, or it cannot have such a value; the message suggests the nearest name.
-    """
+    """Return settings of the supervisor by name."""
     from dataclasses import fields
 
     from lidarium.agents.supervisor.settings import SupervisorSettings
@@ -138,13 +98,7 @@ def is_supervised(name: str) -> bool:
 
 
 def check_supervised(name: str) -> None:
-    """Check that a policy is led by a supervisor whose settings can be set.
-
-    Raises
-    ------
-    ValueError
-        Where it is not; the policies that are, are named.
-    """
+    """Check that a policy is led by a supervisor whose settings can be set."""
     from lidarium.agents import policy_names
 
     if not is_supervised(name):
@@ -169,19 +123,13 @@ class FilmOptions:
     film_speed: Annotated[float, arg(aliases=["--video-speed"])] = 10.0
     """simulated seconds per second of a film"""
     film_width: int | None = None
-    """most pixels that a film is wide; 980 of an mp4, 640 of a GIF and a WebP where left out"""
+    """most pixels that a film is wide; 980 of an mp4, 640 of a GIF and a WebP by default"""
     film_fps: float | None = None
-    """frames per second of a film; 20 of an mp4, 10 of a GIF and a WebP where left out"""
+    """frames per second of a film; 20 of an mp4, 10 of a GIF and a WebP by default"""
 
     @property
     def film_settings(self) -> "FilmSettings":
-        """What the options say.
-
-        Raises
-        ------
-        ValueError
-            Where one is out of range.
-        """
+        """Settings of films."""
         from lidarium.evaluation.drawing.films import FilmSettings
 
         return FilmSettings(self.film_speed, self.film_width, self.film_fps)
@@ -202,15 +150,7 @@ class FilmFiles(FilmOptions):
         return [path for path in (self.gif, self.video) if path is not None]
 
     def check_films(self) -> None:
-        """Check that the films can be made, before anything is written.
-
-        Raises
-        ------
-        ValueError
-            Where a name has no ending of a film, or an option is out of range.
-        OSError
-            Where nothing can be written to a folder.
-        """
+        """Check that the films can be made, before anything is written."""
         from lidarium.evaluation.drawing.films import format_of
         from lidarium.mapping.files.output import check_writable
 
@@ -223,7 +163,7 @@ class FilmFiles(FilmOptions):
 
 
 PORT = 8080
-"""Where the page is served where nothing is said."""
+"""Default port of the page."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -238,14 +178,8 @@ class ViewOptions:
     """keep the page after the run, until Ctrl-C"""
 
 
-def check_view(options: ViewOptions) -> None:
-    """Check what was said of a view.
-
-    Raises
-    ------
-    ValueError
-        Where there is no such port, or a page is to stay that is not asked for.
-    """
+def _check_view(options: ViewOptions) -> None:
+    """Check the options of a view."""
     if not 0 <= options.view_port <= 65535:
         raise ValueError(f"--view-port is {options.view_port}; want 0 to 65535, 0 for any free port")
     if options.view_stay and not options.view:
@@ -254,30 +188,8 @@ def check_view(options: ViewOptions) -> None:
 
 @contextmanager
 def opened_view(options: ViewOptions, policy: "Policy", name: str) -> Iterator["list[LiveView]"]:
-    """Serve a page while a run goes, and after it for as long as it is asked for.
-
-    Parameters
-    ----------
-    options : ViewOptions
-        Whether, and where.
-    policy : Policy
-        Who decides.
-    name : str
-        The policy's.
-
-    Yields
-    ------
-    list of LiveView
-        The watcher of the run; none where no view is asked for.
-
-    Raises
-    ------
-    ValueError
-        Where the options are no good, or the extra ``viewer`` is not installed.
-    OSError
-        Where the port cannot be had.
-    """
-    check_view(options)
+    """Serve a page while a run goes, and after it for as long as it is asked for."""
+    _check_view(options)
     if not options.view:
         yield []
         return
@@ -289,6 +201,6 @@ def opened_view(options: ViewOptions, policy: "Policy", name: str) -> Iterator["
         view = LiveView(server, policy, name)
         yield [view]
         if options.view_stay and view.has_ended:
-            notify(f"the run is over; {address_of(server)} stays until Ctrl-C")
             with suppress(KeyboardInterrupt):
+                notify(f"the run is over; {address_of(server)} stays until Ctrl-C")
                 view.stay()

@@ -1,4 +1,4 @@
-"""What ``lidarium run`` writes of an episode: its files, its films, and the summary that it prints."""
+"""Output of ``lidarium run``: files, its films, and the summary that it prints."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -31,28 +31,7 @@ def write_run(
     policy: str,
     films: Sequence[str],
 ) -> list[str]:
-    """Write the figures of a run first, then the record, the maps and the pictures.
-
-    Parameters
-    ----------
-    folder : Path
-        Where to.
-    episode : Episode
-        The run.
-    result : dict
-        Its figures.
-    recorder : Recorder or None
-        What recorded it; None where nothing did.
-    policy : str
-        Name of the policy.
-    films : sequence of str
-        Names of the films that were written there before.
-
-    Returns
-    -------
-    list of str
-        The files' names.
-    """
+    """Write the figures of a run first, then the record, the maps and the pictures."""
     from lidarium.evaluation.drawing.run_picture import save_run_picture
     from lidarium.evaluation.episodes.events import decision_lines
     from lidarium.evaluation.truth.beliefs import team_log_odds
@@ -98,7 +77,7 @@ def _save_view(path: Path, episode: "Episode") -> None:
 
 def _write_sparse_maps(folder: Path, episode: "Episode") -> list[str]:
     """Write the sparse maps that robots have made, each with a picture of it and of the robot's trail."""
-    from lidarium.evaluation.drawing.maps.sparse_picture import save_sparse_pictures
+    from lidarium.evaluation.drawing.sparse_picture import save_sparse_pictures
     from lidarium.mapping.sparse.files.map_files import write_sparse_map
 
     files = []
@@ -114,20 +93,8 @@ def _write_sparse_maps(folder: Path, episode: "Episode") -> list[str]:
 def write_team(folder: Path, episode: "Episode") -> list[str]:
     """Write each robot's map and, of a team, each group's merged map and ``transforms.json``.
 
-    All are in the robots' own map frames. What is merged is as the station last knew it; without a station
+    All are in the robots' own map frames. Merged maps are as the station last knew them; without a station
     nothing is.
-
-    Parameters
-    ----------
-    folder : Path
-        Where to.
-    episode : Episode
-        The run.
-
-    Returns
-    -------
-    list of str
-        The files' names.
     """
     from lidarium.mapping.files.map_files import write_ros_map
     from lidarium.mapping.files.output import write_json
@@ -154,7 +121,7 @@ def write_team(folder: Path, episode: "Episode") -> list[str]:
 
 
 def _write_own_map(folder: Path, env: "ExplorationEnv", robot: int) -> None:
-    """Write what a robot's own map knows, in that robot's map frame."""
+    """Write a robot's own map, in that robot's map frame."""
     import numpy as np
 
     from lidarium.envs.station.reports import known_map
@@ -186,27 +153,7 @@ def _team_maps(episode: "Episode") -> "TeamMaps":
 
 
 class RunFilms:
-    """Films an episode into several files at once, or into none.
-
-    Parameters
-    ----------
-    env : WatchedExploration
-        Its watchers are the films, from `begin` to `end`.
-    policy : Policy
-        What drives the robots.
-    names : sequence of str
-        Of the files.
-    shown : str
-        Name of a film, or ``auto``: ``maps`` if several robots do not know their starts and have no cameras,
-        else ``scans``.
-    settings : FilmSettings
-        How the films are made.
-
-    Raises
-    ------
-    ValueError
-        If there is no such film, or it cannot show this team.
-    """
+    """Films an episode into several files at once, or into none."""
 
     def __init__(
         self,
@@ -259,7 +206,7 @@ class RunFilms:
 
     @contextmanager
     def kept(self) -> Iterator[None]:
-        """Write the films at the end, or none of them where that is an error."""
+        """Write the films at the end, or none of them if that is an error."""
         with self._open:
             yield
             self._env.watchers[:] = [each for each in self._env.watchers if each not in self._films]
@@ -320,7 +267,7 @@ def run_summary(
 
 
 def _of_station(result: dict[str, Any]) -> list[tuple[str, str]]:
-    """Return what a station merged and ordered; nothing without one."""
+    """Return lines about merges and orders of a station; none without one."""
     known, merges = result["supervisor"], result["merges"]
     if known is None:
         return []

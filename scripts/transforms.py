@@ -1,4 +1,4 @@
-"""What ``transforms.json`` holds: how maps lie to each other, and what came of each two."""
+"""The content of ``transforms.json``: transforms between maps, and the result of each pair."""
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -24,7 +24,7 @@ class PlacedMaps:
     groups : sequence of (mapping of str to Transform)
         Of each group of joined maps the frame of each map in that of the first; frames are those of ROS.
     pairs : mapping of (str, str) to PairResult
-        What came of each two, between lower left corners.
+        Result of each pair, between lower left corners.
     corners : mapping of str to Transform
         Of the lower left corner of each map of a pair in its frame.
     used, dropped : collection of (str, str)
@@ -39,13 +39,7 @@ class PlacedMaps:
 
 
 def transforms(placed: PlacedMaps) -> dict[str, Any]:
-    """Return what ``transforms.json`` holds.
-
-    Parameters
-    ----------
-    placed : PlacedMaps
-        The maps; one of them at least.
-    """
+    """Return the content of ``transforms.json``."""
     maps: dict[str, dict[str, Any] | None] = {}
     for number, group in enumerate(placed.groups):
         for name, frame in group.items():
@@ -58,7 +52,7 @@ def transforms(placed: PlacedMaps) -> dict[str, Any]:
 
 
 def _pair(names: tuple[str, str], placed: PlacedMaps) -> dict[str, Any]:
-    """Return what is said of a pair."""
+    """Return the entry of a pair."""
     first, second = (placed.corners[name] for name in names)
     found = placed.pairs[names]
 

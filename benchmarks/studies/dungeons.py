@@ -19,7 +19,7 @@ import numpy as np
 import lidarium
 from lidarium.benchmarks.studies.shared.study import Study
 from lidarium.evaluation.episodes.stop_rules import STOP_REASON
-from lidarium.evaluation.statistics.means import paired_ratio
+from lidarium.evaluation.statistics.estimates import paired_ratio
 from lidarium.evaluation.suites.campaign import EPISODES_FILE
 from lidarium.evaluation.suites.episodes_file import KEY, read_episodes
 from lidarium.evaluation.suites.presets import PRESETS

@@ -1,7 +1,4 @@
-"""The figures of a report: of each policy, and of policies against a baseline.
-
-Policies are compared with the baseline pair by pair.
-"""
+"""The figures of a report: of each policy, and of policies against a baseline, pair by pair."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -30,6 +27,17 @@ from lidarium.evaluation.statistics import (
     sign_test,
     wilcoxon_test,
 )
+
+
+def over_bound(rows: Sequence[Row], horizon_s: float) -> float | None:
+    """Return the median of the times to 99 % over their bounds."""
+    multiples = [
+        (horizon_s if row["t99_s"] is None else row["t99_s"]) / row["bound_s"]
+        for row in rows
+        if row.get("bound_s")
+    ]
+    return float(np.median(multiples)) if multiples else None
+
 
 TIMES = {key: METRICS[key].title for key in ("t90_s", "t99_s")}
 """Keys of times to a share of the floor, and their titles."""
@@ -76,7 +84,7 @@ class TimeFigure:
     median : Interval
         Of all runs; inf is later than the horizon.
     restricted_mean : Interval or None
-        Of min(time, horizon); None where no run reached the share or where cuts leave it unknown.
+        Of min(time, horizon); None if no run reached the share or if cuts leave it unknown.
     """
 
     reached: int
@@ -107,7 +115,7 @@ class Comparison:
     pairs : int
         Number of pairs.
     difference, ratio : Interval or None
-        Policy less baseline, policy over baseline; of times, of their restricted means. None where there is
+        Policy less baseline, policy over baseline; of times, of their restricted means. None if there is
         none.
     wilcoxon, sign : PairedTest
         Tests; less means that the policy has the smaller figure.

@@ -1,4 +1,4 @@
-"""Films: what they show, and how frames become a file.
+"""Films of runs: their content, and how frames become a file.
 
 A film of a run is an entry of the registry ``film``, which draws its frames. The ending of a film's name is
 its format. A film exists completely or not at all, and FFmpeg takes each frame as it comes.
@@ -28,7 +28,7 @@ from lidarium.mapping.files.output import whole_file
 from lidarium.registry import Registry
 
 MOST_FRAMES_PER_SECOND = 50.0
-"""No GIF is faster: viewers show what is faster slowly."""
+"""No GIF is faster: viewers slow down faster ones."""
 
 WIDTHS = 120, 4096
 """Least and greatest width of a film [pixels]."""
@@ -37,7 +37,7 @@ _LOOP = ("-loop", "0")
 
 
 @dataclass(frozen=True, slots=True)
-class FilmFormat:
+class _FilmFormat:
     """How a film is encoded.
 
     Attributes
@@ -45,11 +45,11 @@ class FilmFormat:
     codec, pixel_format : str
         FFmpeg's names.
     parameters : tuple of str
-        More of what FFmpeg is asked for.
+        Further arguments of FFmpeg.
     width : int
-        Most pixels that a frame is wide, where nothing is said.
+        Most pixels that a frame is wide, by default.
     frames_per_second : float
-        Where nothing is said.
+        If nothing is said.
     is_whole : callable
         Takes the content of a file, and says whether its end was written.
     has_palette : bool
@@ -71,7 +71,7 @@ def _is_whole_webp(content: bytes) -> bool:
 
 FORMATS = {
     # The table of contents of an mp4 comes last.
-    ".mp4": FilmFormat(
+    ".mp4": _FilmFormat(
         "libx264",
         "yuv420p",
         ("-crf", "15", "-preset", "veryfast"),
@@ -79,11 +79,11 @@ FORMATS = {
         20.0,
         lambda content: b"moov" in content,
     ),
-    ".gif": FilmFormat(
+    ".gif": _FilmFormat(
         "gif", "pal8", _LOOP, 640, 10.0, lambda content: content.endswith(b";"), has_palette=True
     ),
     # Without loss: frames are drawn in few colours, which takes less than a lossy file and is sharp.
-    ".webp": FilmFormat(
+    ".webp": _FilmFormat(
         "libwebp_anim",
         "bgra",
         ("-lossless", "1", "-compression_level", "3", *_LOOP),
@@ -92,17 +92,11 @@ FORMATS = {
         _is_whole_webp,
     ),
 }
-"""What a film can be, by the ending of its name."""
+"""Formats by the ending of a film's name."""
 
 
-def format_of(path: Path) -> FilmFormat:
-    """Return the format that the ending of a film's name stands for.
-
-    Raises
-    ------
-    ValueError
-        Where films do not end so.
-    """
+def format_of(path: Path) -> _FilmFormat:
+    """Return the format that the ending of a film's name stands for."""
     found = FORMATS.get(Path(path).suffix.lower())
     if found is None:
         raise ValueError(f"the film {path} has no ending of a film; want one of {', '.join(FORMATS)}")
@@ -118,14 +112,9 @@ class FilmSettings:
     speed : float
         Simulated seconds per second of the film, above 0.
     width : int or None
-        Most pixels that a frame is wide; as the format has it where None.
+        Most pixels that a frame is wide; as the format has it if None.
     frames_per_second : float or None
-        As the format has it where None.
-
-    Raises
-    ------
-    ValueError
-        Where one is out of range.
+        As the format has it if None.
     """
 
     speed: float = 10.0
@@ -155,30 +144,18 @@ class FilmSettings:
         return self.frames_per_second or format_of(path).frames_per_second
 
 
-_LOSSLESS = FilmFormat(
+_LOSSLESS = _FilmFormat(
     "libx264rgb", "rgb24", ("-qp", "0", "-preset", "ultrafast"), 0, 0.0, lambda content: bool(content)
 )
-"""What frames are kept as, on the disk, until the palette of all of them is known."""
+"""Format of the frames on the disk until the palette of all frames is known."""
 
 _BROKEN = "the film is not whole; is the disk full, or were there no frames?"
 
 
-class FilmWriter:
-    """Encodes frames, each as it comes.
+class _FilmWriter:
+    """Encodes frames, each as it comes."""
 
-    Parameters
-    ----------
-    path : Path
-        The file.
-    encoded : FilmFormat
-        How they are encoded.
-    rate : float
-        Frames per second.
-    width : int
-        Wider frames are made as narrow as this [pixels].
-    """
-
-    def __init__(self, path: Path, encoded: FilmFormat, rate: float, width: int) -> None:
+    def __init__(self, path: Path, encoded: _FilmFormat, rate: float, width: int) -> None:
         self._path, self._encoded, self._width = path, encoded, width
         self._encoder: Generator[None, NDArray[np.uint8] | None, None] | None = None
         self.rate, self.frames = rate, 0
@@ -229,30 +206,16 @@ class FilmWriter:
 
 
 @contextmanager
-def film_writer(path: Path, settings: FilmSettings | None = None) -> Iterator[FilmWriter]:
+def film_writer(path: Path, settings: FilmSettings | None = None) -> Iterator[_FilmWriter]:
     """Lend a writer of frames.
 
     The film appears when it is done, whole or not at all.
-
-    Parameters
-    ----------
-    path : Path
-        The film; the ending says what it is, as `FORMATS` lists them.
-    settings : FilmSettings or None
-        How wide and fast it is.
-
-    Raises
-    ------
-    ValueError
-        Where films do not end so.
-    OSError
-        Where it cannot be written whole, or has no frame.
     """
     path, settings = Path(path), settings or FilmSettings()
     final, rate, width = format_of(path), settings.rate_of(path), settings.width_of(path)
     with whole_file(path) as beside:
         first = beside.with_name("frames.mkv") if final.has_palette else beside
-        writer = FilmWriter(first, _LOSSLESS if final.has_palette else final, rate, width)
+        writer = _FilmWriter(first, _LOSSLESS if final.has_palette else final, rate, width)
         try:
             yield writer
         finally:
@@ -262,10 +225,10 @@ def film_writer(path: Path, settings: FilmSettings | None = None) -> Iterator[Fi
             raise OSError(errno.EIO, _BROKEN, str(path))
 
 
-def _write_with_palette(frames: Path, film: Path, encoded: FilmFormat) -> bool:
+def _write_with_palette(frames: Path, film: Path, encoded: _FilmFormat) -> bool:
     """Write frames in the 256 colours that suit all; return whether it was done.
 
-    FFmpeg then writes of each frame what has changed since the one before.
+    FFmpeg then writes only the changes from frame to frame.
     """
     if not frames.exists():
         return False
@@ -277,7 +240,7 @@ def _write_with_palette(frames: Path, film: Path, encoded: FilmFormat) -> bool:
 
 
 def _is_done(*arguments: str | Path) -> bool:
-    """Run FFmpeg; return whether it did what it was asked for.
+    """Run FFmpeg; return whether it succeeded.
 
     It is in a group of its own: Ctrl-C is for us, who then end it.
     """
@@ -290,10 +253,10 @@ def _is_done(*arguments: str | Path) -> bool:
 
 
 HELD_S, LAST_FRAME_S = 1.8, 1.5
-"""How long a film holds what has just happened, and its last picture [s]."""
+"""Duration of a held moment, and of the last picture [s]."""
 
 
-class Frames(Protocol):
+class _Frames(Protocol):
     """Draws an episode as it runs.
 
     A class of frames is made with the policy and the width of a film [pixels]. Optional methods are
@@ -305,10 +268,10 @@ class Frames(Protocol):
         """Return the frame of this moment, (rows, columns, 3) uint8 RGB, always of the same size."""
 
 
-FramesMaker = Callable[[Policy, int], Frames] | Callable[[ExplorationEnv, int], Frame]
+FramesMaker = Callable[[Policy, int], _Frames] | Callable[[ExplorationEnv, int], Frame]
 
 FILMS: Registry[FramesMaker] = Registry("film")
-"""What films of runs show, by name: a class of `Frames`, or a function that returns a frame."""
+"""Films of runs by name: a class of frames, or a function that returns a frame."""
 
 FILMS.register(
     "maps",
@@ -323,7 +286,7 @@ FILMS.register(
 
 
 def film(name: str, summary: str) -> Callable[[FramesMaker], FramesMaker]:
-    """Register what a film of a run shows, for ``lidarium run --film-shows NAME``.
+    """Register a film of runs, for ``lidarium run --film-shows NAME``.
 
     The item is a function of an environment and a width [pixels] that returns a frame, (rows, columns, 3)
     uint8 RGB; or a class of such frames, made with the policy and the width, with a method ``draw(env)``.
@@ -348,8 +311,8 @@ def film(name: str, summary: str) -> Callable[[FramesMaker], FramesMaker]:
     return register
 
 
-def frames_of(name: str, policy: Policy, width: int) -> Frames:
-    """Return what draws the frames of a film by name; a ValueError if the name is unknown."""
+def frames_of(name: str, policy: Policy, width: int) -> _Frames:
+    """Return the frames of a film by name; a ValueError if the name is unknown."""
     item: Any = FILMS[name]
     return item(policy, width) if isinstance(item, type) else _DrawnFrames(item, width)
 
@@ -365,7 +328,7 @@ class _DrawnFrames:
 
 
 class ScanFrames:
-    """The floor, its explored part, the robots, what their lasers see, and recent decisions of a station."""
+    """The floor, its explored part, the robots, their scans, and recent decisions of a station."""
 
     def __init__(self, policy: Policy, width: int) -> None:
         self._size, self._draw_over = width - 2 * BORDER, recent_supervision(policy)
@@ -377,19 +340,9 @@ class ScanFrames:
 
 
 class Film(Watcher):
-    """Takes frames of an environment at equal simulated time; a ``Watcher``.
+    """Takes frames of an environment at equal simulated time; a ``Watcher``."""
 
-    Parameters
-    ----------
-    writer : FilmWriter
-        Takes the frames.
-    frames : Frames
-        Draws them.
-    speed : float
-        Simulated seconds per second of the film.
-    """
-
-    def __init__(self, writer: FilmWriter, frames: Frames, speed: float) -> None:
+    def __init__(self, writer: _FilmWriter, frames: _Frames, speed: float) -> None:
         self.writer, self._frames = writer, frames
         self._period_s, self._taken = speed / writer.rate, 0
 
@@ -398,7 +351,7 @@ class Film(Watcher):
         self._take(env)
 
     def step(self, env: ExplorationEnv, commands: NDArray[np.float64]) -> None:
-        """Take a frame where it is time for one."""
+        """Take a frame if it is time for one."""
         self._take(env)
 
     def _take(self, env: ExplorationEnv) -> None:
@@ -425,26 +378,8 @@ class Film(Watcher):
 
 
 @contextmanager
-def filmed(path: Path, frames: Frames, settings: FilmSettings | None = None) -> Iterator[Film]:
-    """Film a run.
-
-    Parameters
-    ----------
-    path : Path
-        The film, mp4, GIF or WebP by its ending; it appears when the film is finished, also where the run was
-        interrupted.
-    frames : Frames
-        Draws the frames.
-    settings : FilmSettings or None
-        How fast and wide it is.
-
-    Raises
-    ------
-    ValueError
-        Where films do not end so.
-    OSError
-        Where it cannot be written whole.
-    """
+def filmed(path: Path, frames: _Frames, settings: FilmSettings | None = None) -> Iterator[Film]:
+    """Film a run."""
     settings = settings or FilmSettings()
     with film_writer(path, settings) as writer:
         yield Film(writer, frames, settings.speed)

@@ -1,6 +1,6 @@
 """The film ``maps``: robots that do not know their starts, and how a station joins their maps.
 
-Above are the robots' own maps, each in its own frame. Below is the floor with what is known of it.
+Above are the robots' own maps, each in its own frame. Below is the floor with its known part.
 """
 
 import math
@@ -34,7 +34,7 @@ from lidarium.envs.drawing.frame_parts import (
 from lidarium.envs.drawing.rendering import view_of
 from lidarium.envs.exploration import ExplorationEnv
 from lidarium.envs.settings.exploration import ExplorationSettings
-from lidarium.evaluation.drawing.maps.joined_maps import overlaid, shades_of
+from lidarium.evaluation.drawing.joined_maps import overlaid, shades_of
 from lidarium.evaluation.episodes.events import joined_groups
 from lidarium.evaluation.truth.beliefs import maps_on_floor
 from lidarium.mapping.grids.occupancy import FREE, OCCUPIED, UNKNOWN, three_levels
@@ -47,20 +47,13 @@ GAP, LINE = 8, 24
 """Between tiles; height of the line above a map [pixels]."""
 
 _SHARE = 0.3
-"""Height of a tile's map as a share of the picture's width, where tiles leave room for it."""
+"""Height of a tile's map as a share of the picture's width, if tiles leave room for it."""
 
 
 class OwnMaps:
     """Draws each robot's own map, as the robot has it.
 
     A tile shows the part of the map that the floor can fill: it does not move as the map grows.
-
-    Parameters
-    ----------
-    env : ExplorationEnv
-        After a reset; the robots do not know their starts.
-    width : int
-        Of all tiles together [pixels].
     """
 
     def __init__(self, env: ExplorationEnv, width: int) -> None:
@@ -147,14 +140,7 @@ CAPTION = 28
 class MapFrames:
     """The robots' own maps, and how a station joins them.
 
-    On the floor, what a map shows is in the colour of its robot, and what joined maps show is white.
-
-    Parameters
-    ----------
-    policy : Policy
-        What drives the robots; one with a station joins maps.
-    width : int
-        Of a frame [pixels].
+    On the floor, a map is in the colour of its robot, and joined maps are white.
     """
 
     def __init__(self, policy: Policy, width: int) -> None:
@@ -189,7 +175,7 @@ class MapFrames:
         return with_header(np.concatenate(parts), name, env.scorer.coverage, env.scorer.time)
 
     def _caption(self, joined: list[tuple[int, int]]) -> Frame:
-        """Return the line below the maps: which are joined just now, or what white is."""
+        """Return the line below the maps: pairs that were just joined, or the legend."""
         size = self._width, CAPTION
         if joined:
             pairs = ", ".join(f"{a} and {b}" for a, b in joined)
@@ -207,7 +193,7 @@ class MapFrames:
 def _floor(
     env: ExplorationEnv, width: int, groups: Sequence[set[int]], joined: list[tuple[int, int]]
 ) -> Frame:
-    """Draw what is known of the floor, the robots, and who is joined just now."""
+    """Draw the known part of the floor, the robots, and pairs that were just joined."""
     colours, scene = team_colours(env.settings.robots), env.scene()
     tables = env.world.floors[0]
     assert tables is not None
@@ -229,7 +215,7 @@ def _floor(
 
 
 def _known(env: ExplorationEnv, view: View, groups: Sequence[set[int]], colours: list[Colour]) -> Frame:
-    """Draw what each group of robots knows of the floor, mixed where several do."""
+    """Draw the part of the floor that each group knows, mixed if several do."""
     tables = env.world.floors[0]
     assert tables is not None
     raster, maps = tables.laser, maps_on_floor(env)

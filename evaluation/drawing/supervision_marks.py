@@ -27,7 +27,7 @@ _JOIN_COLOUR = "#0f766e"
 def draw_supervision(axes: Axes, env: ExplorationEnv, policy: Policy) -> list[Line2D]:
     """Draw where rules joined, redirected and stopped robots; return the legend.
 
-    They are drawn on a map of the floor; what is returned are the entries of the legend.
+    They are drawn on a map of the floor.
     """
     station = policy.report().supervision
     if station is None:
@@ -79,9 +79,9 @@ def draw_supervision(axes: Axes, env: ExplorationEnv, policy: Policy) -> list[Li
 
 
 def recent_supervision(policy: Policy) -> DrawOver:
-    """Return what draws a station's latest orders and joins on frames of a film.
+    """Return a function that draws a station's latest orders and joins on frames.
 
-    It draws nothing where a policy has no station.
+    It draws nothing if a policy has no station.
     """
 
     def draw(env: ExplorationEnv, frame: Frame, view: View) -> None:

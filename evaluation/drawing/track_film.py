@@ -1,4 +1,4 @@
-"""Films of what records show: of one, or of several side by side in step.
+"""Films of records: of one, or of several side by side in step.
 
 Any version can film them.
 """
@@ -36,26 +36,7 @@ GAP, LINE, BAR, TITLE = 6, 26, 6, 38
 def save_track_film(
     path: Path, record: EpisodeRecord, settings: FilmSettings | None = None, floor: Floor | None = None
 ) -> None:
-    """Film what a record shows (mp4, GIF or WebP by the ending of the name).
-
-    Parameters
-    ----------
-    path : Path
-        The film.
-    record : EpisodeRecord
-        The record.
-    settings : FilmSettings or None
-        How fast and wide it is.
-    floor : Floor or None
-        As for ``TrackFrames``.
-
-    Raises
-    ------
-    ValueError
-        Where films do not end so.
-    OSError
-        Where nothing can be written there.
-    """
+    """Film a record (mp4, GIF or WebP by the ending of the name)."""
     settings = settings or FilmSettings()
     frames = TrackFrames(record, settings.width_of(path) - 2 * BORDER, floor)
     _write(path, frames.draw, _end_of(record), settings)
@@ -64,26 +45,7 @@ def save_track_film(
 def save_side_by_side(
     path: Path, records: Mapping[str, EpisodeRecord], title: str, settings: FilmSettings | None = None
 ) -> None:
-    """Film several records in step; one that has ended shows its end.
-
-    Parameters
-    ----------
-    path : Path
-        The film, mp4, GIF or WebP by the ending of its name.
-    records : mapping of str to EpisodeRecord
-        At most `MOST_SIDE_BY_SIDE`, with what stands above each.
-    title : str
-        What stands above all.
-    settings : FilmSettings or None
-        How fast and wide it is.
-
-    Raises
-    ------
-    ValueError
-        Where there are no records or too many, or films do not end so.
-    OSError
-        Where nothing can be written there.
-    """
+    """Film several records in step; one that has ended shows its end."""
     if not 1 <= len(records) <= MOST_SIDE_BY_SIDE:
         raise ValueError(f"the film shows {len(records)} episodes; want 1 to {MOST_SIDE_BY_SIDE}")
     settings = settings or FilmSettings()

@@ -1,4 +1,4 @@
-"""Results of a run, as the dictionary of ``result.json``: what identifies it, and its metrics.
+"""Results of a run, as the dictionary of ``result.json``: its identity and metrics.
 
 The format is in docs/reference/files.md.
 """
@@ -53,15 +53,6 @@ from lidarium.evaluation.truth.true_map import Truth, left_by_failed, truth_of
 
 class EpisodeData:
     """A finished or interrupted episode, as metrics read it.
-
-    Parameters
-    ----------
-    env : ExplorationEnv
-        The environment at the end of the episode.
-    episode : Episode or None, default None
-        What `run_episode` returned; metrics of decisions, merges and timing need it.
-    history : History or None, default None
-        The history that watched the episode; metrics over time need it.
 
     Attributes
     ----------

@@ -34,7 +34,7 @@ World = Level | SparsePlanning | MergedMaps
 
 @dataclass(slots=True)
 class Episode:
-    """What an episode left, beside the environment itself.
+    """The result of an episode, besides the environment itself.
 
     Attributes
     ----------
@@ -49,11 +49,11 @@ class Episode:
     wall_seconds : float
         Wall time of the whole episode [s].
     given_up : list of GivenUp
-        What the policy left unexplored, and why.
+        Frontiers that the policy left unexplored, and why.
     is_interrupted : bool
         Whether the user broke it off.
     merges : list of MergeEvent
-        Which robots were joined, where maps are merged: by the environment, or by a policy with a
+        Which robots were joined, if maps are merged: by the environment, or by a policy with a
         station.
     """
 
@@ -68,7 +68,7 @@ class Episode:
 
 
 class RunningTeam:
-    """What a policy may ask about its team in a running episode."""
+    """The team of a running episode, as its policy sees it."""
 
     def __init__(self, env: ExplorationEnv, driver: WaypointExploration | None) -> None:
         self._env, self._driver = env, driver
@@ -84,11 +84,11 @@ class RunningTeam:
         return self._env.scorer.time
 
     def belief(self, agent: str) -> Belief:
-        """Return what an agent's onboard software knows."""
+        """Return the belief of an agent's onboard software."""
         return self._env.belief(agent)
 
     def drive_state(self, agent: str) -> DriveState:
-        """Return what its driving is about."""
+        """Return the state of its driving."""
         return DriveState.IDLE if self._driver is None else self._driver.drive_state(agent)
 
     def operating_state(self, agent: str) -> OperatingState:
@@ -96,9 +96,9 @@ class RunningTeam:
         return self._env.operating.states[self._env.possible_agents.index(agent)]
 
     def report(self, agent: str) -> Report | None:
-        """Return what last reached the station of an agent, an ended one too.
+        """Return the last report of an agent that reached the station, an ended one too.
 
-        None where nothing ever did.
+        None if nothing ever did.
         """
         return self._env.station.report(self._env.possible_agents.index(agent))
 
@@ -107,7 +107,7 @@ class RunningTeam:
         return self._env.operating.orders[self._env.possible_agents.index(agent)]
 
     def send_map(self, agent: str, others: FusedMap | None) -> bool:
-        """Send an agent that does not know its start what others know, in its map frame.
+        """Send an agent that does not know its start the map of the others, in its map frame.
 
         Return whether that reached it.
         """
@@ -136,11 +136,11 @@ def run_episode(
     Parameters
     ----------
     policy : Policy
-        What decides; its ``Stop`` ends a robot at its next step.
+        The policy; its ``Stop`` ends a robot at its next step.
     env : ExplorationEnv
         Where; the wrapper of the policy's level is put around it.
     seed : int
-        Where all draws come from: of the environment, and of the policy.
+        If all draws come from: of the environment, and of the policy.
     options : mapping or None
         Options of ``reset``.
     on_decision : callable or None
@@ -151,14 +151,14 @@ def run_episode(
         at hand, and the episode so far is returned; a second one, and one before the first step, is passed on
         all the same.
     merging : MergingSettings or None
-        How the robots merge their maps (`MergedMaps`); they do not where None.
+        How the robots merge their maps (`MergedMaps`); they do not if None.
     plans_sparsely : bool
         Whether robots drive to their goals along routes on their sparse maps (`SparsePlanning`).
 
     Returns
     -------
     Episode
-        What it left.
+        The result.
     """
     check_observed(policy, type(policy).__name__, env.settings.observe)
     level = at_level(env, policy.level, policy.shares_map, policy.decision_period_s)
@@ -177,7 +177,7 @@ def run_episode(
                 on_decision(env)
             while env.agents and not (interrupt and interrupt.is_asked):
                 decided = time.perf_counter()
-                actions = decide(policy, world, observations)
+                actions = _decide(policy, world, observations)
                 episode.decision_seconds.append(time.perf_counter() - decided)
                 observations = world.step(actions)[0]
                 observations = {agent: observations[agent] for agent in env.agents}
@@ -189,7 +189,7 @@ def run_episode(
         episode.is_interrupted |= interrupt is not None and interrupt.is_asked and bool(env.agents)
     episode.wall_seconds = time.perf_counter() - began
     episode.given_up = list(policy.given_up)
-    _note_merges(episode, world.events if isinstance(world, MergedMaps) else merges_of(policy, env))
+    _note_merges(episode, world.events if isinstance(world, MergedMaps) else _merges_of(policy, env))
     return episode
 
 
@@ -208,7 +208,7 @@ def _planning_sparsely(level: Level, shares_map: bool) -> SparsePlanning:
 
 
 def _driver_of(level: Level) -> WaypointExploration | None:
-    """Return what drives the robots to their targets, None where a policy decides speeds."""
+    """Return the driver of the robots to their targets, None if a policy decides speeds."""
     below = level.waypoints if isinstance(level, FrontierExploration) else level
     return below if isinstance(below, WaypointExploration) else None
 
@@ -226,7 +226,7 @@ def _show_decision(
         on_decision(env)
 
 
-def merges_of(policy: Policy, env: ExplorationEnv) -> list[MergeEvent]:
+def _merges_of(policy: Policy, env: ExplorationEnv) -> list[MergeEvent]:
     """Return the joins that a policy's decisions were built on, beside the truth."""
     station = policy.report().supervision
     used = [] if station is None else [join for join in station.joins if join.is_used]
@@ -248,7 +248,7 @@ def merges_of(policy: Policy, env: ExplorationEnv) -> list[MergeEvent]:
     ]
 
 
-def decide(
+def _decide(
     policy: Policy,
     world: World,
     observations: Mapping[str, Observation],

@@ -1,4 +1,4 @@
-"""Metrics of an episode: the registry, and the functions on arrays that they are computed with.
+"""Metrics of episodes, with their registry.
 
 A metric is a key of ``result.json``. It is registered once, with its unit, direction and format; results,
 tables of reports, the report's page and docs/reference/metrics.md are made from the registry.

@@ -26,7 +26,7 @@ Mask = NDArray[np.bool_]
 def share(part: NDArray[Any], whole: NDArray[Any], empty: float = 1.0) -> float:
     """Return ``|part| / |whole|``, the cells of which are those that are not 0.
 
-    ``empty`` where the whole has none.
+    ``empty`` if the whole has none.
     """
     size = int(np.count_nonzero(whole))
     return int(np.count_nonzero(part)) / size if size else empty
@@ -35,7 +35,7 @@ def share(part: NDArray[Any], whole: NDArray[Any], empty: float = 1.0) -> float:
 def free_coverage(sensed: Mask, counted: Mask) -> float:
     """Return ``C_free`` = |sensed and F| / |F|, the share of F that was sensed.
 
-    It is 1 where F is empty.
+    It is 1 if F is empty.
 
     Parameters
     ----------
@@ -98,14 +98,14 @@ def valid_coverage(known: Mask, counted: Mask, occupied: Mask) -> float:
 def overlap(masks: Sequence[NDArray[np.uint64]] | NDArray[np.uint64]) -> float:
     """Return ``Overlap_MX``, the share of seen cells seen by several (MAexp).
 
-    It is |cells seen by two or more| / |cells seen by one or more|; 0 where none was seen.
+    It is |cells seen by two or more| / |cells seen by one or more|; 0 if none was seen.
 
     MAexp prints it at T_0.85 and T_0.95.
 
     Parameters
     ----------
     masks : sequence of (rows, words) uint64
-        What each robot saw, a bit per cell.
+        Cells that each robot saw, a bit per cell.
     """
     once = np.zeros_like(masks[0])
     twice = np.zeros_like(masks[0])
@@ -120,7 +120,7 @@ def overlap_of_maps(known_shares: ArrayLike) -> float:
     """Return ``Overlap_EB`` = sum_i C_known,i - 1 (Explore-Bench, at T_0.99).
 
     A share below 0 says that the maps together hold less than the floor once: it is a measure of overlap
-    where the team's map is nearly whole, and of nothing before.
+    if the team's map is nearly whole, and of nothing before.
 
     Parameters
     ----------
@@ -135,7 +135,7 @@ def instant_overlap(seen_once: ArrayLike, seen_twice: ArrayLike) -> float:
 
     It is the mean of |footprint of two or more| / |footprint of one or more|.
 
-    Decisions at which nobody sees anything count as 0; 0 where there is no decision.
+    Decisions at which nobody sees anything count as 0; 0 if there is no decision.
 
     Parameters
     ----------
@@ -149,10 +149,10 @@ def instant_overlap(seen_once: ArrayLike, seen_twice: ArrayLike) -> float:
 
 def surface(occupied: Mask, free: Mask) -> Mask:
     """Return the occupied cells that are 8-adjacent to given free cells."""
-    return occupied & widened(free)
+    return occupied & _widened(free)
 
 
-def widened(cells: Mask, by: int = 1) -> Mask:
+def _widened(cells: Mask, by: int = 1) -> Mask:
     """Return the cells within ``by`` cells of given ones, diagonals included."""
     side = 2 * by + 1
     bytes_of = np.ascontiguousarray(cells).view(np.uint8)
@@ -166,33 +166,31 @@ def occupied_f1(believed: Mask, occupied: Mask, tolerance: int = 1, wanted: Mask
     """Return F1 = 2 P R / (P + R) of the occupied cells.
 
     P is the share of believed cells within the tolerance of a true one, R that of wanted true cells within
-    the tolerance of a believed one. 1 where there is neither, 0 where there is one only.
+    the tolerance of a believed one. 1 if there is neither, 0 if there is one only.
 
     Parameters
     ----------
     believed, occupied : (rows, columns) bool
         Occupied cells of the map and of the truth.
-    tolerance : int
-        In cells, diagonals included.
     wanted : (rows, columns) bool or None
         The true cells that a map should hold, of which R is the share found: such as those on the surface of
-        what was sensed, where the inside of solids is true but cannot be seen. All where None.
+        what was sensed, as the inside of solids is true but cannot be seen. All if None.
     """
     wanted = occupied if wanted is None else wanted
     if not believed.any() and not wanted.any():
         return 1.0
-    precision = share(believed & widened(occupied, tolerance), believed, empty=0.0)
-    recall = share(wanted & widened(believed, tolerance), wanted, empty=0.0)
+    precision = share(believed & _widened(occupied, tolerance), believed, empty=0.0)
+    recall = share(wanted & _widened(believed, tolerance), wanted, empty=0.0)
     return 2.0 * precision * recall / (precision + recall) if precision + recall > 0.0 else 0.0
 
 
 def occupied_iou(believed: Mask, occupied: Mask, sensed: Mask) -> float:
     """Return ``iou_occupied`` = (hits of B + hits of S) / (|B| + |S|).
 
-    1 where both are empty.
+    1 if both are empty.
 
     B are the believed occupied cells, S the truth's occupied cells that are 8-adjacent to sensed cells of F,
-    so that the inside of solids does not count. A cell of either is a hit where one of the other is within
+    so that the inside of solids does not count. A cell of either is a hit if one of the other is within
     one cell.
 
     Parameters
@@ -206,14 +204,14 @@ def occupied_iou(believed: Mask, occupied: Mask, sensed: Mask) -> float:
     size = int(believed.sum()) + int(true_surface.sum())
     if size == 0:
         return 1.0
-    hits = int((believed & widened(true_surface)).sum()) + int((true_surface & widened(believed)).sum())
+    hits = int((believed & _widened(true_surface)).sum()) + int((true_surface & _widened(believed)).sum())
     return hits / size
 
 
 def free_error_rate(believed_free: Mask, occupied: Mask) -> float:
     """Return |believed free and occupied in truth| / |believed free|.
 
-    0 where nothing is believed free.
+    0 if nothing is believed free.
 
     Parameters
     ----------

@@ -12,8 +12,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.evaluation.record.display import DisplayTrack, MapChanges
-from lidarium.evaluation.record.episode_record import TIME, EpisodeRecord, NewerFormatError, check_header
+from lidarium.evaluation.record.episode_record import (
+    TIME,
+    DisplayTrack,
+    EpisodeRecord,
+    MapChanges,
+    NewerFormatError,
+    check_header,
+)
 from lidarium.mapping.files.guarded_arrays import GuardedArchive
 from lidarium.mapping.files.guarded_reading import read_bytes, reading
 from lidarium.mapping.files.output import whole_file
@@ -42,20 +48,6 @@ def write_record(path: Path, record: EpisodeRecord) -> None:
     """Write a record, whole or not at all.
 
     The same record gives the same file.
-
-    Parameters
-    ----------
-    path : Path
-        The file, by custom an ``.npz``.
-    record : EpisodeRecord
-        What a ``Recorder`` made.
-
-    Raises
-    ------
-    ValueError
-        Where an event holds what JSON cannot.
-    OSError
-        Where nothing can be written there.
     """
     content = io.BytesIO()
     with zipfile.ZipFile(content, "w", zipfile.ZIP_DEFLATED) as archive:
@@ -70,15 +62,7 @@ def write_record(path: Path, record: EpisodeRecord) -> None:
 
 
 def read_record(path: Path) -> EpisodeRecord:
-    """Read a record of this version or an older one.
-
-    Raises
-    ------
-    FileNotFoundError
-        Where there is no such file.
-    ValueError
-        Where it is no record, damaged, cut short, or of a newer format than this version knows.
-    """
+    """Read a record of this version or an older one."""
     path = Path(path)
     content = read_bytes(path)
     with reading(path, "a whole episode record", "want a file that lidarium run --record wrote"):
@@ -138,7 +122,7 @@ def _packed(record: EpisodeRecord) -> dict[str, NDArray[Any]]:
 
 
 def _unpacked(header: dict[str, Any], events: Any, arrays: dict[str, NDArray[Any]]) -> EpisodeRecord:  # noqa: ANN401
-    """Make a record of what a file holds, checked."""
+    """Make a record of the content of a file, checked."""
     steps, robots, time_step = header["steps"], header["robots"], header["time_step"]
     (rows, words), counted = header["map_shape"], max(header["counted_cells"], 1)
     poses, samples = len(arrays["pose_steps"]), len(arrays["map_counts"])

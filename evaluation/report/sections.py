@@ -25,10 +25,15 @@ from lidarium.evaluation.analysis.figures import (
 from lidarium.evaluation.analysis.groups import Group, paired, repeats, times_to
 from lidarium.evaluation.analysis.records import Entry, Key
 from lidarium.evaluation.drawing.floor_pictures import recorded_pair, save_paths, save_visits, visits_on
-from lidarium.evaluation.drawing.plots import coverage_curves, save_boxes, save_coverage
-from lidarium.evaluation.drawing.profiles import profiles, save_profiles
+from lidarium.evaluation.drawing.plots import (
+    coverage_curves,
+    profiles,
+    save_boxes,
+    save_coverage,
+    save_profiles,
+)
 from lidarium.evaluation.report import tables
-from lidarium.evaluation.report.plain_text import code, plain
+from lidarium.evaluation.report.tables import code, plain
 from lidarium.evaluation.statistics import FEWEST_FOR_NOMINAL, median_interval
 
 _LONGEST_STEM = 60
@@ -45,7 +50,7 @@ _OF_FEW = (
 
 @dataclass(slots=True)
 class Section:
-    """What a report says of one group.
+    """The section of a report about one group.
 
     Attributes
     ----------
@@ -58,7 +63,7 @@ class Section:
     markdown : list of str
         Paragraphs, tables and pictures.
     warnings : list of str
-        What to be careful with.
+        Warnings.
     """
 
     group: Group
@@ -71,23 +76,7 @@ class Section:
 def describe_group(
     group: Group, values: tuple[Value, ...], records: dict[Key, Entry], out: Path, baseline: str, seed: int
 ) -> Section:
-    """Return the section of a group and write its plots.
-
-    Parameters
-    ----------
-    group : Group
-        The episodes.
-    values : tuple of Value
-        Columns of tables.
-    records : dict
-        What was recorded, of any episodes.
-    out : Path
-        Folder of the report.
-    baseline : str
-        Policy that the others are compared with.
-    seed : int
-        Where the draws of bootstrap intervals come from.
-    """
+    """Return the section of a group and write its plots."""
     section = Section(group, values)
     section.numbers = {
         "robots": group.robots,

@@ -1,13 +1,34 @@
 """Figures as markdown."""
 
 import math
+import re
 from collections.abc import Iterable, Sequence
 
 from lidarium.evaluation.analysis.figures import TIMES, Comparison, TimeFigure, Value, ValueFigure
 from lidarium.evaluation.analysis.groups import Group, times_to
 from lidarium.evaluation.episodes.result import METRICS
-from lidarium.evaluation.report.plain_text import code, plain
 from lidarium.evaluation.statistics import Interval, median_interval
+from lidarium.mapping.files.names import printable
+
+_SPECIAL = re.compile(r"([\\`*\[\]<>|$~])")
+_WRITTEN = re.compile(r"`([^`]*)`|\\([\\`*\[\]<>|$~])|&amp;")
+
+
+def plain(text: str) -> str:
+    """Return text in which nothing stands for anything but itself, links and tables among it."""
+    return _SPECIAL.sub(r"\\\1", printable(text).replace("&", "&amp;"))
+
+
+def code(name: str) -> str:
+    """Return a name as code; one that would end the code or a table's cell as plain text."""
+    shown = printable(name)
+    return f"`{shown}`" if shown.strip() and not set("`|") & set(shown) else plain(shown)
+
+
+def as_text(markdown: str) -> str:
+    """Return plain text of the output of `plain` and `code`, for pages that are not markdown."""
+    return _WRITTEN.sub(lambda found: found[1] or found[2] or "&", markdown)
+
 
 NONE = "–"  # noqa: RUF001
 

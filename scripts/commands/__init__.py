@@ -1,7 +1,7 @@
-"""Commands of ``lidarium``, one per file: its options, and ``execute``, which takes them.
+"""Commands of ``lidarium``, one per file.
 
-The name of a command is that of its file, and its summary the file's first line. A module is imported when
-its command is used.
+A file has the options of its command, and ``execute``, which takes them. The name of a command is that of its
+file, and its summary the file's first line. A module is imported when its command is used.
 """
 
 import re
@@ -16,7 +16,7 @@ from lidarium.scripts.common import Answer
 Execute = TypeVar("Execute", bound=Callable[[Any], Answer])
 
 COMMANDS: Registry[Callable[[Any], Answer]] = Registry("command")
-"""What runs a command, by its name: a function of its options, a dataclass that extends ``Command``."""
+"""Functions of commands by name; each takes its options, a dataclass that extends ``Command``."""
 
 GROUP = "lidarium.commands"
 """Group of the entry points by which installed packages add commands."""
@@ -32,7 +32,7 @@ def command(name: str, summary: str) -> Callable[[Execute], Execute]:
     Parameters
     ----------
     name : str
-        What users type; no other command has it.
+        Name that users type; no other command has it.
     summary : str
         One line for ``lidarium --help``.
 

@@ -7,7 +7,7 @@ from lidarium.scripts.common import INTERRUPTED, Answer, Command, notify, table
 
 
 @dataclass(frozen=True, kw_only=True)
-class Bench(Command):
+class _Bench(Command):
     """Measure the lines of the speed budget on this machine.
 
     The other simulators that are installed are measured beside it.
@@ -18,7 +18,7 @@ class Bench(Command):
     effort: Literal["quick", "moderate", "full"] = "moderate"
     """how long to measure: coarse figures, figures to read, or those to publish"""
     only: tuple[str, ...] = ()
-    """questions to ask, all where left out.
+    """questions to ask, all by default.
 
     Questions are kernel_step, ray_casting, range_error, map_update, exploration_projects,
     environment_step, batch_step, learning_preset, waypoint_decision, frontier_decision,
@@ -27,8 +27,8 @@ class Bench(Command):
     """
 
 
-def execute(command: Bench) -> Answer:
-    """Measure, print, and write ``speed.md`` and ``speed.json`` where asked to."""
+def execute(command: _Bench) -> Answer:
+    """Measure, print, and write ``speed.md`` and ``speed.json`` if asked to."""
     from lidarium.benchmarks.speed.all import QUESTIONS, ask, result_of
     from lidarium.benchmarks.speed.harness.report import write_speed
     from lidarium.benchmarks.speed.harness.timing import EFFORTS

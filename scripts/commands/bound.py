@@ -10,11 +10,11 @@ from lidarium.scripts.common import DONE, NO, Answer, TeamCommand, table
 
 
 @dataclass(frozen=True, kw_only=True)
-class Bound(TeamCommand):
+class _Bound(TeamCommand):
     """Say how soon a team that knew the floor could have seen it.
 
     Tours past views of the whole floor are planned and driven with the robots' limits. With --out, bound.json
-    and a picture are written there. Exit code 3 where no plan sees enough.
+    and a picture are written there. Exit code 3 if no plan sees enough.
     """
 
     compiles: ClassVar[bool] = True
@@ -28,21 +28,15 @@ class Bound(TeamCommand):
     rounds: int = 300
     """how often the tours are changed to be shorter"""
     resolution: float | None = None
-    """metres per pixel, where the floor is a plain image"""
+    """metres per pixel, if the floor is a plain image"""
 
 
-def execute(command: Bound) -> Answer:
-    """Plan and drive the tours.
-
-    Raises
-    ------
-    ValueError, FileNotFoundError, OSError
-        Where the floor, an option or ``--out`` is no good, or the extra is missing; nothing is written then.
-    """
+def execute(command: _Bound) -> Answer:
+    """Plan and drive the tours."""
     from lidarium.envs.floors.catalogue.names import load_floor
     from lidarium.envs.settings.making import make_settings
     from lidarium.evaluation.bounds.bound import known_floor_bound
-    from lidarium.evaluation.drawing.maps.bound_picture import save_bound_picture
+    from lidarium.evaluation.drawing.bound_picture import save_bound_picture
     from lidarium.evaluation.suites.starts import drawn_starts, starts_in
     from lidarium.mapping.files.output import check_writable, write_json
 

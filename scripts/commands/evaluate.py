@@ -22,7 +22,7 @@ DEFAULT_FOLDER = Path("runs/evaluation")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Evaluate(TeamCommand):
+class _Evaluate(TeamCommand):
     """Run policies x floors x robots x seeds.
 
     Finished episodes are kept, and the same command goes on where it stopped.
@@ -31,7 +31,7 @@ class Evaluate(TeamCommand):
     compiles: ClassVar[bool] = True
 
     suite: Positional[Path | None] = None
-    """TOML file that says what to run, in place of the options below"""
+    """TOML file with the suite, in place of the options below"""
     preset: str | None = None
     """evaluate as another project does.
 
@@ -45,7 +45,7 @@ class Evaluate(TeamCommand):
     policy_set: tuple[str, ...] = ()
     """settings of policies as POLICY.KEY=VALUE, such as learned.weights=FILE"""
     floors: tuple[str, ...] = ()
-    """floors as for `lidarium run`, apartment where left out.
+    """floors as for `lidarium run`, apartment by default.
 
     Set:NAME for all floors of a set, set:NAME:COUNT for its first ones
     """
@@ -61,7 +61,7 @@ class Evaluate(TeamCommand):
     stop_coverage: float = 0.99
     """share of the floor at which an episode ends"""
     resolution: float | None = None
-    """metres per pixel, where floors are plain images"""
+    """metres per pixel, if floors are plain images"""
     workers: int = 0
     """processes that run episodes; 0 for as many as there are cores"""
     ray: str | None = None
@@ -74,14 +74,8 @@ class Evaluate(TeamCommand):
     """keep a record of every episode, for replays and for the pictures of the report"""
 
 
-def execute(command: Evaluate) -> Answer:
-    """Run what is missing of a suite.
-
-    Raises
-    ------
-    ValueError, FileNotFoundError, OSError
-        Where the input or ``--out`` is no good; what was finished before is kept.
-    """
+def execute(command: _Evaluate) -> Answer:
+    """Run the missing episodes of a suite."""
     from lidarium.evaluation.suites.campaign import Campaign
     from lidarium.mapping.files.output import check_writable
 
@@ -123,7 +117,7 @@ def _shard(text: str | None) -> slice:
     return slice(shard - 1, None, count)
 
 
-def _suite(command: Evaluate) -> "Suite":
+def _suite(command: _Evaluate) -> "Suite":
     from lidarium.evaluation.suites.suite import Suite, read_suite
     from lidarium.evaluation.suites.trial import DEFAULT_VARIANT
 
@@ -160,8 +154,8 @@ def _suite(command: Evaluate) -> "Suite":
     )
 
 
-def _policy_settings(command: Evaluate) -> dict[str, dict[str, Any]]:
-    """Return what the policies are made with."""
+def _policy_settings(command: _Evaluate) -> dict[str, dict[str, Any]]:
+    """Return the settings of the policies."""
     given = options_by_policy(command.policy_set, command.policies)
     options = supervisor_options(command.supervisor)
     led = [name for name in command.policies if is_supervised(name)] if options else []
@@ -224,7 +218,7 @@ def _answer(campaign: "Campaign", folder: Path, is_interrupted: bool) -> Answer:
 def summary_of(episodes: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
     """Return medians by settings, policy and size of the team.
 
-    A median time is None where half did not reach it.
+    A median time is None if half did not reach it.
     """
     groups: dict[tuple[str, str, int], list[Mapping[str, Any]]] = {}
     for episode in episodes:

@@ -16,41 +16,41 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, kw_only=True)
-class List(Command):
+class _List(Command):
     """List the floors of the catalogue, the generators and the sets."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Show(Command):
+class _Show(Command):
     """Tell a floor's figures; with --out draw it, too."""
 
     name: Positional[str]
     """name in the catalogue, building:SEED, or a file"""
     resolution: float | None = None
-    """metres per pixel, where the floor is a plain image"""
+    """metres per pixel, if the floor is a plain image"""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Generate(Command):
+class _Generate(Command):
     """Generate a building; writes it as a ROS map (yaml and pgm) and as a picture."""
 
     kind: str = "any"
     """apartment, office, corridors, or any, which the seed draws"""
     area: float | None = None
-    """floor area between the walls, 30 to 1500 [m2]; drawn where left out"""
+    """floor area between the walls, 30 to 1500 [m2]; drawn by default"""
     loops: float | None = None
     """share of the possible openings beyond those that join all rooms, 0 to 1.
 
-    Drawn where left out
+    Drawn by default
     """
     clutter: float | None = None
-    """share of the area under furniture, 0 to 0.3; drawn where left out"""
+    """share of the area under furniture, 0 to 0.3; drawn by default"""
     map_resolution: float = 0.025
     """side of a cell of the ROS map [m]"""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Import(Command):
+class _Import(Command):
     """Read a floor of any known format.
 
     Writes it as a ROS map (yaml and pgm) and as a picture.
@@ -63,16 +63,16 @@ class Import(Command):
     array.
     """
     resolution: float | None = None
-    """metres per pixel, where the file is a plain image"""
+    """metres per pixel, if the file is a plain image"""
     map_resolution: float = 0.025
     """side of a cell of the ROS map [m]"""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Prepare(Command):
+class _Prepare(Command):
     """Make floors and their tables ahead and keep them on disk for all processes.
 
-    What is there already is passed over.
+    Existing ones are skipped.
     """
 
     name: Positional[str]
@@ -98,15 +98,15 @@ class Prepare(Command):
 
 
 @dataclass(frozen=True)
-class Floors:
+class _Floors:
     """List, show, generate, import and prepare floors."""
 
     command: (
-        Annotated[List, subcommand("list")]
-        | Annotated[Show, subcommand("show")]
-        | Annotated[Generate, subcommand("generate")]
-        | Annotated[Import, subcommand("import")]
-        | Annotated[Prepare, subcommand("prepare")]
+        Annotated[_List, subcommand("list")]
+        | Annotated[_Show, subcommand("show")]
+        | Annotated[_Generate, subcommand("generate")]
+        | Annotated[_Import, subcommand("import")]
+        | Annotated[_Prepare, subcommand("prepare")]
     )
 
     @property
@@ -120,20 +120,20 @@ class Floors:
         return self.command.compiles
 
 
-def execute(command: Floors) -> Answer:
+def execute(command: _Floors) -> Answer:
     """Run the command about floors that was chosen."""
     chosen = command.command
-    if isinstance(chosen, List):
-        return list_floors(chosen)
-    if isinstance(chosen, Show):
-        return show_floor(chosen)
-    if isinstance(chosen, Generate):
-        return generate_floor(chosen)
-    return import_floor(chosen) if isinstance(chosen, Import) else prepare_floors(chosen)
+    if isinstance(chosen, _List):
+        return _list_floors(chosen)
+    if isinstance(chosen, _Show):
+        return _show_floor(chosen)
+    if isinstance(chosen, _Generate):
+        return _generate_floor(chosen)
+    return _import_floor(chosen) if isinstance(chosen, _Import) else _prepare_floors(chosen)
 
 
-def list_floors(command: List) -> Answer:
-    """List what there is."""
+def _list_floors(command: _List) -> Answer:
+    """List all floors."""
     from lidarium.envs.floors.catalogue.names import SETS, about_floor, floor_names
     from lidarium.envs.floors.generation.buildings import KINDS
 
@@ -161,7 +161,7 @@ def list_floors(command: List) -> Answer:
     return Answer(result, text + "\n\nand any file that the importers know: lidarium floors import --help")
 
 
-def show_floor(command: Show) -> Answer:
+def _show_floor(command: _Show) -> Answer:
     """Describe a floor."""
     from lidarium.envs.floors.catalogue.names import about_floor, describe_floor, floor_names, load_floor
 
@@ -171,13 +171,13 @@ def show_floor(command: Show) -> Answer:
     about = about_floor(command.name) if command.name in floor_names() else ""
     files = []
     if command.out is not None:
-        save_picture(command.out / f"{file_name(floor.name)}.png", floor)
+        _save_picture(command.out / f"{file_name(floor.name)}.png", floor)
         write_result(command, f"{file_name(floor.name)}.json", result)
         files = [f"{file_name(floor.name)}.json", f"{file_name(floor.name)}.png"]
     return Answer(result, floor_description(result, command.out, files, about))
 
 
-def generate_floor(command: Generate) -> Answer:
+def _generate_floor(command: _Generate) -> Answer:
     """Generate a building and write it."""
     from lidarium.envs.floors.generation.buildings import BuildingSettings, generate_building
 
@@ -188,7 +188,7 @@ def generate_floor(command: Generate) -> Answer:
     return write_floor(command, generate_building(command.seed, settings), command.map_resolution)
 
 
-def import_floor(command: Import) -> Answer:
+def _import_floor(command: _Import) -> Answer:
     """Read a floor and write it."""
     from lidarium.envs.floors.importers import load_file
 
@@ -196,10 +196,10 @@ def import_floor(command: Import) -> Answer:
     return write_floor(command, load_file(command.file, command.resolution), command.map_resolution)
 
 
-def prepare_floors(command: Prepare) -> Answer:
+def _prepare_floors(command: _Prepare) -> Answer:
     """Fill the store of floors.
 
-    A call that is interrupted or loses a worker keeps what it has made.
+    A call that is interrupted or loses a worker keeps the finished floors.
     """
     from lidarium.envs.floors.catalogue.names import set_floors
     from lidarium.envs.floors.catalogue.store import FOLDER_VARIABLE, SIZE_VARIABLE, floor_store
@@ -243,7 +243,7 @@ def prepare_floors(command: Prepare) -> Answer:
 
 
 def _prepared(spec: str, resolution: float, laser_height: float, body_height: float) -> bool:
-    """Keep a floor and its tables; False where they were there."""
+    """Keep a floor and its tables; False if they were there."""
     from lidarium.envs.floors.catalogue.names import load_floor
     from lidarium.envs.floors.catalogue.store import floor_store
     from lidarium.envs.simulation.kernels.floor_cache import prepare_tables
@@ -251,7 +251,9 @@ def _prepared(spec: str, resolution: float, laser_height: float, body_height: fl
     return prepare_tables(floor_store(), load_floor(spec), resolution, laser_height, body_height)
 
 
-def _prepare(prepare: Callable[[str], bool], specs: Sequence[str], command: Prepare) -> tuple[int, int, bool]:
+def _prepare(
+    prepare: Callable[[str], bool], specs: Sequence[str], command: _Prepare
+) -> tuple[int, int, bool]:
     """Prepare floors.
 
     Return how many are ready, how many were made, and whether it was broken off.
@@ -295,7 +297,7 @@ def write_floor(command: Command, floor: "Floor", resolution: float) -> Answer:
     raster = floor.raster(resolution, LASER_HEIGHT, LASER_HEIGHT)
     result = describe_floor(floor)
     write_ros_map(folder, stem, _levels(raster.solid, resolution), (*raster.origin, 0.0), resolution)
-    save_picture(folder / f"{stem}.png", floor)
+    _save_picture(folder / f"{stem}.png", floor)
     write_result(command, f"{stem}.json", result, folder)
     files = [f"{stem}.{kind}" for kind in ("yaml", "pgm", "png", "json")]
     check_written(folder, files)
@@ -305,7 +307,7 @@ def write_floor(command: Command, floor: "Floor", resolution: float) -> Answer:
 def _levels(solid: Any, resolution: float) -> Any:  # noqa: ANN401
     """Return free and occupied cells.
 
-    What is deeper in solids than a wall, no laser sees: unknown.
+    Cells deeper in solids than a wall are unknown: no laser sees them.
     """
     import cv2
     import numpy as np
@@ -319,7 +321,7 @@ def _levels(solid: Any, resolution: float) -> Any:  # noqa: ANN401
     )
 
 
-def save_picture(path: Path, floor: "Floor") -> None:
+def _save_picture(path: Path, floor: "Floor") -> None:
     """Write a picture of a floor."""
     from lidarium.evaluation.drawing.run_picture import save_floor_picture
 
@@ -335,7 +337,7 @@ def check_out(command: Command) -> None:
 
 
 def write_result(command: Command, name: str, result: dict[str, Any], folder: Path | None = None) -> None:
-    """Write a result into a folder, or into ``--out`` where it is given."""
+    """Write a result into a folder, or into ``--out`` if it is given."""
     from lidarium.mapping.files.output import write_json
 
     place = folder or command.out

@@ -28,10 +28,10 @@ LEAST_SCALE = 0.01
 
 
 @dataclass(frozen=True, kw_only=True)
-class Merge(Command):
+class _Merge(Command):
     """Merge maps into one; writes the fused map, transforms.json and a picture.
 
-    Where maps do not join, it says why of each pair; transforms.json and the picture say more.
+    If maps do not join, it says why of each pair; transforms.json and the picture say more.
     """
 
     compiles: ClassVar[bool] = True
@@ -41,14 +41,14 @@ class Merge(Command):
     resolution: float | None = None
     """metres per pixel of maps that are plain images.
 
-    Dark is occupied, light is free, what lies between unknown
+    Dark is occupied, light is free, values between are unknown
     """
     mode: str = "default"
     """rules of merging: default, or thesis for those of the thesis as printed."""
     tolerance: Literal["strict", "normal", "drift"] = "normal"
     """how far maps may be bent against each other: strict for not at all, drift for maps that have drifted"""
     structure: Literal["corners", "regions", "all"] = "all"
-    """what proposes how maps lie before everything is tried.
+    """method that proposes transforms before everything is tried.
 
     Corners; regions of free space and the doors between them; or both. Mode thesis knows corners alone
     """
@@ -85,7 +85,7 @@ class Merge(Command):
 
     @property
     def factor(self) -> float | None:
-        """By how much the second map has to grow; None where that is sought."""
+        """By how much the second map has to grow; None if that is sought."""
         if self.scale in ("fixed", "auto"):
             return 1.0 if self.scale == "fixed" else None
         try:
@@ -100,14 +100,8 @@ class Merge(Command):
         return factor
 
 
-def execute(command: Merge) -> Answer:
-    """Merge maps and write what came of it.
-
-    Raises
-    ------
-    ValueError, FileNotFoundError, OSError
-        Where a map or ``--out`` is no good; nothing is written then.
-    """
+def execute(command: _Merge) -> Answer:
+    """Merge maps and write the results."""
     from lidarium.mapping.files.output import check_writable
     from lidarium.mapping.merging.settings import TOLERANCES, merge_settings
 
@@ -140,7 +134,7 @@ def execute(command: Merge) -> Answer:
 
 
 def _merged(
-    command: Merge, images: "dict[str, MapImage]", settings: "MergeSettings"
+    command: _Merge, images: "dict[str, MapImage]", settings: "MergeSettings"
 ) -> "tuple[Merged, dict[str, MapImage], float]":
     """Merge maps; return also the maps with the second one grown, and by how much it has."""
     from lidarium.mapping.merging.merger import Question, merge_maps
@@ -171,8 +165,8 @@ def _grown(images: "dict[str, MapImage]", factor: float) -> "dict[str, MapImage]
     return {first: kept, second: grown}
 
 
-def _guess(command: Merge, images: "list[MapImage]") -> "Transform | None":
-    """Return the guess between the maps' lower left corners; None where there is none."""
+def _guess(command: _Merge, images: "list[MapImage]") -> "Transform | None":
+    """Return the guess between the maps' lower left corners; None if there is none."""
     if command.guess is None:
         return None
     from lidarium.mapping.geometry.rigid import Transform
@@ -189,8 +183,8 @@ def _guess(command: Merge, images: "list[MapImage]") -> "Transform | None":
     return first.inverse() @ Transform(x, y, theta) @ second
 
 
-def _read(command: Merge) -> "dict[str, MapImage]":
-    """Return the maps by their files' stems, numbered where these are the same."""
+def _read(command: _Merge) -> "dict[str, MapImage]":
+    """Return the maps by their files' stems, numbered if these are the same."""
     from lidarium.mapping.files.map_files import read_grey_map, read_ros_map
 
     images: dict[str, MapImage] = {}
@@ -232,7 +226,7 @@ def _placed(merged: "Merged", images: "dict[str, MapImage]") -> PlacedMaps:
 
 
 def _deformation(found: "Deformation | None") -> dict[str, float] | None:
-    """Return how much a map is bent, and what agrees with those before it then."""
+    """Return how much a map is bent, and its agreement with earlier maps."""
     if found is None:
         return None
     return {
@@ -245,7 +239,7 @@ def _deformation(found: "Deformation | None") -> dict[str, float] | None:
 
 
 def _summary(merged: "Merged", files: list[str], out: Path, scale: float | None) -> str:
-    """Return what is printed; ``scale`` is by how much the second map has grown, None where it may not."""
+    """Return the printed text; ``scale`` is by how much the second map has grown, None if it may not."""
     lines = [
         f"joined: {', '.join(group)}" if len(group) > 1 else f"alone:  {group[0]}"
         for group in merged.groups()
@@ -314,7 +308,7 @@ def draw_regions(
     merged: "Merged", images: "dict[str, MapImage]", settings: "RegionSettings", out: Path
 ) -> str:
     """Draw the regions of each map as it was compared; returns the file's name."""
-    from lidarium.evaluation.drawing.maps.region_picture import RegionMap, save_region_picture
+    from lidarium.evaluation.drawing.region_picture import RegionMap, save_region_picture
     from lidarium.mapping.merging.regions.graph import find_regions
 
     maps = {}

@@ -12,10 +12,10 @@ from lidarium.scripts.common import DONE, NO, Answer, Command, table
 
 
 @dataclass(frozen=True, kw_only=True)
-class Plan(Command):
+class _Plan(Command):
     """Plan a path on a sparse map.
 
-    With --out, path.json and pictures are written there. Exit code 3 where there is no path.
+    With --out, path.json and pictures are written there. Exit code 3 if there is no path.
     """
 
     compiles: ClassVar[bool] = True
@@ -34,17 +34,11 @@ class Plan(Command):
     """by how much paths beside obstacles cost more, as a share"""
 
 
-def execute(command: Plan) -> Answer:
-    """Plan a path.
-
-    Raises
-    ------
-    ValueError, FileNotFoundError, OSError
-        Where the map, a point or ``--out`` is no good; nothing is written then.
-    """
+def execute(command: _Plan) -> Answer:
+    """Plan a path."""
     import numpy as np
 
-    from lidarium.evaluation.drawing.maps.sparse_picture import save_sparse_pictures
+    from lidarium.evaluation.drawing.sparse_picture import save_sparse_pictures
     from lidarium.mapping.files.output import check_writable, write_json
     from lidarium.mapping.sparse.files.map_files import read_sparse_map
     from lidarium.mapping.sparse.graph.topological_graph import GraphSettings, build_graph

@@ -25,7 +25,7 @@ _FIGURES = (
 
 
 @dataclass(frozen=True, kw_only=True)
-class Replay(FilmFiles, Command):
+class _Replay(FilmFiles, Command):
     """Run a recorded episode again and compare its end, or draw its record.
 
     It reports whether the episode ends in the same state to the bit. Pictures, films and pages show records
@@ -35,7 +35,7 @@ class Replay(FilmFiles, Command):
     file: Annotated[Positional[Path], arg(metavar="FILE")]
     """episode.npz of `lidarium run --record`"""
     floor: str | None = None
-    """the floor that was recorded, where the one that the record names is not found"""
+    """the floor that was recorded, if the one that the record names is not found"""
     picture: Path | None = None
     """draw the record as a PNG file instead of running it again.
 
@@ -47,17 +47,11 @@ class Replay(FilmFiles, Command):
     Works for records of other versions too, with less to be seen
     """
     mcap: Path | None = None
-    """run the record again and write what was sensed as a bag of ROS 2 (extra mcap)"""
+    """run the record again and write the sensor data as a bag of ROS 2 (extra mcap)"""
 
 
-def execute(command: Replay) -> Answer:
-    """Run a record again, or draw it.
-
-    Raises
-    ------
-    ValueError, FileNotFoundError, OSError
-        Where the record, its floor or a place to write to is no good; nothing is written then.
-    """
+def execute(command: _Replay) -> Answer:
+    """Run a record again, or draw it."""
     from lidarium.evaluation.record import read_record
     from lidarium.mapping.files.output import check_writable, write_json
 
@@ -73,13 +67,13 @@ def execute(command: Replay) -> Answer:
     return answer
 
 
-def _about(command: Replay, record: "EpisodeRecord") -> dict[str, Any]:
+def _about(command: _Replay, record: "EpisodeRecord") -> dict[str, Any]:
     header = record.header
     names = ("version", "floor", "robots", "policy", "seed", "interrupted")
     return {"record": str(command.file), **{name: header[name] for name in names}}
 
 
-def _drawn(command: Replay, record: "EpisodeRecord") -> Answer:
+def _drawn(command: _Replay, record: "EpisodeRecord") -> Answer:
     from lidarium.evaluation.drawing.record_frames import save_track_picture
     from lidarium.evaluation.drawing.track_film import save_track_film
 
@@ -117,8 +111,9 @@ def _drawn(command: Replay, record: "EpisodeRecord") -> Answer:
     return Answer(result, "\n".join([_title(result), table(facts)]))
 
 
-def _write_page(path: Path, command: Replay, record: "EpisodeRecord") -> None:
-    from lidarium.evaluation.report.page import replay_of, write_replay_page
+def _write_page(path: Path, command: _Replay, record: "EpisodeRecord") -> None:
+    from lidarium.evaluation.report.page import write_replay_page
+    from lidarium.evaluation.report.replay_page import replay_of
 
     replay = replay_of(record, command.floor)
     if replay.lacks:
@@ -126,10 +121,10 @@ def _write_page(path: Path, command: Replay, record: "EpisodeRecord") -> None:
     write_replay_page(path, replay)
 
 
-def _floor_of_camera(command: Replay, record: "EpisodeRecord") -> "Floor | None":
+def _floor_of_camera(command: _Replay, record: "EpisodeRecord") -> "Floor | None":
     """Return the floor that the cameras of a record see.
 
-    It is None where robots had no cameras, or where the floor is not found.
+    It is None if robots had no cameras, or if the floor is not found.
     """
     from lidarium.evaluation.record.replay import find_floor
 
@@ -144,9 +139,8 @@ def _floor_of_camera(command: Replay, record: "EpisodeRecord") -> "Floor | None"
         return None
 
 
-def _run_again(command: Replay, record: "EpisodeRecord") -> Answer:
-    from lidarium.evaluation.record.replay import drive_again, first_difference, is_same
-    from lidarium.evaluation.record.state import state_sha256
+def _run_again(command: _Replay, record: "EpisodeRecord") -> Answer:
+    from lidarium.evaluation.record.replay import drive_again, first_difference, is_same, state_sha256
 
     env = drive_again(record, command.floor)
     same = is_same(record, env)

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Report(FilmFiles, Command):
+class _Report(FilmFiles, Command):
     """Compare policies over the episodes of a directory.
 
     Writes report.html, report.md, report.json and plots to --out, or to DIR/report. A film shows recorded
@@ -28,28 +28,22 @@ class Report(FilmFiles, Command):
     baseline: str | None = None
     """policy that the others are compared with.
 
-    Nearest_frontier where it is there, else the first of the alphabet
+    Nearest_frontier if it is there, else the first of the alphabet
     """
     replays: int = 30
     """most recorded episodes that run again for replays on the page, 0 for none"""
     film_floor: str | None = None
-    """floor of the episodes that a film shows; where left out, one that most policies have explored"""
+    """floor of the episodes that a film shows; by default, one that most policies have explored"""
     film_robots: int | None = None
     """number of robots of the episodes that a film shows"""
     film_seed: int | None = None
     """seed of the episodes that a film shows"""
     film_policies: tuple[str, ...] = ()
-    """policies that a film shows, in this order; all of them where left out, nine at most"""
+    """policies that a film shows, in this order; all of them by default, nine at most"""
 
 
-def execute(command: Report) -> Answer:
-    """Write the report of a directory.
-
-    Raises
-    ------
-    FileNotFoundError, ValueError, OSError
-        Where the directory, the baseline or ``--out`` is no good; nothing is written then.
-    """
+def execute(command: _Report) -> Answer:
+    """Write the report of a directory."""
     from lidarium.evaluation.report import write_report
 
     out = command.out or command.directory / "report"
@@ -65,7 +59,7 @@ def execute(command: Report) -> Answer:
     return Answer(result, "\n".join([_summary(result, out), *(f"film: {path}" for path in command.films)]))
 
 
-def _chosen(command: Report) -> "Chosen":
+def _chosen(command: _Report) -> "Chosen":
     """Return the episodes of the films."""
     from lidarium.evaluation.report.film_choice import Wanted, choose_episodes
 
@@ -76,7 +70,7 @@ def _chosen(command: Report) -> "Chosen":
     return chosen
 
 
-def _film(command: Report, chosen: "Chosen") -> None:
+def _film(command: _Report, chosen: "Chosen") -> None:
     """Film episodes side by side."""
     from lidarium.evaluation.drawing.track_film import save_side_by_side
     from lidarium.evaluation.record import read_record

@@ -20,9 +20,9 @@ SECONDS_BETWEEN_LINES = 10.0
 
 @dataclass(frozen=True, kw_only=True)
 class Reproduce(Command):
-    """Run what a page of docs/results shows, and write the page to --out.
+    """Run the study of a page of docs/results, and write the page to --out.
 
-    What has been run before is not run again.
+    Finished parts are not run again.
     """
 
     compiles: ClassVar[bool] = True
@@ -38,19 +38,13 @@ class Reproduce(Command):
     runs: Path = Path("runs/reproduce")
     """folder for episodes and other work"""
     workers: int = 0
-    """processes that run episodes; 0 for as many as there are cores; what is timed runs in one"""
+    """processes that run episodes; 0 for as many as there are cores; timed parts run in one"""
     records: bool = False
     """keep a record of every episode"""
 
 
 def execute(command: Reproduce) -> Answer:
-    """Run what is missing, then write the page.
-
-    Raises
-    ------
-    ValueError, FileNotFoundError, OSError
-        Where the input or ``--out`` is no good; what was finished before is kept.
-    """
+    """Run the missing parts, then write the page."""
     from lidarium.benchmarks.studies import STUDIES
     from lidarium.evaluation.suites.campaign import Campaign
     from lidarium.mapping.files.output import check_writable, write_text

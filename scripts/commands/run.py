@@ -33,13 +33,13 @@ if TYPE_CHECKING:
 DEFAULT_FOLDER = Path("runs")
 
 LONE_POLICY, TEAM_POLICY = "nearest_frontier", "supervised"
-"""Who decides where nothing is said."""
+"""Default policies of one robot and of a team."""
 
 TEAM_WORLD: dict[str, Any] = {"noise": "datasheet", "odometry": "typical", "localization": "slam"}
-"""How real the world of a team is where nothing is said."""
+"""How real the world of a team is by default."""
 
 CAMERA = "xtion_tilted"
-"""Camera of the robots where nothing is said and the policy needs one."""
+"""Camera of the robots by default and the policy needs one."""
 
 STOP_COVERAGE = 0.99
 """Share of the floor at which a run without a goal ends."""
@@ -70,7 +70,7 @@ class Run(FilmOptions, TeamCommand, ViewOptions):
     policy_set: tuple[str, ...] = ()
     """settings of the policy as KEY=VALUE, such as weights=FILE of `learned`"""
     resolution: float | None = None
-    """metres per pixel, where the floor is a plain image"""
+    """metres per pixel, if the floor is a plain image"""
     horizon_s: float | None = None
     """simulated time after which the run is cut [s].
 
@@ -79,7 +79,7 @@ class Run(FilmOptions, TeamCommand, ViewOptions):
     stop_coverage: float | None = None
     """share of the floor at which the run ends.
 
-    0.99 where left out, and none on a floor with a goal or where the policy explores by camera
+    0.99 by default, and none on a floor with a goal or if the policy explores by camera
     """
     starts: str | None = None
     """where the robots start: fixed, drawn, or x,y,theta of each.
@@ -97,14 +97,14 @@ class Run(FilmOptions, TeamCommand, ViewOptions):
     gif: bool = False
     """write a film of the run as an animated picture, run.gif"""
     film_shows: str = "auto"
-    """what films show, such as maps or scans; `lidarium show films` lists the choices.
+    """content of films, such as maps or scans; `lidarium show films` lists the choices.
 
     By default maps if robots do not know their starts and have no cameras, else scans
     """
 
     @property
     def chosen_policy(self) -> str:
-        """Who decides, once what was left out is known."""
+        """The policy, by default the nearest frontier."""
         return self.policy or LONE_POLICY
 
     @property
@@ -114,13 +114,7 @@ class Run(FilmOptions, TeamCommand, ViewOptions):
 
 
 def execute(command: Run) -> Answer:
-    """Run one episode and write what it left.
-
-    Raises
-    ------
-    ValueError, FileNotFoundError, OSError
-        Where the input or ``--out`` is no good; nothing is written then.
-    """
+    """Run one episode and write its results."""
     import lidarium
     from lidarium.mapping.files.output import check_writable
 
@@ -135,7 +129,7 @@ def execute(command: Run) -> Answer:
 
 
 def _answer(command: Run, policy: "Policy", options: dict[str, Any], views: "Sequence[Watcher]") -> Answer:
-    """Run the episode before all who watch, and write what it left."""
+    """Run the watched episode and write its results."""
     recorder = _recorder(command)
     env, history = _environment(command, policy, recorder)
     env.watchers += views
@@ -177,7 +171,7 @@ def _completed(command: Run) -> Run:
 
 
 def _policy_options(command: Run) -> dict[str, Any]:
-    """Return what the policy is made with."""
+    """Return the settings of the policy."""
     options = policy_options(command.policy_set)
     if command.supervisor:
         options |= supervisor_options(command.supervisor)
@@ -190,7 +184,7 @@ def _settings(command: Run, policy: "Policy") -> "ExplorationSettings":
     from lidarium.envs.floors.floor_choice import FloorChoice
     from lidarium.envs.settings.making import make_settings
 
-    # Coverage is what lasers see: who explores by camera ends when that has seen all.
+    # Coverage is by lasers: a policy that explores by camera ends when cameras have seen all.
     stop, by_laser = command.stop_coverage, "depth" not in policy.observes
     if stop is None and by_laser and not FloorChoice(command.floor, command.resolution).has_goal:
         stop = STOP_COVERAGE

@@ -1,4 +1,4 @@
-"""`lidarium show`: list what can be chosen: policies, robots, metrics, settings and more."""
+"""`lidarium show`: list the choices: policies, robots, metrics, settings and more."""
 
 from dataclasses import asdict, dataclass
 from functools import partial
@@ -40,11 +40,11 @@ class Show(Command):
             "supervisor",
         ]
     ]
-    """what to list"""
+    """kind of the list"""
 
 
 def execute(command: Show) -> Answer:
-    """List what there is of a kind."""
+    """List the choices of a kind."""
     from lidarium.mapping.files.output import check_writable, write_json, write_text
 
     if command.out is not None:

@@ -23,7 +23,7 @@ DEFAULT_FOLDER = Path("slam")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Slam(Command):
+class _Slam(Command):
     """Make a map of a log of laser scans.
 
     Writes map.yaml, map.pgm, trajectory.tum and slam.json.
@@ -38,7 +38,7 @@ class Slam(Command):
     pose_odom; bags are .mcap files with LaserScan messages (extra mcap).
     """
     topic: str | None = None
-    """topic of the scans, where a bag has several"""
+    """topic of the scans, if a bag has several"""
     resolution: float = 0.05
     """side of a cell of the map [m]"""
     range: float = 30.0
@@ -48,7 +48,7 @@ class Slam(Command):
     match_angle: float = 1.0
     """or after so much of a turn [degrees]"""
     beam_interval: float = 0.0
-    """time from beam to beam where the log does not say [s]; 0 for scans taken at once"""
+    """time from beam to beam if the log does not say [s]; 0 for scans taken at once"""
     field_of_view: float | None = None
     """angle between the first and the last beam of FLASER lines [degrees].
 
@@ -93,14 +93,8 @@ class Slam(Command):
             raise ValueError(f"clock-shift is {self.clock_shift} s; want a number")
 
 
-def execute(command: Slam) -> Answer:
-    """Run SLAM over a log and write what came of it.
-
-    Raises
-    ------
-    ValueError, FileNotFoundError, OSError
-        Where the log, the reference, the relations or ``--out`` is no good; nothing is written then.
-    """
+def execute(command: _Slam) -> Answer:
+    """Run SLAM over a log and write the results."""
     from lidarium.mapping.files.output import check_writable
     from lidarium.mapping.files.trajectories import read_tum
     from lidarium.mapping.localization.slam.following import follow
@@ -114,7 +108,7 @@ def execute(command: Slam) -> Answer:
     def watch(scans: Iterable[int]) -> Iterator[int]:
         return counted(scans, len(log.stamps), "scans", command.json)
 
-    followed = follow(log, settings_of(command), watch)
+    followed = follow(log, _settings_of(command), watch)
     if not len(followed.slam.key_scans.poses):
         raise ValueError(
             f"{command.log} holds no scan with a return within {command.range} m; want a larger --range or "
@@ -129,7 +123,7 @@ def execute(command: Slam) -> Answer:
     return Answer(result, _summary(result, out))
 
 
-def settings_of(command: Slam) -> "SlamSettings":
+def _settings_of(command: _Slam) -> "SlamSettings":
     """Return the settings that a command asks for."""
     from lidarium.mapping.localization.slam.following import LOG_SETTINGS
 
@@ -145,7 +139,7 @@ def settings_of(command: Slam) -> "SlamSettings":
     )
 
 
-def _read(command: Slam) -> "LaserLog":
+def _read(command: _Slam) -> "LaserLog":
     from lidarium.mapping.files.bags.reading import read_mcap_log
     from lidarium.mapping.files.carmen_logs import read_carmen_log
     from lidarium.mapping.files.npz_logs import read_npz_log
@@ -159,8 +153,8 @@ def _read(command: Slam) -> "LaserLog":
     )
 
 
-def _log(command: Slam) -> "LaserLog":
-    """Read the log and print what was left out of it."""
+def _log(command: _Slam) -> "LaserLog":
+    """Read the log and print the parts left out."""
     log = _read(command)
     for reason, count in log.skipped.items():
         notify(f"{command.log}: left out: {count} {reason}")
@@ -171,7 +165,7 @@ def _log(command: Slam) -> "LaserLog":
     return log.limited(command.range, command.clear_without_return)
 
 
-def _result(command: Slam, log: "LaserLog", followed: "Followed") -> dict[str, Any]:
+def _result(command: _Slam, log: "LaserLog", followed: "Followed") -> dict[str, Any]:
     import numpy as np
 
     from lidarium import __version__
@@ -179,7 +173,7 @@ def _result(command: Slam, log: "LaserLog", followed: "Followed") -> dict[str, A
     data_s = float(log.stamps[-1] - log.stamps[0])
     cpu_s = float(followed.scan_s.sum() + followed.finish_s)
     steps = np.diff(followed.poses[:, :2], axis=0)
-    settings = asdict(settings_of(command)) | {
+    settings = asdict(_settings_of(command)) | {
         "range_m": command.range,
         "clear_without_return": command.clear_without_return,
     }
@@ -205,7 +199,7 @@ def _result(command: Slam, log: "LaserLog", followed: "Followed") -> dict[str, A
 
 
 def _against_reference(
-    command: Slam,
+    command: _Slam,
     log: "LaserLog",
     poses: "NDArray[np.float64]",
     reference: "tuple[NDArray[np.float64], NDArray[np.float64]]",
@@ -235,7 +229,7 @@ def _against_reference(
     }
 
 
-def _relations(command: Slam, log: "LaserLog") -> "Relations":
+def _relations(command: _Slam, log: "LaserLog") -> "Relations":
     """Read the relations of times within the log, and count the others.
 
     The number of the others is reported.
@@ -258,7 +252,7 @@ def _relations(command: Slam, log: "LaserLog") -> "Relations":
 
 
 def _against_relations(
-    command: Slam, log: "LaserLog", poses: "NDArray[np.float64]", relations: "Relations"
+    command: _Slam, log: "LaserLog", poses: "NDArray[np.float64]", relations: "Relations"
 ) -> dict[str, float]:
     from lidarium.evaluation.metrics.relations import log_relation_errors
 
@@ -266,7 +260,7 @@ def _against_relations(
     return {name: round(value, 8) for name, value in errors.as_dict().items()}
 
 
-def _write(command: Slam, out: Path, log: "LaserLog", followed: "Followed", result: dict[str, Any]) -> None:
+def _write(command: _Slam, out: Path, log: "LaserLog", followed: "Followed", result: dict[str, Any]) -> None:
     from lidarium.mapping.files.map_files import cropped, write_ros_map
     from lidarium.mapping.files.output import check_written, write_json
     from lidarium.mapping.files.trajectories import write_tum

@@ -23,7 +23,7 @@ SUFFIXES = (".smap", ".txt")
 
 
 @dataclass(frozen=True, kw_only=True)
-class SparseMapping(Command):
+class _SparseMapping(Command):
     """Make a sparse map of a cloud, or of frames with their poses.
 
     Writes the map and pictures of it beside, from above in the plane and in space.
@@ -38,11 +38,11 @@ class SparseMapping(Command):
     intrinsics: str | None = None
     """fx,fy,cx,cy of the camera of depth images [pixels]"""
     scale: float | None = None
-    """metres of a unit; 1 where left out, 0.001 of depth images"""
+    """metres of a unit; 1 by default, 0.001 of depth images"""
     codes: int = 0
     """codes of a cloud; 0 for 1024 of one cloud and 256 of each frame"""
     robot_height: float = 1.2
-    """what is higher by 0.3 m is left out [m]"""
+    """points more than 0.3 m higher are left out [m]"""
     levels: bool = False
     """turn the clouds so that their floor is level, for clouds that lean or have another axis upwards"""
     up: str = "0,0,1"
@@ -58,15 +58,9 @@ class SparseMapping(Command):
         return self.out if self.out.suffix in SUFFIXES else self.out / "map.smap"
 
 
-def execute(command: SparseMapping) -> Answer:
-    """Make a map and write it.
-
-    Raises
-    ------
-    ValueError, FileNotFoundError, OSError
-        Where a cloud, a pose or ``--out`` is no good; nothing is written then.
-    """
-    from lidarium.evaluation.drawing.maps.sparse_picture import save_sparse_pictures
+def execute(command: _SparseMapping) -> Answer:
+    """Make a map and write it."""
+    from lidarium.evaluation.drawing.sparse_picture import save_sparse_pictures
     from lidarium.mapping.files.output import check_writable
     from lidarium.mapping.sparse.files.map_files import write_sparse_map
 
@@ -103,7 +97,7 @@ def execute(command: SparseMapping) -> Answer:
     return Answer(result, table(facts))
 
 
-def _mapped(command: SparseMapping) -> "tuple[SparseMap, int]":
+def _mapped(command: _SparseMapping) -> "tuple[SparseMap, int]":
     """Return the map of a command's clouds, and how many points they have."""
     from lidarium.mapping.sparse.mapper.full import map_cloud
     from lidarium.mapping.sparse.mapper.incremental import IncrementalMapper
@@ -120,7 +114,7 @@ def _mapped(command: SparseMapping) -> "tuple[SparseMap, int]":
     return mapper.map, total
 
 
-def _settings(command: SparseMapping) -> "MapperSettings":
+def _settings(command: _SparseMapping) -> "MapperSettings":
     from lidarium.mapping.sparse.settings import FloorSettings, MapperSettings
 
     x, y, z = numbers_of("--up", command.up, (3,))
@@ -130,7 +124,7 @@ def _settings(command: SparseMapping) -> "MapperSettings":
     )
 
 
-def _clouds(command: SparseMapping) -> "Iterator[tuple[NDArray[np.floating], NDArray[np.float64]]]":
+def _clouds(command: _SparseMapping) -> "Iterator[tuple[NDArray[np.floating], NDArray[np.float64]]]":
     """Yield the points of each cloud and its pose in the map."""
     import numpy as np
 
@@ -151,7 +145,7 @@ def _clouds(command: SparseMapping) -> "Iterator[tuple[NDArray[np.floating], NDA
         yield points, pose if levelling is None else levelling @ pose
 
 
-def _intrinsics(command: SparseMapping) -> "Intrinsics | None":
+def _intrinsics(command: _SparseMapping) -> "Intrinsics | None":
     from lidarium.mapping.point_clouds.intrinsics import Intrinsics
 
     return (
@@ -162,13 +156,7 @@ def _intrinsics(command: SparseMapping) -> "Intrinsics | None":
 
 
 def numbers_of(name: str, text: str, counts: tuple[int, ...]) -> list[float]:
-    """Return the numbers of an option, separated by commas.
-
-    Raises
-    ------
-    ValueError
-        Where it is no such list of as many finite numbers.
-    """
+    """Return the numbers of an option, separated by commas."""
     import math
 
     try:

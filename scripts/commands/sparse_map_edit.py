@@ -19,7 +19,7 @@ DEFAULT_MAP = Path("sparse_map") / "edited.smap"
 
 
 @dataclass(frozen=True, kw_only=True)
-class EditSparseMap(Command):
+class _EditSparseMap(Command):
     """Edit a sparse map: clear boxes, add boxes, join another map.
 
     Boxes are cleared first, then others added, then the other map is joined. Writes the map and its pictures.
@@ -32,7 +32,7 @@ class EditSparseMap(Command):
     remove: UseAppendAction[tuple[str, ...]] = ()
     """x,y,z,x,y,z: low and high corner of a space in which nothing stands [m]; may be given again"""
     add: UseAppendAction[tuple[str, ...]] = ()
-    """x,y,z,x,y,z: low and high corner of what stands there as well [m]; may be given again"""
+    """x,y,z,x,y,z: low and high corner of another obstacle [m]; may be given again"""
     join: Path | None = None
     """another map, which is joined to this one"""
     at: str = "0,0,0"
@@ -46,15 +46,9 @@ class EditSparseMap(Command):
         return self.out if self.out.suffix in SUFFIXES else self.out / "edited.smap"
 
 
-def execute(command: EditSparseMap) -> Answer:
-    """Edit a map and write the new one.
-
-    Raises
-    ------
-    ValueError, FileNotFoundError, OSError
-        Where a map, a box or ``--out`` is no good, or nothing is asked for; nothing is written then.
-    """
-    from lidarium.evaluation.drawing.maps.sparse_picture import save_sparse_pictures
+def execute(command: _EditSparseMap) -> Answer:
+    """Edit a map and write the new one."""
+    from lidarium.evaluation.drawing.sparse_picture import save_sparse_pictures
     from lidarium.mapping.files.output import check_writable
     from lidarium.mapping.sparse.editing import edited, join_maps
     from lidarium.mapping.sparse.files.map_files import read_sparse_map, write_sparse_map

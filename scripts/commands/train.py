@@ -21,34 +21,28 @@ if TYPE_CHECKING:
 DEFAULT_FOLDER = Path("runs/training")
 
 EXTRA = ("torch", "stable_baselines3", "sb3_contrib", "tensorboard")
-"""What the extra ``rl`` brings."""
+"""Packages of the extra ``rl``."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Train(Command):
+class _Train(Command):
     """Train explorers as a TOML file says.
 
     A teacher that knows the floors rates each choice, a network is fitted to that, and goes on by rewards if
     the file says so. Finished parts are kept, and the same command goes on where it stopped. The best weights
-    and a card with all that made them are written to --out, runs/training where left out.
+    and a card with all that made them are written to --out, runs/training by default.
     """
 
     compiles: ClassVar[bool] = True
 
     config: Positional[Path]
-    """TOML file that says what to train, and from which seed; docs/tutorials/train_a_team.md shows one"""
+    """TOML file of the training, with its seed; docs/tutorials/train_a_team.md shows one"""
     workers: int = 0
     """processes; 0 for as many as there are cores"""
 
 
-def execute(command: Train) -> Answer:
-    """Do what is missing of a training.
-
-    Raises
-    ------
-    ValueError, FileNotFoundError, OSError
-        Where the file or ``--out`` is no good, or the extra is missing; what was finished before is kept.
-    """
+def execute(command: _Train) -> Answer:
+    """Do the missing parts of a training."""
     from lidarium.mapping.files.output import check_writable
 
     if command.workers < 0:
@@ -80,13 +74,7 @@ def execute(command: Train) -> Answer:
 
 
 def _check_extra() -> None:
-    """Check that what trains is installed.
-
-    Raises
-    ------
-    ValueError
-        Where it is not; the message names it.
-    """
+    """Check that the extra is installed."""
     missing = [name for name in EXTRA if importlib.util.find_spec(name) is None]
     if missing:
         raise ValueError(
@@ -99,13 +87,6 @@ class _Shown:
     """Shows how far a training has come.
 
     A bar for each part on a terminal, else lines: the first and last of a part, and one every few seconds.
-
-    Parameters
-    ----------
-    is_quiet : bool
-        No bar, lines only.
-    clock : callable
-        Wall time [s].
     """
 
     def __init__(self, is_quiet: bool, clock: Callable[[], float] = time.monotonic) -> None:
@@ -136,7 +117,7 @@ class _Shown:
         self._bar.set_postfix_str(_figures(step).strip(" ()"))
 
     def _left(self, step: "Progress", now: float) -> str:
-        """Return how long the part still takes, where that can be said."""
+        """Return how long the part still takes, if that can be said."""
         if step.done in (self._first, step.total):
             return ""
         return f", {_span((now - self._began) * (step.total - step.done) / (step.done - self._first))} left"

@@ -13,7 +13,7 @@ from lidarium.envs.floors.catalogue.names import load_floor
 from lidarium.evaluation.analysis.episodes import read_episodes
 from lidarium.evaluation.drawing.picture_parts import save_figure
 from lidarium.evaluation.report import write_report
-from lidarium.evaluation.report.plain_text import code, plain
+from lidarium.evaluation.report.tables import code, plain
 from lidarium.evaluation.suites.campaign import Campaign
 from lidarium.evaluation.suites.suite import Suite
 from lidarium.mapping.files.map_files import write_ros_map

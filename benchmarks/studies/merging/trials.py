@@ -108,26 +108,6 @@ def try_pairs(
     """Try a method on pairs, kept by `CHUNK` in a folder.
 
     Yields how many are there, as they come.
-
-    Parameters
-    ----------
-    folder : Path
-        Where to; what is there already is not tried again.
-    maps : dict of str to BankMap
-        The bank.
-    pairs : list of Pair
-        Which.
-    method : str
-        One of `METHODS`.
-    workers : int
-        Number of processes.
-    settings : MergeSettings or None
-        In place of those of the mode.
-
-    Raises
-    ------
-    ValueError
-        Where there is no such method.
     """
     if method not in METHODS:
         raise ValueError(f"method is {method!r}; want one of {', '.join(METHODS)}")

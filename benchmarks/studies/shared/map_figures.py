@@ -77,16 +77,8 @@ def map_figures(
 
     Parameters
     ----------
-    floor : Floor
-        The truth.
-    spline_map : SplineMap
-        The map in the end, in the floor's frame.
-    geometry : ScanGeometry
-        The laser.
     true, believed, odometry : (times, 3) float64
         Poses x, y, theta [m, rad]; odometry in a frame of its own.
-    returns : int
-        End points of the scans that went into the map.
     """
     curves = spline_map.sample(SPACING)
     edges = np.concatenate([solid.edges for solid in floor.solids])

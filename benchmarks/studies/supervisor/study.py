@@ -88,13 +88,6 @@ def failing_suite(rows: Sequence[Row], teams: Suite) -> tuple[Suite | None, list
     """Return a suite of teams whose first robot dies halfway, and its trials.
 
     It dies at half the time that the whole team took; None without any.
-
-    Parameters
-    ----------
-    rows : sequence of dict
-        Runs of whole teams.
-    teams : Suite
-        What they are of.
     """
     floors = five_floors(teams.floors)
     whole = [row for row in chosen(rows, SUPERVISED) if floor_of(row) in floors and row["t99_s"] is not None]

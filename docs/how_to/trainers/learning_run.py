@@ -23,7 +23,7 @@ from lidarium.envs.exploration import ExplorationEnv
 from lidarium.envs.floors.catalogue.names import set_floors
 from lidarium.envs.settings.making import make_settings
 from lidarium.evaluation.episodes.runner import run_episode
-from lidarium.evaluation.statistics.means import mean_interval, paired_difference
+from lidarium.evaluation.statistics.estimates import mean_interval, paired_difference
 from lidarium.mapping.files.output import write_json, write_text
 
 LEARNED, UNTRAINED = "learned", "untrained network"

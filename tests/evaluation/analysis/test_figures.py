@@ -7,6 +7,7 @@ from lidarium.evaluation.analysis.figures import (
     compared,
     further_figure,
     further_keys,
+    over_bound,
     time_figure,
     value_figure,
     values_of,
@@ -69,3 +70,19 @@ def test_the_interquartile_mean_of_a_value_leaves_out_what_lies_far_off():
     figure = value_figure([0.0, 1.0, 2.0, 1000.0], seed=0)
     assert (figure.median.estimate, figure.mean.estimate) == (1.5, 250.75)
     assert figure.interquartile_mean.estimate == 1.5
+
+
+def test_the_median_is_of_those_that_have_a_bound(row):
+    rows = [
+        row(t99_s=30.0, bound_s=20.0),
+        row(t99_s=80.0, bound_s=20.0),
+        row(t99_s=None, bound_s=20.0),
+        row(t99_s=1.0),
+        row(t99_s=1.0, bound_s=None),
+    ]
+    assert over_bound(rows, 100.0) == pytest.approx(4.0)
+
+
+def test_without_bounds_there_is_none(row):
+    assert over_bound([row(t99_s=30.0)], 100.0) is None
+    assert over_bound([], 100.0) is None

@@ -8,12 +8,15 @@ from lidarium.evaluation.analysis.figures import compared, time_figure, values_o
 from lidarium.evaluation.analysis.groups import grouped
 from lidarium.evaluation.report.tables import (
     NONE,
+    as_text,
+    code,
     comparisons_table,
     floors_table,
     interval,
     markdown_table,
     number,
     p_value,
+    plain,
     times_table,
 )
 from lidarium.evaluation.statistics import Interval
@@ -80,3 +83,20 @@ def test_comparisons_say_how_many_pairs_are_less_more_and_the_same(row):
     assert path[2] == "4"
     assert path[3].startswith("-0.8")
     assert path[5] == "3 / 0 / 1"
+
+
+EVIL = '</script><img src=x onerror=alert(1)>"&amp; `a|b` \\*'
+
+
+@pytest.mark.parametrize("name", [EVIL, "plain", "`", "a`b", "\\`", "&amp;", "a\\*b", "", "|"])
+def test_markdown_reads_as_the_name_that_was_written(name):
+    assert as_text(plain(name)) == name
+    assert as_text(code(name)) == name
+    assert as_text(f"1 of {code(name)}, {plain(name)}.") == f"1 of {name}, {name}."
+
+
+def test_nothing_in_a_name_makes_a_link_or_a_table():
+    assert plain("[a](b) | *c*") == r"\[a\](b) \| \*c\*"
+    assert code("a|b") == r"a\|b"
+    assert code("a_b") == "`a_b`"
+    assert code(" ") == " "

@@ -137,13 +137,7 @@ def fill(folder: Path, floors: list[BankFloor], workers: int) -> Iterator[tuple[
 
 
 def read_maps(folder: Path, floors: list[BankFloor]) -> dict[str, BankMap]:
-    """Return the maps of a bank that is filled, by key.
-
-    Raises
-    ------
-    FileNotFoundError
-        Where a drive is missing.
-    """
+    """Return the maps of a bank that is filled, by key."""
     maps: dict[str, BankMap] = {}
     for drive_ in drives_of(floors):
         path = _file_of(folder, drive_)
