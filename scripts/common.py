@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
 if TYPE_CHECKING:
     from lidarium.envs.faces.parallel import ExplorationEnv
@@ -21,7 +21,7 @@ DONE, BAD_INPUT, NO, INTERRUPTED, TERMINATED, DEFECT = 0, 2, 3, 130, 143, 1
 """Exit codes."""
 
 LINE_PERIOD_S = 5.0
-"""Wall time between lines of progress where there is no terminal [s]."""
+"""Wall time between lines of progress if there is no terminal [s]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,11 +29,14 @@ class Command:
     """Options of every command."""
 
     seed: int = 0
-    """where all draws come from, zero or more; commands without chance ignore it"""
+    """seed of all draws, zero or more; commands without chance ignore it"""
     out: Path | None = None
     """folder for the files that the command writes"""
     json: bool = False
     """print the result as JSON on standard output, and nothing else there"""
+
+    compiles: ClassVar[bool] = False
+    """Whether the command calls kernels, which the first start compiles."""
 
     def __post_init__(self) -> None:
         if self.seed < 0:
@@ -76,7 +79,7 @@ class TeamCommand(Command):
     They pause until they are commanded to resume.
     """
     unknown_starts: bool = False
-    """robots do not know where they start, nor where the others do"""
+    """robots do not know where they start, nor if the others do"""
     map_resolution: float = 0.025
     """side of a cell of the maps, a whole multiple of 0.025 [m]"""
 
@@ -91,9 +94,9 @@ class TeamCommand(Command):
 
     @property
     def team_options(self) -> dict[str, Any]:
-        """What the options say of a team, as ``make_settings`` takes it.
+        """Settings of a team as ``make_settings`` takes them.
 
-        What was left out is left out.
+        Options that were not given are left out.
         """
         given = {
             name: getattr(self, name)
@@ -116,7 +119,7 @@ class TeamCommand(Command):
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """What a command found.
+    """The result of a command.
 
     Attributes
     ----------
@@ -136,7 +139,7 @@ class Answer:
 def notify(message: str) -> None:
     """Print a message on standard error.
 
-    Where nobody reads it any more the work goes on all the same.
+    If nobody reads it any more the work goes on all the same.
     """
     with suppress(OSError, ValueError):  # ValueError: the stream is closed
         print(message, file=sys.stderr, flush=True)
@@ -166,7 +169,7 @@ def _aligned(cell: str, width: int, is_number: bool) -> str:
 
 
 def file_name(name: str) -> str:
-    """Return a name with what does not belong in a file's name replaced."""
+    """Return a name in which letters unfit for file names are replaced."""
     return (
         "".join(letter if letter.isalnum() or letter in "._-" else "-" for letter in name).strip(".-")
         or "floor"
@@ -179,19 +182,6 @@ def counted(
     """Yield items and report how many there were.
 
     A bar on a terminal, else a line every few seconds, on standard error.
-
-    Parameters
-    ----------
-    items : iterable
-        What is passed on.
-    total : int
-        How many there will be.
-    what : str
-        What they are.
-    is_quiet : bool
-        No bar, lines only.
-    clock : callable
-        Wall time [s].
     """
     if not is_quiet and sys.stderr.isatty():
         from tqdm import tqdm
@@ -210,13 +200,6 @@ class Progress:
     """Report of an episode's progress.
 
     A bar on a terminal, else a line every few seconds, on standard error.
-
-    Parameters
-    ----------
-    is_quiet : bool
-        No bar, lines only.
-    clock : callable
-        Wall time [s].
     """
 
     def __init__(self, is_quiet: bool, clock: Callable[[], float] = time.monotonic) -> None:
@@ -231,7 +214,7 @@ class Progress:
             )
 
     def show(self, env: "ExplorationEnv") -> None:
-        """Tell where the episode is."""
+        """Show the progress of the episode."""
         scorer = env.scorer
         if self._bar is not None:
             self._bar.set_description_str(f"simulated {scorer.time:.0f} s", refresh=False)

@@ -1,141 +1,52 @@
-"""The command line.
+"""The command line: parses arguments, runs commands, and converts the outcome into exit codes."""
 
-It reads what is asked for, runs it, and converts the outcome into exit codes.
-"""
-
+import inspect
+import os
 import sys
 import traceback
 from collections.abc import Callable, Sequence
-from typing import Annotated, Any
-
-from tyro.conf import subcommand
+from contextlib import suppress
+from typing import Any, TextIO, get_type_hints
 
 import lidarium
-from lidarium.scripts import (
-    animate,
-    bench,
-    evaluate,
-    floors,
-    merge,
-    replay,
-    report,
-    reproduce,
-    run,
-    show,
-    slam,
-)
-from lidarium.scripts.animate import Animate
-from lidarium.scripts.bench import Bench
-from lidarium.scripts.bounds import bound
+from lidarium.registry import import_own
+from lidarium.scripts.commands import COMMANDS, find_installed
 from lidarium.scripts.common import (
     BAD_INPUT,
     DEFECT,
     DONE,
     INTERRUPTED,
+    TERMINATED,
     Answer,
     Command,
     announce_compiling,
     notify,
+    table,
 )
-from lidarium.scripts.evaluate import Evaluate
-from lidarium.scripts.floors import Floors
-from lidarium.scripts.merge import Merge
-from lidarium.scripts.options.supervisor import gathered
-from lidarium.scripts.process.signals import (
-    code_of,
-    end_all_workers,
-    heard_termination,
-    leave_at_the_next,
-)
-from lidarium.scripts.process.streams import flush_streams, open_closed_streams, print_result, silence
-from lidarium.scripts.replay import Replay
-from lidarium.scripts.report import Report
-from lidarium.scripts.reproduce import Reproduce
-from lidarium.scripts.run import Run
-from lidarium.scripts.show import Show
-from lidarium.scripts.slam import Slam
-from lidarium.scripts.sparse import edit_map, plan, sparse_map
-from lidarium.scripts.training import train
-
-Choice = (
-    Annotated[Run, subcommand("run")]
-    | Annotated[Evaluate, subcommand("evaluate")]
-    | Annotated[Report, subcommand("report")]
-    | Annotated[Reproduce, subcommand("reproduce")]
-    | Annotated[Replay, subcommand("replay")]
-    | Annotated[Animate, subcommand("animate")]
-    | Annotated[Merge, subcommand("merge")]
-    | Annotated[Slam, subcommand("slam")]
-    | Annotated[sparse_map.SparseMapping, subcommand("sparse-map")]
-    | Annotated[edit_map.EditSparseMap, subcommand("sparse-map-edit")]
-    | Annotated[plan.Plan, subcommand("plan")]
-    | Annotated[bound.Bound, subcommand("bound")]
-    | Annotated[train.Train, subcommand("train")]
-    | Annotated[Floors, subcommand("floors")]
-    | Annotated[Bench, subcommand("bench")]
-    | Annotated[Show, subcommand("show")]
-)
-
-_EXECUTE: dict[type, Callable[[Any], Answer]] = {
-    Run: run.execute,
-    Evaluate: evaluate.execute,
-    Report: report.execute,
-    Reproduce: reproduce.execute,
-    Replay: replay.execute,
-    Animate: animate.execute,
-    Merge: merge.execute,
-    Slam: slam.execute,
-    sparse_map.SparseMapping: sparse_map.execute,
-    edit_map.EditSparseMap: edit_map.execute,
-    plan.Plan: plan.execute,
-    bound.Bound: bound.execute,
-    train.Train: train.execute,
-    floors.List: floors.list_floors,
-    floors.Show: floors.show_floor,
-    floors.Generate: floors.generate_floor,
-    floors.Import: floors.import_floor,
-    floors.Prepare: floors.prepare_floors,
-    Bench: bench.execute,
-    Show: show.execute,
-}
+from lidarium.scripts.options import gathered
 
 _IN_TWO_WORDS = {("sparse-map", "edit"): "sparse-map-edit"}
 """Commands in two words, the first of which is a command of its own that takes files."""
 
-_WITH_KERNELS = (
-    Run,
-    Evaluate,
-    Reproduce,
-    Animate,
-    Merge,
-    Slam,
-    sparse_map.SparseMapping,
-    edit_map.EditSparseMap,
-    plan.Plan,
-    bound.Bound,
-    train.Train,
-    floors.Prepare,
-    Bench,
-)
+_OVERVIEW = """usage: lidarium [--version] [--import MODULE] COMMAND [OPTIONS]
+
+Teams of lidar robots explore unknown floors. Begin with `lidarium run`.
+
+commands; `lidarium COMMAND --help` shows the options of one:
+"""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run a command.
+    """Run a command and return its exit code.
 
-    Parameters
-    ----------
-    arguments : sequence of str or None
-        Those of the process where None.
-
-    Returns
-    -------
-    int
-        Exit code: 0 done, 2 bad input, 3 the answer is no, 130 interrupted by Ctrl-C and 143 by SIGTERM
-        (finished parts are kept), 1 a defect of ours.
+    0 is done, 2 bad input, 3 no solution found, 130 interrupted by Ctrl-C, 143 by SIGTERM (finished parts are
+    kept), 1 a defect of lidarium. The arguments are those of the process by default.
     """
+    from lidarium.evaluation.processes import end_workers, heard_termination, leave_at_the_next
+
     is_process = arguments is None
     if is_process:
-        open_closed_streams()
+        _open_closed_streams()
     with heard_termination() as termination:
         try:
             code = _ended(arguments)
@@ -143,22 +54,22 @@ def main(arguments: Sequence[str] | None = None) -> int:
             code = INTERRUPTED
             notify("interrupted")
         if code == INTERRUPTED:
-            code = code_of(termination.is_asked)
+            code = TERMINATED if termination.is_asked else INTERRUPTED
             if is_process:
                 leave_at_the_next(code)
-            end_all_workers()
+            end_workers()
     if is_process:
-        flush_streams()
+        _flush_streams()
     return code
 
 
 def _ended(arguments: Sequence[str] | None) -> int:
     """Run a command; return its exit code, errors included."""
     if list(sys.argv[1:] if arguments is None else arguments) == ["--version"]:
-        print_result(f"lidarium {lidarium.__version__}\n")
+        _print_result(f"lidarium {lidarium.__version__}\n")
         return DONE
     try:
-        return _answered(_command(arguments))
+        return _answered(list(sys.argv[1:] if arguments is None else arguments))
     except SystemExit as leaving:  # tyro, having printed help (0) or what is wrong with the options (2)
         return leaving.code if isinstance(leaving.code, int) else BAD_INPUT
     except (ValueError, OSError) as error:
@@ -171,7 +82,7 @@ def _ended(arguments: Sequence[str] | None) -> int:
         )
         return BAD_INPUT
     except Exception as error:
-        from lidarium.evaluation.episodes.interrupts import is_wrapped_interrupt
+        from lidarium.evaluation.processes import is_wrapped_interrupt
 
         if is_wrapped_interrupt(error):
             raise KeyboardInterrupt from error
@@ -183,39 +94,110 @@ def _ended(arguments: Sequence[str] | None) -> int:
         return DEFECT
 
 
-def _command(arguments: Sequence[str] | None) -> Command:
-    import tyro
-
-    words = list(sys.argv[1:] if arguments is None else arguments)
+def _answered(words: list[str]) -> int:
+    """Run the command that the words of a command line ask for; print its result and return its exit code."""
+    import_own(_imports(words))
+    if not words or words[0] in ("-h", "--help"):
+        find_installed()
+        text = _OVERVIEW + table(COMMANDS.summaries.items()) + "\n"
+        if not words:
+            notify(text.rstrip())
+            return BAD_INPUT
+        _print_result(text)
+        return DONE
     if tuple(words[:2]) in _IN_TWO_WORDS:
         words[:2] = [_IN_TWO_WORDS[words[0], words[1]]]
-    words = gathered(words)
-    config = (tyro.conf.OmitArgPrefixes, tyro.conf.OmitSubcommandPrefixes, tyro.conf.FlagCreatePairsOff)
-    description = (
-        "Teams of lidar robots explore unknown floors. Begin with `lidarium run`; "
-        "`lidarium --version` is the version."
-    )
-    try:
-        chosen: Any = tyro.cli(Choice, prog="lidarium", description=description, args=words, config=config)
-    except BrokenPipeError as error:  # nobody reads the help to its end
-        silence(sys.stdout)
-        raise SystemExit(DONE) from error
-    command: Command = chosen.command if isinstance(chosen, Floors) else chosen
-    return command
-
-
-def _answered(command: Command) -> int:
-    from lidarium.evaluation.episodes.output import as_json
-
-    if isinstance(command, _WITH_KERNELS):
+    if words[0] not in COMMANDS:
+        find_installed()
+    execute = COMMANDS[words[0]]
+    command = _options(execute, words[0], gathered(words[1:]))
+    if command.compiles:
         announce_compiling()
-    answer = _EXECUTE[type(command)](command)
+    answer = execute(command)
     if answer.result:
-        print_result(as_json(answer.result) if command.json else answer.text + "\n")
+        from lidarium.mapping.files.output import as_json
+
+        _print_result(as_json(answer.result) if command.json else answer.text + "\n")
     return answer.code
+
+
+def _imports(words: list[str]) -> list[str]:
+    """Take ``--import MODULE`` out of a command line; return the modules."""
+    found = []
+    for place in reversed([k for k, word in enumerate(words) if word.partition("=")[0] == "--import"]):
+        _, equals, module = words.pop(place).partition("=")
+        if not equals:
+            module = words.pop(place) if place < len(words) else ""
+        if not module or module.startswith("-"):
+            raise ValueError("--import has no module; want --import MODULE, such as --import my_metrics")
+        found.append(module)
+    return found[::-1]
+
+
+def _options(execute: Callable[[Any], Answer], name: str, words: list[str]) -> Command:
+    """Return the options of a command, read from the words behind its name."""
+    import tyro
+
+    config = (tyro.conf.OmitArgPrefixes, tyro.conf.OmitSubcommandPrefixes, tyro.conf.FlagCreatePairsOff)
+    parameter = next(iter(inspect.signature(execute).parameters))
+    options: type[Command] = get_type_hints(execute)[parameter]
+    try:
+        return tyro.cli(options, prog=f"lidarium {name}", args=words, config=config)
+    except BrokenPipeError as error:  # nobody reads the help to its end
+        _silence(sys.stdout)
+        raise SystemExit(DONE) from error
 
 
 def _message(error: Exception) -> str:
     if isinstance(error, OSError) and error.strerror and error.filename:
         return f"{error.filename}: {error.strerror}"
     return str(error) or type(error).__name__
+
+
+def _open_closed_streams() -> None:
+    """Give this process the standard streams that it was started without.
+
+    They lead to nowhere. A file opened later would take their numbers else, and whatever is printed would be
+    written into it.
+    """
+    for number in range(3):
+        try:
+            os.fstat(number)
+        except OSError:
+            os.open(os.devnull, os.O_RDWR)  # takes the lowest number that is free
+    for name in ("stdout", "stderr"):
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: SIM115
+
+
+def _silence(stream: TextIO) -> None:
+    """Lead a stream to nowhere.
+
+    Its reader has left, and Python would complain at exit.
+    """
+    with suppress(OSError, ValueError):
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, stream.fileno())
+        os.close(nowhere)
+
+
+def _print_result(text: str) -> None:
+    """Print a result on standard output."""
+    try:
+        sys.stdout.write(text)
+        sys.stdout.flush()
+    except BrokenPipeError:
+        _silence(sys.stdout)
+    except OSError as error:
+        _silence(sys.stdout)
+        message = f"the result cannot be written: {error.strerror}"
+        raise OSError(error.errno, message, "standard output") from error
+
+
+def _flush_streams() -> None:
+    """Write the rest of the buffers, as at exit, but without complaints."""
+    for stream in (sys.stdout, sys.stderr):
+        try:
+            stream.flush()
+        except (OSError, ValueError):
+            _silence(stream)

@@ -4,9 +4,8 @@ import math
 
 import numpy as np
 
-from lidarium.envs.floors.floor import Raster
 from lidarium.envs.engine.tally import Tally
-from lidarium.envs.simulation.rewards import reward_weights
+from lidarium.envs.floors.floor import Raster
 from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.settings.lidar import Lidar
 from lidarium.envs.settings.robots import ROBOTS
@@ -14,6 +13,7 @@ from lidarium.envs.simulation.kernels.contact import distance_bound
 from lidarium.envs.simulation.kernels.floor_tables import FloorTables
 from lidarium.envs.simulation.kernels.ray_tables import RayTables
 from lidarium.envs.simulation.kinematic_simulation import KinematicSimulation
+from lidarium.envs.simulation.rewards import reward_weights
 from lidarium.mapping.grids.occupancy import OccupancySettings
 
 

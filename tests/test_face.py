@@ -34,7 +34,7 @@ def test_a_name_is_found_and_documented(name):
 
 def test_the_face_is_small_and_sorted():
     assert 40 <= len(NAMES) <= 64
-    assert NAMES == sorted(NAMES)
+    assert sorted(NAMES) == NAMES
 
 
 def test_other_names_are_none():

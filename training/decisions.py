@@ -19,7 +19,7 @@ PER_OPTION = ("options", "crops", "scores", "mask")
 
 @dataclass(frozen=True, slots=True)
 class Decisions:
-    """N decisions of up to n options as arrays; what a decision lacks is zero.
+    """N decisions of up to n options as arrays; missing entries are zero.
 
     Attributes
     ----------

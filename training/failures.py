@@ -2,26 +2,11 @@
 
 from typing import NoReturn
 
-from lidarium.evaluation.suites.workers import WorkerDiedError
+from lidarium.evaluation.processes import WorkerDiedError
 
 
 def raise_named(error: Exception, episode: str) -> NoReturn:
-    """Raise the error of an episode so that it names the episode.
-
-    Parameters
-    ----------
-    error : Exception
-        What the episode has raised.
-    episode : str
-        Which one it was.
-
-    Raises
-    ------
-    ValueError
-        For bad input, and for a process that died.
-    Exception
-        Any other as it is, with a note.
-    """
+    """Raise the error of an episode so that it names the episode."""
     if isinstance(error, ValueError | WorkerDiedError):
         raise ValueError(f"{episode} failed: {error}; what was finished before is kept") from error
     error.add_note(f"{episode} failed; what was finished before is kept")

@@ -1,4 +1,4 @@
-"""Where the episodes of a training take place: floors of the training set, and the same without furniture."""
+"""Floors of a training's episodes: floors of the training set, and the same without furniture."""
 
 from dataclasses import dataclass
 
@@ -13,7 +13,7 @@ from lidarium.training.settings import Round, TrainingSettings
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """Where an episode takes place.
+    """Floor and settings of an episode.
 
     Attributes
     ----------
@@ -40,15 +40,6 @@ def place_of(training: TrainingSettings, stage: Round, number: int) -> Place:
 
     Seeds of floors are those of the training set, from the first on, and begin again behind the last; a floor
     of another kind with such a seed is in no other set.
-
-    Parameters
-    ----------
-    training : TrainingSettings
-        What is asked for.
-    stage : Round
-        Which kinds of floors, and which teams.
-    number : int
-        Number of the episode.
     """
     generator = np.random.default_rng([training.seed, 3, number])
     first, count = SETS["train"]

@@ -1,4 +1,4 @@
-"""How far a training has come."""
+"""Progress of a training."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -11,11 +11,11 @@ class Progress:
     Attributes
     ----------
     part : str
-        What is done.
+        Name of the part.
     done, total : int
         How much of it, and of how much.
     figures : mapping of float
-        What there is to say of the latest step.
+        Text about the latest step.
     """
 
     part: str

@@ -1,4 +1,4 @@
-"""What a training is asked for, and how it is read from a TOML file."""
+"""Settings of a training, and how they are read from a TOML file."""
 
 import tomllib
 from collections.abc import Mapping
@@ -22,13 +22,7 @@ Part = TypeVar("Part")
 
 
 def _check_sizes(robots: tuple[int, ...], whose: str) -> None:
-    """Check that sizes of teams are some.
-
-    Raises
-    ------
-    ValueError
-        Where there is none, or one is no number from 1 to 100.
-    """
+    """Check that sizes of teams are some."""
     if not robots or not all(type(size) is int and 1 <= size <= 100 for size in robots):
         raise ValueError(f"robots of {whose} is {shown(robots)}; want sizes of teams, as in [1, 1, 2, 3]")
 
@@ -148,8 +142,8 @@ class PpoSettings:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ValidationSettings:
-    """On what networks are compared with classic tours.
+class _ValidationSettings:
+    """Floors and teams of the comparison with classic tours.
 
     Attributes
     ----------
@@ -174,18 +168,18 @@ class ValidationSettings:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TrainingSettings:
-    """What a training is asked for.
+    """Settings of a training.
 
     Attributes
     ----------
     seed : int
-        Where all draws come from.
+        Seed of all draws.
     settings : dict
         Options of the environment, as in a suite.
     rounds : tuple of Round
-        On what robots are taught; the network is fitted after each, and decides in the next.
+        Floors and teams of lessons; the network is fitted after each round, and decides in the next.
     fit, ppo, validation
-        How the network is fitted, how it goes on, and on what it is compared.
+        Settings of fitting, of reinforcement learning, and of validation.
     """
 
     seed: Annotated[int, within(0, 2**31 - 1)] = 0
@@ -193,7 +187,7 @@ class TrainingSettings:
     rounds: tuple[Round, ...] = (Round(),)
     fit: FitSettings = field(default_factory=FitSettings)
     ppo: PpoSettings = field(default_factory=PpoSettings)
-    validation: ValidationSettings = field(default_factory=ValidationSettings)
+    validation: _ValidationSettings = field(default_factory=_ValidationSettings)
 
     def __post_init__(self) -> None:
         check_settings(self, "training")
@@ -213,11 +207,6 @@ class TrainingSettings:
         """Return the settings of a team.
 
         It ends where 0.99 of the floor is seen, or as ``settings`` says.
-
-        Raises
-        ------
-        ValueError
-            Where a setting cannot be used.
         """
         try:
             return make_settings(**self.options, robots=robots)
@@ -225,18 +214,12 @@ class TrainingSettings:
             raise ValueError(f"settings of the training cannot be used: {error}") from error
 
     def as_dict(self) -> dict[str, Any]:
-        """Return what JSON can hold of it."""
+        """Return it as types that JSON has."""
         return asdict(self)
 
 
 def read_training(path: Path) -> TrainingSettings:
-    """Read what a training is asked for from a TOML file.
-
-    Raises
-    ------
-    FileNotFoundError, ValueError
-        Where there is no such file, or what it holds cannot be used; the message names it.
-    """
+    """Read the settings of a training from a TOML file."""
     path = Path(path)
     if not path.exists():
         raise FileNotFoundError(
@@ -250,19 +233,13 @@ def read_training(path: Path) -> TrainingSettings:
 
 
 def training_of(content: Mapping[str, Any]) -> TrainingSettings:
-    """Make settings of what a TOML file holds.
-
-    Raises
-    ------
-    ValueError
-        Where a key is unknown, or a value cannot be used.
-    """
+    """Make settings of the content of a TOML file."""
     parts: dict[str, Any] = dict(content)
     rounds = parts.get("rounds", [{}])
     if not isinstance(rounds, list) or not rounds:
         raise ValueError(f"rounds is {shown(rounds)}; want one or more tables [[rounds]]")
     parts["rounds"] = tuple(_made(Round, each, "a round") for each in rounds)
-    for name, kind in (("fit", FitSettings), ("ppo", PpoSettings), ("validation", ValidationSettings)):
+    for name, kind in (("fit", FitSettings), ("ppo", PpoSettings), ("validation", _ValidationSettings)):
         parts[name] = _made(kind, parts.get(name, {}), name)
     if not isinstance(parts.get("settings", {}), dict):
         raise ValueError(f"settings is {shown(parts['settings'])}; want a table [settings]")

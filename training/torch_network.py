@@ -17,7 +17,7 @@ from lidarium.mapping.planning.touring.map_crops import FREE, OCCUPIED
 from lidarium.training.decisions import Decisions
 
 FORBIDDEN = -1e9
-"""Preference of what the mask forbids."""
+"""Preference of masked options."""
 
 
 class ExplorerNetwork(nn.Module):
@@ -41,9 +41,9 @@ class ExplorerNetwork(nn.Module):
         nn.init.zeros_(self.correction.bias)
 
     def forward(self, seen: "Seen") -> tuple[Tensor, Tensor]:
-        """Return preferences (N, options), and what was made of the situation (N, WIDTH).
+        """Return preferences (N, options), and features of the situation (N, WIDTH).
 
-        What the mask forbids is preferred far less than all else.
+        Masked options are preferred far less than others.
         """
         teammates = seen.teammates.shape[1]
         tokens = torch.cat(
@@ -83,7 +83,7 @@ class AttentionLayer(nn.Module):
         self.inner, self.outer = nn.Linear(WIDTH, INNER), nn.Linear(INNER, WIDTH)
 
     def forward(self, tokens: Tensor, is_there: Tensor) -> Tensor:
-        """Return what becomes of the tokens (N, tokens, WIDTH).
+        """Return the tokens (N, tokens, WIDTH).
 
         No token attends to those that are not there.
         """
@@ -99,11 +99,6 @@ class AttentionLayer(nn.Module):
 
 class Seen:
     """Decisions as tensors.
-
-    Parameters
-    ----------
-    decisions : Decisions
-        As arrays.
 
     Attributes
     ----------

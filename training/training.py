@@ -1,6 +1,6 @@
-"""A whole training in a folder: rounds of lessons, then rewards; what is best beside classic tours is kept.
+"""A whole training in a folder: rounds of lessons, then rewards; the best weights are kept.
 
-What is finished is on the disk. The same call goes on where an earlier one was broken off.
+Finished parts are on the disk. The same call continues an interrupted one.
 """
 
 import json
@@ -17,9 +17,8 @@ import torch
 
 import lidarium
 from lidarium.agents.learned.weights import load_weights, save_weights
-from lidarium.evaluation.episodes.output import clear_unfinished, write_json
 from lidarium.mapping.files.guarded_reading import read_text, reading
-from lidarium.mapping.files.output import only_writer, remove_unfinished
+from lidarium.mapping.files.output import clear_unfinished, only_writer, remove_unfinished, write_json
 from lidarium.mapping.geometry.bounds import shown
 from lidarium.training.progress import Progress
 from lidarium.training.settings import MOST_BYTES, TrainingSettings
@@ -33,7 +32,7 @@ TRAINING_FILE, HOURS_FILE, WEIGHTS_FILE, CARD_FILE = (
     "card.json",
 )
 LIBRARIES = ("numpy", "numba", "torch", "stable-baselines3", "sb3-contrib")
-"""What weights may depend on; the card names their versions."""
+"""Packages that weights may depend on; the card names their versions."""
 
 MEAN, MEAN_FILE = "mean", "mean.safetensors"
 """Mean of the weights of the last two rounds."""
@@ -43,33 +42,14 @@ REWARDS, VALIDATION, TENSORBOARD = "rewards", "validation", "tensorboard"
 
 @dataclass(frozen=True, slots=True)
 class Training:
-    """A training that runs into a folder.
-
-    Parameters
-    ----------
-    settings : TrainingSettings
-        What is asked for.
-    folder : Path
-        Where to. A folder of an earlier call with the same settings and version goes on.
-    workers : int
-        How many processes; they change nothing in what is found.
-    """
+    """A training that runs into a folder."""
 
     settings: TrainingSettings
     folder: Path
     workers: int = 1
 
     def run(self) -> Generator[Progress, None, None]:
-        """Run what is missing, and yield each step when it is on the disk.
-
-        Raises
-        ------
-        ValueError
-            Where the folder holds another training or other files, or another process trains into it, where
-            ``workers`` is less than 1, or a floor of the validation cannot be used.
-        OSError
-            Where the folder cannot be written to.
-        """
+        """Run the missing parts, and yield each step when it is on the disk."""
         if self.workers < 1:
             raise ValueError(f"workers is {self.workers}; want at least 1")
         validation_suite(self.settings, {})  # hours of lessons are not for floors that are not there
@@ -130,13 +110,7 @@ class Training:
         return weights_of(folder, last)
 
     def _begin(self) -> None:
-        """Check that the folder is this training's, or new.
-
-        Raises
-        ------
-        ValueError
-            Where it is not; the message says what differs.
-        """
+        """Check that the folder is this training's, or new."""
         path, asked = self.folder / TRAINING_FILE, self._asked()
         if not path.exists():
             clear_unfinished(self.folder, ".json")
@@ -158,7 +132,7 @@ class Training:
                 )
 
     def _clear_unfinished(self) -> None:
-        """Remove what killed writers of a training have left half written."""
+        """Remove unfinished files of killed writers."""
         rounds = [RoundFolder(self.folder, number).path for number in range(len(self.settings.rounds))]
         lessons = [each / LESSONS for each in rounds]
         for folder in (self.folder, self.folder / REWARDS, *rounds, *lessons):
@@ -170,7 +144,7 @@ class Training:
         return {"version": lidarium.__version__, **content}
 
     def _best(self, candidates: dict[str, Path]) -> str:
-        """Return the name of what took least time on the floors of the validation."""
+        """Return the name of the weights with the least time in validation."""
         return min(candidates, key=lambda name: self._validated(name).ratio)
 
     def _validated(self, name: str) -> Validated:
@@ -217,7 +191,7 @@ class Training:
             return float(json.loads(read_text(path, MOST_BYTES))["hours"])
 
     def _count_hours(self, since: float) -> float:
-        """Add what has passed to the hours of the training, from time to time.
+        """Add the elapsed time to the hours of the training, from time to time.
 
         Returns since when to count.
         """
@@ -249,7 +223,7 @@ def _fitted(folder: RoundFolder) -> dict[str, Any]:
 
 
 def _flat(content: Any, name: str = "") -> dict[str, Any]:  # noqa: ANN401
-    """Return what tables and lists hold by dotted names, such as ``rounds.0.floors``."""
+    """Return the values of tables and lists by dotted names, such as ``rounds.0.floors``."""
     if not isinstance(content, dict | list):
         return {name: content}
     parts = content.items() if isinstance(content, dict) else enumerate(content)

@@ -9,19 +9,18 @@ from typing import Any
 
 import numpy as np
 
-from lidarium.evaluation.episodes.output import write_json
 from lidarium.evaluation.suites.campaign import EPISODES_FILE, SUITE_FILE, Campaign
-from lidarium.evaluation.suites.content import MOST_SUITE_BYTES
 from lidarium.evaluation.suites.episodes_file import read_episodes
-from lidarium.evaluation.suites.suite import Suite
+from lidarium.evaluation.suites.suite import MOST_SUITE_BYTES, Suite
 from lidarium.evaluation.suites.trial import DEFAULT_VARIANT
 from lidarium.mapping.files.guarded_reading import read_text, reading
+from lidarium.mapping.files.output import write_json
 from lidarium.training.failures import raise_named
 from lidarium.training.progress import Progress
 from lidarium.training.settings import TrainingSettings
 
 CLASSIC = "tour_frontier"
-"""What networks are compared with, and correct."""
+"""The policy that networks are compared with, and correct."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,20 +50,7 @@ class Validated:
 
 
 def validation_suite(training: TrainingSettings, candidates: Mapping[str, Path]) -> Suite:
-    """Return the suite on which networks are compared with classic tours.
-
-    Parameters
-    ----------
-    training : TrainingSettings
-        What is asked for.
-    candidates : mapping of str to Path
-        Files of weights by name.
-
-    Raises
-    ------
-    ValueError, FileNotFoundError
-        Where a floor, a setting or a file of weights cannot be used, or is not there.
-    """
+    """Return the suite on which networks are compared with classic tours."""
     return Suite(
         policies=(CLASSIC, *candidates),
         floors=training.validation.floors,
@@ -80,24 +66,7 @@ def validation_suite(training: TrainingSettings, candidates: Mapping[str, Path])
 def validate(
     training: TrainingSettings, folder: Path, candidates: Mapping[str, Path], workers: int
 ) -> Generator[Progress, None, None]:
-    """Run missing episodes of classic tours and networks on the validation's floors.
-
-    Parameters
-    ----------
-    training : TrainingSettings
-        What is asked for.
-    folder : Path
-        Where episodes are kept.
-    candidates : mapping of str to Path
-        Files of weights by name.
-    workers : int
-        How many processes.
-
-    Raises
-    ------
-    Exception
-        What an episode has raised.
-    """
+    """Run missing episodes of classic tours and networks on the validation's floors."""
     suite = validation_suite(training, candidates)
     _follow_move(folder / SUITE_FILE, suite)
     campaign = Campaign(suite, folder, workers, records=False)
@@ -127,22 +96,7 @@ def _follow_move(path: Path, suite: Suite) -> None:
 
 
 def compared(folder: Path, name: str, training: TrainingSettings) -> Validated:
-    """Return how a network did beside classic tours.
-
-    Parameters
-    ----------
-    folder : Path
-        Where episodes are kept.
-    name : str
-        Which network.
-    training : TrainingSettings
-        What is asked for.
-
-    Raises
-    ------
-    ValueError
-        Where there is no pair of episodes.
-    """
+    """Return how a network did beside classic tours."""
     team = training.team(1)
     wanted, horizon = team.stop_coverage or 1.0, team.horizon_s or math.inf
     times: dict[str, dict[tuple[Any, ...], float | None]] = {CLASSIC: {}, name: {}}

@@ -18,23 +18,13 @@ STUDIES.register(
     "ways on public dungeon maps, beside those of other planners there",
 )
 STUDIES.register(
-    "evaluation",
-    f"{_PACKAGE}.evaluation.study:STUDY",
-    "what an evaluation costs beside its episodes, what two workers gain, what survives kills",
-)
-STUDIES.register(
-    "floor_cache",
-    f"{_PACKAGE}.floor_cache:STUDY",
-    "resets over floors of set:train from memory and store, and the memory of processes",
-)
-STUDIES.register(
     "floors",
     f"{_PACKAGE}.floors:STUDY",
     "every real floor, dungeons and 200 generated floors explored with 1 to 3 robots",
 )
 STUDIES.register(
     "interval_coverage",
-    f"{_PACKAGE}.interval_coverage.study:STUDY",
+    f"{_PACKAGE}.interval_coverage:STUDY",
     "how often the intervals of reports hold a known truth",
 )
 STUDIES.register(
@@ -44,12 +34,12 @@ STUDIES.register(
 )
 STUDIES.register(
     "learned",
-    f"{_PACKAGE}.learned.study:STUDY",
+    f"{_PACKAGE}.learned:STUDY",
     "learned explorers beside classic ones and beside bounds, on floors that no training has seen",
 )
 STUDIES.register(
     "machines",
-    f"{_PACKAGE}.evaluation.machines_study:STUDY",
+    f"{_PACKAGE}.machines:STUDY",
     "10^5 episodes, two nodes of a Ray cluster beside one, and nodes that are killed",
 )
 STUDIES.register(
@@ -63,23 +53,13 @@ STUDIES.register(
     "map merging on the half of the bank on which its limits are tuned",
 )
 STUDIES.register(
-    "page",
-    f"{_PACKAGE}.evaluation.page_study:STUDY",
-    "the page of a report in a browser: size, opening, sorting, scrubbing, accessibility",
-)
-STUDIES.register(
     "parity",
     f"{_PACKAGE}.parity:STUDY",
     "random driving in the world of PyBullet beside the kinematic one, on 20 floors",
 )
 STUDIES.register(
-    "policies",
-    f"{_PACKAGE}.policies:STUDY",
-    "how long the policies take on drawn floors with 1 to 3 robots",
-)
-STUDIES.register(
     "realism",
-    f"{_PACKAGE}.realism.study:STUDY",
+    f"{_PACKAGE}.realism:STUDY",
     "how well robots know where they are with noise, wheels that slip, and SLAM",
 )
 STUDIES.register(

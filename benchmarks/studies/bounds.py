@@ -9,8 +9,7 @@ from typing import Any
 
 import lidarium
 from lidarium.agents import make_policy
-from lidarium.benchmarks.studies.shared.kept import Progress, do_missing, kept_lines
-from lidarium.benchmarks.studies.shared.study import Study
+from lidarium.benchmarks.studies.shared.study import Progress, Study, do_missing, kept_lines
 from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.floors.catalogue.names import load_floor, set_floors
 from lidarium.envs.settings.exploration import ExplorationSettings

@@ -18,14 +18,14 @@ import numpy as np
 
 import lidarium
 from lidarium.benchmarks.studies.shared.study import Study
-from lidarium.evaluation.episodes.output import write_text
 from lidarium.evaluation.episodes.stop_rules import STOP_REASON
-from lidarium.evaluation.statistics.means import paired_ratio
+from lidarium.evaluation.statistics.estimates import paired_ratio
 from lidarium.evaluation.suites.campaign import EPISODES_FILE
 from lidarium.evaluation.suites.episodes_file import KEY, read_episodes
 from lidarium.evaluation.suites.presets import PRESETS
 from lidarium.evaluation.suites.suite import Suite
 from lidarium.evaluation.suites.trial import DEFAULT_VARIANT
+from lidarium.mapping.files.output import write_text
 
 POLICIES = ("nearest_frontier", "utility_frontier", "explore_lite", "srt", "tour_frontier", "learned")
 MAPS, WAYS, WAYS_FILE = "dungeon_test", "dungeon_test_ways.csv", "ways.csv"

@@ -11,9 +11,7 @@ from statistics import median
 from typing import Any
 
 import lidarium
-from lidarium.benchmarks.studies.shared.kept import Progress, do_missing, kept_lines
-from lidarium.benchmarks.studies.shared.real_floors import real_floors
-from lidarium.benchmarks.studies.shared.study import Study
+from lidarium.benchmarks.studies.shared.study import Progress, Study, do_missing, kept_lines, real_floors
 from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.settings.making import make_settings
 from lidarium.evaluation.episodes.runner import run_episode

@@ -14,8 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import lidarium
-from lidarium.benchmarks.studies.shared.kept import Progress, do_missing, kept_lines
-from lidarium.benchmarks.studies.shared.study import Study
+from lidarium.benchmarks.studies.shared.study import Progress, Study, do_missing, kept_lines
 from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.settings.making import make_settings
 from lidarium.envs.simulation.bullet.bullet_world import BulletWorld

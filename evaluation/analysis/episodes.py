@@ -14,7 +14,7 @@ from lidarium.mapping.files.guarded_reading import printable
 from lidarium.mapping.geometry.bounds import Rule, shown, within
 
 Row = dict[str, Any]
-"""A line of ``episodes.jsonl``: what `evaluation.result.result_of` returns."""
+"""A line of ``episodes.jsonl``: the result of `result_of`."""
 
 FILE = "episodes.jsonl"
 
@@ -52,9 +52,9 @@ class Episodes:
     rows : tuple of dict
         One for each episode, in the order of the file.
     version : str
-        What they were run with.
+        Version of lidarium.
     warnings : tuple of str
-        What was left out, and why.
+        Parts that were left out, and why.
     """
 
     rows: tuple[Row, ...]
@@ -63,22 +63,7 @@ class Episodes:
 
 
 def read_episodes(directory: Path) -> Episodes:
-    """Read ``episodes.jsonl``.
-
-    Parameters
-    ----------
-    directory : Path
-        What `lidarium evaluate --out` wrote.
-
-    Raises
-    ------
-    FileNotFoundError
-        Where there is no such file.
-    ValueError
-        Where there are no episodes, a line cannot be read or lacks something, two lines are of the same
-        episode differently, or versions or settings differ. A last line that breaks off is dropped with a
-        warning, and so is a line that is there twice.
-    """
+    """Read ``episodes.jsonl``."""
     path = Path(directory) / FILE
     if not path.is_file():
         raise FileNotFoundError(
@@ -101,13 +86,13 @@ def read_episodes(directory: Path) -> Episodes:
     return Episodes(tuple(row for _, row in kept), str(kept[0][1]["version"]), (*warnings, *doubled))
 
 
-def key_of(row: Row) -> tuple[Any, ...]:
-    """Return what identifies episodes: who ran, and the pairing key."""
+def _key_of(row: Row) -> tuple[Any, ...]:
+    """Return the key of an episode: its policy, and the pairing key."""
     return str(row["policy"]), *pair_key_of(row)
 
 
 def pair_key_of(row: Row) -> tuple[Any, ...]:
-    """Return what partners of a pair share.
+    """Return the key that partners of a pair share.
 
     They share settings, floor, starts, seed and number of robots.
     """
@@ -122,7 +107,7 @@ def pair_key_of(row: Row) -> tuple[Any, ...]:
 
 
 def variant_of(row: Row) -> str:
-    """Return the name of an episode's settings, empty where it has none."""
+    """Return the name of an episode's settings, empty if it has none."""
     return str(row.get("variant") or "")
 
 
@@ -162,7 +147,7 @@ def _without_doubles(
     kept: dict[tuple[Any, ...], tuple[int, Row]] = {}
     warnings = []
     for number, row in numbered:
-        known = kept.setdefault((*key_of(row), row["version"], row["settings_sha256"]), (number, row))
+        known = kept.setdefault((*_key_of(row), row["version"], row["settings_sha256"]), (number, row))
         if known[1] is row:
             continue
         differing = [

@@ -1,9 +1,6 @@
-"""The figures of a report: of each policy, and of policies against a baseline.
+"""The figures of a report: of each policy, and of policies against a baseline, pair by pair."""
 
-Policies are compared with the baseline pair by pair.
-"""
-
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,6 +9,8 @@ from numpy.typing import NDArray
 
 from lidarium.evaluation.analysis.episodes import Row
 from lidarium.evaluation.analysis.groups import Group, paired, times_to
+from lidarium.evaluation.episodes.result import METRICS
+from lidarium.evaluation.metrics import Column
 from lidarium.evaluation.statistics import (
     Interval,
     PairedTest,
@@ -29,45 +28,47 @@ from lidarium.evaluation.statistics import (
     wilcoxon_test,
 )
 
-TIMES = {"t90_s": "time to 90 %", "t99_s": "time to 99 %"}
+
+def over_bound(rows: Sequence[Row], horizon_s: float) -> float | None:
+    """Return the median of the times to 99 % over their bounds."""
+    multiples = [
+        (horizon_s if row["t99_s"] is None else row["t99_s"]) / row["bound_s"]
+        for row in rows
+        if row.get("bound_s")
+    ]
+    return float(np.median(multiples)) if multiples else None
+
+
+TIMES = {key: METRICS[key].title for key in ("t90_s", "t99_s")}
 """Keys of times to a share of the floor, and their titles."""
+
+
+MAY_LACK = ("bound_s", "t99_over_bound")
+"""Figures beside times that are null if something was not reached."""
+
+_NOT_FIGURES = ("robots", "seed", "horizon_s", *TIMES)
 
 
 @dataclass(frozen=True, slots=True)
 class Value:
-    """A figure that every run has.
+    """A column of tables: a number that every run has."""
 
-    Attributes
-    ----------
-    key, title, unit : str
-        In ``report.json``, for people, and what it is measured in.
-    of : callable
-        The figure of a run.
-    digits : int
-        Behind the point, for people.
-    """
+    metric: str
+    column: Column
 
-    key: str
-    title: str
-    unit: str
-    of: Callable[[Row], float]
-    digits: int = 1
+    def of(self, row: Row) -> float:
+        """Return the number of a run."""
+        return self.column.of(row[self.metric])
 
 
-VALUES = (
-    Value("coverage_percent", "coverage at the end", "%", lambda row: 100.0 * row["coverage_final"]),
-    Value("path_m", "path of the team", "m", lambda row: float(sum(row["path_m"]))),
-    Value("longest_path_m", "longest path of a robot", "m", lambda row: float(max(row["path_m"]))),
-    Value("overlap_percent", "overlap", "%", lambda row: 100.0 * row["overlap"]),
-    Value("collisions", "collisions", "", lambda row: float(row["collisions"]), 2),
-)
-COMPARED = ("coverage_percent", "path_m", "overlap_percent")
-"""Values in the table of comparisons, beside the times."""
-
-MAY_LACK = ("bound_s", "t99_over_bound")
-"""Figures beside times that are null where something was not reached."""
-
-_NOT_FIGURES = ("robots", "seed", "horizon_s", "coverage_final", "overlap", "collisions", *TIMES)
+def values_of(rows: Sequence[Row]) -> tuple[Value, ...]:
+    """Return the columns of all metrics that every run has a value for."""
+    return tuple(
+        Value(name, column)
+        for name, metric in METRICS.items()
+        for column in metric.columns
+        if all(row.get(name) is not None for row in rows)
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,7 +84,7 @@ class TimeFigure:
     median : Interval
         Of all runs; inf is later than the horizon.
     restricted_mean : Interval or None
-        Of min(time, horizon); None where no run reached the share or where cuts leave it unknown.
+        Of min(time, horizon); None if no run reached the share or if cuts leave it unknown.
     """
 
     reached: int
@@ -114,7 +115,7 @@ class Comparison:
     pairs : int
         Number of pairs.
     difference, ratio : Interval or None
-        Policy less baseline, policy over baseline; of times, of their restricted means. None where there is
+        Policy less baseline, policy over baseline; of times, of their restricted means. None if there is
         none.
     wilcoxon, sign : PairedTest
         Tests; less means that the policy has the smaller figure.
@@ -160,13 +161,10 @@ def value_figure(values: Sequence[float], seed: int) -> ValueFigure:
     )
 
 
-def further_keys(rows: Sequence[Row]) -> list[str]:
-    """Return the other keys under which every run has a number.
-
-    Times that were not reached among them are null.
-    """
-    first = rows[0]
-    candidates = [key for key in first if key not in _NOT_FIGURES and not key.endswith("_sha256")]
+def further_keys(rows: Sequence[Row], values: Sequence[Value]) -> list[str]:
+    """Return the keys beside times and values under which every run has a number; some may be null."""
+    told = {*_NOT_FIGURES, *(value.metric for value in values)}
+    candidates = [key for key in rows[0] if key not in told and not key.endswith("_sha256")]
     return [key for key in candidates if all(_is_figure(key, row.get(key, "")) for row in rows)]
 
 
@@ -178,7 +176,7 @@ def further_figure(rows: Sequence[Row], key: str) -> Interval:
     return median_interval([np.inf if row[key] is None else float(row[key]) for row in rows])
 
 
-def compared(group: Group, baseline: str, seed: int) -> list[Comparison]:
+def compared(group: Group, values: Sequence[Value], baseline: str, seed: int) -> list[Comparison]:
     """Return the comparisons of all other policies with the baseline.
 
     Those without a pair are left out.
@@ -190,8 +188,8 @@ def compared(group: Group, baseline: str, seed: int) -> list[Comparison]:
             found += [_compared_times(policy, key, ours, theirs, group.horizon_s, seed) for key in TIMES]
             found += [
                 _compared_values(policy, value, ours, theirs, seed)
-                for value in VALUES
-                if value.key in COMPARED
+                for value in values
+                if value.column.is_compared
             ]
     if not found:
         return []
@@ -231,7 +229,7 @@ def _compared_values(
 ) -> Comparison:
     a, b = (np.array([value.of(row) for row in rows]) for rows in (ours, theirs))
     ratio = paired_ratio(a, b, seed=seed) if min(a.min(), b.min()) > 0.0 else None
-    return _tested(policy, value.key, a, b, paired_difference(a, b, seed=seed), ratio)
+    return _tested(policy, value.column.key, a, b, paired_difference(a, b, seed=seed), ratio)
 
 
 def _tested(

@@ -17,7 +17,7 @@ from lidarium.evaluation.suites.episodes_file import TIMINGS
 from lidarium.evaluation.suites.trial import DEFAULT_VARIANT
 
 _NAMES = ("seed", "key", "record")
-"""What identifies a run, without saying what came of it."""
+"""Keys that identify a run and are not results."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,7 +27,7 @@ class Group:
     Attributes
     ----------
     variant : str
-        Name of the settings, empty where they have none.
+        Name of the settings, empty if they have none.
     robots : int
         Number of robots.
     floor_set : str
@@ -69,7 +69,7 @@ class Group:
 
 
 @dataclass(frozen=True, slots=True)
-class Reached:
+class _Reached:
     """When the runs of a policy reached a share of the floor.
 
     Attributes
@@ -96,12 +96,12 @@ class Reached:
 
     @property
     def or_never(self) -> NDArray[np.float64]:
-        """The times, inf where the share was not reached."""
+        """The times, inf if the share was not reached."""
         return np.where(self.is_reached, self.times, np.inf)
 
     @property
     def up_to_horizon(self) -> NDArray[np.float64]:
-        """The times, the horizon where the share was not reached."""
+        """The times, the horizon if the share was not reached."""
         return np.where(self.is_reached, self.times, self.horizon_s)
 
 
@@ -140,21 +140,12 @@ def floor_set_of(floor: str) -> str:
     return next((f"set:{name}" for name in within), "generated floors")
 
 
-def times_to(rows: Sequence[Row], key: str, horizon_s: float) -> Reached:
+def times_to(rows: Sequence[Row], key: str, horizon_s: float) -> _Reached:
     """Return when runs reached a share of the floor.
 
-    A run that missed it is never dropped. Where it ended by itself, with nothing left to do, it would not
-    have reached the share later either, and counts as not there at the horizon. Where it was cut (by the
+    A run that missed it is never dropped. If it ended by itself, with nothing left to do, it would not
+    have reached the share later either, and counts as not there at the horizon. If it was cut (by the
     horizon, by the user, by the physics), it is censored then.
-
-    Parameters
-    ----------
-    rows : sequence of dict
-        The runs.
-    key : str
-        Such as ``t90_s``.
-    horizon_s : float
-        Up to when times count [s].
     """
     times, is_reached, cut = [], [], 0
     for row in rows:
@@ -163,7 +154,7 @@ def times_to(rows: Sequence[Row], key: str, horizon_s: float) -> Reached:
         cut += not reached and until < horizon_s
         times.append(float(row[key]) if reached else until)
         is_reached.append(reached)
-    return Reached(np.array(times), np.array(is_reached, np.bool_), horizon_s, cut)
+    return _Reached(np.array(times), np.array(is_reached, np.bool_), horizon_s, cut)
 
 
 def paired(a: Iterable[Row], b: Iterable[Row]) -> tuple[list[Row], list[Row]]:
@@ -181,7 +172,7 @@ def repeats(rows: Iterable[Row]) -> int:
 
     Seed and wall time are not compared.
 
-    Where neither starts nor noise are drawn, a policy without chance does the same whatever the seed.
+    If neither starts nor noise are drawn, a policy without chance does the same whatever the seed.
     """
     said = [
         json.dumps(

@@ -23,7 +23,7 @@ Empty for no record.
 """
 
 _SAME = ("policy", "floor", "floor_sha256", "seed", "robots", "settings_sha256")
-"""What a record and the line of its episode both hold."""
+"""Keys that a record and the line of its episode share."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +44,7 @@ class Entry:
 
 @dataclass(frozen=True, slots=True)
 class Track:
-    """What a picture of one episode shows.
+    """Data of a picture of one episode.
 
     Attributes
     ----------
@@ -68,22 +68,7 @@ class Track:
 
 
 def read_records(directory: Path, rows: Iterable[Row]) -> tuple[dict[Key, Entry], list[str]]:
-    """Read the coverage of the recorded episodes.
-
-    Parameters
-    ----------
-    directory : Path
-        What `lidarium evaluate --out` wrote.
-    rows : iterable of dict
-        The episodes.
-
-    Returns
-    -------
-    dict
-        Records by `record_key`.
-    list of str
-        Which files could not be read, and why.
-    """
+    """Read the coverage of the recorded episodes."""
     found: dict[Key, Entry] = {}
     warnings = []
     for row in rows:
@@ -107,7 +92,7 @@ def read_records(directory: Path, rows: Iterable[Row]) -> tuple[dict[Key, Entry]
 
 
 def record_key(row: Row) -> Key:
-    """Return what joins an episode and its record."""
+    """Return the key that joins an episode and its record."""
     return str(row.get("record") or "")
 
 

@@ -1,6 +1,7 @@
-"""The bound: how soon a team that knew the floor could have seen it.
+"""How soon a team that has the floor plan could have seen the floor.
 
-The plan is feasible, so its time is an upper bound on the optimum; it is driven with the robots' limits.
+The plan is feasible, so its time is an upper bound on the optimum; it is driven with the limits of the
+robots.
 """
 
 import hashlib
@@ -12,12 +13,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from lidarium.agents.policy import Action, Policy, Stop, Team
+from lidarium.envs.faces.parallel import ExplorationEnv, Observation
 from lidarium.envs.floors.catalogue.names import load_floor
 from lidarium.envs.floors.catalogue.store import floor_store, hash_of_code
 from lidarium.envs.floors.floor import Floor
+from lidarium.envs.onboard.radio.messages import MOST_POINTS, DriveState, Route
 from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.simulation.kernels.floor_cache import floor_tables
-from lidarium.evaluation.bounds.driving import Walk, drive, walks_of
 from lidarium.evaluation.bounds.tours import TourPlan, plan_tours
 from lidarium.evaluation.bounds.view_graph import (
     LEAST_SIDE,
@@ -29,18 +32,148 @@ from lidarium.evaluation.bounds.view_graph import (
     seen_on_track,
     view_graph,
 )
+from lidarium.evaluation.episodes.runner import run_episode
+
+PATIENCE, LEAST_PATIENCE_S = 4.0, 60.0
+"""How many times as long as its walks take at cruising speed a drive may last, and more [s].
+
+Robots that block each other would stand until the end of days.
+"""
+
+Looks = Mapping[tuple[int, int], float]
+"""Headings to turn to, by the robot and the number of the place on its walk [rad]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Walk:
+    """A path that one robot drives.
+
+    Attributes
+    ----------
+    points : (P, 2) float64
+        x, y in the floor's frame, from the start on [m].
+    room : (P,) float64
+        Room beside the body on the piece that leads to each [m].
+    headings : (P,) float64
+        Heading to turn to there [rad]; nan for none.
+    """
+
+    points: NDArray[np.float64]
+    room: NDArray[np.float64]
+    headings: NDArray[np.float64]
+
+
+def walks_of(graph: ViewGraph, plan: TourPlan, looks: Looks) -> list[Walk]:
+    """Return the paths of a plan with places at which robots turn to something."""
+    walks = []
+    for robot, walk in enumerate(plan.walks):
+        points, room = graph.places[walk], graph.room[walk]
+        # A piece has no more room than either of its ends.
+        least = np.maximum(np.minimum(room, np.concatenate([[room[0]], room[:-1]])), 0.0)
+        headings = np.array([looks.get((robot, at), math.nan) for at in range(len(walk))])
+        walks.append(Walk(points, least, headings))
+    return walks
+
+
+class _WalkPolicy(Policy):
+    """Robots that follow walks, one after the other piece; who has arrived stays.
+
+    Parameters
+    ----------
+    offsets : (robots, 2) float64
+        Offset from the robots' map frames to the floor's frame [m].
+    """
+
+    level = "waypoint"
+
+    def __init__(self, walks: Sequence[Walk], offsets: NDArray[np.float64]) -> None:
+        self._walks, self._offsets = walks, offsets
+
+    def reset(self, team: Team, seed: int) -> None:
+        """Start an episode."""
+        self._team = team
+        self._left = {
+            agent: _pieces(walk, offset)
+            for agent, walk, offset in zip(team.agents, self._walks, self._offsets, strict=True)
+        }
+        self._at: dict[str, Route | None] = dict.fromkeys(team.agents)
+
+    def act(self, observations: Mapping[str, Observation]) -> dict[str, Action]:
+        """Let each robot follow its walk; all stop together at the ends."""
+        for agent in observations:
+            state = self._team.drive_state(agent)
+            if self._at[agent] is None or state in (DriveState.ARRIVED, DriveState.NO_PATH):
+                self._at[agent] = self._left[agent].pop(0) if self._left[agent] else None
+        if all(self._at[agent] is None for agent in observations):
+            return {agent: Stop("stopped") for agent in observations}
+        return {agent: self._at[agent] for agent in observations}
+
+
+def _pieces(walk: Walk, offset: NDArray[np.float64]) -> list[Route]:
+    """Return a walk as routes.
+
+    They end where the robot turns, and have no more points than routes may.
+    """
+    pieces, start, last = [], 0, len(walk.points) - 1
+    for at in range(last + 1):
+        heading = float(walk.headings[at])
+        if math.isnan(heading) and at < last and at - start < MOST_POINTS - 1:
+            continue
+        part = np.s_[start : at + 1]
+        pieces.append(
+            Route(walk.points[part] - offset, walk.room[part], None if math.isnan(heading) else heading)
+        )
+        start = at
+    return pieces
+
+
+def drive(
+    floor: object, settings: ExplorationSettings, starts: Sequence[Sequence[float]], walks: Sequence[Walk]
+) -> tuple[float, float, NDArray[np.float64]]:
+    """Drive walks with the robots' limits.
+
+    Parameters
+    ----------
+    starts : sequence of (x, y, theta)
+        Where the robots start [m, rad].
+
+    Returns
+    -------
+    (float, float, (n, 3) float64)
+        Time at which that share was seen [s], inf if it never was; the share that was seen; poses that the
+        robots had in the floor's frame [m, rad]. A drive ends if robots block each other for long.
+    """
+    allowed_s = PATIENCE * max(_seconds_of(walk, settings) for walk in walks) + LEAST_PATIENCE_S
+    env = ExplorationEnv(floor, replace(settings, horizon_s=allowed_s))  # type: ignore[arg-type]
+    options = {"starts": [list(start) for start in starts]}
+    env.reset(seed=0, options=options)
+    offsets = np.array([env.perception.poses.offset(row)[:2] for row in range(settings.robots)])
+    run_episode(_WalkPolicy(walks, offsets), env, 0, options)
+    share = float(env.scorer.coverage)
+    wanted = settings.stop_coverage
+    is_reached = wanted is not None and share >= wanted
+    poses = np.concatenate([at.reshape(-1, 3) for _, at in env.scorer.track])
+    return (float(env.scorer.time) if is_reached else math.inf), share, poses
+
+
+def _seconds_of(walk: Walk, settings: ExplorationSettings) -> float:
+    """Return the time of a walk at cruising speed, with a whole turn if it has a heading [s]."""
+    metres = float(np.hypot(*np.diff(walk.points, axis=0).T).sum())
+    turns = int(np.isfinite(walk.headings).sum())
+    return metres / settings.robot.cruise_speed + turns * 2.0 * math.pi / settings.robot.max_turn_rate
+
 
 TRIALS = 3
-"""So often a plan is driven, each time with more places at which robots turn to what they missed."""
+"""Maximum number of drives of a plan, each with more places at which robots turn to missed points."""
 
 MARGINS = (0.001, 0.004, 1.0)
-"""Share of the floor that is planned to be seen beyond what has to be; more where a drive sees too little."""
+"""Additional share of the floor that plans see; more if a drive sees too little."""
 
 MOST_LOOKS, LEAST_LOOK = 40, 4
 """Robots turn to something at so many places at most, where they see so many points by it at least."""
 
 SIGHT_MARGIN = 0.1
-"""What is this far within the edges of a laser's field of view is seen for certain [rad]."""
+"""Margin within a laser's field of view in which cells are certain to be seen [rad]."""
 
 MADE_BY = (
     "envs",
@@ -53,18 +186,18 @@ MADE_BY = (
 
 @dataclass(frozen=True, slots=True)
 class KnownFloorBound:
-    """What a team that knows the floor needs.
+    """The bound of a team that has the floor plan.
 
     Attributes
     ----------
     time_s : float
-        Time at which the driven plan has seen what has to be seen [s]; inf where no plan has.
+        Time at which the driven plan has seen enough [s]; inf if no plan has.
     length_m : float
         Length of the longest planned tour [m].
     total_m : float
         Length of all tours [m].
     share : float
-        What was seen at the end.
+        Share that was seen at the end.
     walks : list of Walk
         The tours.
     """
@@ -101,22 +234,8 @@ def known_floor_bound(
 
     Parameters
     ----------
-    floor : Floor or str
-        The floor, or its name.
-    settings : ExplorationSettings
-        The team; ``stop_coverage`` is what has to be seen.
     starts : sequence of (x, y, theta)
         Where each robot starts in the floor's frame [m, rad].
-    rounds : int
-        How often the tours are changed to be shorter.
-    seed : int
-        Where draws come from.
-
-    Raises
-    ------
-    ValueError
-        Where the settings have no ``stop_coverage``, not as many starts as robots, or the extra ``bounds``
-        is missing.
     """
     if settings.stop_coverage is None:
         raise ValueError("stop_coverage is None; want the share that has to be seen, such as 0.99")
@@ -144,8 +263,8 @@ def _planned_and_driven(
 ) -> KnownFloorBound:
     """Plan and drive until enough is seen; ``effort`` is rounds and seed.
 
-    A plan takes lasers to see all around. Where a drive passed something unseen, the robot turns to it in the
-    next drive. Where no drive sees enough, that which saw most is returned.
+    A plan takes lasers to see all around. If a drive passed something unseen, the robot turns to it in the
+    next drive. If no drive sees enough, that which saw most is returned.
     """
     driven: list[KnownFloorBound] = []
     for margin in MARGINS:
@@ -182,7 +301,7 @@ def _driven(
 def _looks(
     graph: ViewGraph, plan: TourPlan, missed: NDArray[np.uint64], field_of_view: float
 ) -> dict[tuple[int, int], float]:
-    """Return where robots turn, and to what, to see most of what they missed."""
+    """Return where and towards which points robots turn to see most of the missed cells."""
     found: dict[tuple[int, int], float] = {}
     origin, resolution = np.asarray(graph.laser.origin), graph.laser.resolution
     left = missed.copy()
@@ -205,13 +324,7 @@ def _looks(
 
 
 def _team_of(settings: ExplorationSettings) -> ExplorationSettings:
-    """Return what of settings says how soon a floor is seen in a world without noise.
-
-    Raises
-    ------
-    ValueError
-        Where the robots are of different kinds.
-    """
+    """Return the settings that affect the time in a world without noise."""
     if settings.kinds:
         raise ValueError(f"kinds is {list(settings.kinds)}; bounds are for teams of robots of one kind")
     return ExplorationSettings(

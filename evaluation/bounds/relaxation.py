@@ -3,7 +3,7 @@
 A walk that sees a point comes to one of the places that see it. It crosses the border of any set that holds
 all of these and no start, once where it ends within and twice where it goes on. Such cuts are added where the
 solution so far breaks them (minimum cuts; Dantzig, Fulkerson and Johnson 1954 for tours; Current and
-Schilling 1989 for tours that need only come near). What is minimized is the length of all walks together, so
+Schilling 1989 for tours that need only come near). The length of all walks together is minimized, so
 its share holds for the longest one.
 """
 
@@ -32,15 +32,15 @@ Cut = tuple[NDArray[np.bool_], int]
 
 
 @dataclass(frozen=True, slots=True)
-class Relaxation:
-    """What is known of the shortest walks on a graph.
+class _Relaxation:
+    """Bounds on the shortest walks on a graph.
 
     Attributes
     ----------
     lower_m : float
         No walks from which so much is seen are shorter in all [m].
     optimum_m : float
-        Length of the shortest walks in all [m]; inf where it was not found.
+        Length of the shortest walks in all [m]; inf if it was not found.
     cuts : int
         How many cuts were needed.
     """
@@ -52,7 +52,7 @@ class Relaxation:
 
 @dataclass(frozen=True, slots=True)
 class _Program:
-    """Links of a graph with all starts in place 0, and what each place sees."""
+    """Links of a graph with all starts in place 0, and the cells that each place sees."""
 
     first: NDArray[np.int64]
     second: NDArray[np.int64]
@@ -66,28 +66,8 @@ class _Program:
 
 def relax(
     graph: ViewGraph, share: float, rounds: int = 60, exact_s: float = 0.0, limit_s: float = math.inf
-) -> Relaxation:
-    """Bound the length of the walks from which a share of what can be seen is seen.
-
-    Parameters
-    ----------
-    graph : ViewGraph
-        The floor.
-    share : float
-        Share of the points that has to be seen, of those that can be.
-    rounds : int
-        How often cuts are added at most; the bound holds after any number.
-    exact_s : float
-        Time to search for the optimum afterwards, with links crossed whole times, places left as often as
-        entered and points seen or not [s].
-    limit_s : float
-        Cuts are added for about so long at most [s].
-
-    Returns
-    -------
-    Relaxation
-        The bound.
-    """
+) -> _Relaxation:
+    """Bound the length of the walks from which a share of the visible cells is seen."""
     program = _program(graph, share)
     cuts: list[Cut] = []
     lower = 0.0
@@ -101,7 +81,7 @@ def relax(
             break
         following = _solved(program, [*cuts, *broken], left_s)
         if following.x is None or following.status != 0:
-            break  # it took too long; what was found before holds
+            break  # it took too long; the bounds so far hold
         found = following
         cuts += broken
     # Only the cuts that hold the bound up go into the slower program.
@@ -119,7 +99,7 @@ def relax(
         broken = _broken(program, np.asarray(found.x))
         cuts += broken
         optimum = math.inf if broken else float(found.fun)
-    return Relaxation(lower, optimum, len(used))
+    return _Relaxation(lower, optimum, len(used))
 
 
 def _program(graph: ViewGraph, share: float) -> _Program:
@@ -151,7 +131,7 @@ def _program(graph: ViewGraph, share: float) -> _Program:
 def _rows(
     program: _Program, cuts: list[Cut], columns: int
 ) -> tuple[csr_array, NDArray[np.float64], NDArray[np.float64]]:
-    """Return rows of all cuts, of what has to be seen, of the ends; and their sides."""
+    """Return rows of all cuts, of the required cells, of the ends; and their sides."""
     links, places, groups = len(program.lengths), program.places, len(program.weights)
     row: list[NDArray[np.int64]] = []
     column: list[NDArray[np.int64]] = []

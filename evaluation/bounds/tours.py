@@ -1,7 +1,7 @@
-"""Short tours from which a floor is seen: views that see all, their order, and what can be left out.
+"""Short tours from which a floor is seen: views that see all, their order, and stops that can be left out.
 
-Views are chosen greedily by what they show against the way there (set cover), ordered by OR-Tools, and then
-improved: a few stops are taken out at random, and what is no longer seen is covered again, in the cheapest
+Views are chosen greedily by visible cells per distance (set cover), ordered by OR-Tools, and then
+improved: a few stops are taken out at random, and cells no longer seen are covered again, in the cheapest
 manner (large neighbourhood search; Shaw 1998).
 """
 
@@ -51,19 +51,7 @@ class TourPlan:
 
 
 def plan_tours(graph: ViewGraph, share: float, rounds: int, seed: int = 0) -> TourPlan:
-    """Plan short tours from which a share of a floor is seen.
-
-    Parameters
-    ----------
-    graph : ViewGraph
-        The floor.
-    share : float
-        Share of the points that has to be seen, of those that can be.
-    rounds : int
-        How often stops are taken out and covered again.
-    seed : int
-        Where draws come from.
-    """
+    """Plan short tours from which a share of a floor is seen."""
     seen_at_all = np.bitwise_or.reduce(graph.views[reached(graph)], axis=0)
     wanted = math.ceil(share * int(count(seen_at_all)) - 1e-9)
     generator = np.random.default_rng(seed)
@@ -107,7 +95,7 @@ def lengths_of(graph: ViewGraph, stops: Stops) -> NDArray[np.float64]:
 
 
 def cost_of(graph: ViewGraph, stops: Stops) -> float:
-    """Return what tours cost: the longest one, and a little of their sum [m]."""
+    """Return the cost of tours: the longest one, and a little of their sum [m]."""
     lengths = lengths_of(graph, stops)
     return float(lengths.max() + SUM_WEIGHT * lengths.sum())
 
@@ -141,7 +129,7 @@ def covered(graph: ViewGraph, stops: Stops, wanted: int) -> Stops:
 def _cheapest_insertions(
     graph: ViewGraph, tours: Stops, lengths: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Return what each place costs as a stop, and where it is inserted.
+    """Return the cost of each place as a stop, and its position in a tour.
 
     (N,) [m], and (N, 2) of robot and position.
     """
@@ -186,13 +174,7 @@ def _seen_count(graph: ViewGraph, stops: Stops) -> int:
 
 
 def ordered(graph: ViewGraph, stops: Stops) -> Stops:
-    """Return the same stops as the best open tours that OR-Tools finds.
-
-    Raises
-    ------
-    ValueError
-        Without the extra ``bounds``.
-    """
+    """Return the same stops as the best open tours that OR-Tools finds."""
     try:
         from ortools.constraint_solver import pywrapcp, routing_enums_pb2
     except ImportError as error:

@@ -1,4 +1,4 @@
-"""A floor as places, the paths between them, and what is seen from each.
+"""A floor as places, paths between them, and the cells seen from each.
 
 Places are those with most room in each square of a lattice. They are joined by straight lines on which the
 robot's body fits.
@@ -52,15 +52,15 @@ class ViewGraph:
     links : (N, N) csr_array
         Lengths of the straight lines between neighbours [m].
     lengths : (N, N) float64
-        Lengths of the shortest paths [m]; inf where there is none.
+        Lengths of the shortest paths [m]; inf if there is none.
     before : (N, N) int32
-        The place before the last one on the path from each to each, negative where there is none.
+        The place before the last one on the path from each to each, negative if there is none.
     views : (N, words) uint64
         Which points are seen from each place, a bit for each.
     points : (M, 2) int64
         Cells (row, column) of the laser's raster that are to be seen.
     laser : Raster
-        What lasers see.
+        Cells that lasers can see.
     """
 
     places: NDArray[np.float64]
@@ -82,7 +82,7 @@ class ViewGraph:
         return found[::-1]
 
     def seen(self, places: list[int]) -> NDArray[np.uint64]:
-        """Return what is seen from any of some places, (words,) uint64."""
+        """Return the cells seen from any of some places, (words,) uint64."""
         return np.asarray(np.bitwise_or.reduce(self.views[places], axis=0))
 
 
@@ -115,21 +115,10 @@ def view_graph(
 
     Parameters
     ----------
-    body, laser : Raster
-        Solid cells at the heights of the body and of the laser, of the same frame.
-    radius : float
-        Radius of the robots [m].
-    range_max : float
-        How far their lasers see [m].
     starts : (robots, 2 or 3) float64
         Where they start [m].
     spacing : (float, float)
         Least side of the squares of places, and distance of the points that are to be seen [m].
-
-    Raises
-    ------
-    ValueError
-        Where the rasters differ in frame, or a robot does not fit at its start.
     """
     if body.solid.shape != laser.solid.shape or body.origin != laser.origin:
         raise ValueError("the rasters of body and laser lie in different frames; want those of one floor")
@@ -223,14 +212,8 @@ def seen_on_track(
 
     Parameters
     ----------
-    graph : ViewGraph
-        The floor.
     poses : (n, 3) float64
         x, y, theta in the floor's frame [m, rad].
-    range_max : float
-        How far their lasers see [m].
-    field_of_view : float
-        Angle in which they see [rad].
     """
     cells = np.array([cell_of(graph.laser, pose) for pose in poses], np.int64)
     headings = np.ascontiguousarray(poses[:, 2])

@@ -36,7 +36,7 @@ Extent = tuple[float, float, float, float]
 
 
 @dataclass(frozen=True, slots=True)
-class Visits:
+class _Visits:
     """Where the robots of a policy were on a floor.
 
     Attributes
@@ -44,7 +44,7 @@ class Visits:
     seconds : (rows, columns) float64
         Time that robots spent in each cell, mean of the runs [s].
     extent : tuple of float
-        What the cells cover [m].
+        Extent of the cells [m].
     runs : int
         Number of runs.
     """
@@ -111,7 +111,7 @@ def save_paths(path: Path, group: Group, floor: str, records: dict[Key, Entry]) 
 
 def visits_on(
     group: Group, floor: str, records: dict[Key, Entry]
-) -> tuple[dict[str, Visits], dict[str, Track]]:
+) -> tuple[dict[str, _Visits], dict[str, Track]]:
     """Return where the robots of each policy were on a floor, and a track.
 
     All recorded runs count; the track is for the map below.
@@ -130,12 +130,12 @@ def visits_on(
         seconds = np.zeros((rows, columns))
         for track in found:
             seconds += _seconds_in_cells(track, covered, seconds.shape)
-        visits[policy] = Visits(seconds / len(found), covered, len(found))
+        visits[policy] = _Visits(seconds / len(found), covered, len(found))
     return visits, {policy: found[0] for policy, found in tracks.items()}
 
 
 def save_visits(
-    path: Path, group: Group, floor: str, visits: dict[str, Visits], tracks: dict[str, Track]
+    path: Path, group: Group, floor: str, visits: dict[str, _Visits], tracks: dict[str, Track]
 ) -> None:
     """Draw where the robots of each policy spent their time on a floor."""
     extent = next(iter(visits.values())).extent

@@ -1,12 +1,14 @@
-"""Picture of a merge: the maps of each group and of each refused pair, with what agrees and contradicts.
+"""Pictures of merges: the maps of each group and of each refused pair, with agreement and contradictions.
 
-Each map has its colour.
+Each map has its colour; maps are laid over each other rigidly or bent.
 """
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -16,14 +18,124 @@ from matplotlib.transforms import Affine2D
 from numpy.typing import NDArray
 
 from lidarium.envs.drawing.rendering import Colour, team_colours
-from lidarium.evaluation.drawing.maps.merge_panels import Panel, contradicting, panels_of
-from lidarium.evaluation.drawing.plain_words import plain_words
-from lidarium.evaluation.episodes.output import whole_file
+from lidarium.evaluation.drawing.picture_parts import plain_words
+from lidarium.mapping.files.guarded_reading import shortened
+from lidarium.mapping.files.output import whole_file
 from lidarium.mapping.geometry.rigid import Transform
-from lidarium.mapping.grids.occupancy import FREE, OCCUPIED
-from lidarium.mapping.merging.bend.deforming import Deformed
+from lidarium.mapping.grids.occupancy import FREE, OCCUPIED, UNKNOWN
+from lidarium.mapping.merging.bend.deforming import Deformed, Laid
 from lidarium.mapping.merging.fusion import FusedMap, fuse
 from lidarium.mapping.merging.joining.merged_maps import Merged
+
+MOST_PANELS = 6
+"""Most panels of a picture."""
+
+MISS_M = 0.15
+"""A wall contradicts if all within this distance is free [m]."""
+
+_MOST_TITLE = 60
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Panel:
+    """Maps that are drawn over each other.
+
+    Attributes
+    ----------
+    names : list of str
+        The maps, that in whose frame is drawn first.
+    layers : list of Laid
+        Each map as it is laid in the cells of that frame, bent if it was.
+    title : str
+        Text below them.
+    matched : list of (n, 2, 2) float64
+        Matched corners of pairs of them, in the first map's frame [m].
+    """
+
+    names: list[str]
+    layers: list[Laid]
+    title: str
+    matched: list[NDArray[np.float64]]
+
+
+def panels_of(merged: Merged, deformed: Sequence[Deformed] = ()) -> list[_Panel]:
+    """Return the panels: joined groups, and refused pairs of maps that join none, else the maps alone."""
+    known = {name for name, levels in merged.levels.items() if (levels != UNKNOWN).any()}
+    groups = [group for group in merged.groups() if len(group) > 1]
+    if deformed:
+        panels = [_bent_panel(merged, *each) for each in zip(groups, deformed, strict=True)]
+    else:
+        panels = [_group_panel(merged, group) for group in groups]
+    joined = {name for panel in panels for name in panel.names}
+    for (a, b), result in merged.pairs.items():
+        is_refused = {a, b} <= known and not {a, b} <= joined
+        if len(panels) < MOST_PANELS and is_refused and result.a_from_b is not None:
+            title = f"refused, {shortened(result.reason, _MOST_TITLE)}"
+            layers = [Laid(merged.levels[a], Transform()), Laid(merged.levels[b], result.a_from_b)]
+            panels.append(_Panel([a, b], layers, title, []))
+    return panels or [
+        _Panel([name], [Laid(merged.levels[name], Transform())], "joins none", [])
+        for name in sorted(known)[:MOST_PANELS]
+    ]
+
+
+def contradicting(layers: Sequence[Laid], resolution: float) -> NDArray[np.float64]:
+    """Return the walls that stand where another map is free, in the common frame (n, 2) [m]."""
+    found = [
+        one.common_from_cells.apply(_against(one, other, resolution))
+        for one in layers
+        for other in layers
+        if one is not other
+    ]
+    return np.concatenate(found) if found else np.zeros((0, 2))
+
+
+def _group_panel(merged: Merged, group: list[str]) -> _Panel:
+    """Return a group as its maps were joined."""
+    layers = [Laid(merged.levels[name], merged.tree.lookup(group[0], name) or Transform()) for name in group]
+    matched, walls_m = [], 0.0
+    for (a, b), result in merged.pairs.items():
+        if result.is_accepted and a in group and b in group:
+            ends = [
+                layers[group.index(name)].common_from_cells.apply(points)
+                for name, points in zip((a, b), result.joined, strict=True)
+            ]
+            matched.append(np.stack(ends, axis=1))
+            walls_m += result.agreement.agreeing_m
+    title = f"{walls_m:.0f} m of walls agree, {sum(map(len, matched))} matched corners"
+    return _Panel(group, layers, title, matched)
+
+
+def _bent_panel(merged: Merged, group: list[str], deformed: Deformed) -> _Panel:
+    """Return a group as its maps were bent; matched corners move with them."""
+    bent = [one for one in deformed.deformations if one is not None]
+    if not bent:
+        return _group_panel(merged, group)
+    matched = []
+    for (a, b), result in merged.pairs.items():
+        if result.is_accepted and a in group and b in group:
+            ends = [
+                deformed.places(group.index(name), points)
+                for name, points in zip((a, b), result.joined, strict=True)
+            ]
+            matched.append(np.stack(ends, axis=1))
+    walls_m, most_m = sum(one.agreement.agreeing_m for one in bent), max(one.most_m for one in bent)
+    title = f"bent by {most_m:.2f} m at most, {walls_m:.0f} m of walls agree then"
+    return _Panel(group, deformed.laid, title, matched)
+
+
+def _against(one: Laid, other: Laid, resolution: float) -> NDArray[np.float64]:
+    """Return the walls of a map that stand where another one is free, in its own metres (n, 2)."""
+    walls = np.argwhere(one.levels == OCCUPIED)[:, ::-1] + 0.5
+    other_from_one = other.common_from_cells.inverse() @ one.common_from_cells
+    cells = np.floor(other_from_one.apply(walls * resolution) / resolution).astype(np.int64)
+    rows, columns = other.levels.shape
+    is_on = (cells >= 0).all(axis=1) & (cells[:, 0] < columns) & (cells[:, 1] < rows)
+    walls, cells = walls[is_on], cells[is_on]
+    clear = cv2.distanceTransform((other.levels == FREE).astype(np.uint8), cv2.DIST_L2, 5)
+    reach = max(MISS_M / resolution, 1.5)
+    return np.asarray(walls[clear[cells[:, 1], cells[:, 0]] > reach] * resolution)
+
 
 INK, SEVERAL = "#1f2937", np.array([31, 41, 55], np.uint8)
 DPI = 130
@@ -47,17 +159,6 @@ def save_merge_picture(
     Walls and free space have the colour of the map that saw them, walls that several saw are dark, and walls
     that stand where another map is free are red. Lines join the matched corners of each pair, as far apart as
     the maps' frames leave them. Axes are those of the ROS frame of each panel's first map.
-
-    Parameters
-    ----------
-    path : Path
-        The PNG file, written whole or not at all.
-    merged : Merged
-        What `merge_maps` found.
-    corners : mapping of str to Transform
-        From cells' metres into each map's ROS frame.
-    deformed : sequence of Deformed
-        How each group of two maps or more was bent: it is drawn so, with what agrees and contradicts then.
     """
     panels = panels_of(merged, deformed)
     if not panels:
@@ -100,7 +201,7 @@ def _save_nothing(path: Path) -> None:
 
 def _draw_panel(
     axes: Axes,
-    panel: Panel,
+    panel: _Panel,
     fused: FusedMap,
     style: tuple[dict[str, Colour], Transform],
 ) -> None:
@@ -140,7 +241,7 @@ def _draw_panel(
 
 
 def _coloured(fused: FusedMap, colours: list[Colour]) -> NDArray[np.uint8]:
-    """Return the map in colours of who saw what, shape (rows, columns, 3)."""
+    """Return the map in colours of the robots that saw each cell, shape (rows, columns, 3)."""
     counts = np.bitwise_count(fused.sources)
     total = np.zeros((*fused.levels.shape, 3))
     for index, colour in enumerate(colours):

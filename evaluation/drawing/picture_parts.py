@@ -1,26 +1,40 @@
-"""Parts of pictures, drawn from plain arrays.
-
-They are the picture layout, a floor's cells, paths, coverage over time and a list of robots.
-"""
+"""Parts of pictures, drawn from plain arrays: layout, cells of a floor, paths, coverage, lists of robots."""
 
 import io
 import math
-from collections.abc import Mapping, Sequence
+import warnings
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 from matplotlib.patheffects import Normal, Stroke
+from matplotlib.text import Text
 from numpy.typing import NDArray
 
 from lidarium.envs.drawing.frame_parts import team_colours
-from lidarium.evaluation.drawing.plain_words import plain_words
-from lidarium.evaluation.episodes.output import whole_file
+from lidarium.mapping.files.guarded_reading import printable
+from lidarium.mapping.files.output import whole_file
+
+
+@contextmanager
+def plain_words(figure: Figure) -> Iterator[None]:
+    """Take all words of a figure as they are while it is drawn: a name with ``$`` is no formula."""
+    # Labels of ticks are made only when a figure is drawn.
+    with rc_context({"text.parse_math": False}), warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "Glyph .* missing from", UserWarning)
+        for text in figure.findobj(Text):
+            text.set_parse_math(False)
+            text.set_text("\n".join(map(printable, text.get_text().split("\n"))))
+        yield
+
 
 INK, FAINT, SOLID = "#1f2937", "#6b7280", "#b6bec9"
 DPI = 130
@@ -32,7 +46,7 @@ _MARGIN = 0.15
 
 
 @dataclass(frozen=True, slots=True)
-class Box:
+class _Box:
     """Part of a raster to show: rows, columns and extent [m].
 
     The extent is (x_min, x_max, y_min, y_max).
@@ -49,7 +63,7 @@ class Box:
         return (x_max - x_min) / (y_max - y_min)
 
 
-def box_around(free: NDArray[np.bool_], origin: tuple[float, float], resolution: float) -> Box:
+def box_around(free: NDArray[np.bool_], origin: tuple[float, float], resolution: float) -> _Box:
     """Return the part of a raster around the cells of a mask (rows, columns).
 
     The mask marks the cells that are to be seen.
@@ -61,13 +75,13 @@ def box_around(free: NDArray[np.bool_], origin: tuple[float, float], resolution:
         low, high = max(int(used[0]) - margin, 0), min(int(used[-1]) + 1 + margin, free.shape[1 - axis])
         spans.append(slice(low, high))
         limits.append((origin[axis] + low * resolution, origin[axis] + high * resolution))
-    return Box(spans[0], spans[1], (*limits[1], *limits[0]))
+    return _Box(spans[0], spans[1], (*limits[1], *limits[0]))
 
 
 def page(aspect: float) -> tuple[Figure, Axes, Axes, Axes]:
     """Arrange a picture: the floor, the curve and the team.
 
-    The curve and the team are beside the floor, or below it where it is wide.
+    The curve and the team are beside the floor, or below it if it is wide.
     """
     if aspect > _WIDE:
         width = 14.0
@@ -114,7 +128,7 @@ def rgb(colour: str) -> NDArray[np.uint8]:
     return np.array([int(colour[k : k + 2], 16) for k in (1, 3, 5)], np.uint8)
 
 
-def show_cells(axes: Axes, picture: NDArray[np.uint8], box: Box, outside: str) -> None:
+def show_cells(axes: Axes, picture: NDArray[np.uint8], box: _Box, outside: str) -> None:
     """Show cells (rows, columns, 3) of a box, in metres.
 
     Beyond them the colour ``outside``.
@@ -133,7 +147,7 @@ def show_cells(axes: Axes, picture: NDArray[np.uint8], box: Box, outside: str) -
 
 
 def drawn_together(classes: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Draw blocks of cells as one where there are more than the picture has pixels.
+    """Draw blocks of cells as one if there are more than the picture has pixels.
 
     The highest class shows.
     """
@@ -216,14 +230,8 @@ def draw_curve(
 
     Parameters
     ----------
-    axes : Axes
-        Where to draw.
     curve : sequence of (time [s], coverage)
         Coverage at every change.
-    reached : mapping
-        Time at which each threshold was reached [s].
-    end_s : float
-        End of the episode [s].
     """
     times, shares = [time for time, _ in curve], [100.0 * share for _, share in curve]
     end = max(end_s, 1.0)
@@ -253,17 +261,6 @@ def list_robots(
     """List each robot's ending and some figures.
 
     Below them is the text on the team.
-
-    Parameters
-    ----------
-    axes : Axes
-        Where to draw.
-    columns : sequence of str
-        Headings of the figures.
-    robots : sequence of sequence of str
-        For each robot its ending and the figures.
-    below : sequence of str
-        Lines below.
     """
     axes.set_axis_off()
     axes.set_xlim(0.0, 1.0)

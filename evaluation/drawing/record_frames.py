@@ -1,4 +1,4 @@
-"""Pictures of what any version can show of a record, and frames of films.
+"""Pictures of records, which any version can draw, and frames of films.
 
 They show the team's map, paths, coverage, targets and endings.
 """
@@ -48,7 +48,7 @@ from lidarium.evaluation.drawing.picture_parts import (
     save_titled_figure,
     show_cells,
 )
-from lidarium.evaluation.metrics import path_lengths
+from lidarium.evaluation.metrics.progress import path_lengths
 from lidarium.evaluation.record.episode_record import EpisodeRecord
 from lidarium.mapping.grids.occupancy import FREE, OCCUPIED, UNKNOWN
 from lidarium.mapping.grids.speckle_filter import without_small_components
@@ -60,18 +60,12 @@ _UNSEEN = "#dfe3ea"
 
 
 class TrackFrames:
-    """Draws what a record shows at any time.
+    """Draws a record at any time.
 
     Parameters
     ----------
-    record : EpisodeRecord
-        The record.
-    size : int
-        Longer side of the explored part in a frame [pixels].
-    floor : Floor or None
-        The floor of the record: what the first robot's camera sees is then beside a frame.
     shown : (rows, columns) bool or None
-        Cells of the team's map that frames show; those that the team knows at the end where None.
+        Cells of the team's map that frames show; those that the team knows at the end if None.
     """
 
     def __init__(
@@ -93,7 +87,7 @@ class TrackFrames:
         self._views = None if floor is None else views_of(floor, Robot(**robot), len(self._agents))
 
     def draw(self, time_s: float) -> Frame:
-        """Return the frame at a time: what `picture` shows below a header, beside it a camera's view."""
+        """Return the frame at a time: `picture` below a header, next to a camera's view."""
         coverage = self._display.coverage_at(time_s)
         frame = with_header(self.picture(time_s), self._record.header["floor"], coverage, time_s)
         if self._camera is None:
@@ -135,7 +129,7 @@ class TrackFrames:
         return self._map.copy()
 
     def _with_panel(self, frame: Frame, camera: DepthCamera, poses: NDArray[np.float64]) -> Frame:
-        """Put what the first robot's camera sees beside a frame."""
+        """Put the view of the first robot's camera beside a frame."""
         assert self._views is not None
         level = np.zeros_like(poses)
         depth = self._views.depth(poses, level, 0, camera)
@@ -171,7 +165,7 @@ def known_at_end(record: EpisodeRecord) -> NDArray[np.bool_]:
 
 
 def save_track_picture(path: Path, record: EpisodeRecord) -> None:
-    """Draw what a record shows at its end (PNG, written whole or not at all).
+    """Draw the end of a record (PNG, written whole or not at all).
 
     It shows the team's map, all paths, coverage over time and endings.
     """
@@ -179,7 +173,7 @@ def save_track_picture(path: Path, record: EpisodeRecord) -> None:
     levels = without_small_components(display.map_at(math.inf))
     box = box_around(levels != UNKNOWN, display.origin, display.resolution)
     figure, floor_axes, curve_axes, team_axes = page(box.aspect)
-    # In the order of what shows where cells are drawn together.
+    # In the order of what shows if cells are drawn together.
     classes = np.zeros(levels.shape, np.uint8)
     classes[levels == FREE], classes[levels == OCCUPIED] = 1, 2
     palette = np.stack([rgb(colour) for colour in (_UNSEEN, "#ffffff", INK)])

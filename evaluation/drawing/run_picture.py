@@ -1,4 +1,4 @@
-"""Pictures of what a run found on a floor, and of floors themselves.
+"""Pictures of runs and of floors.
 
 They are PNG files, drawn without a display.
 """
@@ -47,18 +47,9 @@ _START_COLOUR = "#2563eb"
 
 
 def save_run_picture(path: Path, episode: Episode, policy: str) -> None:
-    """Draw what a run found: truth, team map, paths, frontiers and coverage.
+    """Draw a run: truth, team map, paths, frontiers and coverage.
 
     Starts and ends are marked. Frontiers are those left and those given up; coverage is over time.
-
-    Parameters
-    ----------
-    path : Path
-        The PNG file, written whole or not at all.
-    episode : Episode
-        What `run_episode` left, finished or interrupted.
-    policy : str
-        Name of the policy.
     """
     env, scorer = episode.env, episode.env.scorer
     if env.floor is None:
@@ -87,17 +78,7 @@ def save_run_picture(path: Path, episode: Episode, policy: str) -> None:
 
 
 def save_floor_picture(path: Path, floor: Floor, height: float, resolution: float = 0.025) -> None:
-    """Draw a floor: what the laser sees at a height [m], its starts and its goal.
-
-    Parameters
-    ----------
-    path : Path
-        The PNG file, written whole or not at all.
-    floor : Floor
-        The floor.
-    height, resolution : float
-        Height of the plane, and side of a cell [m].
-    """
+    """Draw a floor at the laser's height [m], with its starts and its goal."""
     raster = floor.raster(resolution, height, height)
     box = box_around(raster.solid == 0, raster.origin, resolution)
     figure = Figure(figsize=_floor_size(box.aspect), layout="constrained")
@@ -169,7 +150,7 @@ def _draw_maps(axes: Axes, episode: Episode) -> None:
     rows, columns = np.flatnonzero(solid.any(axis=1))[-1] + 1, np.flatnonzero(solid.any(axis=0))[-1] + 1
     levels = without_small_components(three_levels(log_odds))
     solid, counted, levels = solid[:rows, :columns], counted[:rows, :columns], levels[:rows, :columns]
-    # In the order of what shows where cells are drawn together.
+    # In the order of what shows if cells are drawn together.
     classes = np.zeros(solid.shape, np.uint8)
     classes[solid] = 1
     classes[counted] = 2
@@ -192,9 +173,9 @@ def _draw_frontiers(axes: Axes, episode: Episode) -> tuple[bool, bool]:
 def _border_of_team_map(episode: Episode) -> tuple[NDArray[np.bool_], tuple[float, float]]:
     """Return the border cells of the team's map as it is drawn, and its origin.
 
-    They lie within a cell of both what is free and what is unknown.
+    They lie within a cell of both free and unknown cells.
 
-    What one robot has left on its own map another may have seen.
+    Frontiers of one robot's map may have been seen by another.
     """
     log_odds, origin = team_log_odds(episode.env)
     levels = without_small_components(three_levels(log_odds))
@@ -242,7 +223,7 @@ def _draw_legend(figure: Figure, has_left: bool, has_given_up: bool, more: list[
 
 
 def _list_robots(axes: Axes, episode: Episode) -> None:
-    """List each robot's ending, way and share of F, and below what was given up."""
+    """List each robot's ending, way and share of F, and below the frontiers given up."""
     env, world = episode.env, episode.env.world
     counted = max(int(env.score.counted[0]), 1)
     endings = [env.scorer.ended_because.get(agent, "still at work") for agent in env.possible_agents]

@@ -1,6 +1,6 @@
 """Picture of a spline map over the true floor, with the robot's path.
 
-The robot's tree is drawn where there is one.
+The robot's tree is drawn if there is one.
 """
 
 from collections.abc import Sequence
@@ -53,18 +53,10 @@ def save_spline_picture(
 
     Parameters
     ----------
-    path : Path
-        The PNG file, written whole or not at all.
-    floor : Floor
-        The truth, grey.
-    spline_map : SplineMap
-        Its curves, and the corners and peaks that three scans or more have seen, in the floor's frame.
     true_path, believed_path : (times, 2 or more) float64 or None
         Positions of the robot x, y first [m].
     tree : sequence of ((x, y), (x, y))
         Edges of an exploration tree, parent first [m].
-    title : str or None
-        The floor's name where None.
     safe_regions : sequence of (n, 2) float64
         Outlines of the safe regions of the tree's nodes [m].
     """

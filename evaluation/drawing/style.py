@@ -65,7 +65,7 @@ def band(
 
 
 def save(path: Path, figure: Figure, title: str, subtitle: str = "") -> None:
-    """Write a figure with a title and, below it, a line that says what is to be seen."""
+    """Write a figure with a title and, below it, an explanation."""
     height = figure.get_figheight()
     figure.text(
         0.012, 1.0 - 0.12 / height, title, ha="left", va="top", fontsize=13, fontweight="bold", color=INK

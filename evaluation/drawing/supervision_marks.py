@@ -1,6 +1,6 @@
 """Marks of a supervisor's decisions on pictures, with those on films."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 
 import cv2
 import numpy as np
@@ -12,9 +12,11 @@ from lidarium.agents.report import GivenOrder
 from lidarium.envs.drawing.frame_parts import SHIFT, Frame, View, team_colours
 from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.onboard.radio.messages import OrderKind
-from lidarium.evaluation.drawing.films.film import DrawOver
 from lidarium.evaluation.drawing.picture_parts import INK, hex_colours
 from lidarium.evaluation.episodes.events import in_floor_frame
+
+DrawOver = Callable[[ExplorationEnv, Frame, View], None]
+"""Draws on a frame, given the environment and the view of the floor."""
 
 SHOWN_S = 4.0
 """How long a film shows an order or a join [s]."""
@@ -25,7 +27,7 @@ _JOIN_COLOUR = "#0f766e"
 def draw_supervision(axes: Axes, env: ExplorationEnv, policy: Policy) -> list[Line2D]:
     """Draw where rules joined, redirected and stopped robots; return the legend.
 
-    They are drawn on a map of the floor; what is returned are the entries of the legend.
+    They are drawn on a map of the floor.
     """
     station = policy.report().supervision
     if station is None:
@@ -77,9 +79,9 @@ def draw_supervision(axes: Axes, env: ExplorationEnv, policy: Policy) -> list[Li
 
 
 def recent_supervision(policy: Policy) -> DrawOver:
-    """Return what draws a station's latest orders and joins on frames of a film.
+    """Return a function that draws a station's latest orders and joins on frames.
 
-    It draws nothing where a policy has no station.
+    It draws nothing if a policy has no station.
     """
 
     def draw(env: ExplorationEnv, frame: Frame, view: View) -> None:

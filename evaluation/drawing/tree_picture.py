@@ -18,13 +18,6 @@ def save_tree_picture(path: Path, settings: SupervisorSettings | None = None) ->
     """Draw the tree that settings make.
 
     It has questions with their answers, and rule and order at the leaves.
-
-    Parameters
-    ----------
-    path : Path
-        The PNG file, written whole or not at all.
-    settings : SupervisorSettings or None
-        The defaults where None.
     """
     tree = decision_tree(settings or SupervisorSettings())
     count, depth = len(list(leaves(tree))), _depth(tree)

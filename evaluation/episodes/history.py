@@ -1,9 +1,8 @@
 """Watches an episode for the metrics over time.
 
-It keeps what the team and each robot knew, and how far they had driven by then.
-
-A sample is taken at the start, every decision period of simulated time and at the end; what a threshold of
-coverage asks for is noted in the very step that reaches it.
+It keeps what the team and each robot knew, and how far they had driven by then. A sample is taken at the
+start, every decision period of simulated time and at the end; what a threshold of coverage asks for is noted
+in the very step that reaches it.
 """
 
 from dataclasses import dataclass
@@ -12,12 +11,115 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.envs.faces.parallel import ExplorationEnv
+from lidarium.envs.simulation.coverage import count_bits
+from lidarium.envs.simulation.kernels.arrays import (
+    COUNTED_MASK,
+    ENDED,
+    MAP_RESOLUTION,
+    MASK_ROWS,
+    MASK_WORDS,
+    RANGE_MAX,
+    WorldArrays,
+    world_at,
+)
+from lidarium.envs.simulation.kernels.masks import footprint
 from lidarium.evaluation.episodes.watching import Watcher
-from lidarium.evaluation.metrics import overlap
-from lidarium.evaluation.truth.footprints import Footprints
-from lidarium.evaluation.truth.map_tally import MapTally
-from lidarium.evaluation.truth.team_counts import COUNTED, KNOWABLE, VALID
+from lidarium.evaluation.metrics.cells import overlap
+from lidarium.evaluation.truth.map_tally import COUNTED, KNOWABLE, VALID, MapTally
 from lidarium.evaluation.truth.true_map import Truth, truth_of
+from lidarium.mapping.grids.scan_polygon import window_rows, window_words
+from lidarium.mapping.kernels.compilation import Array, kernel
+from lidarium.mapping.kernels.views import grid_at
+
+
+@kernel
+def _is_any_pair_near(world: WorldArrays, first: int, robots: int) -> bool:
+    """Whether the footprints of two robots at work may meet."""
+    reach = 2.0 * world.sensor[RANGE_MAX] + 4.0 * world.sensor[MAP_RESOLUTION]
+    for row in range(first, first + robots):
+        for other in range(row + 1, first + robots):
+            gap_x, gap_y = (
+                world.poses[row, 0] - world.poses[other, 0],
+                world.poses[row, 1] - world.poses[other, 1],
+            )
+            if (
+                not (world.flags[row] | world.flags[other]) & ENDED
+                and gap_x * gap_x + gap_y * gap_y < reach * reach
+            ):
+                return True
+    return False
+
+
+@kernel
+def _count_footprints(table: Array, episode: int, windows: Array) -> tuple[int, int]:
+    """Count the cells of F that a robot or more, and two or more, see now.
+
+    Ended robots see nothing.
+
+    If no two footprints can meet, the first count is not needed and is 0. ``windows`` (robots, window
+    rows, words) uint64 is scratch memory, all zero before and after.
+    """
+    world, robots = world_at(table), windows.shape[0]
+    first = episode * robots
+    if not _is_any_pair_near(world, first, robots):
+        return 0, 0
+    # Of each window the rows and words of the masks that may hold bits, and where it begins.
+    boxes, spans, corners = (
+        np.zeros((robots, 4), np.int64),
+        np.zeros((robots, 4), np.int64),
+        np.zeros((robots, 2), np.int64),
+    )
+    once, twice = 0, 0
+    for robot in range(robots):
+        row = first + robot
+        if world.flags[row] & ENDED:
+            continue
+        masks = world.mask_rows[row]
+        counted = grid_at(masks[COUNTED_MASK], masks[MASK_ROWS], masks[MASK_WORDS], np.uint64)
+        box, row_offset, word_offset = footprint(world, row, first, robots, windows[robot])
+        spans[robot, 0], spans[robot, 1], spans[robot, 2], spans[robot, 3] = box
+        corners[robot, 0], corners[robot, 1] = row_offset, word_offset
+        boxes[robot, 0], boxes[robot, 1] = (
+            max(box[0] + row_offset, 0),
+            min(box[1] + row_offset, masks[MASK_ROWS]),
+        )
+        boxes[robot, 2], boxes[robot, 3] = (
+            max(box[2] + word_offset, 0),
+            min(box[3] + word_offset, masks[MASK_WORDS]),
+        )
+        for i in range(boxes[robot, 0], boxes[robot, 1]):
+            for j in range(boxes[robot, 2], boxes[robot, 3]):
+                seen = windows[robot, i - row_offset, j - word_offset] & counted[i, j]
+                if seen == np.uint64(0):
+                    continue
+                by_one, by_two = np.uint64(0), np.uint64(0)
+                for other in range(robot):
+                    if boxes[other, 0] <= i < boxes[other, 1] and boxes[other, 2] <= j < boxes[other, 3]:
+                        bits = windows[other, i - corners[other, 0], j - corners[other, 1]]
+                        by_two |= by_one & bits
+                        by_one |= bits
+                once += count_bits(seen & ~by_one)
+                twice += count_bits(seen & by_one & ~by_two)
+    for robot in range(robots):
+        windows[robot, spans[robot, 0] : spans[robot, 1], spans[robot, 2] : spans[robot, 3]] = 0
+    return once, twice
+
+
+class Footprints:
+    """Cells that the robots of a team see from their positions."""
+
+    def __init__(self, env: ExplorationEnv) -> None:
+        reach = env.settings.lidar.range_max / env.settings.occupancy.resolution
+        self._windows = np.zeros((env.settings.robots, window_rows(reach), window_words(reach)), np.uint64)
+
+    def count(self, env: ExplorationEnv) -> tuple[int, int]:
+        """Return how many cells of F a robot or more, and two or more, see now.
+
+        (0, 0) if no two footprints can meet.
+        """
+        once, twice = _count_footprints(env.simulation.table, 0, self._windows)
+        return int(once), int(twice)
+
 
 WHOLE = 0.99
 """Coverage at which the overlap of maps is asked for."""
@@ -50,7 +152,7 @@ class Milestone:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Curves:
+class _Curves:
     """Metrics over time.
 
     Attributes
@@ -67,7 +169,7 @@ class Curves:
         Length of each robot's path [m].
     seen_once, seen_twice : (decisions,) int64
         Cells of F that a robot or more, and two or more, saw at once from where they stood, at the start and
-        every decision period; both 0 where no two footprints could meet.
+        every decision period; both 0 if no two footprints could meet.
     """
 
     times: NDArray[np.float64]
@@ -81,12 +183,12 @@ class Curves:
 
 
 class History(Watcher):
-    """What metrics over time need, of the episode that runs or ran last.
+    """Data for metrics over time, of the current or last episode.
 
     Attributes
     ----------
     truth : Truth
-        What is true of the floor; after ``begin``.
+        Ground truth of the floor; after ``begin``.
     milestones : list of Milestone
         Steps in which thresholds of coverage were reached, in their order; one step may have reached several.
     """
@@ -103,7 +205,7 @@ class History(Watcher):
         return bool(self._times)
 
     def begin(self, env: ExplorationEnv) -> None:
-        """Take the first sample; what was seen of an episode before is forgotten."""
+        """Take the first sample; data of an earlier episode is dropped."""
         self.truth = truth_of(env)
         self.milestones = []
         self._tally, self._footprints = MapTally(env, self.truth), Footprints(env)
@@ -120,7 +222,7 @@ class History(Watcher):
         self._sample(env, is_decision=True)
 
     def step(self, env: ExplorationEnv, _commands: NDArray[np.float64]) -> None:
-        """Note what this step changed; take a sample where it is time for one."""
+        """Note the changes of this step; take a sample if it is time for one."""
         self._tally.note_step(env)
         scorer = env.scorer
         if len(scorer.track) != len(self._believed):
@@ -133,7 +235,7 @@ class History(Watcher):
             self._sample(env, is_decision=True)
 
     def outcome(self, env: ExplorationEnv) -> None:
-        """Count a decision; take the last sample where all agents have ended."""
+        """Count a decision; take the last sample if all agents have ended."""
         self._decisions += 1
         if not env.agents and self._times[-1] != env.scorer.time:
             self._sample(env, is_decision=False)
@@ -171,7 +273,7 @@ class History(Watcher):
     def milestone(self, share: float) -> Milestone | None:
         """Return the step in which coverage first reached one of the thresholds.
 
-        Coverage is then at least the threshold. None where it was not reached.
+        Coverage is then at least the threshold. None if it was not reached.
         """
         return next((milestone for milestone in self.milestones if milestone.coverage >= share), None)
 
@@ -184,14 +286,14 @@ class History(Watcher):
         return np.stack(self._believed)
 
     @property
-    def curves(self) -> Curves:
-        """The metrics over time, of what has been seen so far."""
+    def curves(self) -> _Curves:
+        """The metrics over time so far."""
         counts, sizes = np.stack(self._counts), np.maximum(self._tally.sizes, 1)
         team = counts[:, -1] / sizes
         held = counts[:, -1:] if self._tally.shares else counts[:, :-1]
         footprints = np.array(self._footprint_counts, np.int64).reshape(-1, 2)
         robots = counts.shape[1] - 1
-        return Curves(
+        return _Curves(
             np.array(self._times),
             np.array(self._coverage),
             team[:, KNOWABLE],

@@ -1,60 +1,164 @@
-"""Results of a run, as the dictionary of ``result.json``.
+"""Results of a run, as the dictionary of ``result.json``: its identity and metrics.
 
 The format is in docs/reference/files.md.
 """
 
+from collections.abc import Callable, Iterable
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 import lidarium
-from lidarium.agents.report import GivenUp
+from lidarium.agents.report import GivenUp, PolicyReport
 from lidarium.envs.engine.tally import THRESHOLDS
 from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.simulation.coverage import unpack_bits
-from lidarium.evaluation import metrics
 from lidarium.evaluation.episodes.events import in_floor_frame, operating_events
-from lidarium.evaluation.episodes.history import WHOLE, History
+from lidarium.evaluation.episodes.history import WHOLE, History, Milestone
 from lidarium.evaluation.episodes.runner import Episode
 from lidarium.evaluation.episodes.settings_identity import realism_of, settings_sha256
-from lidarium.evaluation.episodes.supervision import tick_percentiles
+from lidarium.evaluation.metrics import METRICS, Column, Direction, Metric
+from lidarium.evaluation.metrics.cells import (
+    free_coverage,
+    free_error_rate,
+    instant_overlap,
+    known_coverage,
+    occupied_f1,
+    occupied_iou,
+    overlap,
+    overlap_of_maps,
+    own_coverage,
+    surface,
+    valid_coverage,
+)
 from lidarium.evaluation.metrics.merges import Trajectories, merge_figures
+from lidarium.evaluation.metrics.poses import absolute_error, relative_error
+from lidarium.evaluation.metrics.progress import (
+    area_under_curve,
+    balance,
+    collisions_per_km,
+    decision_percentiles,
+    decisions_to,
+    distance_sum_to,
+    distance_to,
+    is_success,
+    path_balance,
+    peak_megabytes,
+)
 from lidarium.evaluation.truth.beliefs import free_as_held, maps_on_floor
-from lidarium.evaluation.truth.true_map import left_by_failed, truth_of
+from lidarium.evaluation.truth.true_map import Truth, left_by_failed, truth_of
+
+
+class EpisodeData:
+    """A finished or interrupted episode, as metrics read it.
+
+    Attributes
+    ----------
+    env, settings, episode, history
+        As above; the settings are those of the environment.
+    robots : int
+        Number of robots.
+    lengths : (robots,) float64
+        Length of each robot's path [m].
+    """
+
+    def __init__(
+        self, env: ExplorationEnv, episode: Episode | None = None, history: History | None = None
+    ) -> None:
+        self.env, self.settings, self.episode = env, env.settings, episode
+        self.history = None if history is None or not history.has_begun else history
+        self.robots = env.settings.robots
+        self.lengths: NDArray[np.float64] = env.world.travelled
+
+    @property
+    def coverage(self) -> NDArray[np.float64]:
+        """Coverage over time, (changes, 2): time [s], and the share of the floor sensed from then on."""
+        return np.array(self.env.scorer.curve).reshape(-1, 2)
+
+    @property
+    def times(self) -> NDArray[np.float64]:
+        """Times of ``poses``, (times,) [s]."""
+        return np.array([time for time, _ in self.env.scorer.track], np.float64)
+
+    @property
+    def poses(self) -> NDArray[np.float64]:
+        """True poses over time, (times, robots, 3): x, y, theta [m, m, rad]."""
+        return np.stack([poses for _, poses in self.env.scorer.track])
+
+    @property
+    def collisions(self) -> int:
+        """Number of contacts that began, all robots together."""
+        return int(self.env.world.collisions.sum())
+
+    @cached_property
+    def report(self) -> PolicyReport:
+        """The policy's report."""
+        return self.run.policy.report()
+
+    @property
+    def run(self) -> Episode:
+        """The episode; a ValueError if the metrics were asked of an environment alone."""
+        if self.episode is None:
+            raise ValueError("this metric needs the whole episode; want EpisodeData(env, episode)")
+        return self.episode
+
+    @cached_property
+    def truth(self) -> Truth:
+        """Occupied, reachable and knowable cells of the floor, each (rows, columns) bool."""
+        return truth_of(self.env)
+
+    @cached_property
+    def maps(self) -> NDArray[np.int16]:
+        """Each robot's own map on the floor, (robots, rows, columns): log-odds, 0 is unknown."""
+        return np.asarray(maps_on_floor(self.env))
+
+    @cached_property
+    def team_map(self) -> NDArray[np.int16]:
+        """The sum of the robots' maps, (rows, columns): above 0 is occupied, below 0 is free."""
+        return np.sum(self.maps, axis=0, dtype=np.int16)
+
+    @cached_property
+    def sensed(self) -> NDArray[np.bool_]:
+        """Cells that the team's lasers have sensed, (rows, columns) bool."""
+        return unpack_bits(self.env.score.team_masks[0], self.maps.shape[2])
+
+    @cached_property
+    def own_coverages(self) -> tuple[float, float]:
+        """Minimum and mean of the robots' ``C_own``."""
+        return own_coverage(free_as_held(self.env, self.maps), self.truth.counted)
+
+    @cached_property
+    def trajectories(self) -> Trajectories:
+        """True and believed poses of the robots over time; needs a history."""
+        assert self.history is not None
+        times, poses = zip(*self.env.scorer.track, strict=True)
+        # An interrupted step may have left one more of the one than of the other.
+        known = min(len(poses), len(self.history.believed))
+        return Trajectories(
+            self.env.possible_agents,
+            np.array(times[:known], np.float64),
+            np.stack(poses[:known]),
+            self.history.believed[:known],
+        )
+
+    def milestone(self, share: float) -> Milestone | None:
+        """Return the step in which coverage first reached a threshold; None if it did not, or is unknown."""
+        return None if self.history is None else self.history.milestone(share)
 
 
 def result_of(episode: Episode, policy: str | None = None, history: History | None = None) -> dict[str, Any]:
-    """Return the figures of an episode as ``result.json`` has them.
+    """Return the figures of a finished or interrupted episode as ``result.json`` has them.
 
-    The episode is finished or interrupted.
-
-    Parameters
-    ----------
-    episode : Episode
-        What `run_episode` left; its environment must have been reset.
-    policy : str or None
-        Name of the policy; that of its class where None.
-    history : History or None
-        What watched the episode; where None, the figures over time that need one are None.
-
-    Returns
-    -------
-    dict
-        Ready for JSON. Times are simulated [s], lengths in metres; positions of ``given_up`` are in the
-        floor's frame. ``ended_because`` is None for robots that an interrupted run left at work.
-
-    Raises
-    ------
-    ValueError
-        Where the episode was interrupted before it began.
+    Times are simulated [s], lengths are in metres, positions of ``given_up`` in the floor's frame. Figures
+    over time are None without a history. ``ended_because`` is None for robots that an interrupted run left at
+    work. A ValueError if the episode was interrupted before it began.
     """
-    env, settings, scorer, world = episode.env, episode.env.settings, episode.env.scorer, episode.env.world
+    env, settings = episode.env, episode.env.settings
     if env.floor is None:
         raise ValueError("the episode was interrupted before it began, there is no result")
-    if history is not None and not history.has_begun:
-        history = None
-    steps, report = max(int(world.steps[0]), 0), episode.policy.report()
-    collisions = int(world.collisions.sum())
+    data = EpisodeData(env, episode, history)
     return {
         "floor": env.floor.name,
         "robots": settings.robots,
@@ -65,189 +169,397 @@ def result_of(episode: Episode, policy: str | None = None, history: History | No
         "seed": episode.seed,
         "horizon_s": settings.horizon_s,
         "interrupted": episode.is_interrupted,
-        "coverage_final": round(scorer.coverage, 9),
-        "time_s": round(scorer.time, 6),
-        **{f"t{round(100 * share)}_s": _rounded(scorer.times.get(share), 6) for share in THRESHOLDS},
-        **_success(env),
-        **_at_thresholds(history),
-        "path_m": [round(float(length), 9) for length in world.travelled],
-        "path_balance": round(metrics.path_balance(world.travelled), 9),
-        "overlap": round(metrics.overlap(env.score.masks), 9),
-        **_overlaps(history),
-        "collisions": collisions,
-        "collisions_per_km": _rounded(metrics.collisions_per_km(collisions, world.travelled), 6),
-        "ended_because": {agent: scorer.ended_because.get(agent) for agent in env.possible_agents},
-        "given_up": [_entry(env, given_up) for given_up in episode.given_up],
-        "decided_by": dict(report.decided_by) or None,
-        **_pose_errors(env, history),
-        **map_figures(env),
-        "energy_j": [round(float(used), 6) for used in env.energy_j] if settings.battery.is_limited else None,
-        "operating": operating_events(env),
-        "merges": merge_figures(
-            episode.merges,
-            settings.occupancy.resolution,
-            None if history is None else _trajectories(env, history),
-        ),
-        "supervisor": None if report.supervision is None else report.supervision.figures,
-        "decision_ms": metrics.decision_percentiles(episode.decision_seconds),
-        "tick_ms": tick_percentiles(report),
-        "peak_mb": _rounded(metrics.peak_megabytes(), 1),
-        "steps_per_s": round(steps / episode.wall_seconds, 3) if episode.wall_seconds > 0.0 else None,
+        **figures_of(data, METRICS),
         "version": lidarium.__version__,
         "floor_sha256": env.floor.sha256,
         "settings_sha256": settings_sha256(settings),
     }
 
 
-def _success(env: ExplorationEnv) -> dict[str, Any]:
-    """Return whether the run reached what stops it, and its coverage area.
-
-    The area is that under its curve of coverage.
-    """
-    settings = env.settings
-    times, coverage = np.array(env.scorer.curve).reshape(-1, 2).T
-    stop = THRESHOLDS[-1] if settings.stop_coverage is None else settings.stop_coverage
-    horizon = None if settings.horizon_steps is None else settings.horizon_steps * settings.time_step
-    return {
-        "success": metrics.is_success(times, coverage, stop, horizon),
-        "auc": None if horizon is None else round(metrics.area_under_curve(times, coverage, horizon), 9),
-    }
+def figures_of(data: EpisodeData, names: Iterable[str]) -> dict[str, Any]:
+    """Return metrics of an episode by name, ready for JSON."""
+    return {name: _plain(METRICS[name].of(data)) for name in names}
 
 
-def _at_thresholds(history: History | None) -> dict[str, Any]:
-    """Return ways and decisions until each threshold of coverage."""
-    milestones = [] if history is None else history.milestones
-    coverage = [milestone.coverage for milestone in milestones]
-    lengths = np.array([milestone.lengths for milestone in milestones])
-    decisions = [milestone.decisions for milestone in milestones]
-    names = {share: str(round(100 * share)) for share in THRESHOLDS}
-    return {
-        **{
-            f"d{name}_m": _rounded(metrics.distance_to(lengths, coverage, share), 9)
-            for share, name in names.items()
-        },
-        **{
-            f"d_sum{name}_m": _rounded(metrics.distance_sum_to(lengths, coverage, share), 9)
-            for share, name in names.items()
-        },
-        **{f"n{name}": metrics.decisions_to(decisions, coverage, share) for share, name in names.items()},
-    }
+def _plain(value: Any) -> Any:  # noqa: ANN401
+    """Return a value without types of NumPy, which JSON does not have."""
+    return value.tolist() if isinstance(value, np.generic | np.ndarray) else value
 
 
-def _overlaps(history: History | None) -> dict[str, Any]:
-    """Return the overlaps as the reference projects take them, each when they take it."""
-    nearly, mostly, whole = (
-        None if history is None else history.milestone(share) for share in (0.85, 0.95, WHOLE)
-    )
-    curves = None if history is None else history.curves
-    return {
-        "overlap_eb": None
-        if whole is None or whole.known_shares is None
-        else round(metrics.overlap_of_maps(whole.known_shares), 9),
-        "overlap_mx_85": None if nearly is None else round(nearly.overlap, 9),
-        "overlap_mx_95": None if mostly is None else round(mostly.overlap, 9),
-        "overlap_mv": None
-        if curves is None
-        else round(metrics.instant_overlap(curves.seen_once, curves.seen_twice), 9),
-    }
+_Value = Callable[[EpisodeData], Any]
 
 
-def _pose_errors(env: ExplorationEnv, history: History | None) -> dict[str, Any]:
-    """Return ATE and RPE of each robot.
-
-    Frames agree where starts are known, else the best fit brings them together.
-    """
-    robots = env.settings.robots
-    if history is None and env.settings.localization != "truth":
-        return {"ate_m": None, "rpe_m": None, "rpe_rad": None}
-    if history is None:
-        # The localizer is the truth: no error.
-        return {"ate_m": [0.0] * robots, "rpe_m": None, "rpe_rad": None}
-    trajectories = _trajectories(env, history)
-    times, true, believed = trajectories.times, trajectories.true, trajectories.believed
-    steps = max(round(1.0 / (times[1] - times[0])), 1) if len(times) > 1 else 1
-    relative = [metrics.relative_error(believed[:, robot], true[:, robot], steps) for robot in range(robots)]
-    return {
-        "ate_m": [
-            round(
-                metrics.absolute_error(believed[:, robot], true[:, robot], not env.settings.known_starts), 9
-            )
-            for robot in range(robots)
-        ],
-        "rpe_m": [None if error is None else round(error[0], 9) for error in relative],
-        "rpe_rad": [None if error is None else round(error[1], 9) for error in relative],
-    }
-
-
-def _trajectories(env: ExplorationEnv, history: History) -> Trajectories:
-    """Return where the robots were and believed to be."""
-    times, poses = zip(*env.scorer.track, strict=True)
-    # An interrupted step may have left one more of the one than of the other.
-    known = min(len(poses), len(history.believed))
-    return Trajectories(
-        env.possible_agents,
-        np.array(times[:known], np.float64),
-        np.stack(poses[:known]),
-        history.believed[:known],
-    )
-
-
-def map_figures(env: ExplorationEnv) -> dict[str, Any]:
-    """Return the known share of the floor, and how well maps agree with the truth.
-
-    Both are those of the maps in the end.
-    """
-    truth, maps = truth_of(env), maps_on_floor(env)
-    team = np.sum(maps, axis=0, dtype=np.int16)
-    known, believed, believed_free = (
-        np.asarray(cells) for cells in ((maps != 0).any(axis=0), team > 0, team < 0)
-    )
-    sensed = unpack_bits(env.score.team_masks[0], maps.shape[2])
-    own_least, own_mean = metrics.own_coverage(free_as_held(env, maps), truth.counted)
-    return {
-        "c_known_final": round(metrics.known_coverage(known, truth.knowable), 9),
-        "c_valid_final": round(metrics.valid_coverage(known, truth.counted, truth.occupied), 9),
-        "c_own_min_final": round(own_least, 9),
-        "c_own_mean_final": round(own_mean, 9),
-        "c_others_final": _rounded(others_coverage(env), 9),
-        "balance": round(
-            metrics.balance([metrics.known_coverage(own != 0, truth.knowable) for own in maps]), 9
-        ),
-        "iou_occupied": round(metrics.occupied_iou(believed, truth.occupied, sensed), 9),
-        "f1_occupied": round(
-            metrics.occupied_f1(believed, truth.occupied, wanted=metrics.surface(truth.occupied, sensed)), 9
-        ),
-        "free_error_rate": round(metrics.free_error_rate(believed_free, truth.occupied), 9),
-    }
-
-
-def others_coverage(env: ExplorationEnv) -> float | None:
-    """Return the share of the reachable floor sensed by robots that have not failed.
-
-    Reachable is what the bodies of the failed ones leave in reach. None where no robot has failed, or all
-    have.
-    """
-    left = left_by_failed(env)
-    if left is None:
-        return None
-    seen = [
-        unpack_bits(mask, left.shape[1])
-        for mask, failed in zip(env.score.masks, env.world.failed, strict=True)
-        if not failed
-    ]
-    return metrics.free_coverage(np.any(seen, axis=0), left)
-
-
-def _entry(env: ExplorationEnv, given_up: GivenUp) -> dict[str, Any]:
-    x, y = in_floor_frame(env, given_up.agent, given_up.x, given_up.y)
-    return {
-        "agent": given_up.agent,
-        "x": round(x, 4),
-        "y": round(y, 4),
-        "size_m": round(given_up.size_m, 4),
-        "reason": given_up.reason,
-    }
+def _add(
+    name: str,
+    of: _Value,
+    summary: str,
+    unit: str = "",
+    direction: Direction = None,
+    *,
+    title: str | None = None,
+    digits: int | None = None,
+    columns: tuple[Column, ...] = (),
+) -> None:
+    """Register a metric of the package."""
+    digits = (1 if unit in ("s", "m", "ms") else 3) if digits is None else digits
+    made = Metric(name, title or name.replace("_", " "), unit, direction, summary, digits, of, columns)
+    METRICS.register(name, made, summary)
 
 
 def _rounded(value: float | None, digits: int) -> float | None:
     return None if value is None else round(value, digits)
+
+
+def _time_to(data: EpisodeData, share: float) -> float | None:
+    return _rounded(data.env.scorer.times.get(share), 6)
+
+
+def _success(data: EpisodeData) -> bool:
+    stop = THRESHOLDS[-1] if data.settings.stop_coverage is None else data.settings.stop_coverage
+    times, coverage = data.coverage.T
+    return is_success(times, coverage, stop, _horizon(data))
+
+
+def _area(data: EpisodeData) -> float | None:
+    horizon, (times, coverage) = _horizon(data), data.coverage.T
+    return None if horizon is None else round(area_under_curve(times, coverage, horizon), 9)
+
+
+def _horizon(data: EpisodeData) -> float | None:
+    steps = data.settings.horizon_steps
+    return None if steps is None else steps * data.settings.time_step
+
+
+def _at_threshold(data: EpisodeData, share: float, figure: str) -> float | int | None:
+    """Return the longest path, the sum of paths or the decisions until a threshold of coverage."""
+    milestones = [] if data.history is None else data.history.milestones
+    coverage = [milestone.coverage for milestone in milestones]
+    if figure == "decisions":
+        return decisions_to([milestone.decisions for milestone in milestones], coverage, share)
+    lengths = np.array([milestone.lengths for milestone in milestones])
+    return _rounded((distance_to if figure == "longest" else distance_sum_to)(lengths, coverage, share), 9)
+
+
+def _overlap_of_maps(data: EpisodeData) -> float | None:
+    whole = data.milestone(WHOLE)
+    return (
+        None if whole is None or whole.known_shares is None else round(overlap_of_maps(whole.known_shares), 9)
+    )
+
+
+def _overlap_at(data: EpisodeData, share: float) -> float | None:
+    milestone = data.milestone(share)
+    return None if milestone is None else round(milestone.overlap, 9)
+
+
+def _instant_overlap(data: EpisodeData) -> float | None:
+    if data.history is None:
+        return None
+    curves = data.history.curves
+    return round(instant_overlap(curves.seen_once, curves.seen_twice), 9)
+
+
+def _given_up(data: EpisodeData) -> list[dict[str, Any]]:
+    def entry(given_up: GivenUp) -> dict[str, Any]:
+        x, y = in_floor_frame(data.env, given_up.agent, given_up.x, given_up.y)
+        return {
+            "agent": given_up.agent,
+            "x": round(x, 4),
+            "y": round(y, 4),
+            "size_m": round(given_up.size_m, 4),
+            "reason": given_up.reason,
+        }
+
+    return [entry(given_up) for given_up in data.run.given_up]
+
+
+def _absolute_errors(data: EpisodeData) -> list[float] | None:
+    """Return the ATE of each robot; the best fit brings frames together if starts are unknown."""
+    if data.history is None:
+        # True localization has no error.
+        return [0.0] * data.robots if data.settings.localization == "truth" else None
+    poses = data.trajectories
+    return [
+        round(
+            absolute_error(poses.believed[:, robot], poses.true[:, robot], not data.settings.known_starts), 9
+        )
+        for robot in range(data.robots)
+    ]
+
+
+def _relative_errors(data: EpisodeData, part: int) -> list[float | None] | None:
+    """Return the RPE over 1 s of each robot: of translations (part 0), or of rotations (part 1)."""
+    if data.history is None:
+        return None
+    poses = data.trajectories
+    times = poses.times
+    steps = max(round(1.0 / (times[1] - times[0])), 1) if len(times) > 1 else 1
+    errors = [
+        relative_error(poses.believed[:, robot], poses.true[:, robot], steps) for robot in range(data.robots)
+    ]
+    return [None if error is None else round(error[part], 9) for error in errors]
+
+
+def _known(data: EpisodeData) -> NDArray[np.bool_]:
+    return np.asarray((data.maps != 0).any(axis=0))
+
+
+def _others_coverage(data: EpisodeData) -> float | None:
+    """Return the coverage by robots that have not failed, of the floor still in their reach."""
+    left = left_by_failed(data.env)
+    if left is None:
+        return None
+    seen = [
+        unpack_bits(mask, left.shape[1])
+        for mask, failed in zip(data.env.score.masks, data.env.world.failed, strict=True)
+        if not failed
+    ]
+    return round(free_coverage(np.any(seen, axis=0), left), 9)
+
+
+def _f1(data: EpisodeData) -> float:
+    wanted = surface(data.truth.occupied, data.sensed)
+    return round(occupied_f1(data.team_map > 0, data.truth.occupied, wanted=wanted), 9)
+
+
+def _energy(data: EpisodeData) -> list[float] | None:
+    return [round(float(used), 6) for used in data.env.energy_j] if data.settings.battery.is_limited else None
+
+
+def _merges(data: EpisodeData) -> dict[str, Any]:
+    trajectories = None if data.history is None else data.trajectories
+    return merge_figures(data.run.merges, data.settings.occupancy.resolution, trajectories)
+
+
+def _tick_ms(data: EpisodeData) -> dict[str, float | None] | None:
+    """Return percentiles of the station's decisions, and of its merges; None without a station."""
+    station = data.report.supervision
+    if station is None:
+        return None
+    ticks, merges = map(decision_percentiles, (station.tick_seconds, station.merge_seconds))
+    return {**ticks, **{f"merge_{name}": value for name, value in merges.items()}}
+
+
+def _steps_per_s(data: EpisodeData) -> float | None:
+    steps, seconds = max(int(data.env.world.steps[0]), 0), data.run.wall_seconds
+    return round(steps / seconds, 3) if seconds > 0.0 else None
+
+
+_PERCENT = {share: round(100 * share) for share in THRESHOLDS}
+
+_add(
+    "coverage_final",
+    lambda data: round(data.env.scorer.coverage, 9),
+    "share of the floor (`C_free`) that the team sensed",
+    direction="higher",
+    columns=(
+        Column(
+            "coverage_percent",
+            "coverage at the end",
+            "%",
+            "higher",
+            of=lambda share: 100.0 * share,
+            by_mean=True,
+            is_compared=True,
+        ),
+    ),
+)
+_add("time_s", lambda data: round(data.env.scorer.time, 6), "simulated time of the episode", "s")
+for _share, _name in _PERCENT.items():
+    _add(
+        f"t{_name}_s",
+        partial(_time_to, share=_share),
+        f"time to {_name} % coverage",
+        "s",
+        "lower",
+        title=f"time to {_name} %",
+    )
+_add(
+    "success",
+    _success,
+    "whether the coverage that ends a run was reached within the horizon",
+    direction="higher",
+)
+_add("auc", _area, "mean coverage from the start to the horizon", direction="higher")
+for _figure, _key, _text in (
+    ("longest", "d{}_m", "longest path of a robot at {} % coverage"),
+    ("sum", "d_sum{}_m", "sum of the robots' paths at {} % coverage"),
+    ("decisions", "n{}", "number of decisions until {} % coverage"),
+):
+    for _share, _name in _PERCENT.items():
+        _add(
+            _key.format(_name),
+            partial(_at_threshold, share=_share, figure=_figure),
+            _text.format(_name),
+            "" if _figure == "decisions" else "m",
+            "lower",
+        )
+_add(
+    "path_m",
+    lambda data: [round(float(length), 9) for length in data.lengths],
+    "length of each robot's path",
+    "m",
+    "lower",
+    columns=(
+        Column(
+            "path_m", "path of the team", "m", "lower", of=lambda paths: float(sum(paths)), is_compared=True
+        ),
+        Column(
+            "longest_path_m",
+            "longest path of a robot",
+            "m",
+            "lower",
+            of=lambda paths: float(max(paths)),
+            is_main=False,
+        ),
+    ),
+)
+_add(
+    "path_balance",
+    lambda data: round(path_balance(data.lengths), 9),
+    "standard deviation of the paths' lengths over their mean",
+    direction="lower",
+)
+_add(
+    "overlap",
+    lambda data: round(overlap(data.env.score.masks), 9),
+    "share of the sensed cells that two or more robots sensed",
+    direction="lower",
+    columns=(
+        Column("overlap_percent", "overlap", "%", "lower", of=lambda share: 100.0 * share, is_compared=True),
+    ),
+)
+_add(
+    "overlap_eb",
+    _overlap_of_maps,
+    "sum of the robots' `C_known`, minus 1, at 99 % (Explore-Bench)",
+    "",
+    "lower",
+)
+for _share in (0.85, 0.95):
+    _name = round(100 * _share)
+    _add(
+        f"overlap_mx_{_name}",
+        partial(_overlap_at, share=_share),
+        f"`overlap` at {_name} % (MAexp)",
+        "",
+        "lower",
+    )
+_add(
+    "overlap_mv",
+    _instant_overlap,
+    "mean share of footprints seen by two or more at once (MARVEL)",
+    "",
+    "lower",
+)
+_add(
+    "collisions",
+    lambda data: data.collisions,
+    "number of contacts that began",
+    direction="lower",
+    columns=(Column("collisions", "collisions", "", "lower", 2, by_mean=True, is_main=False),),
+)
+_add(
+    "collisions_per_km",
+    lambda data: _rounded(collisions_per_km(data.collisions, data.lengths), 6),
+    "collisions per kilometre driven",
+    "1/km",
+    "lower",
+)
+_add(
+    "ended_because",
+    lambda data: {agent: data.env.scorer.ended_because.get(agent) for agent in data.env.possible_agents},
+    "reason why each robot ended; null if it was still at work",
+)
+_add("given_up", _given_up, "frontiers that the policy left unexplored, with position, size and reason")
+_add(
+    "decided_by",
+    lambda data: dict(data.report.decided_by) or None,
+    "number of decisions by each rule of the policy",
+)
+_add("ate_m", _absolute_errors, "absolute trajectory error of each robot", "m", "lower")
+_add(
+    "rpe_m",
+    partial(_relative_errors, part=0),
+    "relative error of each robot's translation over 1 s",
+    "m",
+    "lower",
+)
+_add(
+    "rpe_rad",
+    partial(_relative_errors, part=1),
+    "relative error of each robot's rotation over 1 s",
+    "rad",
+    "lower",
+)
+_add(
+    "c_known_final",
+    lambda data: round(known_coverage(_known(data), data.truth.knowable), 9),
+    "`C_known` of the team's map",
+    direction="higher",
+)
+_add(
+    "c_valid_final",
+    lambda data: round(valid_coverage(_known(data), data.truth.counted, data.truth.occupied), 9),
+    "`C_valid` of the team's map",
+    direction="higher",
+)
+_add(
+    "c_own_min_final",
+    lambda data: round(data.own_coverages[0], 9),
+    "minimum of the robots' `C_own`",
+    direction="higher",
+)
+_add(
+    "c_own_mean_final",
+    lambda data: round(data.own_coverages[1], 9),
+    "mean of the robots' `C_own`",
+    direction="higher",
+)
+_add(
+    "c_others_final",
+    _others_coverage,
+    "coverage by the robots that have not failed, of the floor still in reach; null if none has failed",
+    direction="higher",
+)
+_add(
+    "balance",
+    lambda data: round(balance([known_coverage(own != 0, data.truth.knowable) for own in data.maps]), 9),
+    "standard deviation of the robots' `C_known` (Explore-Bench)",
+    direction="lower",
+)
+_add(
+    "iou_occupied",
+    lambda data: round(occupied_iou(data.team_map > 0, data.truth.occupied, data.sensed), 9),
+    "intersection over union of occupied cells, within one cell",
+    direction="higher",
+)
+_add("f1_occupied", _f1, "F1 of occupied cells, within one cell", direction="higher")
+_add(
+    "free_error_rate",
+    lambda data: round(free_error_rate(data.team_map < 0, data.truth.occupied), 9),
+    "share of the cells believed free that are occupied",
+    direction="lower",
+)
+_add("energy_j", _energy, "energy that each robot used; null without batteries", "J", "lower")
+_add(
+    "operating",
+    lambda data: operating_events(data.env),
+    "changes of the robots' operating states, and orders",
+)
+_add("merges", _merges, "number and errors of merges of maps")
+_add(
+    "supervisor",
+    lambda data: None if data.report.supervision is None else data.report.supervision.figures,
+    "counts of the station's decisions; null without a station",
+)
+_add(
+    "decision_ms",
+    lambda data: decision_percentiles(data.run.decision_seconds),
+    "median and 95th percentile of the wall time of decisions",
+    "ms",
+    "lower",
+)
+_add("tick_ms", _tick_ms, "the same of the station's decisions and merges", "ms", "lower")
+_add("peak_mb", lambda _: _rounded(peak_megabytes(), 1), "peak memory of the process", "MB", "lower")
+_add("steps_per_s", _steps_per_s, "simulated time steps per second of wall time", "1/s", "higher", digits=1)

@@ -18,8 +18,8 @@ from lidarium.envs.faces.team import EpisodeTeam
 from lidarium.envs.faces.team_exchange import MergeEvent, MergingSettings
 from lidarium.envs.onboard.radio.messages import Order
 from lidarium.evaluation.episodes.events import merge_event
-from lidarium.evaluation.episodes.interrupts import PatientInterrupt
 from lidarium.evaluation.episodes.watching import WatchedExploration
+from lidarium.evaluation.processes import PatientInterrupt
 
 Progress = Callable[[ExplorationEnv], None]
 
@@ -28,7 +28,7 @@ World = ExplorationEnv | SparsePlanning | MergedMaps
 
 @dataclass(slots=True)
 class Episode:
-    """What an episode left, beside the environment itself.
+    """The result of an episode, besides the environment itself.
 
     Attributes
     ----------
@@ -43,11 +43,11 @@ class Episode:
     wall_seconds : float
         Wall time of the whole episode [s].
     given_up : list of GivenUp
-        What the policy left unexplored, and why.
+        Frontiers that the policy left unexplored, and why.
     is_interrupted : bool
         Whether the user broke it off.
     merges : list of MergeEvent
-        Which robots were joined, where maps are merged: by the environment, or by a policy with a
+        Which robots were joined, if maps are merged: by the environment, or by a policy with a
         station.
     """
 
@@ -76,11 +76,11 @@ def run_episode(
     Parameters
     ----------
     policy : Policy
-        What decides; its ``Stop`` ends a robot at its next step.
+        The policy; its ``Stop`` ends a robot at its next step.
     env : ExplorationEnv
         Where; it takes the policy's level.
     seed : int
-        Where all draws come from: of the environment, and of the policy.
+        If all draws come from: of the environment, and of the policy.
     options : mapping or None
         Options of ``reset``.
     on_decision : callable or None
@@ -91,14 +91,14 @@ def run_episode(
         at hand, and the episode so far is returned; a second one, and one before the first step, is passed on
         all the same.
     merging : MergingSettings or None
-        How the robots merge their maps (`MergedMaps`); they do not where None.
+        How the robots merge their maps (`MergedMaps`); they do not if None.
     plans_sparsely : bool
         Whether robots drive to their goals along routes on their sparse maps (`SparsePlanning`).
 
     Returns
     -------
     Episode
-        What it left.
+        The result.
     """
     check_observed(policy, type(policy).__name__, env.settings.observe)
     env.use_level(policy.level, policy.shares_map, policy.decision_period_s)
@@ -116,7 +116,7 @@ def run_episode(
                 on_decision(env)
             while env.agents and not (interrupt and interrupt.is_asked):
                 decided = time.perf_counter()
-                actions = decide(policy, world, observations)
+                actions = _decide(policy, world, observations)
                 episode.decision_seconds.append(time.perf_counter() - decided)
                 observations = world.step(actions)[0]
                 observations = {agent: observations[agent] for agent in env.agents}
@@ -128,7 +128,7 @@ def run_episode(
         episode.is_interrupted |= interrupt is not None and interrupt.is_asked and bool(env.agents)
     episode.wall_seconds = time.perf_counter() - began
     episode.given_up = list(policy.given_up)
-    _note_merges(episode, world.events if isinstance(world, MergedMaps) else merges_of(policy, env))
+    _note_merges(episode, world.events if isinstance(world, MergedMaps) else _merges_of(policy, env))
     return episode
 
 
@@ -152,7 +152,7 @@ def _show_decision(
         on_decision(env)
 
 
-def merges_of(policy: Policy, env: ExplorationEnv) -> list[MergeEvent]:
+def _merges_of(policy: Policy, env: ExplorationEnv) -> list[MergeEvent]:
     """Return the joins that a policy's decisions were built on, beside the truth."""
     station = policy.report().supervision
     used = [] if station is None else [join for join in station.joins if join.is_used]
@@ -174,7 +174,7 @@ def merges_of(policy: Policy, env: ExplorationEnv) -> list[MergeEvent]:
     ]
 
 
-def decide(
+def _decide(
     policy: Policy,
     world: World,
     observations: Mapping[str, Observation],

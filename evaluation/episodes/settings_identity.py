@@ -1,4 +1,4 @@
-"""What results say of settings: a preset's name, and a hash."""
+"""Identity of settings in results: a preset's name, and a hash."""
 
 import hashlib
 import json
@@ -12,7 +12,7 @@ from lidarium.envs.settings.realism import REALISM
 def realism_of(settings: ExplorationSettings) -> str:
     """Return the name of the preset of realism that the settings are of.
 
-    It is ``custom`` where they are of none.
+    It is ``custom`` if they are of none.
     """
     for name in REALISM:
         if make_settings(settings, realism=name) == settings:
@@ -38,8 +38,8 @@ LATER = (
 def settings_sha256(settings: ExplorationSettings) -> str:
     """Return a hash of all settings that can change a result.
 
-    It is of their JSON with sorted keys, without ``threads``, and without what older records do not have
-    where it is not used: `LATER` settings at their defaults, more rewards, the build of robots without
+    It is of their JSON with sorted keys, without ``threads``, and without settings that older records do not
+    have if it is not used: `LATER` settings at their defaults, more rewards, the build of robots without
     forces, sparse maps of robots without cameras.
     """
     values, plain = asdict(settings), ExplorationSettings()

@@ -18,7 +18,7 @@ _FIGURES: dict[str, Callable[[ExplorationEnv, History], float]] = {
     "c_own_min": lambda _, history: float(history.curves.c_own[-1].min()),
     "remaining_cells": lambda env, _: float(env.score.counted[0] - env.score.team_seen[0]),
 }
-"""What a rule may ask for, as docs/reference/metrics.md defines it.
+"""Figures of rules, as docs/reference/metrics.md defines them.
 
 ``remaining_cells`` are those of F that are not sensed.
 """
@@ -29,21 +29,16 @@ STOP_REASON = "stop_rule"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StopRule:
-    """Ends an episode where a figure is good enough, or after some decisions.
+    """Ends an episode if a figure is good enough, or after some decisions.
 
     Attributes
     ----------
     figure : str or None
         ``c_free``, ``c_known``, ``c_valid``, ``c_own_min`` or ``remaining_cells``.
     at_least, above, at_most : float or None
-        What it has to be; one of them.
+        Bound of the figure; one of them.
     decisions : int or None
         After how many decisions the episode ends in any case.
-
-    Raises
-    ------
-    ValueError
-        Where the figure is unknown, or it is not clear what it has to be.
     """
 
     figure: str | None = None
@@ -95,13 +90,7 @@ class Stopper:
 
 
 def stop_rule_of(content: Mapping[str, Any] | None) -> StopRule | None:
-    """Make a rule of what a file of a suite holds.
-
-    Raises
-    ------
-    ValueError
-        Where it is not clear what it asks for.
-    """
+    """Make a rule of the content of a suite's file."""
     if content is None:
         return None
     if not isinstance(content, Mapping):

@@ -32,44 +32,14 @@ class Watcher:
         """Observe the episode after rewards and endings, when ended agents have left."""
 
     def decision(self, env: ExplorationEnv, orders: Orders | None, given_up: Sequence[GivenUp]) -> None:
-        """Observe a decision that has been carried out.
-
-        Parameters
-        ----------
-        env : ExplorationEnv
-            The environment.
-        orders : Orders or None
-            Where the robots were sent; None at the level of velocities.
-        given_up : sequence of GivenUp
-            All that the policy leaves unexplored by now.
-        """
+        """Observe a decision that has been carried out."""
 
     def note(self, kind: str, time_s: float, agent: str | None, **details: Any) -> None:  # noqa: ANN401
-        """Take note of an event, such as a message or a merge.
-
-        Parameters
-        ----------
-        kind : str
-            What happened.
-        time_s : float
-            When [s].
-        agent : str or None
-            To whom.
-        **details
-            Whatever else is known.
-        """
+        """Take note of an event, such as a message or a merge."""
 
 
 class WatchedExploration(ExplorationEnv):
-    """An exploration environment with watchers, whatever drives it.
-
-    Parameters
-    ----------
-    floor, settings, image_resolution
-        As for ``ExplorationEnv``.
-    watchers : iterable of Watcher
-        Who watches, in this order; the list ``watchers`` may change between steps.
-    """
+    """An exploration environment with watchers, whatever drives it."""
 
     def __init__(
         self,

@@ -1,90 +1,148 @@
-"""The figures of a run, each a pure function on arrays.
+"""Metrics of episodes, with their registry.
 
-Each has its formula and its source; docs/reference/metrics.md lists them.
+A metric is a key of ``result.json``. It is registered once, with its unit, direction and format; results,
+tables of reports, the report's page and docs/reference/metrics.md are made from the registry.
 """
 
-from lidarium.evaluation.metrics.communication import (
-    bytes_per_robot_second,
-    connected_share,
-    largest_cluster_share,
-    largest_clusters,
-    sharing_lag,
-)
-from lidarium.evaluation.metrics.coverage import free_coverage, known_coverage, own_coverage, valid_coverage
-from lidarium.evaluation.metrics.curves import (
-    WallError,
-    curve_precision,
-    distances_to_walls,
-    end_point_bytes,
-    grid_bytes,
-    hits_of_beams,
-    seen_walls,
-    wall_error,
-    wall_recall,
-)
-from lidarium.evaluation.metrics.effort import decision_percentiles, peak_megabytes
-from lidarium.evaluation.metrics.evenness import balance, jain_index, path_balance
-from lidarium.evaluation.metrics.maps import free_error_rate, occupied_f1, occupied_iou, surface, widened
-from lidarium.evaluation.metrics.overlaps import instant_overlap, overlap, overlap_of_maps
-from lidarium.evaluation.metrics.poses import absolute_error, best_transform, moved, relative_error
-from lidarium.evaluation.metrics.progress import (
-    area_under_curve,
-    decisions_to,
-    distance_sum_to,
-    distance_to,
-    first_reached,
-    is_success,
-    path_lengths,
-    restricted_time,
-    time_to,
-)
-from lidarium.evaluation.metrics.safety import collisions_per_episode, collisions_per_km
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Literal
 
-__all__ = [
-    "WallError",
-    "absolute_error",
-    "area_under_curve",
-    "balance",
-    "best_transform",
-    "bytes_per_robot_second",
-    "collisions_per_episode",
-    "collisions_per_km",
-    "connected_share",
-    "curve_precision",
-    "decision_percentiles",
-    "decisions_to",
-    "distance_sum_to",
-    "distance_to",
-    "distances_to_walls",
-    "end_point_bytes",
-    "first_reached",
-    "free_coverage",
-    "free_error_rate",
-    "grid_bytes",
-    "hits_of_beams",
-    "instant_overlap",
-    "is_success",
-    "jain_index",
-    "known_coverage",
-    "largest_cluster_share",
-    "largest_clusters",
-    "moved",
-    "occupied_f1",
-    "occupied_iou",
-    "overlap",
-    "overlap_of_maps",
-    "own_coverage",
-    "path_balance",
-    "path_lengths",
-    "peak_megabytes",
-    "relative_error",
-    "restricted_time",
-    "seen_walls",
-    "sharing_lag",
-    "surface",
-    "time_to",
-    "valid_coverage",
-    "wall_error",
-    "wall_recall",
-    "widened",
-]
+from lidarium.registry import Registry, registry
+
+Direction = Literal["higher", "lower"] | None
+"""Which values of a metric are better; None if neither is."""
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """A number per episode in tables of reports, computed from a metric's value.
+
+    Attributes
+    ----------
+    key, title, unit : str
+        Key in ``report.json``, heading and unit.
+    direction : str or None
+        Which values are better.
+    digits : int
+        Number of digits after the point.
+    of : callable
+        Maps the metric's value to the number.
+    by_mean : bool
+        Whether policies are summarized by their mean instead of their median.
+    is_main : bool
+        Whether the leaderboard has the column.
+    is_compared : bool
+        Whether policies are compared with the baseline in it.
+    """
+
+    key: str
+    title: str
+    unit: str
+    direction: Direction
+    digits: int = 1
+    of: Callable[[Any], float] = float
+    by_mean: bool = False
+    is_main: bool = True
+    is_compared: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Metric:
+    """A metric of an episode.
+
+    Attributes
+    ----------
+    name, title, unit : str
+        Key in ``result.json``, name in tables, unit (empty if it has none).
+    direction : str or None
+        ``higher`` or ``lower`` if such values are better, else None.
+    summary : str
+        One line of documentation.
+    digits : int
+        Number of digits after the point in tables.
+    of : callable
+        Computes the value, ready for JSON, of an ``EpisodeData``.
+    columns : tuple of Column
+        Its columns in tables of reports; without any, its median is listed among further figures if it is a
+        number.
+    """
+
+    name: str
+    title: str
+    unit: str
+    direction: Direction
+    summary: str
+    digits: int
+    of: Callable[[Any], Any]
+    columns: tuple[Column, ...] = ()
+
+
+METRICS: Registry[Metric] = Registry("metric")
+"""The metrics by name, in the order of ``result.json``. ``registry("metric")`` holds the built-in ones."""
+
+
+def metric(
+    name: str,
+    *,
+    unit: str = "",
+    direction: Direction = None,
+    summary: str,
+    digits: int = 2,
+    title: str | None = None,
+) -> Callable[[Callable[[Any], Any]], Callable[[Any], Any]]:
+    """Register a function of an episode as a metric.
+
+    Its value appears in ``result.json``, in the rows of evaluations, and in the tables and on the page of
+    reports. The function takes an ``EpisodeData``
+    and returns a number, or None if the episode has no such
+    number.
+
+    Parameters
+    ----------
+    name : str
+        Key in ``result.json``; no other metric has it.
+    unit : str, default ""
+        Unit, such as ``m``.
+    direction : {"higher", "lower"} or None, default None
+        Which values are better.
+    summary : str
+        One line that describes it.
+    digits : int, default 2
+        Number of digits after the point in tables.
+    title : str or None, default None
+        Name in tables; by default ``name`` with spaces.
+
+    Raises
+    ------
+    ValueError
+        If the name is taken, or the direction is neither ``higher``, ``lower`` nor None.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import lidarium
+    >>> @lidarium.metric("longest_step_m", unit="m", direction="lower", summary="Longest step of a robot.")
+    ... def longest_step_m(episode):
+    ...     return np.linalg.norm(np.diff(episode.poses[..., :2], axis=0), axis=-1).max()
+    """
+    if direction not in ("higher", "lower", None):
+        raise ValueError(f"direction of metric {name!r} is {direction!r}; want 'higher', 'lower' or None")
+    shown = title or name.replace("_", " ")
+
+    def register(function: Callable[[Any], Any]) -> Callable[[Any], Any]:
+        column = Column(name, shown, unit, direction, digits)
+        made = Metric(name, shown, unit, direction, summary, digits, function, (column,))
+        registry("metric").register(name, made, summary)
+        return function
+
+    return register
+
+
+def metrics_table() -> str:
+    """Return the built-in and registered metrics as a Markdown table."""
+    lines = [
+        f"| `{each.name}` | {each.unit} | {each.direction or ''} | {each.summary} |"
+        for each in registry("metric").values()
+    ]
+    return "\n".join(["| key | unit | better | meaning |", "|---|---|---|---|", *lines]) + "\n"

@@ -19,7 +19,7 @@ from lidarium.evaluation.metrics.progress import time_to
 def largest_clusters(links: NDArray[np.bool_]) -> NDArray[np.int64]:
     """Return the robots of the largest cluster at each time, shape (times,).
 
-    Robots are in one cluster where links join them.
+    Robots are in one cluster if links join them.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ def largest_clusters(links: NDArray[np.bool_]) -> NDArray[np.int64]:
 def connected_share(links: NDArray[np.bool_]) -> float:
     """Return the share of times at which all robots are in one cluster (MAES, IR2).
 
-    1 where there is no time.
+    1 if there is no time.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ def connected_share(links: NDArray[np.bool_]) -> float:
 def largest_cluster_share(links: NDArray[np.bool_]) -> float:
     """Return the mean over time of |largest cluster| / |team|.
 
-    It is MAES's biggest cluster %; 1 where there is no time.
+    It is MAES's biggest cluster %; 1 if there is no time.
 
     Parameters
     ----------
@@ -62,14 +62,12 @@ def largest_cluster_share(links: NDArray[np.bool_]) -> float:
 
 
 def bytes_per_robot_second(sent: ArrayLike, duration: float) -> float:
-    """Return ``sum_i bytes_i / (n T)`` [bytes/s]; 0 where no time passed.
+    """Return ``sum_i bytes_i / (n T)`` [bytes/s]; 0 if no time passed.
 
     Parameters
     ----------
     sent : (robots,) int
         Bytes that each robot sent.
-    duration : float
-        T [s].
     """
     return float(np.mean(np.asarray(sent, np.float64))) / duration if duration > 0.0 else 0.0
 
@@ -79,7 +77,7 @@ def sharing_lag(
 ) -> float | None:
     """Return ``T_p(min_i C_own,i) - T_p(C_team)`` [s].
 
-    It is how much later the last robot knows what the team knows; None where not reached.
+    It is the delay until the last robot has the team's knowledge; None if not reached.
 
     Parameters
     ----------
@@ -89,8 +87,6 @@ def sharing_lag(
         C_own of each robot.
     team : (times,) float64
         Coverage of the team.
-    share : float
-        p.
     """
     last, first = time_to(times, own.min(axis=1), share), time_to(times, team, share)
     return None if last is None or first is None else last - first

@@ -23,10 +23,10 @@ Edges = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
-class WallError:
+class _WallError:
     """How far points of curves lie from the nearest wall: mean and 95 % quantile [m].
 
-    Nan where there are no points.
+    Nan if there are no points.
     """
 
     mean: float
@@ -34,13 +34,7 @@ class WallError:
 
 
 def distances_to_walls(points: Points, edges: Edges) -> NDArray[np.float64]:
-    """Return the distance of each point (n, 2) from the nearest wall, (n,) [m].
-
-    Raises
-    ------
-    ValueError
-        Where there are no walls.
-    """
+    """Return the distance of each point (n, 2) from the nearest wall, (n,) [m]."""
     if len(edges) == 0:
         raise ValueError("there are no walls; want at least one edge")
     distances = np.empty(len(points))
@@ -48,21 +42,21 @@ def distances_to_walls(points: Points, edges: Edges) -> NDArray[np.float64]:
     return distances
 
 
-def wall_error(curve_points: Points, edges: Edges) -> WallError:
+def wall_error(curve_points: Points, edges: Edges) -> _WallError:
     """Return how far points along the curves (n, 2) lie from the nearest wall.
 
     The points lie evenly along the curves.
     """
     if len(curve_points) == 0:
-        return WallError(float("nan"), float("nan"))
+        return _WallError(float("nan"), float("nan"))
     distances = distances_to_walls(curve_points, edges)
-    return WallError(float(distances.mean()), float(np.quantile(distances, 0.95)))
+    return _WallError(float(distances.mean()), float(np.quantile(distances, 0.95)))
 
 
 def curve_precision(curve_points: Points, edges: Edges, tolerance: float = TOLERANCE) -> float:
     """Return the share of the curves' length within a tolerance of a wall.
 
-    1 where there are no curves.
+    1 if there are no curves.
 
     Parameters
     ----------
@@ -70,8 +64,6 @@ def curve_precision(curve_points: Points, edges: Edges, tolerance: float = TOLER
         Points evenly along the curves [m].
     edges : (edges, 4) float64
         All walls.
-    tolerance : float
-        [m]
     """
     return float(np.mean(distances_to_walls(curve_points, edges) <= tolerance)) if len(curve_points) else 1.0
 
@@ -79,7 +71,7 @@ def curve_precision(curve_points: Points, edges: Edges, tolerance: float = TOLER
 def wall_recall(wall_points: Points, curve_points: Points, tolerance: float = TOLERANCE) -> float:
     """Return the share of seen walls within a tolerance of a curve.
 
-    1 where nothing was seen.
+    1 if nothing was seen.
 
     Parameters
     ----------
@@ -87,8 +79,6 @@ def wall_recall(wall_points: Points, curve_points: Points, tolerance: float = TO
         Points evenly along the walls that were seen, such as those of `seen_walls` [m].
     curve_points : (m, 2) float64
         Points along the curves, no farther apart than the tolerance [m].
-    tolerance : float
-        [m]
     """
     if len(wall_points) == 0:
         return 1.0
@@ -108,10 +98,6 @@ def seen_walls(edges: Edges, hits: Points, spacing: float = 0.02, reach: float =
         Walls.
     hits : (m, 2) float64
         Ends of beams from true poses, before noise, as `hits_of_beams` gives them [m].
-    spacing : float
-        Distance of the points [m].
-    reach : float
-        A point was seen where a beam ended within this distance [m].
     """
     if len(hits) == 0:
         return np.empty((0, 2))
@@ -135,8 +121,6 @@ def hits_of_beams(edges: Edges, poses: Points, angles: NDArray[np.float64], rang
         True poses of the laser x, y, theta [m, rad].
     angles : (beams,) float64
         Angles of the beams against the heading [rad].
-    range_max : float
-        Reach of the laser [m].
     """
     hits = np.empty((len(poses) * len(angles), 2))
     count = _cast(

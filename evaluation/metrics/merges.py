@@ -1,9 +1,7 @@
 """Whether maps were merged where they should be, and how exactly.
 
-References
-----------
-What is correct: the tolerances of m-explore's own test of its map merging (Hörner, m-explore, BSD), 1e-2 rad
-and 2 cells.
+References ---------- Tolerances of correct merges: those of m-explore's own test of its map merging (Hörner,
+m-explore, BSD), 1e-2 rad and 2 cells.
 """
 
 import math
@@ -26,7 +24,7 @@ TRANSLATION_TOLERANCE = 2.0
 WRONG_TRANSLATION, WRONG_ROTATION = 0.3, math.radians(3.0)
 """Errors beyond which a merge is wrong [m, rad].
 
-A merge that errs by more than one of them puts a team's walls where there are none.
+A merge that errs by more than one of them puts a team's walls if there are none.
 """
 
 LEAST_OVERLAP = 0.10
@@ -45,7 +43,7 @@ def transform_error(
     found, true : (3,) float64
         x, y, theta [m, m, rad].
     at : (x, y)
-        a, the point at which translations are compared [m]: the centre of what the maps have in common, since
+        a, the point at which translations are compared [m]: the centre of the area that the maps share, since
         at a far origin a small error of the rotation seems a large one of the translation.
     """
     points = []
@@ -62,13 +60,6 @@ def is_correct(translation_error: float, rotation_error: float, resolution: floa
     It is within ``ROTATION_TOLERANCE`` and ``TRANSLATION_TOLERANCE``.
 
     m-explore's test takes the tolerance of each axis alone; here it is that of the distance.
-
-    Parameters
-    ----------
-    translation_error, rotation_error : float
-        As of `transform_error` [m, rad].
-    resolution : float
-        Side of a cell of the maps [m].
     """
     # A millionth of a cell, so that an error of exactly two cells is not lost to rounding.
     return (
@@ -77,7 +68,7 @@ def is_correct(translation_error: float, rotation_error: float, resolution: floa
     )
 
 
-def is_wrong(translation_error: float, rotation_error: float) -> bool:
+def _is_wrong(translation_error: float, rotation_error: float) -> bool:
     """Return whether a merge is wrong.
 
     It is beyond ``WRONG_TRANSLATION`` or ``WRONG_ROTATION``, with errors as of `transform_error` [m,
@@ -122,17 +113,10 @@ class Trajectories:
 def drifted_truth(event: MergeEvent, trajectories: Trajectories) -> tuple[float, float, float]:
     """Return the true transform ``a_from_b`` of two robots' maps.
 
-    It holds where they overlap.
+    It holds if they overlap.
 
-    Maps drift: what their starts say of each other is not what is true of two maps where they meet. A merger
+    Maps drift: the transform between starts is not the true one where two maps meet. A merger
     sees the maps alone.
-
-    Parameters
-    ----------
-    event : MergeEvent
-        Who was joined, when, and where the maps overlap.
-    trajectories : Trajectories
-        Of these robots at least.
     """
     at_a = Transform(*event.found).apply(event.at)
     floor_from_a = trajectories.floor_from_map(event.a, at_a, event.time_s)
@@ -144,27 +128,7 @@ def drifted_truth(event: MergeEvent, trajectories: Trajectories) -> tuple[float,
 def merge_figures(
     events: Sequence[MergeEvent], resolution: float, trajectories: Trajectories | None = None
 ) -> dict[str, Any]:
-    """Return the entry ``merges`` of ``result.json``.
-
-    Parameters
-    ----------
-    events : sequence of MergeEvent
-        All of an episode.
-    resolution : float
-        Side of a cell of the maps [m].
-    trajectories : Trajectories or None
-        By which the drift of maps is known; None where they have none.
-
-    Returns
-    -------
-    dict
-        ``accepted``, ``correct`` and ``false`` (not correct) are numbers of events by what the starts say,
-        ``worst_m`` and ``worst_rad`` the largest errors so, and ``off`` is how many err by more than
-        ``WRONG_TRANSLATION`` or ``WRONG_ROTATION``. ``wrong``, ``worst_here_m`` and ``worst_here_rad`` are
-        the same by `drifted_truth` of maps that were compared directly: where others lie between two maps,
-        what those have drifted and the lever of small angles come to what is between the two, and the merges
-        that join them are judged themselves. ``first_correct_s`` is a time. None where there is none.
-    """
+    """Return the entry ``merges`` of ``result.json``."""
     accepted = np.ones(len(events), np.bool_)
     errors = [transform_error(one.found, one.true, one.at) for one in events]
     direct = [one for one in events if one.is_direct]
@@ -181,10 +145,10 @@ def merge_figures(
         "accepted": len(events),
         "correct": right,
         "false": len(events) - right,
-        "off": sum(is_wrong(*error) for error in errors),
+        "off": sum(_is_wrong(*error) for error in errors),
         "worst_m": max((round(distance, 6) for distance, _ in errors), default=None),
         "worst_rad": max((round(angle, 6) for _, angle in errors), default=None),
-        "wrong": sum(is_wrong(*error) for error in here),
+        "wrong": sum(_is_wrong(*error) for error in here),
         "worst_here_m": max((round(distance, 6) for distance, _ in here), default=None),
         "worst_here_rad": max((round(angle, 6) for _, angle in here), default=None),
         "first_correct_s": first_correct_time(times, accepted, correct),
@@ -194,7 +158,7 @@ def merge_figures(
 def precision(accepted: NDArray[np.bool_], correct: NDArray[np.bool_]) -> float | None:
     """Return |accepted and correct| / |accepted| over the attempts.
 
-    None where none was accepted.
+    None if none was accepted.
 
     Parameters
     ----------
@@ -225,12 +189,10 @@ def recall(accepted: NDArray[np.bool_], correct: NDArray[np.bool_], overlaps: Ar
 def first_correct_time(
     times: Sequence[float], accepted: NDArray[np.bool_], correct: NDArray[np.bool_]
 ) -> float | None:
-    """Return when the first correct merge was accepted [s], None where none was.
+    """Return when the first correct merge was accepted [s], None if none was.
 
     Parameters
     ----------
-    times : sequence of float
-        When each attempt was made, in any order [s].
     accepted, correct : (attempts,) bool
         Which attempts were accepted, and which were correct.
     """

@@ -19,7 +19,7 @@ Poses = NDArray[np.float64]
 """Poses in the order of time, (times, 3) float64 [m, m, rad]."""
 
 
-def wrapped(angles: NDArray[np.float64]) -> NDArray[np.float64]:
+def _wrapped(angles: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return angles in (-pi, pi] [rad]."""
     return np.asarray(math.pi - np.mod(math.pi - np.asarray(angles, np.float64), 2.0 * math.pi))
 
@@ -52,8 +52,6 @@ def absolute_error(believed: Poses, true: Poses, is_aligned: bool = True) -> flo
     ----------
     believed, true : (times, 3) float64
         Believed and true poses at the same times, at least one.
-    is_aligned : bool
-        False where both are in one frame: S is the identity then.
     """
     fitted = (
         moved(believed, best_transform(believed, true)) if is_aligned else np.asarray(believed, np.float64)
@@ -65,7 +63,7 @@ def absolute_error(believed: Poses, true: Poses, is_aligned: bool = True) -> flo
 def relative_error(believed: Poses, true: Poses, steps: int) -> tuple[float, float] | None:
     """Return RPE: ``sqrt(mean |trans(E_k)|^2)`` [m] and ``mean |angle(E_k)|`` [rad].
 
-    None where the poses do not span the steps.
+    None if the poses do not span the steps.
 
     ``E_k = (Q_k^-1 Q_(k+d))^-1 (P_k^-1 P_(k+d))`` of true poses Q and believed ones P; no frames have to
     agree.
@@ -74,8 +72,6 @@ def relative_error(believed: Poses, true: Poses, steps: int) -> tuple[float, flo
     ----------
     believed, true : (times, 3) float64
         Believed and true poses at the same times.
-    steps : int
-        d, at least 1: commonly as many as make a second.
     """
     if len(believed) <= steps:
         return None
@@ -83,7 +79,7 @@ def relative_error(believed: Poses, true: Poses, steps: int) -> tuple[float, flo
     # The rotation of Q_k^-1 Q_(k+d) turns the gap of translations and leaves its length.
     gaps = motion[:, :2] - truth[:, :2]
     return math.sqrt(float((gaps**2).sum(axis=1).mean())), float(
-        np.abs(wrapped(motion[:, 2] - truth[:, 2])).mean()
+        np.abs(_wrapped(motion[:, 2] - truth[:, 2])).mean()
     )
 
 

@@ -77,14 +77,7 @@ class RelationErrors:
 def read_relations(path: Path) -> Relations:
     """Read ``t1 t2 dx dy dz roll pitch yaw`` a line, plain or gzipped.
 
-    What leaves the plane is left out.
-
-    Raises
-    ------
-    FileNotFoundError
-        If the file is not there.
-    ValueError
-        If it holds no relations.
+    Motion out of the plane is ignored.
     """
     table = read_numbers(path, 8, "a file of relations (t1 t2 dx dy dz roll pitch yaw)")
     return Relations(table[:, 0].copy(), table[:, 1].copy(), table[:, [2, 3, 7]])
@@ -95,15 +88,8 @@ def covered(relations: Relations, stamps: NDArray[np.float64]) -> Relations:
 
     Parameters
     ----------
-    relations : Relations
-        All of them.
     stamps : (scans,) float64
         Times of the log's scans, growing, on the clock of the relations [s].
-
-    Raises
-    ------
-    ValueError
-        Where it covers none, as with clocks that differ.
     """
     first, last = np.minimum(relations.begin, relations.end), np.maximum(relations.begin, relations.end)
     is_inside = (first >= stamps[0] - BEYOND_S) & (last <= stamps[-1] + BEYOND_S)
@@ -127,8 +113,6 @@ def relation_errors(
     ----------
     begin, end : (relations, 3) float64
         Poses at the relations' times: x, y, theta [m, rad].
-    relations : Relations
-        The true motions.
     """
     difference = relative(relations.motions, relative(begin, end))
     translation, rotation = np.hypot(difference[:, 0], difference[:, 1]), np.abs(difference[:, 2])
@@ -150,23 +134,8 @@ def log_relation_errors(
 
     Parameters
     ----------
-    log : LaserLog
-        The log.
     poses : (scans, 3) float64
         The robot's poses at its scans [m, rad].
-    relations : Relations
-        The true motions.
-    clock_shift : float
-        What is added to the log's stamps to compare them with the relations' [s].
-    which : str
-        Pose at a relation's time: ``between`` those of the scans around it at constant speed, or ``before``,
-        the last one before, for logs whose scans carry the stamp of the odometry before them; the log's
-        odometry then gives the motion between scans.
-
-    Raises
-    ------
-    ValueError
-        Where the log covers none of their times.
     """
     stamps = log.stamps + clock_shift
     relations = covered(relations, stamps)

@@ -3,7 +3,7 @@
 The same version runs them again to the bit; any version shows them.
 """
 
-from lidarium.evaluation.record.display import DisplayTrack as DisplayTrack
+from lidarium.evaluation.record.episode_record import DisplayTrack as DisplayTrack
 from lidarium.evaluation.record.episode_record import EpisodeRecord as EpisodeRecord
 from lidarium.evaluation.record.file import read_record as read_record
 from lidarium.evaluation.record.file import write_record as write_record

@@ -32,39 +32,17 @@ def write_bag(path: Path, record: EpisodeRecord, floor: str | Floor | None = Non
     of its wheels from its start), ``map`` (what it has mapped itself) and ``path`` (where it truly drove).
     ``/tf`` leads from ``map`` by ``robot_0/odom`` to ``robot_0/base_link`` at the true pose, ``/tf_static``
     from there to ``robot_0/laser``.
-
-    Parameters
-    ----------
-    path : Path
-        The file, by custom an ``.mcap``.
-    record : EpisodeRecord
-        Made by this version.
-    floor : str, Floor or None
-        The floor, where the one that the record names is not found any more.
-
-    Raises
-    ------
-    ValueError
-        Where the record cannot run again, or bags cannot be written (extra ``bags``).
-    OSError
-        Where nothing can be written there.
     """
     with bag(path) as writer:
-        recorder = BagRecorder(writer)
+        recorder = _BagRecorder(writer)
         env = drive_again(record, floor, [recorder])
         if not is_same(record, env):
             raise ValueError(f"the episode does not run as it was recorded: {first_difference(record, env)}")
         recorder.finish(env)
 
 
-class BagRecorder(Watcher):
-    """Writes an episode to a bag as it runs.
-
-    Parameters
-    ----------
-    writer : BagWriter
-        Where to.
-    """
+class _BagRecorder(Watcher):
+    """Writes an episode to a bag as it runs."""
 
     def __init__(self, writer: BagWriter) -> None:
         self._writer = writer
@@ -85,7 +63,7 @@ class BagRecorder(Watcher):
         self._write(env)
 
     def step(self, env: ExplorationEnv, commands: NDArray[np.float64], /) -> None:
-        """Write what the sensors measured in this step."""
+        """Write the measurements of this step."""
         self._write(env)
 
     def finish(self, env: ExplorationEnv) -> None:

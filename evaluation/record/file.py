@@ -12,10 +12,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.evaluation.episodes.output import whole_file
-from lidarium.evaluation.record.display import DisplayTrack, MapChanges
-from lidarium.evaluation.record.episode_record import TIME, EpisodeRecord, NewerFormatError, check_header
+from lidarium.evaluation.record.episode_record import (
+    TIME,
+    DisplayTrack,
+    EpisodeRecord,
+    MapChanges,
+    NewerFormatError,
+    check_header,
+)
 from lidarium.mapping.files.guarded_reading import GuardedArchive, read_bytes, reading
+from lidarium.mapping.files.output import whole_file
 
 _HEADER, _EVENTS = "header.json", "events.json"
 _ARRAYS = (
@@ -41,20 +47,6 @@ def write_record(path: Path, record: EpisodeRecord) -> None:
     """Write a record, whole or not at all.
 
     The same record gives the same file.
-
-    Parameters
-    ----------
-    path : Path
-        The file, by custom an ``.npz``.
-    record : EpisodeRecord
-        What a ``Recorder`` made.
-
-    Raises
-    ------
-    ValueError
-        Where an event holds what JSON cannot.
-    OSError
-        Where nothing can be written there.
     """
     content = io.BytesIO()
     with zipfile.ZipFile(content, "w", zipfile.ZIP_DEFLATED) as archive:
@@ -69,15 +61,7 @@ def write_record(path: Path, record: EpisodeRecord) -> None:
 
 
 def read_record(path: Path) -> EpisodeRecord:
-    """Read a record of this version or an older one.
-
-    Raises
-    ------
-    FileNotFoundError
-        Where there is no such file.
-    ValueError
-        Where it is no record, damaged, cut short, or of a newer format than this version knows.
-    """
+    """Read a record of this version or an older one."""
     path = Path(path)
     content = read_bytes(path)
     with reading(path, "a whole episode record", "want a file that lidarium run --record wrote"):
@@ -137,7 +121,7 @@ def _packed(record: EpisodeRecord) -> dict[str, NDArray[Any]]:
 
 
 def _unpacked(header: dict[str, Any], events: Any, arrays: dict[str, NDArray[Any]]) -> EpisodeRecord:  # noqa: ANN401
-    """Make a record of what a file holds, checked."""
+    """Make a record of the content of a file, checked."""
     steps, robots, time_step = header["steps"], header["robots"], header["time_step"]
     (rows, words), counted = header["map_shape"], max(header["counted_cells"], 1)
     poses, samples = len(arrays["pose_steps"]), len(arrays["map_counts"])

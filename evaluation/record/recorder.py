@@ -1,11 +1,15 @@
-"""Records an episode as it runs: what re-runs it, and what can be shown of it."""
+"""Records an episode as it runs: the data to run it again, and to show it."""
 
 import json
+import math
+import platform
 from collections.abc import Sequence
 from dataclasses import asdict
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+import numba
 import numpy as np
 from numpy.typing import NDArray
 
@@ -16,11 +20,129 @@ from lidarium.envs.onboard.radio.messages import Orders
 from lidarium.evaluation.episodes.events import operating_events, place_of
 from lidarium.evaluation.episodes.settings_identity import settings_sha256
 from lidarium.evaluation.episodes.watching import Watcher
-from lidarium.evaluation.record.display import DisplayTrack
-from lidarium.evaluation.record.episode_record import FORMAT, EpisodeRecord
-from lidarium.evaluation.record.made_with import made_with
-from lidarium.evaluation.record.map_sampler import MapSampler
-from lidarium.evaluation.record.state import state_sha256
+from lidarium.evaluation.record.episode_record import FORMAT, DisplayTrack, EpisodeRecord, MapChanges
+from lidarium.evaluation.record.replay import state_sha256
+from lidarium.evaluation.truth.beliefs import cells_beyond
+from lidarium.mapping.grids.map_deltas import OverlaidMaps, note_changes, note_overlaid_changes
+
+PACKAGES = {"bullet": "pybullet"}
+"""The package that moves the bodies, by backend."""
+
+
+def made_with(backend: str) -> dict[str, str]:
+    """Return versions of numpy, numba and the physics engine, and the processor."""
+    package = PACKAGES.get(backend)
+    bodies = {} if package is None else {package: version(package)}
+    return {"numpy": np.__version__, "numba": numba.__version__, **bodies, "machine": platform.machine()}
+
+
+FAR = 1e5
+"""How far from a robot a map may have changed that was rendered again [m]."""
+
+
+class MapSampler:
+    """Follows the team's map of an episode; the first sample is taken when it is made.
+
+    The map is the sign of the sum of the robots' log-odds, those that do not know their starts overlaid over
+    the floor by their true starts, as in ``result.json`` and the map files.
+
+    Attributes
+    ----------
+    origin : (x, y)
+        Lower left corner of cell (0, 0) in the floor's frame [m].
+    shape : (rows, words)
+        Rows of the map, and words of 64 cells in a row.
+    """
+
+    def __init__(self, env: ExplorationEnv, period_s: float) -> None:
+        world, settings = env.world, env.settings
+        tables = world.floors[0]
+        assert tables is not None
+        self.origin: tuple[float, float] = tables.laser.origin
+        self.shape: tuple[int, int] = (
+            env.score.counted_masks[0].shape[0],
+            env.score.counted_masks[0].shape[1],
+        )
+        self._env, self._time_step, self._resolution = (
+            env,
+            settings.time_step,
+            settings.occupancy.resolution,
+        )
+        self._frame = np.array([*self.origin, self._resolution])
+        self._known, self._occupied = np.zeros(self.shape, np.uint64), np.zeros(self.shape, np.uint64)
+        self._buffer = np.empty((self.shape[0] * self.shape[1], 3), np.uint64)
+        # Between two samples a robot gets no further from both places than half of what it can drive.
+        self._reach = (
+            settings.lidar.range_max
+            + 0.5 * settings.speed_limits[:, 0].max() * period_s
+            + 4 * self._resolution
+        )
+        self._last = env.beliefs.believed[:, :2].copy()
+        self._is_overlaid = not settings.known_starts
+        self._maps = env.beliefs.belief_rows.copy()
+        if settings.known_starts:
+            for row in range(settings.robots):
+                first_row, first_column = cells_beyond(env, row)
+                self._maps[row, 0] += first_row * self._maps[row, 2] + first_column
+        self._renderings = env.beliefs.renderings.copy()
+        self._placements = _overlays_of(env, self.origin)
+        self._before = (
+            [np.zeros(log_odds.shape, np.int8) for log_odds in env.beliefs.log_odds]
+            if self._is_overlaid
+            else []
+        )
+        self._before_at = np.array([log_odds.ctypes.data for log_odds in self._before], np.int64)
+        self._steps: list[int] = []
+        self._changes: list[NDArray[np.uint64]] = []
+        self.sample()
+
+    def sample(self) -> None:
+        """Take a sample; once in a step."""
+        world = self._env.world
+        step = int(world.steps[0])
+        if self._steps and step <= self._steps[-1]:
+            return
+        planes = (self._known, self._occupied, self._buffer)
+        is_new = not np.array_equal(self._renderings, self._env.beliefs.renderings)
+        reach = FAR if is_new else self._reach
+        self._renderings[:] = self._env.beliefs.renderings
+        if self._is_overlaid:
+            overlaid = OverlaidMaps(
+                self._env.beliefs.belief_rows, self._before_at, self._placements, self._resolution
+            )
+            count = note_overlaid_changes(overlaid, self._env.beliefs.believed, self._last, reach, *planes)
+        else:
+            count = note_changes(
+                self._maps, self._env.beliefs.believed, self._last, reach, self._frame, *planes
+            )
+        self._steps.append(step)
+        self._changes.append(self._buffer[:count].copy())
+
+    def changes(self) -> MapChanges:
+        """Return all samples so far."""
+        changes = np.concatenate(self._changes)
+        counts = np.array([len(change) for change in self._changes], np.int64)
+        places = changes[:, 0].astype(np.int64)
+        # Words above each other are alike, so that in this order they take less room when they are
+        # compressed.
+        order = np.lexsort((places, np.repeat(np.arange(len(counts)), counts)))
+        times = np.array(self._steps) * self._time_step
+        return MapChanges(*self.shape, times, counts, places[order], changes[order, 1], changes[order, 2])
+
+
+def _overlays_of(env: ExplorationEnv, origin: tuple[float, float]) -> NDArray[np.float64]:
+    """Return how maps in the frames of the starts lie over the floor's lattice.
+
+    It is in the form that ``note_overlaid_changes`` takes.
+    """
+    world = env.world
+    return np.array(
+        [
+            (*origin, x, y, math.cos(theta), math.sin(theta), *own_origin)
+            for (x, y, theta), own_origin in zip(world.starts, env.beliefs.origins, strict=True)
+        ]
+    )
+
 
 MAP_PERIOD_S = 2.0
 """Time between samples of the team's map [s]."""
@@ -29,21 +151,9 @@ MAP_PERIOD_S = 2.0
 class Recorder(Watcher):
     """Records an episode.
 
-    Parameters
-    ----------
-    policy : str
-        Name of the policy, for the header.
-    seed : int or None
-        The seed that the episode was reset with, for the header; what was drawn with it is recorded itself.
-    floor : str, Path or None
-        The floor as the user named it, to find it again; without it only floors that are not files are found
-        again by themselves.
-    image_resolution : float or None
-        Side of a pixel [m] where the floor is a plain image.
-
     Notes
     -----
-    An episode is what was drawn at its beginning (floor, starts, seed of the noise, goal), the speeds that
+    An episode is its draws at the beginning (floor, starts, seed of the noise, goal), the speeds that
     its robots were driven at, and when robots ended. Nothing else enters the world, so neither the policy nor
     the onboard software is needed to run it again.
     """
@@ -106,7 +216,7 @@ class Recorder(Watcher):
         ]
 
     def decision(self, env: ExplorationEnv, orders: Orders | None, given_up: Sequence[GivenUp]) -> None:
-        """Note where robots were sent next, and what was given up."""
+        """Note targets of robots, and frontiers given up."""
         time_s = self._decided_at * env.settings.time_step
         self._decided_at = int(env.world.steps[0])
         if orders is not None:
@@ -115,34 +225,11 @@ class Recorder(Watcher):
             self._note_given_up(env, given_up, time_s)
 
     def note(self, kind: str, time_s: float, agent: str | None, **details: Any) -> None:  # noqa: ANN401
-        """Add an event, such as a message or a merge.
-
-        Parameters
-        ----------
-        kind : str
-            What happened.
-        time_s : float
-            When [s].
-        agent : str or None
-            Whom it concerns, None for the team.
-        **details
-            What else is to be known, ready for JSON; positions in the floor's frame [m].
-        """
+        """Add an event, such as a message or a merge."""
         self._events.append({"time_s": round(time_s, 6), "kind": kind, "agent": agent, **details})
 
     def finish(self, *, is_interrupted: bool = False) -> EpisodeRecord:
-        """Return the record of the episode so far; recording may go on.
-
-        Parameters
-        ----------
-        is_interrupted : bool
-            Whether the user broke the episode off.
-
-        Raises
-        ------
-        ValueError
-            Where no episode was begun.
-        """
+        """Return the record of the episode so far; recording may go on."""
         env = self._env
         if env is None or env.floor is None:
             raise ValueError(
@@ -207,9 +294,9 @@ class Recorder(Watcher):
                 self.note("decision", time_s, agent, **place_of(env, agent, target))
 
     def _note_given_up(self, env: ExplorationEnv, given_up: Sequence[GivenUp], time_s: float) -> None:
-        """Note what is given up for the first time.
+        """Note frontiers that are given up for the first time.
 
-        What was seen later from elsewhere may leave the list, and come back.
+        Frontiers may leave the list if they are seen from elsewhere, and come back.
         """
         self._last_given_up = list(given_up)
         for entry in self._last_given_up:

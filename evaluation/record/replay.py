@@ -1,14 +1,17 @@
-"""Runs a recorded episode again, from its beginning and speeds.
+"""Runs a recorded episode again, from its beginning and the speeds of its robots.
 
-The speeds are those that its robots were driven at.
+A hash of everything that an episode leaves in its world tells whether the end is the same.
 """
 
+import hashlib
+import json
 from collections.abc import Iterable
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 import lidarium
 from lidarium.envs.engine.beginnings import EpisodeStart
@@ -22,8 +25,60 @@ from lidarium.envs.simulation.kernels.floor_cache import floor_tables
 from lidarium.evaluation.episodes.settings_identity import settings_sha256
 from lidarium.evaluation.episodes.watching import WatchedExploration, Watcher
 from lidarium.evaluation.record.episode_record import EpisodeRecord
-from lidarium.evaluation.record.state import state_sha256
 from lidarium.mapping.files.guarded_reading import reason as said_by
+
+_ARRAYS = (
+    "steps",
+    "poses",
+    "believed",
+    "velocities",
+    "ranges",
+    "bumpers",
+    "contacts",
+    "travelled",
+    "collisions",
+    "seen",
+    "team_seen",
+    "counted",
+)
+
+
+def state_sha256(env: ExplorationEnv) -> str:
+    """Return a hash of the state of an environment's world, to the bit.
+
+    It covers the number of steps; true and believed poses, velocities, scans, bumpers and contacts; ways,
+    collisions and counts of seen cells; the scorer's masks and the robots' maps; and why each robot ended. It
+    does not cover what is made of these: observations, plans, clearance.
+    """
+    simulation = env.simulation
+    owners = (simulation, simulation.world, simulation.beliefs, simulation.score)
+    digest = hashlib.sha256()
+    for name in _ARRAYS:
+        _add(digest, name, next(getattr(owner, name) for owner in owners if hasattr(owner, name)))
+    for name in ("masks", "team_masks", "counted_masks"):
+        for mask in getattr(env.score, name):
+            _add(digest, name, mask)
+    for log_odds in env.beliefs.log_odds:
+        _add_map(digest, log_odds)
+    digest.update(json.dumps(env.scorer.ended_because, sort_keys=True).encode())
+    return digest.hexdigest()
+
+
+def _add(digest: "hashlib._Hash", name: str, array: NDArray[Any]) -> None:
+    digest.update(f"{name} {array.dtype.str} {array.shape};".encode())
+    digest.update(np.ascontiguousarray(array).data)
+
+
+def _add_map(digest: "hashlib._Hash", log_odds: NDArray[np.int8]) -> None:
+    """Add the rows of a map from the first to the last that is not blank.
+
+    Much of a large map was never touched.
+    """
+    used = np.flatnonzero(log_odds.view(np.uint64).any(axis=1))
+    low, high = (int(used[0]), int(used[-1]) + 1) if used.size else (0, 0)
+    digest.update(f"map {log_odds.shape} from row {low};".encode())
+    _add(digest, "log_odds", log_odds[low:high])
+
 
 ADDED = frozenset({"camera", "localizer", "sparse_map"})
 """Settings that older records do not have."""
@@ -35,26 +90,6 @@ def rerun(
     """Run a recorded episode again and check that its end state is the same.
 
     It must be the same to the bit.
-
-    Parameters
-    ----------
-    record : EpisodeRecord
-        The record, made by this version.
-    floor : str, Path, Floor or None
-        The floor, where the one that the record names is not found any more.
-    watchers : iterable of Watcher
-        Who watches.
-
-    Returns
-    -------
-    ExplorationEnv
-        The environment at the end of the episode.
-
-    Raises
-    ------
-    ValueError
-        Where the record is of another version, its floor is not found or has changed, its settings are not
-        whole, or the final state is another one.
     """
     env = drive_again(record, floor, watchers)
     if not is_same(record, env):
@@ -78,7 +113,7 @@ def drive_again(
             "the episode was broken off within a time step, its last state is not known; pictures and films "
             "can be drawn"
         )
-    settings = settings_of(header)
+    settings = _settings_of(header)
     there = find_floor(header, floor)
     tables = floor_tables(there, settings.raster_resolution, settings.lidar.height, settings.robot.height)
     goal = None if header["goal"] is None else (header["goal"][0], header["goal"][1])
@@ -103,7 +138,7 @@ def is_same(record: EpisodeRecord, env: ExplorationEnv) -> bool:
 def first_difference(record: EpisodeRecord, env: ExplorationEnv) -> str:
     """Describe when and where a re-run first leaves the recorded paths.
 
-    What the record was made with is included.
+    The versions of the record are included.
     """
     made_with = ", ".join(f"{name} {version}" for name, version in record.header.get("made_with", {}).items())
     display = record.display
@@ -119,14 +154,8 @@ def first_difference(record: EpisodeRecord, env: ExplorationEnv) -> str:
     )
 
 
-def settings_of(header: dict[str, Any]) -> ExplorationSettings:
-    """Return the settings of a record.
-
-    Raises
-    ------
-    ValueError
-        Where they are not whole, or not those that were hashed.
-    """
+def _settings_of(header: dict[str, Any]) -> ExplorationSettings:
+    """Return the settings of a record."""
     missing = {each.name for each in fields(ExplorationSettings)} - set(header["settings"]) - ADDED
     if missing:
         raise ValueError(
@@ -147,13 +176,7 @@ def settings_of(header: dict[str, Any]) -> ExplorationSettings:
 
 
 def find_floor(header: dict[str, Any], floor: str | Path | Floor | None = None) -> Floor:
-    """Return the floor of a record: the given one, else what the record names.
-
-    Raises
-    ------
-    ValueError
-        Where it is not found, or is not the one of the record.
-    """
+    """Return the floor of a record: the given one, else the one that the record names."""
     names = (
         [floor]
         if floor is not None

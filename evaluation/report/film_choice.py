@@ -10,13 +10,13 @@ from typing import Any
 
 from lidarium.evaluation.analysis.episodes import Row, pair_key_of, read_episodes, variant_of
 from lidarium.evaluation.analysis.records import FOLDER, read_records, record_key
-from lidarium.evaluation.drawing.films.track_film import MOST_SIDE_BY_SIDE
+from lidarium.evaluation.drawing.track_film import MOST_SIDE_BY_SIDE
 from lidarium.evaluation.suites.trial import DEFAULT_VARIANT
 
 
 @dataclass(frozen=True, slots=True)
 class Wanted:
-    """What the episodes of a film have in common; anything where None.
+    """The conditions on the episodes of a film; None is any.
 
     Attributes
     ----------
@@ -25,7 +25,7 @@ class Wanted:
     robots, seed : int or None
         Size of the team, and seed.
     policies : sequence of str
-        The policies, in this order; all where there are none.
+        The policies, in this order; all if there are none.
     """
 
     floor: str | None = None
@@ -41,7 +41,7 @@ class Chosen:
     Attributes
     ----------
     title : str
-        What they have in common.
+        Title of the film.
     records : dict
         File of the record of each policy.
     left_out : list of str
@@ -58,11 +58,6 @@ def choose_episodes(directory: Path, wanted: Wanted) -> Chosen:
 
     They have the same floor, starts, seed, team and settings. Of all that are wanted those with the most
     policies are chosen, and of these the first in the directory.
-
-    Raises
-    ------
-    FileNotFoundError, ValueError
-        As `read_episodes`; where there are no records, or none that is wanted.
     """
     rows = read_episodes(directory).rows
     records, warnings = read_records(directory, rows)
@@ -87,13 +82,7 @@ def choose_episodes(directory: Path, wanted: Wanted) -> Chosen:
 
 
 def _matching(rows: list[Row], wanted: Wanted) -> list[Row]:
-    """Return the episodes that are wanted.
-
-    Raises
-    ------
-    ValueError
-        Where one choice leaves none; the message lists what would leave some.
-    """
+    """Return the episodes that are wanted."""
     for key, value in (("floor", wanted.floor), ("robots", wanted.robots), ("seed", wanted.seed)):
         found = {row[key]: None for row in rows}
         if value is not None and value not in found:

@@ -13,15 +13,15 @@ import numpy as np
 
 import lidarium
 from lidarium.evaluation.analysis.episodes import Episodes, Row, name_of, read_episodes
+from lidarium.evaluation.analysis.figures import values_of
 from lidarium.evaluation.analysis.groups import grouped
 from lidarium.evaluation.analysis.records import FOLDER, Entry, Key, read_records, record_key
-from lidarium.evaluation.episodes.output import check_writable, check_written, write_text
 from lidarium.evaluation.record import read_record
-from lidarium.evaluation.report.page.content import chosen_replays, page_content, rounded
-from lidarium.evaluation.report.page.document import write_page
-from lidarium.evaluation.report.page.replay_content import replay_of
-from lidarium.evaluation.report.plain_text import code, plain
+from lidarium.evaluation.report.page import chosen_replays, page_content, rounded, write_page
+from lidarium.evaluation.report.replay_page import replay_of
 from lidarium.evaluation.report.sections import Section, describe_group
+from lidarium.evaluation.report.tables import code, plain
+from lidarium.mapping.files.output import check_writable, check_written, write_text
 
 REPLAYS = 30
 """Most episodes that the page replays."""
@@ -46,15 +46,15 @@ def write_report(
     Parameters
     ----------
     directory : Path
-        What `lidarium evaluate --out` wrote: ``episodes.jsonl``, and ``records`` for the plots that show
-        paths and curves.
+        Folder that `lidarium evaluate --out` wrote: ``episodes.jsonl``, and ``records`` for the plots that
+        show paths and curves.
     out : Path
         Folder of the report.
     baseline : str or None
-        Policy that the others are compared with; ``nearest_frontier`` where it is there, else the first of
+        Policy that the others are compared with; ``nearest_frontier`` if it is there, else the first of
         the alphabet.
     seed : int
-        Where the draws of bootstrap intervals come from.
+        Seed of the bootstrap.
     replays : int
         Most recorded episodes that run again for the page's replays.
     progress : callable
@@ -68,7 +68,7 @@ def write_report(
     Raises
     ------
     FileNotFoundError, ValueError, OSError
-        As `read_episodes`; where the baseline is not among the policies; where nothing can be written.
+        As `read_episodes`; if the baseline is not among the policies; if nothing can be written.
     """
     if replays < 0:
         raise ValueError(f"--replays is {replays}; want zero or more")
@@ -76,8 +76,8 @@ def write_report(
     episodes = read_episodes(directory)
     baseline = _baseline(episodes, baseline)
     records, warnings = read_records(directory, episodes.rows)
-    groups = grouped(episodes.rows)
-    sections = [describe_group(group, records, out, baseline, seed) for group in groups]
+    groups, values = grouped(episodes.rows), values_of(episodes.rows)
+    sections = [describe_group(group, values, records, out, baseline, seed) for group in groups]
     replayed = chosen_replays(groups, records, replays)
     warnings = [*episodes.warnings, *_about_names(episodes), *warnings, *_about_records(episodes, records)]
     result = {

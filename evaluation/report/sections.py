@@ -14,8 +14,8 @@ import numpy as np
 from lidarium.evaluation.analysis.episodes import Row
 from lidarium.evaluation.analysis.figures import (
     TIMES,
-    VALUES,
     TimeFigure,
+    Value,
     compared,
     further_figure,
     further_keys,
@@ -25,10 +25,15 @@ from lidarium.evaluation.analysis.figures import (
 from lidarium.evaluation.analysis.groups import Group, paired, repeats, times_to
 from lidarium.evaluation.analysis.records import Entry, Key
 from lidarium.evaluation.drawing.floor_pictures import recorded_pair, save_paths, save_visits, visits_on
-from lidarium.evaluation.drawing.plots import coverage_curves, save_boxes, save_coverage
-from lidarium.evaluation.drawing.profiles import profiles, save_profiles
+from lidarium.evaluation.drawing.plots import (
+    coverage_curves,
+    profiles,
+    save_boxes,
+    save_coverage,
+    save_profiles,
+)
 from lidarium.evaluation.report import tables
-from lidarium.evaluation.report.plain_text import code, plain
+from lidarium.evaluation.report.tables import code, plain
 from lidarium.evaluation.statistics import FEWEST_FOR_NOMINAL, median_interval
 
 _LONGEST_STEM = 60
@@ -45,43 +50,34 @@ _OF_FEW = (
 
 @dataclass(slots=True)
 class Section:
-    """What a report says of one group.
+    """The section of a report about one group.
 
     Attributes
     ----------
     group : Group
         The episodes.
+    values : tuple of Value
+        Columns of tables.
     numbers : dict
         For ``report.json``.
     markdown : list of str
         Paragraphs, tables and pictures.
     warnings : list of str
-        What to be careful with.
+        Warnings.
     """
 
     group: Group
+    values: tuple[Value, ...]
     numbers: dict[str, Any] = field(default_factory=dict)
     markdown: list[str] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
 
 
-def describe_group(group: Group, records: dict[Key, Entry], out: Path, baseline: str, seed: int) -> Section:
-    """Return the section of a group and write its plots.
-
-    Parameters
-    ----------
-    group : Group
-        The episodes.
-    records : dict
-        What was recorded, of any episodes.
-    out : Path
-        Folder of the report.
-    baseline : str
-        Policy that the others are compared with.
-    seed : int
-        Where the draws of bootstrap intervals come from.
-    """
-    section = Section(group)
+def describe_group(
+    group: Group, values: tuple[Value, ...], records: dict[Key, Entry], out: Path, baseline: str, seed: int
+) -> Section:
+    """Return the section of a group and write its plots."""
+    section = Section(group, values)
     section.numbers = {
         "robots": group.robots,
         "floor_set": group.floor_set,
@@ -141,13 +137,15 @@ def _missed(policy: str, figure: TimeFigure) -> str:
 
 def _describe_values(section: Section, seed: int) -> None:
     figures = {
-        policy: {value.key: value_figure([value.of(row) for row in rows], seed) for value in VALUES}
+        policy: {
+            value.column.key: value_figure([value.of(row) for row in rows], seed) for value in section.values
+        }
         for policy, rows in section.group.runs.items()
     }
     section.numbers["values"] = figures
-    section.markdown += ["### Coverage, paths, overlap", tables.values_table(figures)]
+    section.markdown += ["### Coverage, paths, overlap", tables.values_table(figures, section.values)]
     further = {
-        policy: {key: further_figure(rows, key) for key in further_keys(rows)}
+        policy: {key: further_figure(rows, key) for key in further_keys(rows, section.values)}
         for policy, rows in section.group.runs.items()
     }
     section.numbers["further_medians"] = further
@@ -166,13 +164,13 @@ def _describe_comparisons(section: Section, baseline: str, seed: int) -> None:
         return
     if not others:
         return
-    comparisons = compared(group, baseline, seed)
+    comparisons = compared(group, section.values, baseline, seed)
     section.numbers["comparisons"] = comparisons
     _warn_of_pairs(section, others, baseline)
     if comparisons:
         section.markdown += [
             f"### Compared with {code(baseline)}, pair by pair",
-            tables.comparisons_table(comparisons),
+            tables.comparisons_table(comparisons, section.values),
         ]
         section.markdown.append(
             "Policy less baseline, policy over baseline. Wilcoxon's signed rank test and the sign test leave "
@@ -213,7 +211,8 @@ def _draw_plots(section: Section, records: dict[Key, Entry], out: Path) -> None:
         save_coverage(
             _picture(section, out, f"coverage_{group.slug}.png", "Coverage over time"), group, curves
         )
-    save_boxes(_picture(section, out, f"boxes_{group.slug}.png", "Times, paths and overlap"), group)
+    picture = _picture(section, out, f"boxes_{group.slug}.png", "Times, paths and overlap")
+    save_boxes(picture, group, section.values)
     save_profiles(
         _picture(section, out, f"profiles_{group.slug}.png", "Performance profiles"),
         group,

@@ -1,16 +1,36 @@
 """Figures as markdown."""
 
 import math
+import re
 from collections.abc import Iterable, Sequence
 
-from lidarium.evaluation.analysis.figures import TIMES, VALUES, Comparison, TimeFigure, ValueFigure
+from lidarium.evaluation.analysis.figures import TIMES, Comparison, TimeFigure, Value, ValueFigure
 from lidarium.evaluation.analysis.groups import Group, times_to
-from lidarium.evaluation.report.plain_text import code, plain
+from lidarium.evaluation.episodes.result import METRICS
 from lidarium.evaluation.statistics import Interval, median_interval
+from lidarium.mapping.files.guarded_reading import printable
+
+_SPECIAL = re.compile(r"([\\`*\[\]<>|$~])")
+_WRITTEN = re.compile(r"`([^`]*)`|\\([\\`*\[\]<>|$~])|&amp;")
+
+
+def plain(text: str) -> str:
+    """Return text in which nothing stands for anything but itself, links and tables among it."""
+    return _SPECIAL.sub(r"\\\1", printable(text).replace("&", "&amp;"))
+
+
+def code(name: str) -> str:
+    """Return a name as code; one that would end the code or a table's cell as plain text."""
+    shown = printable(name)
+    return f"`{shown}`" if shown.strip() and not set("`|") & set(shown) else plain(shown)
+
+
+def as_text(markdown: str) -> str:
+    """Return plain text of the output of `plain` and `code`, for pages that are not markdown."""
+    return _WRITTEN.sub(lambda found: found[1] or found[2] or "&", markdown)
+
 
 NONE = "–"  # noqa: RUF001
-TITLES = {**TIMES, **{value.key: value.title for value in VALUES}}
-UNITS = {**dict.fromkeys(TIMES, "s"), **{value.key: value.unit for value in VALUES}}
 
 
 def markdown_table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
@@ -67,22 +87,20 @@ def times_table(figures: dict[str, TimeFigure], horizon_s: float) -> str:
     return markdown_table(header, rows)
 
 
-def values_table(figures: dict[str, dict[str, ValueFigure]]) -> str:
-    """Return the median of every value by policy, of collisions and coverage the mean."""
-    by_mean = ("coverage_percent", "collisions")
-    header = ["policy"]
-    for value in VALUES:
-        unit = f" [{value.unit}]" if value.unit else ""
-        header.append(f"{value.title}{unit}, {'mean' if value.key in by_mean else 'median'}")
+def values_table(figures: dict[str, dict[str, ValueFigure]], values: Sequence[Value]) -> str:
+    """Return the median of every value by policy, or its mean if its column says so."""
+    columns = [value.column for value in values]
+    header = [f"{_headed(each.title, each.unit)}, {'mean' if each.by_mean else 'median'}" for each in columns]
     rows = []
     for policy, by_key in figures.items():
-        shown = [
-            (by_key[value.key].mean if value.key in by_mean else by_key[value.key].median, value.digits)
-            for value in VALUES
-        ]
-        cells = [interval(found, digits=digits) for found, digits in shown]
+        shown = [by_key[each.key].mean if each.by_mean else by_key[each.key].median for each in columns]
+        cells = [interval(found, digits=each.digits) for found, each in zip(shown, columns, strict=True)]
         rows.append([code(policy), *cells])
-    return markdown_table(header, rows)
+    return markdown_table(["policy", *header], rows)
+
+
+def _headed(title: str, unit: str) -> str:
+    return f"{plain(title)} [{plain(unit)}]" if unit else plain(title)
 
 
 def further_table(figures: dict[str, dict[str, Interval]], horizon_s: float) -> str:
@@ -97,11 +115,16 @@ def further_table(figures: dict[str, dict[str, Interval]], horizon_s: float) -> 
 
 
 def _digits(key: str) -> int:
+    if key in METRICS:
+        return METRICS[key].digits
     return 1 if key.endswith(("_s", "_m", "_ms", "_percent")) else 3
 
 
-def comparisons_table(comparisons: Sequence[Comparison]) -> str:
+def comparisons_table(comparisons: Sequence[Comparison], values: Sequence[Value]) -> str:
     """Return differences, ratios and tests of policies against the baseline."""
+    titles = {key: _headed(title, "s") for key, title in TIMES.items()} | {
+        value.column.key: _headed(value.column.title, value.column.unit) for value in values
+    }
     header = (
         "policy",
         "figure",
@@ -116,7 +139,7 @@ def comparisons_table(comparisons: Sequence[Comparison]) -> str:
     rows = [
         (
             code(each.policy),
-            f"{TITLES[each.key]} [{UNITS[each.key]}]",
+            titles[each.key],
             str(each.pairs),
             interval(each.difference),
             interval(each.ratio, digits=2),

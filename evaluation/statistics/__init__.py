@@ -6,14 +6,16 @@ Pure functions on arrays. Which interval belongs to which figure, and how often 
 docs/reference/statistics.md and docs/results/interval_coverage.md.
 """
 
-from lidarium.evaluation.statistics.means import (
+from lidarium.evaluation.statistics.estimates import (
     interquartile_mean,
     interquartile_mean_interval,
     mean_interval,
+    median_bands,
+    median_interval,
     paired_difference,
     paired_ratio,
+    share_interval,
 )
-from lidarium.evaluation.statistics.medians import median_bands, median_interval
 from lidarium.evaluation.statistics.paired_tests import PairedTest, holm, sign_test, wilcoxon_test
 from lidarium.evaluation.statistics.profiles import ratio_profile, score_profile
 from lidarium.evaluation.statistics.restricted import (
@@ -24,7 +26,6 @@ from lidarium.evaluation.statistics.restricted import (
     restricted_ratio,
 )
 from lidarium.evaluation.statistics.samples import FEWEST_FOR_NOMINAL, Interval
-from lidarium.evaluation.statistics.shares import share_interval
 
 __all__ = [
     "FEWEST_FOR_NOMINAL",

@@ -1,6 +1,6 @@
 """Tests of whether the partners of pairs differ, singly and in a table.
 
-They also give what many of them in one table are worth.
+Holm's correction is for several tests in one table.
 
 References
 ----------
@@ -19,12 +19,12 @@ from lidarium.evaluation.statistics.samples import Values, checked_pairs, checke
 
 @dataclass(frozen=True, slots=True)
 class PairedTest:
-    """What a paired test found.
+    """The result of a paired test.
 
     Attributes
     ----------
     p_value : float
-        How likely so much difference is by chance, two-sided; 1 where all pairs are ties.
+        How likely so much difference is by chance, two-sided; 1 if all pairs are ties.
     size : int
         Number of pairs.
     less, greater, ties : int
@@ -82,11 +82,6 @@ def holm(p_values: ArrayLike) -> Values:
     ----------
     p_values : (m,) array_like
         From 0 to 1.
-
-    Raises
-    ------
-    ValueError
-        Where there are none, or one is not from 0 to 1.
     """
     given = checked_values(p_values, "p_values")
     if (given < 0.0).any() or (given > 1.0).any():

@@ -1,4 +1,4 @@
-"""Performance profiles: in what share of runs a policy is that good.
+"""Performance profiles: share of runs in which a policy is within a factor of the best.
 
 References
 ----------
@@ -9,8 +9,8 @@ Dolan and More, Benchmarking optimization software with performance profiles, Ma
 import numpy as np
 from numpy.typing import ArrayLike
 
+from lidarium.evaluation.statistics.estimates import share_interval
 from lidarium.evaluation.statistics.samples import Values, checked_values
-from lidarium.evaluation.statistics.shares import share_interval
 
 
 def ratio_profile(costs: ArrayLike, factors: ArrayLike) -> Values:
@@ -21,7 +21,7 @@ def ratio_profile(costs: ArrayLike, factors: ArrayLike) -> Values:
     Parameters
     ----------
     costs : (runs, policies) array_like
-        What each policy needed, 0 or more; inf where it did not succeed. Runs in which none succeeded count
+        Cost of each policy, 0 or more; inf if it did not succeed. Runs in which none succeeded count
         for nobody.
     factors : (k,) array_like
         Factors, 1 or more.
@@ -30,11 +30,6 @@ def ratio_profile(costs: ArrayLike, factors: ArrayLike) -> Values:
     -------
     (policies, k) float64
         Shares of all runs.
-
-    Raises
-    ------
-    ValueError
-        Where there are no costs, costs are nan or negative, or a factor is below 1.
     """
     needed, within = np.asarray(costs, np.float64), checked_values(factors, "factors")
     if needed.ndim != 2 or not needed.size:
@@ -62,9 +57,7 @@ def score_profile(scores: ArrayLike, thresholds: ArrayLike, confidence: float = 
     scores : (n,) array_like
         Score of each run.
     thresholds : (k,) array_like
-        What is asked of them.
-    confidence : float
-        How often the interval at one threshold shall hold the truth.
+        Thresholds.
 
     Returns
     -------

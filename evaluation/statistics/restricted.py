@@ -3,7 +3,7 @@
 Their intervals are studentised bootstrap intervals.
 
 A time that was cut before the event is censored: the event comes later than that, nobody knows when. The
-restricted mean is the area below the Kaplan-Meier curve S up to a horizon. Where all times are known or cut
+restricted mean is the area below the Kaplan-Meier curve S up to a horizon. If all times are known or cut
 at the horizon itself, it is the plain mean of min(T, horizon). Standard errors come from each run's influence
 on the area, which also gives those of differences and ratios of paired runs: there the influences of both
 partners are subtracted run by run.
@@ -22,9 +22,15 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from lidarium.evaluation.statistics.means import exponential
-from lidarium.evaluation.statistics.resampling import RESAMPLES, Counts, studentised_interval
-from lidarium.evaluation.statistics.samples import Interval, Values, checked_values
+from lidarium.evaluation.statistics.estimates import exponential
+from lidarium.evaluation.statistics.samples import (
+    RESAMPLES,
+    Counts,
+    Interval,
+    Values,
+    checked_values,
+    studentised_interval,
+)
 from lidarium.mapping.kernels.compilation import Array, kernel
 
 
@@ -48,18 +54,10 @@ class CensoredTimes:
         When it happened, or until when it had not happened, 0 or more [s].
     is_observed : (n,) array_like of bool
         Whether it happened.
-    horizon : float
-        Where the mean is cut [s].
-
-    Raises
-    ------
-    ValueError
-        Where a sample is empty, holds nan or negative times, lengths differ, the horizon is not positive, or
-        the longest time is censored before the horizon, so that the curve is unknown up to there.
     """
 
     def __init__(self, times: ArrayLike, is_observed: ArrayLike, horizon: float) -> None:
-        known, happened = checked_times(times, is_observed)
+        known, happened = _checked_times(times, is_observed)
         if not 0.0 < horizon < math.inf:
             raise ValueError(f"horizon is {horizon}; want a positive number of seconds")
         happened = happened & (known <= horizon)
@@ -80,18 +78,12 @@ class CensoredTimes:
 
     @property
     def arrays(self) -> _Sample:
-        """What the kernels take."""
+        """Arguments of the kernels."""
         return _Sample(self.times, self.is_observed, self.order, self.horizon)
 
 
-def checked_times(times: ArrayLike, is_observed: ArrayLike) -> tuple[Values, NDArray[np.bool_]]:
-    """Return times and whether each was observed, both (n,).
-
-    Raises
-    ------
-    ValueError
-        Where the sample is empty, holds nan, infinite or negative times, or lengths differ.
-    """
+def _checked_times(times: ArrayLike, is_observed: ArrayLike) -> tuple[Values, NDArray[np.bool_]]:
+    """Return times and whether each was observed, both (n,)."""
     known, happened = checked_values(times, "times"), np.asarray(is_observed, np.bool_)
     if happened.shape != known.shape:
         raise ValueError(
@@ -107,7 +99,7 @@ def kaplan_meier(times: ArrayLike, is_observed: ArrayLike) -> tuple[Values, Valu
 
     The share is that of runs in which it has not happened after each time.
     """
-    known, happened = checked_times(times, is_observed)
+    known, happened = _checked_times(times, is_observed)
     moments, events = np.unique(known[happened], return_counts=True)
     at_risk = len(known) - np.searchsorted(np.sort(known), moments, side="left")
     return moments, np.asarray(np.cumprod(1.0 - events / at_risk), np.float64)
@@ -124,15 +116,6 @@ def restricted_mean(
     """Return the restricted mean of censored times [s] and its interval.
 
     It is a studentised bootstrap interval.
-
-    Parameters
-    ----------
-    times, is_observed, horizon
-        As in `CensoredTimes`, with its errors; also refused where nothing was observed up to the horizon.
-    confidence : float
-        How often the interval shall hold the truth.
-    resamples, seed : int
-        Number of resamples, and where their draws come from.
     """
     sample = CensoredTimes(times, is_observed, horizon)
     if not sample.is_observed.any():
@@ -154,18 +137,6 @@ def restricted_difference(
     """Return the restricted mean of ``a`` minus that of ``b`` [s] and its interval.
 
     It is over paired runs, with a studentised bootstrap interval.
-
-    Parameters
-    ----------
-    a, b : CensoredTimes
-        Times of the two partners of each pair, in the same order and up to the same horizon.
-    confidence, resamples, seed
-        As in `restricted_mean`.
-
-    Raises
-    ------
-    ValueError
-        Where lengths or horizons differ, or nothing was observed in either.
     """
     _check_partners(a, b)
 
@@ -182,7 +153,7 @@ def restricted_ratio(
 
     Both are over paired runs; the interval is made of logarithms.
 
-    Parameters and errors as `restricted_difference`; also refused where one of the means is 0.
+    Parameters and errors as `restricted_difference`; also refused if one of the means is 0.
     """
     _check_partners(a, b)
     for name, sample in (("a", a), ("b", b)):

@@ -1,8 +1,8 @@
 """Runs a suite into a folder, and keeps every finished episode at once.
 
-What was interrupted continues where it stopped.
+An interrupted run continues where it stopped.
 
-A folder holds ``suite.json`` (what was asked for), ``episodes.jsonl`` (a line per finished episode) and
+A folder holds ``suite.json`` (the request), ``episodes.jsonl`` (a line per finished episode) and
 ``records/`` (a record per episode). Episodes depend on their trial alone, never on the worker or on those
 before, so that any number of workers leaves the same lines, though in another order.
 """
@@ -16,14 +16,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import lidarium
-from lidarium.evaluation.episodes.output import clear_unfinished, write_json
-from lidarium.evaluation.suites.content import MOST_SUITE_BYTES
+from lidarium.evaluation.processes import shared_out
 from lidarium.evaluation.suites.episodes_file import KEY, EpisodesFile
-from lidarium.evaluation.suites.suite import Suite
+from lidarium.evaluation.suites.suite import MOST_SUITE_BYTES, Suite
 from lidarium.evaluation.suites.trial import Trial
 from lidarium.evaluation.suites.trial_run import RECORDS_FOLDER, RecordNotWrittenError, run_trial
-from lidarium.evaluation.suites.workers import shared_out
 from lidarium.mapping.files.guarded_reading import read_text, reason
+from lidarium.mapping.files.output import clear_unfinished, write_json
 
 if TYPE_CHECKING:
     pass
@@ -34,22 +33,6 @@ SUITE_FILE, EPISODES_FILE = "suite.json", "episodes.jsonl"
 @dataclass(slots=True)
 class Campaign:
     """A suite that runs into a folder.
-
-    Parameters
-    ----------
-    suite : Suite
-        What is asked for.
-    folder : Path
-        Where to. A folder of an earlier call goes on: what it has is not run again; other policies, floors,
-        teams and seeds may be added, other settings or another version may not.
-    workers : int
-        How many processes; the calling one does the work where 1.
-    records : bool
-        Whether every episode's record is kept.
-    trials : sequence of Trial or None
-        Those of the suite that are run; all where None.
-    cluster : str or None
-        A Ray cluster that runs them, ``auto`` or HOST:PORT, in place of processes of this machine.
 
     Attributes
     ----------
@@ -72,24 +55,13 @@ class Campaign:
     total: int = 0
 
     def run(self) -> Generator[dict[str, Any], None, None]:
-        """Run what is missing, and yield each episode's line when it is on the disk.
-
-        Raises
-        ------
-        ValueError
-            Where the folder holds episodes of another version or other settings, or is being written to by
-            someone else.
-        OSError
-            Where the folder cannot be written to, the disk is full, or the folder was removed meanwhile: at
-            the first episode that cannot be kept. Finished ones are kept, but for those of a folder that is
-            gone.
-        """
+        """Run the missing parts, and yield each episode's line when it is on the disk."""
         if self.workers < 1:
             raise ValueError(f"workers is {self.workers}; want at least 1")
         trials = list(self.suite.trials() if self.trials is None else self.trials)
         self.total, self.failures = len(trials), []
         with EpisodesFile(self.folder / EPISODES_FILE) as file:
-            check_same(file.episodes, self.suite, self.folder)
+            _check_same(file.episodes, self.suite, self.folder)
             _write_suite(self.folder / SUITE_FILE, self.suite)
             records = self.folder / RECORDS_FOLDER if self.records else None
             clear_unfinished(self.folder / RECORDS_FOLDER, ".npz")
@@ -111,7 +83,7 @@ class Campaign:
     def _work(
         self, missing: Sequence[Trial], records: Path | None
     ) -> Generator[tuple[Trial, dict[str, Any] | Exception], None, None]:
-        """Return what runs trials: this machine's processes, or a cluster."""
+        """Return the work of trials, on this machine's processes or on a cluster."""
         if self.cluster is None:
             return shared_out(partial(run_trial, self.suite, records=records), missing, self.workers)
         from lidarium.evaluation.suites.on_ray import trials_on_ray
@@ -119,14 +91,8 @@ class Campaign:
         return trials_on_ray(self.suite, missing, records, self.cluster)
 
 
-def check_same(episodes: list[dict[str, Any]], suite: Suite, folder: Path) -> None:
-    """Check that existing episodes are of this version and the suite's settings.
-
-    Raises
-    ------
-    ValueError
-        Where they are not; the difference is named.
-    """
+def _check_same(episodes: list[dict[str, Any]], suite: Suite, folder: Path) -> None:
+    """Check that existing episodes are of this version and the suite's settings."""
     for episode in episodes:
         if episode.get("version") != lidarium.__version__:
             raise ValueError(
@@ -182,7 +148,7 @@ def _kept_suite(path: Path) -> dict[str, Any]:
 
 
 def _write_suite(path: Path, suite: Suite) -> None:
-    """Write what was asked for, by this and the calls before."""
+    """Write the requests of this and of earlier calls."""
     kept, asked = _kept_suite(path), suite.as_dict()
     joined: dict[str, Any] = {"version": lidarium.__version__}
     for name, value in asked.items():

@@ -2,7 +2,7 @@
 
 They are written at once, never in part, by one writer at a time.
 
-What is in the file stays there. A line that was cut off when its writer was killed is dropped, with a
+Existing lines stay. A line that was cut off when its writer was killed is dropped, with a
 warning; anything else that is wrong is reported and left to the user, and so is a file that no writer of
 episodes has made. An episode counts as kept when it is on the disk, in the file that bears the name.
 """
@@ -24,38 +24,26 @@ from lidarium.mapping.files.output import lock_file
 from lidarium.mapping.geometry.bounds import shown
 
 KEY = "key"
-"""What identifies an episode in its file."""
+"""Key of an episode in its file."""
 
 TIMINGS = ("decision_ms", "tick_ms", "steps_per_s", "wall_s", "peak_mb")
-"""What differs between two runs of the same episode."""
+"""Keys that differ between two runs of the same episode."""
 
 
 def read_episodes(path: Path) -> list[dict[str, Any]]:
-    """Read all episodes of a file, in its order; none where there is no file.
-
-    Raises
-    ------
-    ValueError
-        Where a line other than the last is no episode, or two of the same key have come to different ends;
-        the line is named.
-
-    Warns
-    -----
-    UserWarning
-        Where the last line was cut off, or an episode is there twice; it is left out.
-    """
+    """Read all episodes of a file, in its order; none if there is no file."""
     return _parsed(path)[0]
 
 
 _FIRST = f'{{"{KEY}":'.encode()
-"""What each line begins with."""
+"""Beginning of each line."""
 
 _NOT_FOLLOWED = getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
 """How the file is opened: no link, and without waiting for the other end of a pipe."""
 
 
 @dataclass(frozen=True, slots=True)
-class Lines:
+class _Lines:
     """The lines of a file of episodes.
 
     Attributes
@@ -73,17 +61,11 @@ class Lines:
     cut_off: tuple[int, int] | None = None
 
 
-def read_lines(path: Path) -> Lines:
-    """Read the lines of a file; none where there is no file.
-
-    Raises
-    ------
-    ValueError
-        Where a line other than the last is no JSON object; the line is named.
-    """
+def read_lines(path: Path) -> _Lines:
+    """Read the lines of a file; none if there is no file."""
     path = Path(path)
     if not path.exists():
-        return Lines([], 0)
+        return _Lines([], 0)
     lines = read_bytes(path).split(b"\n")
     numbered: list[tuple[int, dict[str, Any]]] = []
     whole = 0
@@ -95,7 +77,7 @@ def read_lines(path: Path) -> Lines:
             except (ValueError, RecursionError) as error:
                 # Without a line feed behind it, writing was broken off there.
                 if is_last:
-                    return Lines(numbered, whole, (number, len(line)))
+                    return _Lines(numbered, whole, (number, len(line)))
                 raise ValueError(
                     f"{path}, line {number} is not JSON ({reason(error)}); want one episode a line"
                 ) from error
@@ -103,7 +85,7 @@ def read_lines(path: Path) -> Lines:
                 raise ValueError(f"{path}, line {number} is not a JSON object; want one episode a line")
             numbered.append((number, episode))
         whole += len(line) + (0 if is_last else 1)
-    return Lines(numbered, whole)
+    return _Lines(numbered, whole)
 
 
 def _parsed(path: Path) -> tuple[list[dict[str, Any]], int]:
@@ -138,29 +120,17 @@ def _parsed(path: Path) -> tuple[list[dict[str, Any]], int]:
 
 
 def _lasting(episode: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what is the same whenever the episode is run."""
+    """Return the entries that are the same whenever the episode is run."""
     return {name: value for name, value in episode.items() if name not in TIMINGS}
 
 
 class EpisodesFile:
     """Appends episodes to a file; the only writer while it is open.
 
-    Parameters
-    ----------
-    path : Path
-        The file; made where absent, with its folder.
-
     Attributes
     ----------
     episodes : list of dict
-        What was there when the file was opened; a last line that was cut off is taken out of the file.
-
-    Raises
-    ------
-    ValueError
-        As ``read_episodes``; and where another process has the file open.
-    OSError
-        Where the file cannot be written to.
+        Episodes that the file had when it was opened; a last line that was cut off is taken out of the file.
     """
 
     def __init__(self, path: Path) -> None:
@@ -179,16 +149,7 @@ class EpisodesFile:
             raise
 
     def append(self, episode: Mapping[str, Any]) -> None:
-        """Add an episode; when this returns it is on the disk.
-
-        Raises
-        ------
-        ValueError
-            Where it has no key, or holds a number that is not finite.
-        OSError
-            Where it cannot be written, such as on a full disk; the file is as it was before. And where the
-            file has been removed or replaced since it was opened.
-        """
+        """Add an episode; when this returns it is on the disk."""
         if not isinstance(episode.get(KEY), str):
             raise ValueError(
                 f"the episode has the key {episode.get(KEY)!r}; want text that tells it from all others"
@@ -199,13 +160,7 @@ class EpisodesFile:
         self.check_in_place()
 
     def check_in_place(self) -> None:
-        """Check that what is written here is what others read under the file's name.
-
-        Raises
-        ------
-        OSError
-            Where the file, or its folder, was removed or replaced since it was opened.
-        """
+        """Check that the file is still the one of its name."""
         ours = os.fstat(self._handle)
         try:
             named = os.lstat(self.path)
@@ -272,7 +227,7 @@ def _not_plain(path: Path, what: str) -> ValueError:
 
 
 def _check_ours(path: Path, whole: int) -> None:
-    """Check that what breaks off is the beginning of an episode."""
+    """Check that the cut-off line is the beginning of an episode."""
     with path.open("rb") as file:
         file.seek(whole)
         rest = file.read(64).replace(b" ", b"").strip(b"\0\r\n\t")

@@ -4,6 +4,7 @@ A task whose worker or machine is lost is done again elsewhere; its result comes
 """
 
 import logging
+import os
 import signal
 import socket
 import tempfile
@@ -18,6 +19,7 @@ import lidarium
 from lidarium.evaluation.suites.suite import Suite
 from lidarium.evaluation.suites.trial import Trial
 from lidarium.evaluation.suites.trial_run import run_trial, write_record_bytes
+from lidarium.registry import IMPORTS_VARIABLE, import_own
 
 Task = TypeVar("Task")
 Result = TypeVar("Result")
@@ -35,35 +37,15 @@ POLL_S = 0.5
 def on_ray(
     work: Callable[[Task], Result], tasks: Iterable[Task], address: str
 ) -> Generator[tuple[Task, Result | Exception], None, None]:
-    """Do tasks on a Ray cluster; yield each with its result when ready.
-
-    Parameters
-    ----------
-    work : callable
-        Does a task; it and the tasks can be pickled. What it reads is on all machines.
-    tasks : iterable
-        What is done.
-    address : str
-        ``auto`` for the cluster of this machine, or HOST:PORT.
-
-    Yields
-    ------
-    task, result
-        An exception that the task has raised is its result.
-
-    Raises
-    ------
-    ValueError
-        Where the extra ``ray`` is missing, no cluster answers within 10 s, or a machine has another version
-        of lidarium.
-    """
+    """Do tasks on a Ray cluster; yield each with its result when ready."""
     ray = _connected(address)
     try:
         # Lost workers and machines are no fault of a task: it is tried until it has an end.
         remote = ray.remote(max_retries=-1, num_cpus=1)(_done)
         window = WAITING_PER_CORE * max(int(ray.cluster_resources().get("CPU", 1)), 1)
         pending = iter(tasks)
-        running = {remote.remote(work, task, lidarium.__version__): task for task in islice(pending, window)}
+        version, imports = lidarium.__version__, os.environ.get(IMPORTS_VARIABLE, "")
+        running = {remote.remote(work, task, version, imports): task for task in islice(pending, window)}
         while running:
             for ready in ray.wait(list(running), num_returns=1, timeout=POLL_S)[0]:
                 task = running.pop(ready)
@@ -72,13 +54,13 @@ def on_ray(
                     raise ValueError(str(result))
                 yield task, result
                 for following in islice(pending, 1):
-                    running[remote.remote(work, following, lidarium.__version__)] = following
+                    running[remote.remote(work, following, version, imports)] = following
     finally:
         ray.shutdown()
 
 
 class OtherVersionError(RuntimeError):
-    """Raised where a machine of a cluster has another version."""
+    """Raised if a machine of a cluster has another version."""
 
 
 def _connected(address: str) -> Any:  # noqa: ANN401
@@ -111,7 +93,7 @@ def _connected(address: str) -> Any:  # noqa: ANN401
 
 @contextmanager
 def _handlers_kept() -> Iterator[None]:
-    """Keep what this process does at SIGTERM: Ray puts a handler of its own there."""
+    """Keep the handler of SIGTERM, which Ray replaces."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -122,18 +104,19 @@ def _handlers_kept() -> Iterator[None]:
         signal.signal(signal.SIGTERM, kept)
 
 
-def _done(work: Callable[[Task], Result], task: Task, version: str) -> Result:
+def _done(work: Callable[[Task], Result], task: Task, version: str, imports: str) -> Result:
     """Do a task on a machine of the cluster, if it has the same version."""
     if lidarium.__version__ != version:
         raise OtherVersionError(
             f"machine {socket.gethostname()} of the cluster has lidarium {lidarium.__version__}, this is "
             f"{version}; install the same on all"
         )
+    import_own(name for name in imports.split(",") if name)
     return work(task)
 
 
 def _result(ray: Any, ready: Any) -> Any:  # noqa: ANN401
-    """Return the result of a task, or what it has raised."""
+    """Return the result of a task, or its exception."""
     try:
         return ray.get(ready)
     except ray.exceptions.RayTaskError as error:
@@ -142,16 +125,8 @@ def _result(ray: Any, ready: Any) -> Any:  # noqa: ANN401
         return error
 
 
-class Recorded:
-    """A trial's line, and its record as bytes.
-
-    Parameters
-    ----------
-    suite : Suite
-        What is asked for.
-    keeps_records : bool
-        Whether there is a record.
-    """
+class _Recorded:
+    """A trial's line, and its record as bytes."""
 
     def __init__(self, suite: Suite, keeps_records: bool) -> None:
         self._suite, self._keeps_records = suite, keeps_records
@@ -168,20 +143,8 @@ class Recorded:
 def trials_on_ray(
     suite: Suite, trials: Iterable[Trial], records: Path | None, address: str
 ) -> Generator[tuple[Trial, dict[str, Any] | Exception], None, None]:
-    """Run trials on a Ray cluster; yield each with its line when its record is written here.
-
-    Parameters
-    ----------
-    suite : Suite
-        What is asked for.
-    trials : iterable of Trial
-        What is run.
-    records : Path or None
-        Where records go on this machine; none are kept where None.
-    address : str
-        As in ``on_ray``.
-    """
-    with closing(on_ray(Recorded(suite, records is not None), trials, address)) as work:
+    """Run trials on a Ray cluster; yield each with its line when its record is written here."""
+    with closing(on_ray(_Recorded(suite, records is not None), trials, address)) as work:
         for trial, result in work:
             if isinstance(result, Exception):
                 yield trial, result

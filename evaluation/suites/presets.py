@@ -1,8 +1,8 @@
 """Suites as other projects evaluate: sensor, team, stop rule and figures.
 
 They run on these projects' floors where any are at hand. Sources: the projects' own scripts at the commits
-named. What cannot be the same is said in ``differences``; the figures of such a run stand beside a project's
-only where none of them matters.
+named. Differences that remain are listed in ``differences``; figures of such a run may be compared with a
+project's only if none of them matters.
 """
 
 import difflib
@@ -18,13 +18,13 @@ _CLOCK = "time is simulated, not that of a clock on the wall"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Preset:
+class _Preset:
     """How a project evaluates.
 
     Attributes
     ----------
     project, source : str
-        Whose it is, and where the numbers are from.
+        Project, and source of the numbers.
     robots : tuple of int
         Sizes of teams.
     settings : dict
@@ -36,9 +36,9 @@ class Preset:
     files : tuple of str
         Patterns of its floors below the folder of real data.
     floors : tuple of str
-        What stands in where there are no such files; empty where nothing does.
+        Substitutes if there are no such files; empty if there are none.
     differences : tuple of str
-        What is not the same as there.
+        Differences from the project.
     """
 
     project: str
@@ -66,8 +66,8 @@ def _lidar(reach: float, beams: int, view: float = _FULL_CIRCLE, noise: float = 
 _POINT = {"robot": "point", "resolution": 0.1, "stop_coverage": None}
 _GRAPH = "robots drive at 1 m/s with a body of 1 cm; the project moves a point between the nodes of a graph"
 
-PRESETS: dict[str, Preset] = {
-    "explore-bench": Preset(
+PRESETS: dict[str, _Preset] = {
+    "explore-bench": _Preset(
         project="Explore-Bench, level 0 (Xu et al., ICRA 2022)",
         source="efc-robot/Explore-Bench ce3b98a, grid_simulator/GridEnv.py and exploration_benchmark/scripts",
         robots=(1, 2),
@@ -88,7 +88,7 @@ PRESETS: dict[str, Preset] = {
             "path_m has every robot; the project prints that of robot 0",
         ),
     ),
-    "ariadne": Preset(
+    "ariadne": _Preset(
         project="ARiADNE (Cao et al., ICRA 2023)",
         source="marmotlab/ARiADNE 8d726ad, env.py and sensor.py",
         robots=(1,),
@@ -102,7 +102,7 @@ PRESETS: dict[str, Preset] = {
             "machines",
         ),
     ),
-    "chen": Preset(
+    "chen": _Preset(
         project="Self-learning exploration (Chen et al., IROS 2019)",
         source="RobustFieldAutonomyLab/DRL_robot_exploration b611d20, scripts/robot_simulation.py",
         robots=(1,),
@@ -115,7 +115,7 @@ PRESETS: dict[str, Preset] = {
             "robot",
         ),
     ),
-    "ir2": Preset(
+    "ir2": _Preset(
         project="IR2 (Tan et al., IROS 2024)",
         source="marmotlab/IR2-Multi-Robot-RL-Exploration e53a6fc, env.py and test_driver.py",
         robots=(4, 5),
@@ -129,7 +129,7 @@ PRESETS: dict[str, Preset] = {
             "floors of a sister project: the project's have no licence",
         ),
     ),
-    "marvel": Preset(
+    "marvel": _Preset(
         project="MARVEL (Chiun et al., ICRA 2025)",
         source="marmotlab/MARVEL 1e2e17d, utils/test_worker.py",
         robots=(4,),
@@ -155,7 +155,7 @@ PRESETS: dict[str, Preset] = {
             "robots drive; the project moves them between the nodes of a graph",
         ),
     ),
-    "maexp": Preset(
+    "maexp": _Preset(
         project="MAexp, indoor (Zhu et al., ICRA 2024)",
         source="DuangZhu/MAexp 6c0014e, env_v7.py",
         robots=(3,),
@@ -175,7 +175,7 @@ PRESETS: dict[str, Preset] = {
             "RV, the deviation of learners' returns, is not printed",
         ),
     ),
-    "mapex": Preset(
+    "mapex": _Preset(
         project="MapEx (Ho et al., ICRA 2025)",
         source="castacks/MapEx b607ed3, scripts/calc_metrics_subdirectory.py",
         robots=(1,),
@@ -200,7 +200,7 @@ PRESETS: dict[str, Preset] = {
             "the project also fills in what it has not seen",
         ),
     ),
-    "houseexpo": Preset(
+    "houseexpo": _Preset(
         project="HouseExpo with PseudoSLAM (Li et al., 2019)",
         source="TeaganLi/HouseExpo 45e2b25, config_exploration.yaml and robot_exploration_v0.py",
         robots=(1,),
@@ -225,14 +225,8 @@ PRESETS: dict[str, Preset] = {
 """Presets by name."""
 
 
-def preset_named(name: str) -> Preset:
-    """Return a preset.
-
-    Raises
-    ------
-    ValueError
-        Where there is none of that name; the nearest one is named.
-    """
+def preset_named(name: str) -> _Preset:
+    """Return a preset."""
     if name not in PRESETS:
         nearest = difflib.get_close_matches(name, PRESETS, n=1)
         guess = f", did you mean {nearest[0]!r}?" if nearest else ""
@@ -240,15 +234,10 @@ def preset_named(name: str) -> Preset:
     return PRESETS[name]
 
 
-def preset_floors(preset: Preset, data: Path | None) -> tuple[str, ...]:
+def _preset_floors(preset: _Preset, data: Path | None) -> tuple[str, ...]:
     """Return the floors of a preset.
 
-    They are its files below a folder of real data, else what stands in for them.
-
-    Raises
-    ------
-    ValueError
-        Where there are neither.
+    They are its files below a folder of real data, else their substitutes.
     """
     files = (
         []
@@ -271,28 +260,11 @@ def preset_suite(
     data: Path | None = None,
     floors: tuple[str, ...] = (),
 ) -> Suite:
-    """Make the suite of a preset.
-
-    Parameters
-    ----------
-    name : str
-        Of the preset.
-    policies, seeds : tuple
-        What is compared, and from where draws come.
-    data : Path or None
-        Folder of real floors.
-    floors : tuple of str
-        Floors in place of the preset's.
-
-    Raises
-    ------
-    ValueError
-        Where there is no such preset, or it has no floors here.
-    """
+    """Make the suite of a preset."""
     preset = preset_named(name)
     return Suite(
         policies=policies,
-        floors=floors or preset_floors(preset, data),
+        floors=floors or _preset_floors(preset, data),
         robots=preset.robots,
         seeds=seeds,
         variants={name: preset.settings},

@@ -1,4 +1,4 @@
-"""Where the robots of a trial start."""
+"""Starts of the robots of a trial."""
 
 import numpy as np
 
@@ -11,12 +11,7 @@ def drawn_starts(
 ) -> list[list[float]] | None:
     """Draw where robots start on a floor that has starts of its own.
 
-    None on others, where a reset draws by the seed.
-
-    Returns
-    -------
-    list or None
-        x, y, theta of each robot [m, rad].
+    None on other floors, if a reset draws by the seed.
     """
     from lidarium.envs.floors.catalogue.names import load_floor
     from lidarium.envs.floors.starts import draw_starts

@@ -1,11 +1,8 @@
-"""What an evaluation asks for, and the single trials that this makes.
-
-It asks for policies x floors x robots x seeds x settings.
-"""
+"""Suites: policies x floors x robots x seeds x settings, read from TOML, and their single trials."""
 
 import json
 import tomllib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import Any
@@ -16,29 +13,121 @@ from lidarium.envs.floors.catalogue.names import is_generated, load_floor, set_f
 from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.settings.making import make_settings
 from lidarium.evaluation.episodes.stop_rules import stop_rule_of
-from lidarium.evaluation.suites.content import (
-    MOST_SUITE_BYTES,
-    ROBOTS,
-    SEED,
-    SIDE,
-    Starts,
-    check_members,
-    check_numbers,
-    check_texts,
-    check_trials,
-    listed,
-    seeds_of,
-    starts_of,
-    tables_of,
-)
 from lidarium.evaluation.suites.trial import DEFAULT_VARIANT, Trial
 from lidarium.mapping.files.guarded_reading import read_text, reading
-from lidarium.mapping.geometry.bounds import shown
+from lidarium.mapping.geometry.bounds import Rule, above, shown, within
+
+MOST_SUITE_BYTES = 1 << 20
+"""Longest file of a suite."""
+
+MOST_EACH = 1_000_000
+"""Most policies, floors, teams, seeds or variants."""
+
+MOST_TRIALS = 10_000_000
+"""Most episodes of a suite."""
+
+ROBOTS = Rule(int, bounds=within(1, 64))
+SEED = Rule(int, bounds=within(0, 2**63 - 1))
+SIDE = Rule(float, True, above(0.0, 1000.0))
+_POSE = Rule(float, bounds=within(-1e8, 1e8))
+
+Starts = tuple[tuple[float, float, float], ...]
+
+
+def check_members(name: str, values: Sequence[Any]) -> None:
+    """Check that there is something, with names, and nothing is there twice."""
+    if not 1 <= len(values) <= MOST_EACH:
+        some = "no" if not values else f"{len(values):,}"
+        raise ValueError(f"the suite has {some} {name}; want at least one, at most {MOST_EACH:,}")
+    seen: set[Any] = set()
+    for value in values:
+        if not isinstance(value, Hashable):
+            raise ValueError(f"the suite has {shown(value)} among its {name}; want names or numbers")
+        if value in seen:
+            raise ValueError(f"the suite names {shown(value)} twice among its {name}")
+        seen.add(value)
+
+
+def check_numbers(name: str, values: Iterable[Any], rule: Rule) -> None:
+    """Check all numbers of a list of the suite."""
+    for value in values:
+        if not rule.hold(value):
+            raise ValueError(f"{name} of the suite has {shown(value)}; want {rule.wanted}")
+
+
+def check_texts(name: str, values: Iterable[Any]) -> None:
+    """Check that all members of a list of the suite are names."""
+    for value in values:
+        if not isinstance(value, str):
+            raise ValueError(f"{name} of the suite has {shown(value)}; want names")
+
+
+def check_trials(*lengths: int) -> None:
+    """Check that a suite has not more episodes than can be counted one by one."""
+    trials = 1
+    for length in lengths:
+        trials *= max(length, 1)
+    if trials > MOST_TRIALS:
+        raise ValueError(f"the suite has {trials:,} episodes; want at most {MOST_TRIALS:,}: part it")
+
+
+def listed(content: Mapping[str, Any], name: str) -> tuple[Any, ...]:
+    """Return a list of a suite; a single name or number stands for a list of it."""
+    values = content[name]
+    if isinstance(values, list | tuple):
+        return tuple(values)
+    if isinstance(values, str | int):
+        return (values,)
+    raise ValueError(f"{name} of the suite is {shown(values)}; want a list")
+
+
+def seeds_of(seeds: Any, content: Mapping[str, Any]) -> tuple[Any, ...]:  # noqa: ANN401
+    """Return the seeds of a suite: those of a list, or so many from 0 on."""
+    if isinstance(seeds, int) and not isinstance(seeds, bool):
+        if not 1 <= seeds <= MOST_EACH:
+            raise ValueError(
+                f"seeds of the suite is {shown(seeds)}; want a list, or how many, 1 to {MOST_EACH:,}"
+            )
+        return tuple(range(seeds))
+    return listed(content, "seeds")
+
+
+def tables_of(content: Any, what: str) -> dict[str, dict[str, Any]]:  # noqa: ANN401
+    """Return tables by name, as those of variants."""
+    if not isinstance(content, Mapping) or not all(isinstance(table, Mapping) for table in content.values()):
+        raise ValueError(f"{what} of the suite is {shown(content)}; want tables, as in [{what}.name]")
+    return {name: dict(table) for name, table in content.items()}
+
+
+def starts_of(content: Any) -> dict[str, tuple[Starts, ...]]:  # noqa: ANN401
+    """Return teams of starts by floor."""
+    if not isinstance(content, Mapping):
+        raise ValueError(f"starts of the suite is {shown(content)}; want a table of teams by floor")
+    return {
+        floor: tuple(_team(floor, team) for team in _list(floor, teams)) for floor, teams in content.items()
+    }
+
+
+def _team(floor: str, team: Any) -> Starts:  # noqa: ANN401
+    for start in _list(floor, team):
+        if len(_list(floor, start)) != 3 or not all(_POSE.hold(value) for value in start):
+            raise ValueError(
+                f"a start on {floor!r} is {shown(start)}; want x, y [m] and theta [rad] of each robot"
+            )
+    return tuple((start[0], start[1], start[2]) for start in team)
+
+
+def _list(floor: str, value: Any) -> Sequence[Any]:  # noqa: ANN401
+    if not isinstance(value, list | tuple):
+        raise ValueError(
+            f"starts on {shown(floor)} has {shown(value)}; want a list of teams, each a list of x, y, theta"
+        )
+    return value
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Suite:
-    """What an evaluation asks for.
+    """The request of an evaluation.
 
     Trials that differ in the policy alone are paired: same floor, same starts, same seed.
 
@@ -60,18 +149,12 @@ class Suite:
     bounds : bool
         Whether each episode is set beside how soon a team that knew the floor could have seen it.
     stop : dict or None
-        When episodes end beside what the settings say, as ``StopRule``.
+        Rule that ends episodes in addition to the settings, as ``StopRule``.
     image_resolution : float or None
-        Metres per pixel, where floors are plain images.
+        Metres per pixel, if floors are plain images.
     policy_settings : dict
         By a name among the policies: options that the policy is made with, and ``policy``, which one it is,
         where the name is another.
-
-    Raises
-    ------
-    ValueError
-        Where there is nothing to try, something is named twice, or a policy, floor, number or setting cannot
-        be used.
     """
 
     policies: tuple[str, ...]
@@ -121,13 +204,7 @@ class Suite:
                     )
 
     def settings(self, variant: str, robots: int) -> ExplorationSettings:
-        """Return the settings of a variant for a team; each episode runs on one thread.
-
-        Raises
-        ------
-        ValueError
-            Where a setting cannot be used; the variant is named.
-        """
+        """Return the settings of a variant for a team; each episode runs on one thread."""
         options = dict(self.variants[variant])
         for name, why in (("robots", "the suite's robots"), ("threads", "one thread an episode")):
             if name in options:
@@ -143,7 +220,7 @@ class Suite:
         Raises
         ------
         ValueError
-            Where there is no such policy, or its settings cannot be used; the message names it.
+            If there is no such policy, or its settings cannot be used; the message names it.
         """
         options = dict(self.policy_settings.get(name, {}))
         try:
@@ -169,25 +246,19 @@ class Suite:
                                     yield Trial(variant, single, robots, start, seed, policy)
 
     def starts_of(self, trial: Trial) -> list[list[float]] | None:
-        """Return the starts of a trial's robots, None where they are not given."""
+        """Return the starts of a trial's robots, None if they are not given."""
         if trial.start < 0:
             return None
         return [list(start) for start in self.starts[trial.floor][trial.start][: trial.robots]]
 
     def as_dict(self) -> dict[str, Any]:
-        """Return what JSON can hold of it."""
+        """Return it as types that JSON has."""
         content: dict[str, Any] = json.loads(json.dumps(asdict(self)))
         return content
 
 
 def read_suite(path: Path) -> Suite:
-    """Read a suite from a TOML file (docs/reference/files.md).
-
-    Raises
-    ------
-    FileNotFoundError, ValueError
-        Where there is no such file, or what it holds cannot be used; the message names the file.
-    """
+    """Read a suite from a TOML file (docs/reference/files.md)."""
     path = Path(path)
     if not path.exists():
         raise FileNotFoundError(f"no suite {path}; want a TOML file, as docs/reference/files.md shows one")
@@ -199,20 +270,7 @@ def read_suite(path: Path) -> Suite:
 
 
 def suite_of(content: Mapping[str, Any]) -> Suite:
-    """Make a suite of what a TOML file holds.
-
-    Parameters
-    ----------
-    content : mapping
-        ``policies``, ``floors``, ``robots``, ``seeds`` (a list, or how many from 0 on), ``settings`` (for all
-        variants), ``variants``, ``starts``, ``draws_starts``, ``bounds``, ``stop``, ``image_resolution``,
-        ``policy_settings``.
-
-    Raises
-    ------
-    ValueError
-        Where something is missing, unknown or cannot be used.
-    """
+    """Make a suite of the content of a TOML file."""
     known = {each.name for each in fields(Suite)} | {"settings"}
     unknown = sorted(set(content) - known)
     if unknown:

@@ -19,9 +19,9 @@ class Trial:
     robots : int
         Size of the team.
     start : int
-        Which of the suite's starts on this floor, -1 where the seed draws them.
+        Which of the suite's starts on this floor, -1 if the seed draws them.
     seed : int
-        Where all draws come from.
+        Seed of all draws.
     policy : str
         Name of the policy.
     """

@@ -1,33 +1,57 @@
 """Runs one trial of a suite, and keeps its record."""
 
+import math
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from lidarium.agents.policy import settings_for
-from lidarium.evaluation.episodes.output import whole_file
-from lidarium.evaluation.suites.bounds import beside_bound
+from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.evaluation.suites.episodes_file import KEY
 from lidarium.evaluation.suites.starts import drawn_starts
 from lidarium.evaluation.suites.suite import Suite
 from lidarium.evaluation.suites.trial import Trial
+from lidarium.mapping.files.output import whole_file
 
 if TYPE_CHECKING:
     from lidarium.evaluation.record import EpisodeRecord
+
+
+BOUND_COVERAGE = 0.99
+"""Share of the floor that bounds are computed for."""
+
+
+def beside_bound(
+    trial: Trial, settings: ExplorationSettings, result: dict[str, Any], image_resolution: float | None
+) -> dict[str, Any]:
+    """Return how soon a team that knew the floor could have seen 99 %, and the episode's time over that."""
+    from lidarium.envs.floors.catalogue.names import load_floor
+    from lidarium.evaluation.bounds.bound import known_floor_bound
+
+    starts = result["starts"]
+    wanted = replace(settings, stop_coverage=BOUND_COVERAGE)
+    bound = known_floor_bound(load_floor(trial.floor, image_resolution), wanted, starts).time_s
+    reached = result["t99_s"]
+    return {
+        "bound_s": round(bound, 6) if math.isfinite(bound) else None,
+        "t99_over_bound": round(reached / bound, 6) if reached is not None and math.isfinite(bound) else None,
+    }
+
 
 RECORDS_FOLDER = "records"
 
 
 class RecordNotWrittenError(OSError):
-    """Raised where a record cannot be written; the next ones could not be either."""
+    """Raised if a record cannot be written; the next ones could not be either."""
 
 
 def run_trial(suite: Suite, trial: Trial, records: Path | None = None) -> dict[str, Any]:
     """Run one episode and return its line.
 
-    Its record is written before, where a folder is given.
+    Its record is written before, if a folder is given.
     """
     from lidarium.evaluation.episodes.history import History
     from lidarium.evaluation.episodes.result import result_of
@@ -74,13 +98,7 @@ def run_trial(suite: Suite, trial: Trial, records: Path | None = None) -> dict[s
 
 
 def write_record_bytes(path: Path, content: bytes) -> None:
-    """Write a record that another machine has made, whole or not at all.
-
-    Raises
-    ------
-    RecordNotWrittenError
-        Where it cannot be written.
-    """
+    """Write a record that another machine has made, whole or not at all."""
     with _kept(path), whole_file(path) as beside:
         beside.write_bytes(content)
 
@@ -94,7 +112,7 @@ def _keep_record(path: Path, record: "EpisodeRecord") -> None:
 
 @contextmanager
 def _kept(path: Path) -> Iterator[None]:
-    """Say of a record that cannot be written what is kept all the same."""
+    """Name the episodes that are kept if a record cannot be written."""
     try:
         yield
     except OSError as error:

@@ -1,3 +1,1 @@
-"""What is true of a floor, for the figures of a run."""
-
-from typing import Any
+"""Ground truth of an episode: free and occupied cells, who sensed and knows them."""

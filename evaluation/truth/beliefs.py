@@ -1,4 +1,4 @@
-"""What the robots' maps say, overlaid on the lattice of the scorer's masks."""
+"""The robots' maps, overlaid on the lattice of the scorer's masks."""
 
 import math
 
@@ -29,7 +29,7 @@ def map_within(env: ExplorationEnv, row: int, rows: slice, columns: slice) -> ND
     """
     log_odds = env.beliefs.log_odds[row]
     if env.settings.known_starts:
-        return on_floor(env, row, log_odds)[rows, columns]
+        return _on_floor(env, row, log_odds)[rows, columns]
     tables, resolution = env.world.floors[0], env.settings.occupancy.resolution
     assert tables is not None
     y, x = ((np.arange(side.start, side.stop) + 0.5) * resolution for side in (rows, columns))
@@ -60,7 +60,7 @@ def cells_beyond(env: ExplorationEnv, row: int) -> tuple[int, int]:
     return round(float(y) / resolution), round(float(x) / resolution)
 
 
-def on_floor(env: ExplorationEnv, row: int, log_odds: NDArray[np.int8]) -> NDArray[np.int8]:
+def _on_floor(env: ExplorationEnv, row: int, log_odds: NDArray[np.int8]) -> NDArray[np.int8]:
     """Return a robot's map on the lattice of the scorer's masks, (rows, columns).
 
     The part that lies on it is taken; the robot knows its start.
@@ -97,7 +97,7 @@ def held_maps(env: ExplorationEnv) -> list[NDArray[np.int8]]:
     """
     held = [env.perception.shared_map(row) for row in range(env.settings.robots)]
     return [
-        on_floor(env, row, navigation.log_odds)
+        _on_floor(env, row, navigation.log_odds)
         for row, navigation in enumerate(held)
         if navigation is not None
     ]
@@ -110,15 +110,13 @@ def free_as_held(env: ExplorationEnv, maps: NDArray[np.int8]) -> NDArray[np.bool
 
     Parameters
     ----------
-    env : ExplorationEnv
-        The environment.
     maps : (robots, rows, columns) int8
         Log-odds of `maps_on_floor`.
 
     Returns
     -------
     (robots, rows, columns) bool
-        Where it is less than 0; read-only.
+        If it is less than 0; read-only.
     """
     if env.perception.hears:
         return np.stack(held_maps(env)) < 0

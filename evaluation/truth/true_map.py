@@ -1,4 +1,4 @@
-"""What is true of a floor, on the lattice of the robots' maps.
+"""Ground truth of a floor, on the lattice of the robots' maps.
 
 The scorer's masks lie on it, too.
 """
@@ -14,9 +14,7 @@ from lidarium.envs.floors.floor import Raster
 from lidarium.envs.floors.free_space import reachable_free_space
 from lidarium.envs.simulation.coverage import unpack_bits
 from lidarium.envs.simulation.disturbances.odometry import RADIUS
-from lidarium.envs.simulation.score import counted_cells
-from lidarium.evaluation.metrics import surface
-from lidarium.evaluation.metrics.shares import Mask
+from lidarium.evaluation.metrics.cells import Mask, surface
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -31,7 +29,7 @@ class Truth:
         F: free cells that the smallest robot's disc sweeps over its configuration space, connected to the
         starts.
     knowable : Mask
-        What a sensor that fits everywhere would come to know: free cells connected to a start through free
+        Cells that a sensor that fits everywhere could know: free cells connected to a start through free
         cells, and the occupied cells 8-adjacent to them. The rest, the inside of solids, sealed rooms and all
         that lies outside, is unknown in a perfect map.
     valid : Mask
@@ -45,7 +43,7 @@ class Truth:
 
 
 def truth_of(env: ExplorationEnv) -> Truth:
-    """Return what is true of the floor of an episode, after its reset."""
+    """Return the ground truth of the floor of an episode, after its reset."""
     occupied = occupied_in_truth(env)
     counted = unpack_bits(env.score.counted_masks[0], occupied.shape[1])
     free = _connected_free(env, occupied)
@@ -57,7 +55,7 @@ def left_by_failed(env: ExplorationEnv) -> Mask | None:
 
     They reach it from where they are now.
 
-    None where none has failed, or all have.
+    None if none has failed, or all have.
     """
     world, tables = env.world, env.world.floors[0]
     failed = world.failed.astype(np.bool_)

@@ -1,1 +1,1 @@
-"""A run shown in a browser while it goes: what is drawn, its page, its controls, its pace."""
+"""A run shown in a browser while it goes: scene, page, controls, pace."""

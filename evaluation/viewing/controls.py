@@ -1,4 +1,4 @@
-"""The controls of a page: pause, speed, whom to follow, which layers, and what is said."""
+"""The controls of a page: pause, speed, whom to follow, layers, and text."""
 
 import math
 from collections.abc import Sequence
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 class Layer(Enum):
-    """What can be shown or not; the value is what a person reads."""
+    """Layers that can be shown; the value is the label."""
 
     FLOOR = "True walls"
     JOINED = "Joined map"
@@ -31,10 +31,10 @@ class Layer(Enum):
 
 
 OF_CAMERAS = (Layer.CLOUDS, Layer.BOXES)
-"""Layers that are there only where robots have cameras."""
+"""Layers that are there only if robots have cameras."""
 
 SPEEDS = {"1 x": 1.0, "2 x": 2.0, "5 x": 5.0, "10 x": 10.0, "20 x": 20.0, "As fast as it goes": math.inf}
-"""Simulated seconds per second by what a person reads."""
+"""Simulated seconds per second by label."""
 
 FIRST_SPEED = "5 x"
 
@@ -47,16 +47,10 @@ PAUSE, GO_ON = "Pause", "Go on"
 
 
 class Controls:
-    """Controls at the side of a page; who asks them gets what was last chosen in any browser.
+    """Controls at the side of a page; they have the last choice in any browser.
 
     Parameters
     ----------
-    server : ViserServer
-        Whose page.
-    agents : sequence of str
-        The robots.
-    has_cameras : bool
-        Whether they have depth cameras.
     heights : (float, float)
         Greatest height at which walls can be cut, and the one to begin with [m].
     """
@@ -110,7 +104,7 @@ class Controls:
 
     @property
     def layers(self) -> frozenset[Layer]:
-        """What is shown."""
+        """Layers that are shown."""
         return frozenset(layer for layer, box in self._layers.items() if box.value)
 
     @property
@@ -119,7 +113,7 @@ class Controls:
         return float(self._height.value)
 
     def write(self, status: str, events: str, coverage: float) -> None:
-        """Show where the run is and what happened (HTML), and a share of the floor as a bar."""
+        """Show progress and events (HTML), and a share of the floor as a bar."""
         self._text.content, self._events.content = status, events
         self._coverage.value = 100.0 * min(coverage, 1.0)
 

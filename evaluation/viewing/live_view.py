@@ -1,29 +1,141 @@
-"""Shows a run in a browser while it goes."""
+"""Shows a run in a browser while it goes, in step with the wall clock."""
 
 import time
 from collections.abc import Callable, Sequence
+from html import escape
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.agents.policy import Policy
-from lidarium.agents.report import GivenUp
+from lidarium.agents.report import GivenUp, PolicyReport
+from lidarium.envs.drawing.frame_parts import team_colours
 from lidarium.envs.drawing.views import CUT_M, false_colours
 from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.onboard.radio.messages import Orders
-from lidarium.evaluation.episodes.interrupts import is_end_asked
-from lidarium.evaluation.episodes.supervision import joined_groups
+from lidarium.evaluation.episodes.events import joined_groups
 from lidarium.evaluation.episodes.watching import WatchedExploration, Watcher
+from lidarium.evaluation.processes import is_end_asked
 from lidarium.evaluation.viewing.controls import Controls, Layer, follow
-from lidarium.evaluation.viewing.maps import TeamMaps
 from lidarium.evaluation.viewing.moment import Moment, moment_of
-from lidarium.evaluation.viewing.pace import LONGEST_WAIT_S, Pace
-from lidarium.evaluation.viewing.scene import TeamScene
-from lidarium.evaluation.viewing.words import events_text, status_text
+from lidarium.evaluation.viewing.scene import TeamMaps, TeamScene
+from lidarium.mapping.files.guarded_reading import printable
 
 if TYPE_CHECKING:
     from viser import ViserServer
+
+
+LONGEST_WAIT_S = 0.05
+"""Longest time between two looks at the controls [s]."""
+
+MOST_BEHIND_S = 0.25
+"""A run that is later than this does not hurry after the clock [s]."""
+
+
+class Pace:
+    """Waits until simulated time is due; it holds up a run and changes nothing of it."""
+
+    def __init__(
+        self,
+        clock: Callable[[], float] = time.monotonic,
+        sleep: Callable[[float], None] = time.sleep,
+    ) -> None:
+        self._clock, self._sleep = clock, sleep
+        self._since = (0.0, 0.0, 0.0)
+
+    def wait(
+        self,
+        time_s: float,
+        speed: Callable[[], float],
+        is_held: Callable[[], bool],
+        meanwhile: Callable[[], bool],
+    ) -> None:
+        """Wait until a simulated time is due."""
+        while True:
+            now, rate = self._clock(), speed()
+            wall_s, simulated_s, before = self._since
+            due = wall_s + (time_s - simulated_s) / rate
+            is_other = rate != before or is_held() or now - due > MOST_BEHIND_S
+            if is_other:
+                self._since, due = (now, time_s, rate), now
+            if not is_held() and now >= due:
+                return
+            self._sleep(LONGEST_WAIT_S if is_held() else min(due - now, LONGEST_WAIT_S))
+            if not meanwhile():
+                return
+
+
+MOST_EVENTS = 6
+"""Most events that are listed, the latest first."""
+
+
+def status_text(env: WatchedExploration, policy: str, report: PolicyReport, decisions: int) -> str:
+    """Return the progress of a run: time, coverage, decisions, and states of robots."""
+    name = "" if env.floor is None else env.floor.name
+    joins = [] if report.supervision is None else [join for join in report.supervision.joins if join.is_used]
+    rows = [
+        ("Time", f"{env.scorer.time:.1f} s"),
+        ("Explored", f"{100.0 * env.scorer.coverage:.1f} %"),
+        ("Decisions", f"{decisions:,}"),
+    ]
+    if report.supervision is not None:
+        rows.append(("Maps joined", f"{len(joins):,}"))
+        rows.append(("Orders", f"{len(report.supervision.orders):,}"))
+    title = f"<b>{_safe(name)}</b><br>{_safe(policy)}"
+    return _BOX.format("".join([title, _table(rows), _robots(env)]))
+
+
+def events_text(env: WatchedExploration, report: PolicyReport) -> str:
+    """Return the latest joins, orders and changes of state, the last one first."""
+    events = [
+        (event.time_s, f"{event.agent}: {event.what}{f' ({event.reason})' if event.reason else ''}")
+        for event in env.operating.events[0]
+    ]
+    if report.supervision is not None:
+        joins = report.supervision.joins
+        events += [(join.time_s, f"{join.a} and {join.b} joined") for join in joins if join.is_used]
+    if not events:
+        return _BOX.format("nothing yet")
+    latest = sorted(events, key=lambda event: event[0])[: -MOST_EVENTS - 1 : -1]
+    return _BOX.format(_table([(_safe(words), f"{time_s:.1f} s") for time_s, words in latest]))
+
+
+_BOX = '<div style="padding:4px 14px 2px;font-size:0.875em;line-height:1.5">{}</div>'
+_TABLE = '<table style="width:100%;margin-top:4px;border-collapse:collapse">{}</table>'
+
+
+def _safe(text: str) -> str:
+    """Return text that HTML shows as it is."""
+    return escape(printable(text))
+
+
+def _table(rows: Sequence[tuple[str, str]]) -> str:
+    return _TABLE.format(
+        "".join(
+            f'<tr><td>{name}</td><td style="text-align:right;white-space:nowrap">{value}</td></tr>'
+            for name, value in rows
+        )
+    )
+
+
+def _robots(env: WatchedExploration) -> str:
+    """Return a line for each robot: its colour, state, and distance driven."""
+    lines = []
+    colours = team_colours(env.settings.robots)
+    for row, (agent, (red, green, blue)) in enumerate(zip(env.possible_agents, colours, strict=True)):
+        dot = f'<span style="color:rgb({red},{green},{blue})">&#9679;</span>'
+        lines.append((f"{dot} {agent}", f"{_doing(env, row)}, {env.world.travelled[row]:.1f} m"))
+    return _table(lines)
+
+
+def _doing(env: WatchedExploration, row: int) -> str:
+    if env.possible_agents[row] not in env.agents:
+        return "ended"
+    if env.driver is None:
+        return "driving"
+    return env.driver.state(row).value.replace("_", " ")
+
 
 FRAME_S, MAPS_S = 0.1, 0.5
 """Least wall time between two frames, and between two drawings of maps and words [s]."""
@@ -32,7 +144,7 @@ MAPS_SHARE = 0.1
 """Most of the wall time that drawing maps takes."""
 
 LOW_WALLS_M = 0.4
-"""Height at which walls are cut at first where nobody looks at furniture [m]."""
+"""Height at which walls are cut at first if nobody looks at furniture [m]."""
 
 DEPTH_SIZE = 180, 240
 """Rows and columns of the depth image at the side [pixels]."""
@@ -40,19 +152,6 @@ DEPTH_SIZE = 180, 240
 
 class LiveView(Watcher):
     """A page that shows the run at hand; the run is the same to the bit with and without it.
-
-    Parameters
-    ----------
-    server : ViserServer
-        Whose page.
-    policy : Policy
-        Who decides.
-    name : str
-        The policy's.
-    clock : callable
-        Wall time [s].
-    pace : Pace or None
-        What keeps the run to the speed that was chosen.
 
     Attributes
     ----------
@@ -73,7 +172,7 @@ class LiveView(Watcher):
         self.has_ended = False
 
     def begin(self, env: ExplorationEnv) -> None:
-        """Lay out the page and draw the start; what was seen of an episode before is forgotten."""
+        """Lay out the page and draw the start; data of an earlier episode is dropped."""
         assert isinstance(env, WatchedExploration)
         assert env.floor is not None
         self._env, self.has_ended, self._decisions = env, False, 0
@@ -103,7 +202,7 @@ class LiveView(Watcher):
         self._decisions += 1
 
     def outcome(self, env: ExplorationEnv) -> None:
-        """Draw the end, where all robots have ended."""
+        """Draw the end, if all robots have ended."""
         if not env.agents:
             self.has_ended = True
             self._controls.end()
@@ -116,7 +215,7 @@ class LiveView(Watcher):
             self._answer_controls()
 
     def _answer_controls(self) -> bool:
-        """Follow what was chosen at the side; return whether nobody wants the run to end."""
+        """Follow the controls; return whether nobody wants the run to end."""
         layers = self._controls.layers
         self._scene.cut_walls(self._controls.wall_height)
         self._scene.show(layers)

@@ -1,4 +1,4 @@
-"""What a page shows of a run at one time, besides maps: bodies, scans, paths, plans, boxes."""
+"""The state of a run at one time that a page shows, besides maps: bodies, scans, paths, plans, boxes."""
 
 from dataclasses import dataclass
 
@@ -38,9 +38,9 @@ class RobotMoment:
     is_hit : (beams,) bool
         Which of them met something.
     trail : (T, 2) float64
-        Where it has been, in the floor's frame [m].
+        If it has been, in the floor's frame [m].
     plan : (P, 2) float64
-        What is left of the path that it drives, placed as ``believed`` [m].
+        Rest of the path that it drives, placed as ``believed`` [m].
     goal : (2,) float64 or None
         Where it drives to, placed alike [m].
     cloud : (C, 3) float32
@@ -86,9 +86,9 @@ class Moment:
 
 
 def moment_of(env: WatchedExploration) -> Moment:
-    """Return what is to be drawn of an environment after a reset; nothing of it is changed.
+    """Return the drawn state of an environment after a reset, which is not changed.
 
-    What a robot would only work out because somebody asks, such as a sparse map, is not asked for.
+    Data that a robot would compute only on request, such as a sparse map, is not requested.
     """
     believed, trails = believed_on_floor(env), _trails(env)
     frames = None if env.simulation.camera is None else env.simulation.camera.frames

@@ -21,15 +21,7 @@ MISSING = 'a view needs the package viser; pip install "lidarium[viewer]"'
 
 @contextmanager
 def view_server(port: int) -> Iterator["ViserServer"]:
-    """Serve a page at a port, any free one where 0.
-
-    Raises
-    ------
-    ValueError
-        Where the package of the extra ``viewer`` is not installed.
-    OSError
-        Where the port cannot be had.
-    """
+    """Serve a page at a port, any free one where 0."""
     try:
         import rich
         import viser
@@ -65,7 +57,7 @@ def view_server(port: int) -> Iterator["ViserServer"]:
 
 
 def address_of(server: "ViserServer") -> str:
-    """Return what a browser opens."""
+    """Return the address for a browser."""
     return f"http://{server.get_host()}:{server.get_port()}"
 
 

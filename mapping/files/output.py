@@ -1,11 +1,15 @@
 """Files that are there whole or not at all."""
 
+import errno
+import json
 import os
 import re
 import secrets
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+import tempfile
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import Any
 
 _BESIDE = re.compile(r"\.(?P<name>.+)\.[0-9a-f]{8}")
 """Names under which ``write_whole`` writes."""
@@ -80,3 +84,140 @@ def only_writer(path: Path) -> Iterator[None]:
         yield
     finally:
         os.close(handle)
+
+
+_UNFINISHED = re.compile(r"\.(?P<name>.+)\.[a-z0-9_]{8}")
+"""Names of the folders in which ``whole_file`` writes."""
+
+
+@contextmanager
+def whole_file(path: Path) -> Iterator[Path]:
+    """Lend a name beside ``path`` to write to.
+
+    It becomes ``path`` at the end, when it is on the disk, and is removed where writing fails. A link of that
+    name is replaced, not followed.
+
+    Parameters
+    ----------
+    path : Path
+        The file that shall be; its folder is made if absent. The lent name ends as this one does.
+
+    Yields
+    ------
+    Path
+        Where to write.
+
+    Raises
+    ------
+    OSError
+        Where nothing can be written there.
+    """
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(dir=path.parent, prefix=f".{path.name}.") as folder:
+        beside = Path(folder) / path.name
+        with errors_named(path):
+            yield beside
+            _bring_to_disk(beside)
+        beside.replace(path)
+
+
+def _bring_to_disk(path: Path) -> None:
+    """Wait until a file is on the disk: some report only then that they are full."""
+    handle = os.open(path, os.O_RDWR)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
+
+
+def clear_unfinished(folder: Path, suffix: str) -> None:
+    """Take away what ``whole_file`` left where its process was killed.
+
+    Only what it made goes: a folder of its naming, no link, that holds at most the one file.
+
+    Parameters
+    ----------
+    folder : Path
+        Where it wrote; nobody writes there now.
+    suffix : str
+        How the files' names end, such as ``.npz``.
+    """
+    for rest in folder.glob(f".*{suffix}.*"):
+        named = _UNFINISHED.fullmatch(rest.name)
+        if named is None or not named["name"].endswith(suffix) or rest.is_symlink():
+            continue
+        with suppress(OSError):  # it is no folder, or cannot be read
+            if set(os.listdir(rest)) <= {named["name"]}:
+                (rest / named["name"]).unlink(missing_ok=True)
+                rest.rmdir()
+
+
+def check_written(folder: Path, names: Iterable[str]) -> None:
+    """Check that the files that were written are still there.
+
+    Raises
+    ------
+    FileNotFoundError
+        Where one is not: the folder was removed or replaced meanwhile.
+    """
+    for name in names:
+        if not (Path(folder) / name).is_file():
+            raise FileNotFoundError(
+                errno.ENOENT,
+                "was written, and somebody has removed it meanwhile; run the same command again",
+                str(Path(folder) / name),
+            )
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a text file (UTF-8)."""
+    with whole_file(path) as beside:
+        beside.write_text(text, encoding="utf-8")
+
+
+def as_json(content: Mapping[str, Any]) -> str:
+    """Return JSON text with a line feed at the end.
+
+    Raises
+    ------
+    ValueError
+        Where a number is not finite: JSON has no such numbers.
+    """
+    text = json.dumps(content, indent=2, allow_nan=False, ensure_ascii=False) + "\n"
+    # Bytes of names that are no UTF-8 are escaped as JSON does it.
+    return text.encode("utf-8", "backslashreplace").decode()
+
+
+def write_json(path: Path, content: Mapping[str, Any]) -> None:
+    """Write a JSON file; raises as `as_json`."""
+    write_text(path, as_json(content))
+
+
+def check_writable(folder: Path) -> None:
+    """Check that files can be written to a folder that need not exist yet.
+
+    The check leaves nothing behind.
+
+    Raises
+    ------
+    NotADirectoryError
+        Where the folder, or one above it, is a file.
+    PermissionError
+        Where nothing can be written there.
+    """
+    folder = Path(folder)
+    nearest = folder.absolute()
+    while not nearest.exists() and not nearest.is_symlink():
+        nearest = nearest.parent
+    if not nearest.is_dir():
+        raise NotADirectoryError(
+            f"cannot write to {folder}: {nearest} is not a folder; want a folder, or a new name"
+        )
+    try:
+        with tempfile.TemporaryDirectory(dir=nearest, prefix=".lidarium."):
+            pass
+    except OSError as error:
+        raise PermissionError(
+            f"cannot write to {folder}: {error.strerror or error}; want a folder that can be written to"
+        ) from error

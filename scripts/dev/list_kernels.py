@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from lidarium.mapping.kernels.first_start import encode_type
-from lidarium.scripts.process.first_start import LIST, count_compiled
+from lidarium.scripts.first_start import LIST, count_compiled
 
 CHILD = "--child"
 
@@ -43,7 +43,7 @@ def _code_size(kernel: Any) -> int:  # noqa: ANN401
     )
 
 
-def run_and_list(caches: Path | None) -> list[dict[str, Any]]:
+def _run_and_list(caches: Path | None) -> list[dict[str, Any]]:
     """Run ``lidarium run`` in a process of its own and return the kernels that it called."""
     with tempfile.TemporaryDirectory() as folder:
         # A floor that is not in the user's cache: what draws floors is among the kernels.
@@ -56,8 +56,8 @@ def run_and_list(caches: Path | None) -> list[dict[str, Any]]:
 
 
 def _child(folder: str) -> None:
+    from lidarium.scripts import first_start
     from lidarium.scripts.main import main
-    from lidarium.scripts.process import first_start
 
     first_start.compile_first = lambda is_quiet: None
     assert main(["run", "--out", f"{folder}/run"]) == 0
@@ -66,9 +66,9 @@ def _child(folder: str) -> None:
 
 def _write() -> None:
     with tempfile.TemporaryDirectory() as caches:
-        run_and_list(Path(caches))
+        _run_and_list(Path(caches))
         compiled = count_compiled(Path(caches))
-        kernels = run_and_list(Path(caches))
+        kernels = _run_and_list(Path(caches))
     lines = ",\n".join(json.dumps(each) for each in kernels)
     LIST.write_text(f'{{"compiled": {compiled}, "kernels": [\n{lines}\n]}}\n')
 
@@ -77,7 +77,7 @@ def _is_current() -> bool:
     def by_name(kernels: list[dict[str, Any]]) -> list[str]:
         return sorted(json.dumps(each) for each in kernels)
 
-    return by_name(json.loads(LIST.read_text())["kernels"]) == by_name(run_and_list(None))
+    return by_name(json.loads(LIST.read_text())["kernels"]) == by_name(_run_and_list(None))
 
 
 if __name__ == "__main__":

@@ -21,8 +21,8 @@ LEAST_SHARE = 0.015
 """Share of all compiling that makes a kernel worth a place in the list."""
 
 
-def compiled_in_reset() -> list[dict[str, Any]]:
-    """Reset an environment; return the kernels that took long, the longest first, with what they call."""
+def _compiled_in_reset() -> list[dict[str, Any]]:
+    """Reset an environment; return the kernels that took long, the longest first, with their callees."""
     from numba.core import event
     from numba.core.dispatcher import Dispatcher
 
@@ -78,7 +78,7 @@ def _place_of(kernel: Any) -> str:  # noqa: ANN401
 def main() -> None:
     """Write the list."""
     if sys.argv[1:] == [CHILD]:
-        print(json.dumps(compiled_in_reset()))
+        print(json.dumps(_compiled_in_reset()))
         return
     with tempfile.TemporaryDirectory() as caches:
         environment = {**os.environ, "NUMBA_CACHE_DIR": caches, "XDG_CACHE_HOME": caches, SWITCH: "off"}

@@ -33,7 +33,7 @@ def parameters(function: ast.FunctionDef) -> int:
 
 
 def measure(root: Path) -> dict[str, str]:
-    """Return the figures of a checkout, by what they measure."""
+    """Return the figures of a checkout by name."""
     sources = {path: path.read_text() for layer in LAYERS for path in sorted((root / layer).rglob("*.py"))}
     found = [each for text in sources.values() for each in functions(ast.parse(text))]
     lengths, counts = [length(each) for each in found], [parameters(each) for each in found]

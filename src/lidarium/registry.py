@@ -5,7 +5,9 @@ is imported when the item is first asked for, so a name costs nothing until it i
 """
 
 import difflib
+import os
 import reprlib
+import sys
 from collections.abc import Iterable, Iterator, Mapping
 from importlib import import_module
 from typing import Any, Generic, TypeVar, cast
@@ -29,6 +31,9 @@ REGISTRIES: dict[str, str] = {
     "study": "lidarium.benchmarks.studies:STUDIES",
     "reward_term": "lidarium.envs.engine.reward_terms:REWARD_TERMS",
     "backend": "lidarium.envs.simulation.backends:BACKENDS",
+    "metric": "lidarium.evaluation.episodes.result:METRICS",
+    "film": "lidarium.evaluation.drawing.films:FILMS",
+    "command": "lidarium.scripts.commands:COMMANDS",
 }
 """All registries by kind, and where each is."""
 
@@ -155,3 +160,29 @@ def registry(kind: str) -> Registry[Any]:
         raise ValueError(unknown("registry", kind, REGISTRIES))
     module, _, attribute = REGISTRIES[kind].partition(":")
     return cast("Registry[Any]", getattr(import_module(module), attribute))
+
+
+IMPORTS_VARIABLE = "LIDARIUM_IMPORT"
+"""Environment variable that names modules of the user's, separated by commas; workers import them, too."""
+
+
+def import_own(names: Iterable[str] = ()) -> None:
+    """Import modules that register parts of the user's: those named here, and those in ``LIDARIUM_IMPORT``.
+
+    They are installed, or in the current folder. Processes started from here import them, too. A ValueError
+    if one cannot be imported.
+    """
+    named = [name for name in os.environ.get(IMPORTS_VARIABLE, "").split(",") if name]
+    wanted = list(dict.fromkeys([*named, *names]))
+    here = os.getcwd() if wanted else ""
+    if wanted and here not in sys.path and "" not in sys.path:
+        sys.path.append(here)
+    for name in wanted:
+        try:
+            import_module(name)
+        except ImportError as error:
+            raise ValueError(
+                f"module {name!r} cannot be imported ({error}); want a module that is installed or in {here}"
+            ) from error
+    if wanted:
+        os.environ[IMPORTS_VARIABLE] = ",".join(wanted)

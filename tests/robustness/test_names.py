@@ -12,13 +12,13 @@ from matplotlib.figure import Figure
 from lidarium.envs.floors.catalogue.names import load_floor
 from lidarium.evaluation.analysis.episodes import read_episodes
 from lidarium.evaluation.drawing.picture_parts import save_figure
-from lidarium.evaluation.episodes.output import as_json
 from lidarium.evaluation.report import write_report
-from lidarium.evaluation.report.plain_text import code, plain
+from lidarium.evaluation.report.tables import code, plain
 from lidarium.evaluation.suites.campaign import Campaign
 from lidarium.evaluation.suites.suite import Suite
 from lidarium.mapping.files.guarded_reading import printable
 from lidarium.mapping.files.map_files import write_ros_map
+from lidarium.mapping.files.output import as_json
 
 NAMES = ["$\\frac{$", "a|b`c", "<script>alert(1)<", "x\x1b[31m", "_*[a](b)_", "\udcff\udcfe", "$", "名"]
 

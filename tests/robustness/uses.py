@@ -30,7 +30,7 @@ from lidarium.mapping.files.spline_files import compact_arrays, read_spline_map
 from lidarium.mapping.files.trajectories import interpolated, read_tum
 from lidarium.mapping.localization.dead_reckoning.localizer import Sensing
 from lidarium.mapping.localization.registry import make_localizer
-from lidarium.scripts.evaluate import summary_of
+from lidarium.scripts.commands.evaluate import summary_of
 from lidarium.training.places import place_of
 from lidarium.training.settings import read_training
 from lidarium.training.teaching.samples import joined, read_samples

@@ -7,10 +7,10 @@ import pytest
 from films_read import read_film, share_of
 
 from lidarium.envs.drawing.frame_parts import EXPLORED, team_colours
-from lidarium.evaluation.drawing.films.own_maps import JOINED
+from lidarium.evaluation.drawing.map_film import JOINED
 from lidarium.evaluation.record.file import read_record
 from lidarium.scripts.main import main
-from lidarium.scripts.output.run_films import RunFilms
+from lidarium.scripts.run_output import RunFilms
 
 SHORT = ["--robots", "2", "--policy", "nearest_frontier", "--map-resolution", "0.05", "--horizon-s", "4"]
 

@@ -12,7 +12,8 @@ import yaml
 
 from lidarium.mapping.files.map_files import read_ros_map, write_ros_map
 from lidarium.mapping.kernels import compilation
-from lidarium.scripts import main as command_line
+from lidarium.scripts.commands import COMMANDS
+from lidarium.scripts.commands.run import Run
 from lidarium.scripts.main import main
 
 
@@ -44,6 +45,15 @@ def refused(arguments, capsys, tmp_path, *words):
     assert not out.exists()
     assert not (tmp_path / "runs").exists()
     return told.err
+
+
+def failing(run):
+    """Return a command with the options of `run` that does something else."""
+
+    def execute(command: Run):
+        return run(command)
+
+    return execute
 
 
 def rewritten(path, **changes):
@@ -377,7 +387,7 @@ def test_memory_that_runs_out_is_told_without_a_traceback(tmp_path, capsys, monk
     def fail(command):
         raise MemoryError
 
-    monkeypatch.setitem(command_line._EXECUTE, command_line.Run, fail)
+    monkeypatch.setitem(COMMANDS._items, "run", failing(fail))
     refused(["run"], capsys, tmp_path, "memory")
 
 
@@ -419,7 +429,7 @@ def test_a_defect_of_ours_asks_for_a_report(capsys, monkeypatch):
     def fail(command):
         raise RuntimeError("a wheel came off")
 
-    monkeypatch.setitem(command_line._EXECUTE, command_line.Run, fail)
+    monkeypatch.setitem(COMMANDS._items, "run", failing(fail))
     assert main(["run"]) == 1
     told = capsys.readouterr()
     assert told.out == ""
@@ -431,7 +441,7 @@ def test_an_interrupt_out_of_compiled_code_is_no_defect(capsys, monkeypatch):
     def interrupted(command):
         raise SystemError("returned a result with an exception set") from KeyboardInterrupt()
 
-    monkeypatch.setitem(command_line._EXECUTE, command_line.Run, interrupted)
+    monkeypatch.setitem(COMMANDS._items, "run", failing(interrupted))
     assert main(["run"]) == 130
     assert capsys.readouterr().err.endswith("interrupted\n")
 

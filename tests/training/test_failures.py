@@ -2,7 +2,7 @@
 
 import pytest
 
-from lidarium.evaluation.suites.workers import WorkerDiedError
+from lidarium.evaluation.processes import WorkerDiedError
 from lidarium.training.failures import raise_named
 
 

@@ -12,13 +12,12 @@ from safetensors.numpy import load, save
 from torch import nn
 
 from lidarium.agents.learned.weights import load_weights, save_weights
-from lidarium.evaluation.episodes.output import write_json
 from lidarium.mapping.files.guarded_reading import read_bytes, read_text, reading, shortened
-from lidarium.mapping.files.output import write_whole
+from lidarium.mapping.files.output import write_json, write_whole
 from lidarium.training.torch_network import ExplorerNetwork
 
 MOMENTS = ("exp_avg", "exp_avg_sq")
-"""What Adam keeps of each parameter, beside how often it was changed."""
+"""Adam's state of each parameter, besides its step count."""
 
 MOST_STATE = 1 << 20
 """Files that say how far a training has come are no larger."""
@@ -36,7 +35,7 @@ class Checkpoint:
     decisions : int
         How many were made.
     curve : list of (int, float or None)
-        Mean reward of the episodes that ended, by the number of decisions; None where none ended.
+        Mean reward of the episodes that ended, by the number of decisions; None if none ended.
     """
 
     decisions: int
@@ -45,12 +44,12 @@ class Checkpoint:
 
 @dataclass(frozen=True, slots=True)
 class Learner:
-    """What learns, beside the network.
+    """The learner, besides the network.
 
     Attributes
     ----------
     critic : Module
-        What estimates how well an episode goes on.
+        The critic.
     optimizer : Adam
         Of network and critic.
     """
@@ -64,8 +63,8 @@ def write_checkpoint(
 ) -> None:
     """Write a checkpoint, and remove all but the last two.
 
-    The file that makes it one is written last and removed first: whenever the process is killed, what is
-    found is whole.
+    The file that makes it one is written last and removed first: whenever the process is killed, the part
+    that is found is whole.
     """
     name = _name(checkpoint.decisions)
     save_weights(folder / f"{name}.safetensors", network.weights())
@@ -78,13 +77,7 @@ def write_checkpoint(
 
 
 def latest_checkpoint(folder: Path) -> Checkpoint | None:
-    """Return the latest checkpoint of a folder, None where there is none.
-
-    Raises
-    ------
-    ValueError
-        Where a file is damaged; the message names it.
-    """
+    """Return the latest checkpoint of a folder, None if there is none."""
     found = sorted(folder.glob("decisions-*.json"))
     if not found:
         return None
@@ -97,13 +90,7 @@ def latest_checkpoint(folder: Path) -> Checkpoint | None:
 
 
 def restore(folder: Path, checkpoint: Checkpoint, network: ExplorerNetwork, learner: Learner) -> None:
-    """Bring network and learner to where they were at a checkpoint.
-
-    Raises
-    ------
-    ValueError
-        Where a file is missing, damaged, or of another network; the message names it, and what to remove.
-    """
+    """Bring network and learner to where they were at a checkpoint."""
     name = _name(checkpoint.decisions)
     path = weights_of(folder, checkpoint)
     try:
@@ -141,13 +128,7 @@ def _state_of(learner: Learner) -> dict[str, NDArray[np.float32]]:
 
 
 def _set_state(learner: Learner, arrays: dict[str, NDArray[np.float32]]) -> None:
-    """Take the critic and the moments of the optimizer over.
-
-    Raises
-    ------
-    KeyError, RuntimeError
-        Where an array is missing, or has another shape.
-    """
+    """Take the critic and the moments of the optimizer over."""
     tensors = {name: torch.from_numpy(np.array(array)) for name, array in arrays.items()}
     state = {}
     for k, parameter in enumerate(_parameters(learner.optimizer)):

@@ -1,6 +1,6 @@
-"""A Gymnasium environment of decisions: each step chooses where one robot of a team sets out.
+"""A Gymnasium environment of decisions: each step chooses if one robot of a team sets out.
 
-The robots of a team are asked in turn; all share the rewards. These are what is gained on classic tours: of
+The robots of a team are asked in turn; all share the rewards. The reward is the gain over classic tours: of
 the time that those take, the share that they needed for what was newly seen, minus the share that it took.
 They add up to 1 less the time over that of classic tours.
 """
@@ -33,13 +33,6 @@ class ChoiceEnv(gymnasium.Env[Observation, np.int64]):
     """Chooses the first legs of tours, one robot after the other.
 
     An observation is a row of ``Decisions``; an action is the number of an option.
-
-    Parameters
-    ----------
-    places : callable
-        Returns the n-th place. Those where classic tours do not see enough are passed over.
-    first, step : int
-        The places are ``first``, ``first + step`` and so on, for environments side by side.
     """
 
     metadata = {"render_modes": []}  # noqa: RUF012
@@ -92,13 +85,7 @@ class ChoiceEnv(gymnasium.Env[Observation, np.int64]):
         return self._place
 
     def step(self, action: np.int64) -> tuple[Observation, SupportsFloat, bool, bool, dict[str, Any]]:
-        """Let the robot that was asked for set out, and go on to the next decision.
-
-        Raises
-        ------
-        ValueError
-            Where there is no episode, or the mask forbids the action.
-        """
+        """Let the robot that was asked for set out, and go on to the next decision."""
         before = self._asked
         if self._episode is None or before.decision is None or self._pace is None:
             raise ValueError("there is no episode to go on with; call reset() first")

@@ -27,7 +27,7 @@ class Asked:
     Attributes
     ----------
     decision : Decision or None
-        None where the episode has ended.
+        None if the episode has ended.
     time_s : float
         Time since its start [s].
     coverage : float
@@ -65,7 +65,7 @@ class Pace:
 def classic_pace(place: Place) -> Pace | None:
     """Return how fast classic tours explore.
 
-    None where they do not see enough, or all at once.
+    None if they do not see enough, or all at once.
     """
     env = ExplorationEnv(place.floor, place.settings)
     course: list[tuple[float, float]] = []
@@ -91,13 +91,7 @@ class _AbandonedError(Exception):
 
 
 class AskedEpisode:
-    """An episode that asks for each decision.
-
-    Parameters
-    ----------
-    place : Place
-        Where.
-    """
+    """An episode that asks for each decision."""
 
     def __init__(self, place: Place) -> None:
         self._questions: SimpleQueue[Asked | BaseException] = SimpleQueue()
@@ -107,13 +101,7 @@ class AskedEpisode:
         self._thread.start()
 
     def ask(self) -> Asked:
-        """Return the decision that is asked for next; the last one was answered.
-
-        Raises
-        ------
-        Exception
-            What the episode has raised.
-        """
+        """Return the decision that is asked for next; the last one was answered."""
         asked = self._questions.get()
         if isinstance(asked, BaseException):
             raise asked

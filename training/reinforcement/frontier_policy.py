@@ -25,7 +25,7 @@ SITUATION = ("time_left", "coverage", "velocity", "bumper")
 """Observables that are seen of the situation."""
 
 METRES, SQUARE_METRES, SECONDS = 10.0, 10.0, 60.0
-"""What lengths, areas and ages are divided by."""
+"""Scales of lengths, areas and ages."""
 
 PATH_FACTOR = 3.0
 """A metre of path counts as so many of size, as in explore_lite."""
@@ -37,22 +37,10 @@ MOST_GROUPS = 4
 
 
 class FrontierRanking(BaseFeaturesExtractor):
-    """Ranks the frontiers on offer, and estimates what is still gained.
-
-    Parameters
-    ----------
-    observation_space : Dict
-        Of an environment at the level of frontiers: ``frontiers`` and ``action_mask``, and any of
-        ``frontier_gains``, ``teammates`` and those of ``SITUATION``.
-
-    Raises
-    ------
-    ValueError
-        Where it has no frontiers, or something that the network does not see.
-    """
+    """Ranks the frontiers on offer, and estimates the future gain."""
 
     def __init__(self, observation_space: spaces.Space[dict[str, object]]) -> None:
-        check_observed(observation_space)
+        _check_observed(observation_space)
         assert isinstance(observation_space, spaces.Dict)
         shapes = {name: space.shape or () for name, space in observation_space.spaces.items()}
         super().__init__(observation_space, shapes[MASK][0] + 1)
@@ -124,14 +112,8 @@ class FrontierPolicy(RankingPolicy):
     ranking = FrontierRanking
 
 
-def check_observed(space: spaces.Space[dict[str, object]]) -> None:
-    """Check that a network can see what there is to observe.
-
-    Raises
-    ------
-    ValueError
-        Where it cannot; the message says what to observe.
-    """
+def _check_observed(space: spaces.Space[dict[str, object]]) -> None:
+    """Check that the network supports the observations."""
     seen = (FRONTIERS, GAINS, TEAMMATES, *SITUATION)
     names = list(space.spaces) if isinstance(space, spaces.Dict) else []
     if FRONTIERS not in names or MASK not in names:

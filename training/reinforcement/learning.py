@@ -1,4 +1,4 @@
-"""Goes on with a network by rewards: sb3-contrib's PPO with masks, from checkpoint to checkpoint.
+"""Trains a network further by rewards: sb3-contrib's PPO with masks, from checkpoint to checkpoint.
 
 J. Schulman et al., "Proximal policy optimization algorithms", 2017; masks: S. Huang and S. Ontanon, 2022.
 """
@@ -37,26 +37,7 @@ PLACES_PER_CHECKPOINT = 1000
 def learn(
     training: TrainingSettings, folder: Path, begin: Path | None, workers: int, log: Path
 ) -> Generator[Progress, None, None]:
-    """Go on with a network by rewards, from its last checkpoint on.
-
-    Parameters
-    ----------
-    training : TrainingSettings
-        What is asked for; its last round says on what floors and with which teams.
-    folder : Path
-        Where checkpoints are kept.
-    begin : Path or None
-        Weights to begin with, those of classic tours where None.
-    workers : int
-        Where 1, all environments are in this process; else each has one of its own. It changes nothing else.
-    log : Path
-        Where TensorBoard's files go.
-
-    Raises
-    ------
-    ValueError
-        Where a checkpoint is damaged, or the process of an environment has ended.
-    """
+    """Go on with a network by rewards, from its last checkpoint on."""
     settings, checkpoint = training.ppo, latest_checkpoint(folder) or Checkpoint(0, [])
     total = -(-settings.decisions // settings.checkpoint) * settings.checkpoint
     if checkpoint.decisions >= total:
@@ -93,7 +74,7 @@ def learn(
 
 
 def _close(environment: VecEnv, is_whole: bool) -> None:
-    """Close environments; where learning was broken off, end their processes.
+    """Close environments; if learning was broken off, end their processes.
 
     Of these some may have answered and others not: asked to close, they would be waited for without end.
     """
@@ -154,11 +135,6 @@ def _learn_on(
 
     New episodes begin and all draws are seeded again, so that a training that goes on from a checkpoint does
     the same as one that was never interrupted.
-
-    Returns
-    -------
-    float or None
-        Mean reward of the episodes that ended, None where none did.
     """
     environment.env_method("begin_at", number * PLACES_PER_CHECKPOINT)
     model.set_random_seed(training.seed + 1 + number)

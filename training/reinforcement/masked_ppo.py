@@ -15,7 +15,7 @@ from lidarium.training.torch_network import ExplorerNetwork, Seen
 
 
 class _PreferencesAndValue(BaseFeaturesExtractor):
-    """The network's preferences, then the critic's estimate of what is still gained.
+    """The network's preferences, then the critic's estimate of the future gain.
 
     Gradients of values do not reach the network: it prefers, and nothing else.
     """
@@ -49,7 +49,7 @@ class RankingPolicy(MaskableMultiInputActorCriticPolicy):
     Attributes
     ----------
     ranking : type of BaseFeaturesExtractor
-        Returns the preferences, then an estimate of what is still gained.
+        Returns the preferences, then an estimate of the future gain.
     """
 
     ranking: type[BaseFeaturesExtractor]
@@ -83,7 +83,7 @@ class ExplorerPolicy(RankingPolicy):
 
     @property
     def critic(self) -> nn.Module:
-        """What estimates how well an episode goes on."""
+        """The critic."""
         assert isinstance(self.features_extractor, _PreferencesAndValue)
         return self.features_extractor.critic
 

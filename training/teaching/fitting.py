@@ -1,4 +1,4 @@
-"""Fits a network to lessons: what the teacher regrets less is preferred more."""
+"""Fits a network to lessons: options that the teacher rates better are preferred."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -32,7 +32,7 @@ class Fit:
     Attributes
     ----------
     fitted, held_out : float
-        Mean regret on what is fitted, where options are drawn by their preferences, and on what is not, where
+        Mean regret on the fitted samples, with options drawn by their preferences, and on the others, with
         the preferred one is taken [m].
     """
 
@@ -41,29 +41,7 @@ class Fit:
 
 
 def fit(network: ExplorerNetwork, floors: list[Samples], settings: FitSettings, seed: int) -> Iterator[Fit]:
-    """Fit a network to the samples of some floors, and keep its best epoch.
-
-    Parameters
-    ----------
-    network : ExplorerNetwork
-        Changed in place.
-    floors : list of Samples
-        Floor by floor.
-    settings : FitSettings
-        How.
-    seed : int
-        Of the order.
-
-    Yields
-    ------
-    Fit
-        How each epoch went.
-
-    Raises
-    ------
-    ValueError
-        Where there are not two floors.
-    """
+    """Fit a network to the samples of some floors, and keep its best epoch."""
     if len(floors) < 2:
         raise ValueError(f"there are lessons of {len(floors)} floors; want 2 at least: one is held out")
     generator = np.random.default_rng(seed)
@@ -88,7 +66,7 @@ def fit(network: ExplorerNetwork, floors: list[Samples], settings: FitSettings, 
 def held_out_of(count: int, share: float) -> NDArray[np.bool_]:
     """Return which of some floors are held out, (count,) bool: one at least, and not all.
 
-    A floor that is held out stays so when more follow: no round has fitted what a later one is judged by.
+    A floor that is held out stays so when more follow: no round is fitted to samples that judge a later one.
     """
     draws = np.random.default_rng(SPLIT_SEED).random(count)
     is_held_out = draws < share
@@ -98,7 +76,7 @@ def held_out_of(count: int, share: float) -> NDArray[np.bool_]:
 
 
 def evaluate(network: ExplorerNetwork, groups: Sequence[Samples], settings: FitSettings) -> float:
-    """Return the mean regret of taking what the network prefers [m]."""
+    """Return the mean regret of the preferred options [m]."""
     found = []
     with torch.no_grad():
         for samples in groups:

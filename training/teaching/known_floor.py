@@ -1,4 +1,4 @@
-"""What is left to see of a floor that is known, and from where."""
+"""Unseen cells of a known floor, and places that see them."""
 
 import math
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ MOST_POINTS, LEAST_SAMPLE = 4000, 0.15
 """Floors have about so many points that are to be seen at most, so far apart at least [m]."""
 
 MOST_STOPS = 60
-"""What is left is seen from so many places at most."""
+"""Maximum number of places for the unseen cells."""
 
 LEAST_SEEN = 2
 """A place from which fewer points are seen is not gone to."""
@@ -32,7 +32,7 @@ class KnownFloor:
     env : ExplorationEnv
         The episode.
     graph : ViewGraph
-        Places, the paths between them, and what is seen from each.
+        Places, the paths between them, and the cells seen from each.
     cells : (M, 2) int64
         The score's cells (row, column) of the points that are to be seen.
     """
@@ -56,7 +56,7 @@ class KnownFloor:
     def stops(self, unseen: NDArray[np.uint64], lengths: NDArray[np.float64], most: int) -> NDArray[np.int64]:
         """Return places from which all that has to be seen is seen, the nearest ones.
 
-        They are chosen greedily by what they show (set cover).
+        They are chosen greedily by visible cells (set cover).
 
         Parameters
         ----------
@@ -64,8 +64,6 @@ class KnownFloor:
             Points that are left.
         lengths : (N,) float64
             Length of the path to each place [m].
-        most : int
-            How many are returned at most.
         """
         wanted, left = self.env.settings.stop_coverage or 1.0, unseen.copy()
         spare = (1.0 - wanted) * len(self.cells)

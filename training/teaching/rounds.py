@@ -11,10 +11,10 @@ from lidarium.agents.learned.decision import Chooser, choose_classic
 from lidarium.agents.learned.network import Network
 from lidarium.agents.learned.weights import load_weights, save_weights
 from lidarium.envs.faces.parallel import ExplorationEnv
-from lidarium.evaluation.episodes.output import write_json
 from lidarium.evaluation.episodes.runner import run_episode
+from lidarium.evaluation.processes import shared_out
 from lidarium.evaluation.suites.starts import drawn_starts
-from lidarium.evaluation.suites.workers import shared_out
+from lidarium.mapping.files.output import write_json
 from lidarium.training.failures import raise_named
 from lidarium.training.places import first_number, place_of
 from lidarium.training.progress import Progress
@@ -29,7 +29,7 @@ LESSONS, WEIGHTS, FIT, WITHOUT = "lessons", "weights.safetensors", "fit.json", "
 
 @dataclass(frozen=True, slots=True)
 class RoundFolder:
-    """Where a round is kept.
+    """If a round is kept.
 
     Attributes
     ----------
@@ -49,12 +49,12 @@ class RoundFolder:
 
     @property
     def weights(self) -> Path:
-        """What was fitted in it."""
+        """The fitted network."""
         return self.path / WEIGHTS
 
     @property
     def before(self) -> Path | None:
-        """The weights that decide in it, None where classic tours do."""
+        """The weights that decide in it, None if classic tours do."""
         return RoundFolder(self.training, self.number - 1).weights if self.number else None
 
     def lessons(self, number: int) -> Path:
@@ -65,24 +65,7 @@ class RoundFolder:
 def run_round(
     training: TrainingSettings, folder: RoundFolder, workers: int
 ) -> Generator[Progress, None, None]:
-    """Do what is missing of a round, floor by floor; what is finished is on the disk.
-
-    Parameters
-    ----------
-    training : TrainingSettings
-        What is asked for.
-    folder : RoundFolder
-        Where the round is kept; the one before has ended.
-    workers : int
-        How many processes teach; they change nothing in what is found.
-
-    Raises
-    ------
-    ValueError
-        Where a floor, or the lessons of one, cannot be used; the message names it.
-    Exception
-        What an episode has raised.
-    """
+    """Do the missing parts of a round, floor by floor; finished parts are on the disk."""
     if folder.weights.exists():
         return
     stage = training.rounds[folder.number]

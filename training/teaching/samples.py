@@ -17,12 +17,12 @@ from lidarium.training.teaching.teacher import Lesson
 
 @dataclass(frozen=True, slots=True)
 class Samples:
-    """N decisions, and what the teacher says of them.
+    """N decisions with the teacher's ratings.
 
     Attributes
     ----------
     decisions : Decisions
-        What robots saw.
+        Observations of the robots.
     regrets : (N, n) float32
         By how much each of up to n options costs more than the best [m].
     """
@@ -51,13 +51,7 @@ def samples_of(lessons: Sequence[Lesson]) -> Samples:
 
 
 def joined(parts: Sequence[Samples]) -> Samples:
-    """Return the samples of several parts as one.
-
-    Raises
-    ------
-    ValueError
-        Where there is no part.
-    """
+    """Return the samples of several parts as one."""
     if not parts:
         raise ValueError("there are no lessons to learn from; want those of at least one floor")
     decisions = Decisions(
@@ -73,13 +67,6 @@ def by_width(parts: Sequence[Samples], widths: Sequence[int]) -> list[Samples]:
     """Return the samples of several parts, those of about as many options together.
 
     Most decisions have few options, and memory and time go by the most of those that lie together.
-
-    Parameters
-    ----------
-    parts : sequence of Samples
-        With room for the largest width at most.
-    widths : sequence of int
-        How many options each group has room for, increasing. Groups without samples are left out.
     """
     groups = []
     for low, high in zip((-1, *widths[:-1]), widths, strict=True):
@@ -88,13 +75,13 @@ def by_width(parts: Sequence[Samples], widths: Sequence[int]) -> list[Samples]:
             counts = part.decisions.counts[:, 0]
             rows = np.flatnonzero((counts > low) & (counts <= high))
             if len(rows):
-                found.append(widened(part.take(rows), high))
+                found.append(_widened(part.take(rows), high))
         if found:
             groups.append(joined(found))
     return groups
 
 
-def widened(samples: Samples, width: int) -> Samples:
+def _widened(samples: Samples, width: int) -> Samples:
     """Return the same samples with room for exactly so many options."""
     room = width - samples.regrets.shape[1]
     if room <= 0:
@@ -118,13 +105,7 @@ def write_samples(path: Path, samples: Samples) -> None:
 
 
 def read_samples(path: Path) -> Samples:
-    """Read what ``write_samples`` has written, with room for as many options as there are.
-
-    Raises
-    ------
-    ValueError
-        Where the file holds something else.
-    """
+    """Read the file of ``write_samples``, with room for as many options as there are."""
     with reading(path, "lessons of a training", "remove it, and the same command teaches there again"):
         archive = GuardedArchive(read_bytes(path))
         decisions = Decisions(*(archive.array(field.name) for field in fields(Decisions)))
@@ -134,13 +115,7 @@ def read_samples(path: Path) -> Samples:
 
 
 def _check(samples: Samples) -> None:
-    """Check that all arrays are as ``samples_of`` makes them.
-
-    Raises
-    ------
-    ValueError
-        Where one is not; the message names it.
-    """
+    """Check that all arrays are as ``samples_of`` makes them."""
     wanted = samples_of([])
     own, like_own = samples.decisions, wanted.decisions
     pairs = [

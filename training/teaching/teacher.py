@@ -1,4 +1,4 @@
-"""A teacher that knows the floor: what each option would cost if the rest were seen by short tours.
+"""A teacher that has the floor plan rates options: their cost if the rest were seen by short tours.
 
 It corrects whoever explores, in all states that are reached: S. Ross, G. Gordon and D. Bagnell, "A reduction
 of imitation learning and structured prediction to no-regret online learning", 2011.
@@ -22,25 +22,25 @@ MOST_STOPS = 16
 """Tours pass so many of the nearest stops."""
 
 KEPT_SHARE = 0.1
-"""A stop is left out where an option shows all but this share of what it is for."""
+"""A stop is left out if an option shows all but this share of its cells."""
 
 VISIT_M = 0.5
-"""What slowing down, turning and setting out at each stop costs [m]."""
+"""Cost of slowing down, turning and setting out at each stop [m]."""
 
 WEIGHTS = TourWeights(1.0, 0.4, 0.0)
-"""What the teacher's tours are weighed by: the longest, the sum, and nothing for waiting."""
+"""Weights of the teacher's tours: the longest, the sum, and nothing for waiting."""
 
 
 @dataclass(frozen=True, slots=True)
 class Lesson:
-    """A decision and what the teacher says of it.
+    """A decision with the teacher's ratings.
 
     Attributes
     ----------
     decision : Decision
-        What the robot saw.
+        Observation of the robot.
     regrets : (n,) float64
-        By how much each option costs more than the best [m]; 0 where the mask forbids it.
+        By how much each option costs more than the best [m]; 0 if the mask forbids it.
     """
 
     decision: Decision
@@ -49,7 +49,7 @@ class Lesson:
 
 @dataclass(slots=True)
 class _Rest:
-    """What is left to see, as one scene has it.
+    """The unseen cells of a scene.
 
     Attributes
     ----------
@@ -62,7 +62,7 @@ class _Rest:
     views, robots : list of int
         Places of the options, and where each robot is or will be.
     spent : list of float
-        What each robot needs to get there [m].
+        Distance of each robot [m].
     """
 
     scene: Scene
@@ -74,18 +74,7 @@ class _Rest:
 
 
 class TaughtTours(ChosenTours):
-    """Explorers beside a teacher that says what each option would have cost.
-
-    Parameters
-    ----------
-    env : ExplorationEnv
-        The episode.
-    choose : callable
-        Who chooses.
-    teaching_share : float
-        So often the teacher chooses instead.
-    seed : int
-        Where that is drawn from.
+    """Explorers with a teacher that rates each option.
 
     Attributes
     ----------
@@ -108,7 +97,7 @@ class TaughtTours(ChosenTours):
         return super().pick(agents, options)
 
     def _choose_among(self, scene: Scene, robot: int, decision: Decision, picks: Sequence[int | None]) -> int:
-        """Return the option that is chosen, and keep what the teacher says."""
+        """Return the option that is chosen, and keep the teacher's ratings."""
         rest = self._rest = self._rest or self._rest_of(scene)
         for k, pick in enumerate(picks):
             if pick is not None:
@@ -120,7 +109,7 @@ class TaughtTours(ChosenTours):
         return self.choose_option(decision)
 
     def _rest_of(self, scene: Scene) -> _Rest:
-        """Return what is left to see in a scene."""
+        """Return the unseen cells of a scene."""
         floor = self._floor = self._floor or known_floor(self._env)
         row = self._env.possible_agents.index(self._first)
         offset = self._env.world.poses[row, :2] - scene.options.robots[0].pose[:2]
@@ -138,7 +127,7 @@ class TaughtTours(ChosenTours):
         return np.where(decision.mask, costs - costs[decision.mask].min(), 0.0)
 
     def _cost(self, rest: _Rest, robot: int, option: int) -> float:
-        """Return what tours cost in which a robot drives to an option first [m]."""
+        """Return the cost of tours that begin with an option [m]."""
         assert self._floor is not None
         graph, first = self._floor.graph, float(rest.scene.options.first[robot, option])
         view = rest.views[option]

@@ -36,11 +36,6 @@ class Twins:
     """Two environments in the same state, stepped alternately.
 
     One takes whole steps; of the other the kernel alone is called, some steps at a time.
-
-    Parameters
-    ----------
-    floor : BenchFloor
-        Where.
     """
 
     def __init__(self, floor: BenchFloor) -> None:

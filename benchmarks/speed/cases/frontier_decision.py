@@ -32,17 +32,7 @@ NOTES = (
 
 
 class Choosers:
-    """A batch whose robots choose among their frontiers at random.
-
-    Parameters
-    ----------
-    robots : int
-        Robots of each episode.
-    threads : int
-        How many the kernels use.
-    floors : str or None
-        Where episodes take place; `FLOORS` where None.
-    """
+    """A batch whose robots choose among their frontiers at random."""
 
     def __init__(self, robots: int, threads: int = 1, floors: str | None = None) -> None:
         self._env = lidarium.vector_env(

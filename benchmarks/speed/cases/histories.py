@@ -53,18 +53,6 @@ class Histories:
     """Runs all drives, one batch after the other, on one thread.
 
     Each batch is put where its drives begin and keeps its maps.
-
-    Parameters
-    ----------
-    drives : Drives
-        What is driven.
-    rows : int
-        Robots of a batch.
-    resolution : float
-        Side of a cell of the maps [m].
-    maps : int or None
-        Let all robots write to the maps and masks of so many, so that the same arithmetic uses less memory;
-        None for all their own.
     """
 
     def __init__(self, drives: Drives, rows: int, resolution: float, maps: int | None = None) -> None:

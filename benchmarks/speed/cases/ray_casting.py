@@ -12,7 +12,7 @@ from lidarium.benchmarks.speed.harness.lines import Line, faster, faster_than_qu
 from lidarium.benchmarks.speed.harness.report import run_alone
 from lidarium.benchmarks.speed.harness.timing import Contender, Effort, interleaved, repeated
 from lidarium.benchmarks.speed.peers import f1tenth_scans
-from lidarium.benchmarks.speed.peers.bullet_rays import bullet_scan
+from lidarium.benchmarks.speed.peers.bullet import bullet_scan
 from lidarium.benchmarks.speed.peers.f1tenth_scans import F1tenthScanner
 from lidarium.benchmarks.speed.peers.sphere_tracing import SphereTracer
 from lidarium.benchmarks.speed.scenes.floors import BenchFloor, free_poses, straight_floor, turned_floor

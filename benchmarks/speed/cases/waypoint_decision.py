@@ -50,11 +50,6 @@ class Deciders:
     """A batch that drives between waypoints, and its shadow of bare steps.
 
     The shadow takes the same steps.
-
-    Parameters
-    ----------
-    threads : int
-        Threads of both.
     """
 
     def __init__(self, threads: int) -> None:

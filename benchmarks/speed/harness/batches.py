@@ -33,15 +33,6 @@ class DrivenBatch:
 
     Each speed and turn rate is held for 2 s.
 
-    Parameters
-    ----------
-    floor : BenchFloor
-        Where they drive.
-    threads : int
-        Threads of the kernels.
-    **options
-        Settings of the environment, as for ``lidarium.vector_env``.
-
     Attributes
     ----------
     env : ExplorationVectorEnv

@@ -16,7 +16,7 @@ from typing import Any
 from lidarium.benchmarks.speed.harness.lines import Line, table
 from lidarium.benchmarks.speed.harness.timing import EFFORTS, Effort, on_cores
 from lidarium.benchmarks.speed.peers.catalogue import outside_versions
-from lidarium.evaluation.episodes.output import write_json, write_text
+from lidarium.mapping.files.output import write_json, write_text
 
 PACKAGES = ("lidarium", "numpy", "numba", "opencv-python-headless", "ir-sim", "pybullet")
 

@@ -28,17 +28,7 @@ def is_there() -> bool:
 
 
 class F1tenthScanner:
-    """Casts scans with the original simulator, its noise included.
-
-    Parameters
-    ----------
-    floor : BenchFloor
-        The floor.
-    beams : int
-        Beams of a scan.
-    reach : float
-        Longest range [m].
-    """
+    """Casts scans with the original simulator, its noise included."""
 
     def __init__(self, floor: BenchFloor, beams: int, reach: float) -> None:
         path = Path(os.environ[SOURCE])

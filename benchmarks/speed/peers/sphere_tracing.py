@@ -85,19 +85,7 @@ def _scan(
 
 
 class SphereTracer:
-    """Casts scans by sphere tracing.
-
-    Parameters
-    ----------
-    floor : BenchFloor
-        The floor.
-    beams : int
-        Beams of a scan.
-    field_of_view : float
-        Between the first and the last beam [rad].
-    reach : float
-        Longest range [m].
-    """
+    """Casts scans by sphere tracing."""
 
     def __init__(self, floor: BenchFloor, beams: int, field_of_view: float, reach: float) -> None:
         self._beams, self._field_of_view, self._reach, self._resolution = (

@@ -45,13 +45,7 @@ def is_there() -> bool:
 
 
 def package_version() -> str:
-    """Return the version of VMAS in its interpreter.
-
-    Raises
-    ------
-    ValueError
-        Where the interpreter has none.
-    """
+    """Return the version of VMAS in its interpreter."""
     python = interpreter()
     assert python is not None
     program = "from importlib.metadata import version; print(version('vmas'))"
@@ -72,16 +66,6 @@ class VmasProcess:
         The floor [m].
     poses : (A, 3) float64
         Where the agents of each environment start [m, rad].
-    rays : int
-        Rays of each lidar.
-    reach : float
-        Their longest range [m].
-    field_of_view : float
-        What the rays are spread over [rad].
-    threads : int
-        Threads of torch.
-    batches : sequence of int
-        Numbers of environments of which the best is taken, in a short trial.
 
     Attributes
     ----------

@@ -35,17 +35,6 @@ class DrivenTeam:
     """Robots that drive at drawn speeds and turn rates.
 
     Each pair is held for 2 s; robots may drive into walls and each other.
-
-    Parameters
-    ----------
-    floor : BenchFloor
-        Where they drive; the maps have its cells.
-    robots : int
-        How many.
-    lidar : Lidar
-        The laser of each.
-    scales : tuple of int
-        Scales at which maps are pooled for observations [cells].
     """
 
     def __init__(

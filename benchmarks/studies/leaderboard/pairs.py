@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from lidarium.benchmarks.studies.leaderboard.worlds import HORIZON_S, TEAMS
-from lidarium.evaluation.statistics.means import paired_ratio
+from lidarium.evaluation.statistics.estimates import paired_ratio
 from lidarium.evaluation.suites.episodes_file import KEY
 
 PAIRS = (
@@ -30,15 +30,7 @@ Episode = Mapping[str, Any]
 
 
 def pairs_table(episodes: Mapping[str, Sequence[Episode]], names: Mapping[str, str]) -> str:
-    """Return the table of pairs of all teams.
-
-    Parameters
-    ----------
-    episodes : mapping
-        By name of the world.
-    names : mapping
-        What worlds are called in the table.
-    """
+    """Return the table of pairs of all teams."""
     rows = [HEADER]
     for world, ours, theirs in PAIRS:
         first, second = (_times(episodes.get(world, ()), policy) for policy in (ours, theirs))

@@ -21,14 +21,19 @@ from lidarium.benchmarks.studies.leaderboard.worlds import (
     parts,
     suites,
 )
-from lidarium.benchmarks.studies.shared.bounded import Bounded, measure_bound
-from lidarium.benchmarks.studies.shared.kept import Progress, do_missing, kept_lines
-from lidarium.benchmarks.studies.shared.study import Study
-from lidarium.evaluation.analysis.multiples import over_bound
-from lidarium.evaluation.episodes.output import write_text
+from lidarium.benchmarks.studies.shared.study import (
+    Bounded,
+    Progress,
+    Study,
+    do_missing,
+    kept_lines,
+    measure_bound,
+)
+from lidarium.evaluation.analysis.figures import over_bound
 from lidarium.evaluation.report import write_report
 from lidarium.evaluation.suites.campaign import EPISODES_FILE
 from lidarium.evaluation.suites.episodes_file import KEY, read_episodes
+from lidarium.mapping.files.output import write_text
 
 BOUNDS_FILE = "bounds.jsonl"
 ALL = "all"

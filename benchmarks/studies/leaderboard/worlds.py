@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from lidarium.benchmarks.studies.shared.real_floors import real_floors
+from lidarium.benchmarks.studies.shared.study import real_floors
 from lidarium.envs.floors.catalogue.names import set_floors
 from lidarium.evaluation.suites.suite import Suite
 from lidarium.evaluation.suites.trial import DEFAULT_VARIANT
@@ -90,15 +90,7 @@ def floors_of(data: Path | None, every: int) -> dict[str, list[str]]:
 
 
 def suites(data: Path | None, every: int = 1) -> dict[str, Suite]:
-    """Return the suites by kind of floor and world.
-
-    Parameters
-    ----------
-    data : Path or None
-        Folder of real floors; generated floors alone where None.
-    every : int
-        Of each kind every so many-th floor is run.
-    """
+    """Return the suites by kind of floor and world."""
     floors = floors_of(data, every)
     return {
         f"{kind}_{name}": Suite(

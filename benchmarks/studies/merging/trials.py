@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 from lidarium.benchmarks.studies.merging.bank.bank import BankMap, Pair
 from lidarium.benchmarks.studies.merging.bank.drives import RESOLUTION
 from lidarium.benchmarks.studies.merging.peers import FEATURES, features_of, match_peers
-from lidarium.evaluation.episodes.output import write_json
-from lidarium.evaluation.suites.workers import shared_out
+from lidarium.evaluation.processes import shared_out
+from lidarium.mapping.files.output import write_json
 from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.grids.occupancy import UNKNOWN
 from lidarium.mapping.merging.agreement.validation import Agreement
@@ -108,26 +108,6 @@ def try_pairs(
     """Try a method on pairs, kept by `CHUNK` in a folder.
 
     Yields how many are there, as they come.
-
-    Parameters
-    ----------
-    folder : Path
-        Where to; what is there already is not tried again.
-    maps : dict of str to BankMap
-        The bank.
-    pairs : list of Pair
-        Which.
-    method : str
-        One of `METHODS`.
-    workers : int
-        Number of processes.
-    settings : MergeSettings or None
-        In place of those of the mode.
-
-    Raises
-    ------
-    ValueError
-        Where there is no such method.
     """
     if method not in METHODS:
         raise ValueError(f"method is {method!r}; want one of {', '.join(METHODS)}")

@@ -17,8 +17,7 @@ from lidarium.benchmarks.studies.merging.bank.floors import bank_floors
 from lidarium.benchmarks.studies.merging.bank.making import make_bank
 from lidarium.benchmarks.studies.merging.figures import Tried
 from lidarium.benchmarks.studies.merging.trials import read_outcomes, try_pairs
-from lidarium.benchmarks.studies.shared.kept import Progress
-from lidarium.benchmarks.studies.shared.study import Study
+from lidarium.benchmarks.studies.shared.study import Progress, Study
 from lidarium.mapping.merging.settings import MODES
 
 HALF = "tuning"

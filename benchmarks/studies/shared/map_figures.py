@@ -7,17 +7,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.envs.floors.floor import Floor
-from lidarium.evaluation.metrics import (
-    absolute_error,
+from lidarium.evaluation.metrics.curves import (
     curve_precision,
     end_point_bytes,
     grid_bytes,
     hits_of_beams,
-    moved,
     seen_walls,
     wall_error,
     wall_recall,
 )
+from lidarium.evaluation.metrics.poses import absolute_error, moved
 from lidarium.mapping.files.spline_files import compact_bytes
 from lidarium.mapping.geometry.rigid import relative
 from lidarium.mapping.grids.scan_geometry import ScanGeometry
@@ -78,16 +77,8 @@ def map_figures(
 
     Parameters
     ----------
-    floor : Floor
-        The truth.
-    spline_map : SplineMap
-        The map in the end, in the floor's frame.
-    geometry : ScanGeometry
-        The laser.
     true, believed, odometry : (times, 3) float64
         Poses x, y, theta [m, rad]; odometry in a frame of its own.
-    returns : int
-        End points of the scans that went into the map.
     """
     curves = spline_map.sample(SPACING)
     edges = np.concatenate([solid.edges for solid in floor.solids])

@@ -1,10 +1,20 @@
-"""What a study is: work that one command does, with the page that reports it."""
+"""What studies have in common: a study, kept lines, real floors, bounds."""
 
-from collections.abc import Callable, Iterator
+import json
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any, Protocol, TypeVar
 
+import lidarium
+from lidarium.envs.settings.making import make_settings
+from lidarium.evaluation.bounds.bound import known_floor_bound
+from lidarium.evaluation.processes import shared_out
+from lidarium.evaluation.suites.episodes_file import KEY, EpisodesFile, read_episodes
+from lidarium.evaluation.suites.starts import drawn_starts, starts_in
 from lidarium.evaluation.suites.suite import Suite
+from lidarium.mapping.files.output import write_json
 
 
 def no_suites(_data: Path | None, _every: int) -> dict[str, Suite]:
@@ -36,3 +46,106 @@ class Study:
     suites: Callable[[Path | None, int], dict[str, Suite]] = no_suites
     work: Callable[[Path, Path | None, int, int], Iterator[tuple[str, int, int]]] | None = None
     pictures: Callable[[Path, Path], None] | None = None
+
+
+VERSION = "version"
+"""Entry of a line: the version of lidarium that did the task."""
+
+Progress = Iterator[tuple[str, int, int]]
+"""What is being done, how much of it is, and of how much."""
+
+
+class Task(Protocol):
+    """A part of a study that is done by itself."""
+
+    @property
+    def key(self) -> str:
+        """Name that no other one of its file has."""
+        ...
+
+
+T = TypeVar("T", bound=Task)
+
+
+def do_missing(
+    path: Path, what: str, tasks: Sequence[T], measure: Callable[[T], dict[str, Any]], workers: int
+) -> Progress:
+    """Do the tasks that a file lacks, and keep a line for each.
+
+    A file beside it says which tasks were asked for, since the file may hold others of an earlier call.
+    """
+    with EpisodesFile(path) as file:
+        if any(line[VERSION] != lidarium.__version__ for line in file.episodes):
+            raise ValueError(
+                f"{path} is of another version than {lidarium.__version__}; choose another folder with --runs"
+            )
+        write_json(_asked_file(path), {"keys": [task.key for task in tasks]})
+        finished = {line[KEY] for line in file.episodes}
+        missing = [task for task in tasks if task.key not in finished]
+        for done, (task, line) in enumerate(
+            shared_out(measure, missing, workers), len(tasks) - len(missing) + 1
+        ):
+            if isinstance(line, Exception):
+                raise line
+            file.append({KEY: task.key, **line, VERSION: lidarium.__version__})
+            yield what, done, len(tasks)
+
+
+def kept_lines(path: Path) -> list[dict[str, Any]]:
+    """Return the lines of the tasks that were asked for last, in their order."""
+    asked = json.loads(_asked_file(path).read_text(encoding="utf-8"))["keys"]
+    lines = {line[KEY]: line for line in read_episodes(path)}
+    return [lines[key] for key in asked if key in lines]
+
+
+def _asked_file(path: Path) -> Path:
+    return path.with_name(f"{path.stem}_asked.json")
+
+
+def real_floors(data: Path) -> dict[str, list[Path]]:
+    """Return the files of real floors below a folder, by kind."""
+    plans = Path(data) / "floorplans"
+    meta = plans / "kth" / "meta.json"
+    connected = (
+        {name for name, entry in json.loads(meta.read_text()).items() if entry["conn"] >= 0.8}
+        if meta.is_file()
+        else set()
+    )
+    found = {
+        "kth": [
+            path
+            for path in sorted((plans / "kth" / "xml").glob("*.xml.gz"))
+            if path.name.removesuffix(".xml.gz") in connected
+        ],
+        "lifull": sorted((plans / "lifull" / "txt").glob("*.txt")),
+        "slam": sorted((Path(data) / "slam_maps").glob("*.yaml")),
+        "dungeon": sorted((plans / "synthetic_dungeon").glob("*.png")),
+    }
+    if not any(found.values()):
+        raise FileNotFoundError(
+            f"no real floors below {data}; want the folders floorplans and slam_maps there"
+        )
+    return found
+
+
+@dataclass(frozen=True, slots=True)
+class Bounded:
+    """A floor, a number of robots and their settings."""
+
+    floor: str
+    robots: int
+    settings: Mapping[str, Any]
+
+    @property
+    def key(self) -> str:
+        """Name that no other one of its file has."""
+        return f"{self.floor} | {self.robots}"
+
+
+def measure_bound(team: Bounded) -> dict[str, Any]:
+    """Return what a team needs that knows the floor, None where it cannot see 99 %."""
+    settings = make_settings(robots=team.robots, **team.settings)
+    starts = drawn_starts(team.floor, settings, 0) or starts_in(team.floor, settings, 0)
+    bound = known_floor_bound(team.floor, settings, starts)
+    known = bound.time_s if math.isfinite(bound.time_s) else None
+    return {"floor": team.floor, "robots": team.robots, "known_s": known}

@@ -13,8 +13,7 @@ from typing import Any
 import numpy as np
 
 from lidarium.benchmarks.speed.harness.report import about, heading
-from lidarium.benchmarks.studies.shared.kept import Progress, do_missing, kept_lines
-from lidarium.benchmarks.studies.shared.study import Study
+from lidarium.benchmarks.studies.shared.study import Progress, Study, do_missing, kept_lines
 from lidarium.benchmarks.studies.slam import lies
 from lidarium.benchmarks.studies.slam.logs import OTHERS, RELATIONS, log_row, read, relation_cells
 from lidarium.benchmarks.studies.slam.robot import Robot, measured_robot, robot_lines
@@ -119,11 +118,6 @@ def work(folder: Path, data: Path | None, every: int, _workers: int) -> Progress
     """Follow every N-th log, none without data, and a simulated robot.
 
     All is done in this process, as scans are timed.
-
-    Raises
-    ------
-    FileNotFoundError
-        Where the folder of real data does not hold the logs.
     """
     logs = None if data is None else Path(data) / LOGS_FOLDER
     tasks = [] if logs is None else [Task(name) for name in (*RELATIONS, *OTHERS)][::every]

@@ -15,8 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.benchmarks.studies.sparse.places import BODY, Place
-from lidarium.benchmarks.studies.sparse.survey import Frame
+from lidarium.benchmarks.studies.sparse.places import BODY, Frame, Place
 from lidarium.mapping.planning.clearance import ClearanceField
 from lidarium.mapping.planning.footprint import Footprint
 from lidarium.mapping.planning.grid_planning import cells_of, centres_of, plan
@@ -94,13 +93,7 @@ class TreeSizes:
 
 
 class OctoMap:
-    """An OctoMap of frames, made by the octomap library.
-
-    Raises
-    ------
-    ModuleNotFoundError
-        Where that library is not installed.
-    """
+    """An OctoMap of frames, made by the octomap library."""
 
     def __init__(self) -> None:
         if importlib.util.find_spec("octomap") is None:

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from lidarium.benchmarks.studies.sparse.paths import COLLIDES, DISPERSION, LENGTH, SECONDS, TURNING
 from lidarium.benchmarks.studies.sparse.tables import answered, answers_of
 from lidarium.evaluation.drawing.style import colours, dash, dress
-from lidarium.evaluation.episodes.output import whole_file
+from lidarium.mapping.files.output import whole_file
 
 Line = Mapping[str, Any]
 

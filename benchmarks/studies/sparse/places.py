@@ -1,13 +1,22 @@
-"""Furnished places, the requests that are made there, and what decides whether a path collides."""
+"""Places of the study of sparse maps, and their survey."""
 
-from dataclasses import dataclass
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
 from lidarium.envs.floors.catalogue.names import load_floor
+from lidarium.envs.floors.faces import faces_of
 from lidarium.envs.floors.floor import Floor
+from lidarium.envs.settings.robots import ROBOTS
+from lidarium.envs.settings.sensors.cameras import CAMERAS, DepthCamera
+from lidarium.envs.simulation.depth.frames import image_of
+from lidarium.envs.simulation.depth.point_cloud import camera_pose
+from lidarium.mapping.geometry.rigid import Transform
+from lidarium.mapping.point_clouds.cameras import map_from_base, points_of_depth
 from lidarium.mapping.sparse.planning import points_along
 from lidarium.mapping.sparse.swept_body import SweptBody
 
@@ -80,3 +89,92 @@ def load_place(name: str) -> Place:
 def requests_of(place: Place) -> NDArray[np.float64]:
     """Return starts and goals, (REQUESTS, 2, 2) [m]."""
     return place.drawn_points(BODY.radius + CLEAR_M, 2 * REQUESTS, seed=0).reshape(-1, 2, 2)
+
+
+SPACING_M = 0.6
+"""Between the points at which the robot turns [m]."""
+
+TURNS = 8
+"""Frames of a turn."""
+
+ROBOT = "service"
+CAMERA = replace(CAMERAS["xtion"], height=1.0, pitch=0.45)
+"""The camera, where service robots have theirs: 1 m above the floor, and looking down."""
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """What the camera has seen.
+
+    Attributes
+    ----------
+    points : (N, 3) float64
+        Points in the camera's optical frame [m].
+    pose : (4, 4) float64
+        Pose of the optical frame in the map.
+    base : (3,) float64
+        Pose of the robot [m, rad].
+    """
+
+    points: NDArray[np.float64]
+    pose: NDArray[np.float64]
+    base: NDArray[np.float64]
+
+    @property
+    def in_map(self) -> NDArray[np.float64]:
+        """The points in the map, (N, 3) [m]."""
+        return np.asarray(self.points @ self.pose[:3, :3].T + self.pose[:3, 3])
+
+
+def stops_of(place: Place) -> NDArray[np.float64]:
+    """Return where the robot turns, (S, 2), each next to the one before [m]."""
+    step = round(SPACING_M / CELL_M)
+    is_open = place.reached & (place.gaps > BODY.radius)
+    cells = [
+        _first_open(is_open[row : row + step, column : column + step], row, column)
+        for row in range(0, is_open.shape[0], step)
+        for column in range(0, is_open.shape[1], step)
+    ]
+    left = [np.array(cell) for cell in cells if cell is not None]
+    tour = [left.pop(0)]
+    while left:
+        gaps = [float(np.hypot(*(cell - tour[-1]))) for cell in left]
+        tour.append(left.pop(int(np.argmin(gaps))))
+    return np.asarray(place.origin + (np.array(tour)[:, ::-1] + 0.5) * CELL_M)
+
+
+def _first_open(part: NDArray[np.bool_], row: int, column: int) -> tuple[int, int] | None:
+    """Return the open cell of a square that is nearest to its middle."""
+    open_cells = np.argwhere(part)
+    if len(open_cells) == 0:
+        return None
+    nearest = open_cells[np.abs(open_cells - np.array(part.shape) / 2.0).sum(axis=1).argmin()]
+    return row + int(nearest[0]), column + int(nearest[1])
+
+
+def frames_of(place: Place, camera: DepthCamera = CAMERA, seed: int = 0) -> Iterator[Frame]:
+    """Yield the frames of a survey, with the camera's noise."""
+    faces, numbers = faces_of(place.floor), ROBOTS[ROBOT].numbers[None]
+    mount, generator = camera_pose(camera), np.random.default_rng(seed)
+    for stop in stops_of(place):
+        for turn in range(TURNS):
+            base = np.array([*stop, turn * math.tau / TURNS])
+            depth = image_of(faces, base[None], np.zeros((1, 3)), numbers, 0, camera)
+            points = points_of_depth(_disturbed(depth, camera, generator), camera.intrinsics)
+            yield Frame(points.astype(np.float64), map_from_base(Transform(*base)) @ mount, base)
+
+
+def _disturbed(
+    depth: NDArray[np.float32], camera: DepthCamera, generator: np.random.Generator
+) -> NDArray[np.float32]:
+    """Add a camera's noise to depths, and round their inverses to its steps."""
+    if not camera.is_noisy:
+        return depth
+    deviation = camera.noise_floor + camera.noise_share * (depth - camera.depth_min) ** 2
+    noisy = np.maximum(depth + deviation * generator.standard_normal(depth.shape), 1e-3)
+    if camera.disparity_step > 0.0:
+        noisy = 1.0 / (
+            np.maximum(np.round(1.0 / (noisy * camera.disparity_step)), 1.0) * camera.disparity_step
+        )
+    within = np.clip(noisy, camera.depth_min, camera.depth_max)
+    return np.where(depth > 0.0, within, 0.0).astype(np.float32)

@@ -12,9 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.benchmarks.studies.shared.kept import Progress, do_missing
-from lidarium.benchmarks.studies.sparse.places import load_place
-from lidarium.benchmarks.studies.sparse.survey import CAMERA, frames_of
+from lidarium.benchmarks.studies.shared.study import Progress, do_missing
+from lidarium.benchmarks.studies.sparse.places import CAMERA, frames_of, load_place
 from lidarium.mapping.point_clouds.cameras import Intrinsics
 from lidarium.mapping.point_clouds.cloud_files import read_cloud
 from lidarium.mapping.sparse.quantisation.quantiser import QuantisationSettings, quantise

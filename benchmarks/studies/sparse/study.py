@@ -7,13 +7,11 @@ from typing import Any
 import numpy as np
 
 from lidarium.benchmarks.speed.harness.report import about, heading
-from lidarium.benchmarks.studies.shared.kept import Progress, kept_lines
-from lidarium.benchmarks.studies.shared.study import Study
+from lidarium.benchmarks.studies.shared.study import Progress, Study, kept_lines
 from lidarium.benchmarks.studies.sparse import paths, quantisation
 from lidarium.benchmarks.studies.sparse.figures import figure_table
 from lidarium.benchmarks.studies.sparse.pictures import draw_errors, draw_paths
-from lidarium.benchmarks.studies.sparse.places import CELL_M, CLEAR_M, REQUESTS
-from lidarium.benchmarks.studies.sparse.survey import SPACING_M, TURNS
+from lidarium.benchmarks.studies.sparse.places import CELL_M, CLEAR_M, REQUESTS, SPACING_M, TURNS
 from lidarium.benchmarks.studies.sparse.tables import (
     MEASURES,
     error_table,

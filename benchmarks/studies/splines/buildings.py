@@ -15,10 +15,10 @@ from scipy import stats
 from lidarium.agents import make_policy
 from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.settings.making import make_settings
-from lidarium.evaluation.episodes.result import map_figures
+from lidarium.evaluation.episodes.result import EpisodeData, figures_of
 from lidarium.evaluation.episodes.runner import run_episode
 from lidarium.evaluation.episodes.watching import WatchedExploration, Watcher
-from lidarium.evaluation.metrics import absolute_error
+from lidarium.evaluation.metrics.poses import absolute_error
 
 FLOORS = tuple(f"building:{seed}" for seed in (424242, 77001, 1000, 1001, 1007, 1011, 1016, 1021, 1022, 1028))
 """Two that are known to be hard, and the first eight from 1000 on whose bounds cover 300 to 600 m2."""
@@ -102,7 +102,7 @@ def measure_stay(stay: Stay) -> dict[str, Any]:
         "steps": len(true),
         "within": float((distances <= SQUARED_RADIUS).mean()),
         "ate_m": absolute_error(believed, true, is_aligned=False),
-        "iou": map_figures(env)["iou_occupied"],
+        "iou": figures_of(EpisodeData(env), ["iou_occupied"])["iou_occupied"],
         "coverage": float(env.scorer.coverage),
     }
 

@@ -23,9 +23,8 @@ from numpy.typing import NDArray
 
 import lidarium
 from lidarium.agents import make_policy
-from lidarium.benchmarks.studies.shared.kept import Progress, do_missing, kept_lines
 from lidarium.benchmarks.studies.shared.map_figures import MapFigures, map_figures
-from lidarium.benchmarks.studies.shared.study import Study
+from lidarium.benchmarks.studies.shared.study import Progress, Study, do_missing, kept_lines
 from lidarium.benchmarks.studies.splines import buildings
 from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.floors.catalogue.names import load_floor

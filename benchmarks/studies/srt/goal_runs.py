@@ -99,13 +99,7 @@ class Way(Watcher):
 
 
 def tracker_of(env: ExplorationEnv) -> SplineTracker:
-    """Return the localizer on curves of the robot.
-
-    Raises
-    ------
-    ValueError
-        Where the robot has another one.
-    """
+    """Return the localizer on curves of the robot."""
     localizer = env.perception.poses.localizers[0]
     if not isinstance(localizer, SplineTracker):
         raise ValueError(f"localization is {env.settings.localization!r}; want splines or splines_ekf")

@@ -21,7 +21,7 @@ from lidarium.benchmarks.studies.srt.goal_runs import (
     tracker_of,
 )
 from lidarium.evaluation.drawing.spline_picture import save_spline_picture
-from lidarium.evaluation.episodes.output import whole_file
+from lidarium.mapping.files.output import whole_file
 
 COLOURS = {"thesis": "#6b7280", "default": "#2563eb"}
 

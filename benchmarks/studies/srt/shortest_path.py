@@ -22,12 +22,8 @@ def shortest_path(tables: FloorTables, start: Place, goal: Place, radius: float)
 
     Parameters
     ----------
-    tables : FloorTables
-        The floor.
     start, goal : (x, y)
         In the floor's frame [m].
-    radius : float
-        Of the disc [m].
     """
     raster = tables.body
     log_odds = np.where(raster.solid, 1, -1).astype(np.int8)

@@ -8,8 +8,7 @@ from datetime import date
 from pathlib import Path
 
 import lidarium
-from lidarium.benchmarks.studies.shared.kept import Progress, do_missing
-from lidarium.benchmarks.studies.shared.study import Study
+from lidarium.benchmarks.studies.shared.study import Progress, Study, do_missing
 from lidarium.benchmarks.studies.srt import tables
 from lidarium.benchmarks.studies.srt.ablations import FollowedWay, measure_variants
 from lidarium.benchmarks.studies.srt.goal_runs import MODES, WORLDS, GoalRun, measure_goal_run

@@ -55,15 +55,7 @@ class Goal:
 
 
 def goals_of(rows: Mapping[str, Sequence[Row]], failing: Sequence[Row]) -> list[Goal]:
-    """Return all figures.
-
-    Parameters
-    ----------
-    rows : mapping of str to sequence of dict
-        Runs by suite.
-    failing : sequence of dict
-        Runs in which a robot fails.
-    """
+    """Return all figures."""
     teams, alone = rows["teams"], rows["one"]
     told = chosen(teams, TOLD)
     goals: list[Goal] = []

@@ -1,22 +1,16 @@
-"""The page on supervised teams."""
+"""The page of the study of the supervisor, and what the logs of its runs say."""
 
+import json
 import platform
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from datetime import date
 from pathlib import Path
+from typing import Any
 
 import lidarium
 from lidarium.benchmarks.studies.supervisor import tables
-from lidarium.benchmarks.studies.supervisor.event_tables import (
-    bumper_table,
-    extension_table,
-    failing_table,
-    left_table,
-    wrong_table,
-)
 from lidarium.benchmarks.studies.supervisor.figures import Row, chosen, floor_of, has_wrong_merge
 from lidarium.benchmarks.studies.supervisor.goals import BUMPER, SUPERVISED, goals_of, is_covered
-from lidarium.benchmarks.studies.supervisor.logs import logs_section
 from lidarium.benchmarks.studies.supervisor.runs import FAILING, LOGS_FILE, asked_runs, read_json
 from lidarium.benchmarks.studies.supervisor.suites import (
     BUMPED,
@@ -27,6 +21,58 @@ from lidarium.benchmarks.studies.supervisor.suites import (
     floors_of,
     suites,
 )
+from lidarium.benchmarks.studies.supervisor.tables import (
+    bumper_table,
+    extension_table,
+    failing_table,
+    left_table,
+    wrong_table,
+)
+from lidarium.evaluation.suites.episodes_file import KEY
+
+LINES_SHOWN = 12
+"""Lines of a log on the page."""
+
+
+def logs_section(logs: Mapping[str, Any]) -> list[str]:
+    """Return the logs of typical runs where something was missed."""
+    if not logs:
+        return []
+    parts = [
+        "### Typical runs\n\nWhere a figure was missed, what the station noted and ordered: for a size of "
+        "teams in the run whose share "
+        "of one robot's time is the median, where runs are counted in the middle one of those that missed it."
+    ]
+    for name, log in logs.items():
+        lines = [line for entry in log["lines"] if (line := _line_of(json.loads(entry)))]
+        left_out = len(lines) - LINES_SHOWN
+        if left_out > 0:
+            lines = [*lines[: LINES_SHOWN // 2], f"... {left_out} more", *lines[-LINES_SHOWN // 2 :]]
+        parts.append(f"{name}, `{_short(log[KEY])}`:\n\n```\n" + "\n".join(lines) + "\n```")
+    return parts
+
+
+def _line_of(entry: Mapping[str, Any]) -> str:
+    """Return what happened at the station, or an order, in a line.
+
+    Nothing of decisions to go on.
+    """
+    if entry["event"] != "decision":
+        return f"{entry['time_s']:6.1f} s  {entry['event']} {' + '.join(entry['agents'])}: {entry['words']}"
+    if entry["order"] is None:
+        return ""
+    inputs = entry["inputs"]
+    return (
+        f"{entry['time_s']:6.1f} s  rule {entry['rule']}, {entry['agent']} {entry['order']}: {entry['why']} "
+        f"(d_rest {inputs['remaining_m'] or 0.0:.2f} m, map_kno {inputs['map_known']:.2f}, d_trav "
+        f"{inputs['travelled_m']:.1f} m)"
+    )
+
+
+def _short(key: str) -> str:
+    parts = key.split(" | ")
+    return " | ".join([Path(parts[1]).name, *parts[2:]])
+
 
 EXTENSION_SUITES = ("extensions", "radio", "energy", "together")
 SECONDS_PER_HOUR = 3600.0

@@ -32,14 +32,14 @@ from lidarium.benchmarks.studies.supervisor.suites import (
     suites,
 )
 from lidarium.envs.faces.parallel import ExplorationEnv
-from lidarium.evaluation.episodes.output import write_json
+from lidarium.evaluation.episodes.events import decision_lines
 from lidarium.evaluation.episodes.runner import run_episode
-from lidarium.evaluation.episodes.supervision import decision_lines
 from lidarium.evaluation.suites.campaign import Campaign
 from lidarium.evaluation.suites.episodes_file import KEY
 from lidarium.evaluation.suites.starts import drawn_starts
 from lidarium.evaluation.suites.suite import Suite
 from lidarium.evaluation.suites.trial import Trial
+from lidarium.mapping.files.output import write_json
 
 __all__ = ["page", "suites", "work"]
 
@@ -88,13 +88,6 @@ def failing_suite(rows: Sequence[Row], teams: Suite) -> tuple[Suite | None, list
     """Return a suite of teams whose first robot dies halfway, and its trials.
 
     It dies at half the time that the whole team took; None without any.
-
-    Parameters
-    ----------
-    rows : sequence of dict
-        Runs of whole teams.
-    teams : Suite
-        What they are of.
     """
     floors = five_floors(teams.floors)
     whole = [row for row in chosen(rows, SUPERVISED) if floor_of(row) in floors and row["t99_s"] is not None]

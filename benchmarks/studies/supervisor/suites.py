@@ -122,13 +122,7 @@ RADIOS: Mapping[str, Mapping[str, Any]] = {
 
 
 def floors_of(data: Path | None) -> dict[str, tuple[str, ...]]:
-    """Return the floors by kind, ``generated`` and ``real``.
-
-    Raises
-    ------
-    FileNotFoundError
-        Where a folder of real data is given that lacks one of them.
-    """
+    """Return the floors by kind, ``generated`` and ``real``."""
     if data is None:
         return {"generated": tuple(GENERATED), "real": tuple(STAND_INS)}
     paths = [Path(data) / "floorplans" / name for name in REAL]
@@ -150,15 +144,7 @@ def area_m2(floor: str) -> float:
 
 
 def suites(data: Path | None, every: int = 1) -> dict[str, Suite]:
-    """Return the suites by name.
-
-    Parameters
-    ----------
-    data : Path or None
-        Folder of real floors; generated ones stand in for them where None.
-    every : int
-        Every so many-th seed is run, and where there are not as many seeds, so many fewer floors.
-    """
+    """Return the suites by name."""
     seeds = tuple(range(SEEDS))[::every]
     few = max(round(every / SEEDS), 1)
     by_kind = {kind: floors[::few] for kind, floors in floors_of(data).items()}

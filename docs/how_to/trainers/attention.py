@@ -21,7 +21,7 @@ from stable_baselines3.common.vec_env import VecMonitor
 
 import lidarium
 from lidarium.envs.floors.catalogue.names import set_floors
-from lidarium.evaluation.episodes.output import write_json, write_text
+from lidarium.mapping.files.output import write_json, write_text
 from lidarium.training.reinforcement.frontier_policy import FrontierPolicy
 
 ROBOT = {

@@ -22,9 +22,9 @@ import lidarium
 from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.floors.catalogue.names import set_floors
 from lidarium.envs.settings.making import make_settings
-from lidarium.evaluation.episodes.output import write_json, write_text
 from lidarium.evaluation.episodes.runner import run_episode
-from lidarium.evaluation.statistics.means import mean_interval, paired_difference
+from lidarium.evaluation.statistics.estimates import mean_interval, paired_difference
+from lidarium.mapping.files.output import write_json, write_text
 
 LEARNED, UNTRAINED = "learned", "untrained network"
 CLASSIC = ("random_walk", "nearest_frontier")

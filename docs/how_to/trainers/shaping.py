@@ -18,7 +18,7 @@ from learning_run import SEEDS_APART, draw
 from ppo import Settings, train
 
 import lidarium
-from lidarium.evaluation.episodes.output import write_json, write_text
+from lidarium.mapping.files.output import write_json, write_text
 
 REWARDS: dict[str, dict[str, Any]] = {
     "area": {},

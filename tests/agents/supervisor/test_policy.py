@@ -12,9 +12,9 @@ from lidarium.agents.supervisor.factories import supervised
 from lidarium.agents.supervisor.policy import Supervised
 from lidarium.agents.supervisor.settings import SupervisorSettings
 from lidarium.envs.settings.faults import Fault, FaultSettings
+from lidarium.evaluation.episodes.events import decision_lines
 from lidarium.evaluation.episodes.result import result_of
 from lidarium.evaluation.episodes.runner import run_episode
-from lidarium.evaluation.episodes.supervision import decision_lines
 from lidarium.evaluation.metrics.merges import transform_error
 
 

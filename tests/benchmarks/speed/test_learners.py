@@ -9,7 +9,6 @@ from lidarium.benchmarks.speed.cases import frontier_decision
 from lidarium.benchmarks.speed.cases.learners import (
     attention_training,
     first_reset,
-    frontier_learner,
     frontier_threads,
     learned_training,
     masked_training,
@@ -45,17 +44,17 @@ def test_where_there_is_one_core_two_threads_are_not_compared(monkeypatch):
 @pytest.fixture
 def short(monkeypatch):
     """A short training, and what memory floors may take in each."""
-    monkeypatch.setattr(frontier_learner, "FLOORS", "apartment")
-    monkeypatch.setattr(frontier_learner, "WARM_DECISIONS", 8)
-    monkeypatch.setattr(frontier_learner, "TIMED_ROLLOUTS", 1)
+    monkeypatch.setattr(masked_training, "FLOORS", "apartment")
+    monkeypatch.setattr(masked_training, "WARM_DECISIONS", 8)
+    monkeypatch.setattr(masked_training, "TIMED_ROLLOUTS", 1)
     monkeypatch.setenv(SIZE_VARIABLE, "100")
-    limits, measured = [], frontier_learner.timed
+    limits, measured = [], masked_training.timed
 
     def timed(environments):
         limits.append(os.environ.get(SIZE_VARIABLE))
         return measured(environments)
 
-    monkeypatch.setattr(frontier_learner, "timed", timed)
+    monkeypatch.setattr(masked_training, "timed", timed)
     return limits
 
 
@@ -65,7 +64,7 @@ def test_a_training_is_measured_by_its_steps(monkeypatch, short):
     monkeypatch.setattr(masked_training, "LEARNER", few)
     lines = masked_training.measure(LEAST)
     assert all(line.figure > 0.0 and line.ours.endswith("steps/s") for line in lines)
-    assert short == ["100", str(frontier_learner.ALL_MIB)]
+    assert short == ["100", str(masked_training.ALL_MIB)]
     assert os.environ[SIZE_VARIABLE] == "100"
 
 
@@ -77,7 +76,7 @@ def test_attention_is_measured_with_the_simulators_share(monkeypatch, short):
     assert [line.is_upper_bound for line in lines] == [False, True, False, True]
     assert all(line.figure > 0.0 for line in lines)
     assert all(line.figure < 1.0 for line in lines if line.is_upper_bound)
-    assert short == ["100", str(frontier_learner.ALL_MIB)]
+    assert short == ["100", str(masked_training.ALL_MIB)]
 
 
 def test_without_the_extra_a_training_is_not_measured(monkeypatch):

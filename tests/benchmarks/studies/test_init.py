@@ -10,8 +10,6 @@ NAMES = (
     *(
         "bounds",
         "dungeons",
-        "evaluation",
-        "floor_cache",
         "floors",
         "interval_coverage",
         "leaderboard",
@@ -20,7 +18,7 @@ NAMES = (
         "merging",
         "merging_tuning",
     ),
-    *("page", "parity", "policies", "realism", "slam", "sparse", "splines", "srt", "supervisor"),
+    *("parity", "realism", "slam", "sparse", "splines", "srt", "supervisor"),
 )
 
 
@@ -36,9 +34,7 @@ def test_show_lists_all_of_them(capsys):
     assert sorted(listed) == sorted(NAMES)
 
 
-@pytest.mark.parametrize(
-    ("name", "near"), [("realizm", "realism"), ("floor_cash", "floor_cache"), ("policy", "policies")]
-)
+@pytest.mark.parametrize(("name", "near"), [("realizm", "realism"), ("machine", "machines")])
 def test_an_unknown_name_is_answered_with_the_nearest(name, near, tmp_path, capsys):
     assert main(["reproduce", name, "--out", str(tmp_path)]) == 2
     assert f"did you mean {near!r}?" in capsys.readouterr().err

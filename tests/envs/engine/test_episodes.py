@@ -5,9 +5,9 @@ import pytest
 from linked_rooms import TWO_ROOMS
 
 from lidarium.envs.engine.engine import Engine
-from lidarium.envs.simulation.endings import HORIZON, NO_FRONTIER, REASONS
 from lidarium.envs.settings.making import make_settings
 from lidarium.envs.settings.reset_options import ResetOptions
+from lidarium.envs.simulation.endings import HORIZON, NO_FRONTIER, REASONS
 
 EVERY = np.arange(2)
 AHEAD = np.tile([0.5, 0.1], (4, 1))

@@ -13,10 +13,10 @@ from lidarium.envs.engine.running import (
     run_serial,
 )
 from lidarium.envs.levels.level import DECIDES, SENSES, STEPS, WAITS
-from lidarium.envs.onboard.driving.path_following import ARRIVED, DRIVING
 from lidarium.envs.observing.writer import ObservationWriter
-from lidarium.envs.simulation.endings import make_rules
+from lidarium.envs.onboard.driving.path_following import ARRIVED, DRIVING
 from lidarium.envs.onboard.radio.messages import Orders, Target
+from lidarium.envs.simulation.endings import make_rules
 from lidarium.mapping.kernels.work_queue import new_work
 
 FIRST = np.array([True, False])

@@ -3,7 +3,7 @@
 import pytest
 from held_memory import STATUS, growth
 
-from lidarium.evaluation.suites.workers import shared_out
+from lidarium.evaluation.processes import shared_out
 
 
 @pytest.mark.skipif(not STATUS.exists(), reason="the memory of a process is read from /proc")

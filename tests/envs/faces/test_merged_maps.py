@@ -5,9 +5,9 @@ import pytest
 from pettingzoo.test import parallel_api_test
 
 import lidarium
+from lidarium.envs.faces.merged_maps import MergedMaps, MergeEvent, MergingSettings
 from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.settings.making import make_settings
-from lidarium.envs.faces.merged_maps import MergedMaps, MergeEvent, MergingSettings
 from lidarium.evaluation.episodes.result import result_of
 from lidarium.evaluation.episodes.runner import run_episode
 from lidarium.evaluation.metrics.merges import merge_figures

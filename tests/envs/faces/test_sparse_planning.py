@@ -5,12 +5,12 @@ import pytest
 from pettingzoo.test import parallel_api_test
 
 import lidarium
+from lidarium.envs.faces.merged_maps import MergedMaps
 from lidarium.envs.faces.parallel import ExplorationEnv
+from lidarium.envs.faces.sparse_planning import SparsePlanning
 from lidarium.envs.floors.floor import Floor, Solid
 from lidarium.envs.onboard.radio.messages import DriveState, Order, OrderKind, Target
 from lidarium.envs.settings.making import make_settings
-from lidarium.envs.faces.merged_maps import MergedMaps
-from lidarium.envs.faces.sparse_planning import SparsePlanning
 from lidarium.evaluation.episodes.runner import run_episode
 
 

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 import lidarium
-from lidarium.envs.floors.floor import Floor
 from lidarium.envs.faces.team_exchange import (
     MergeEvent,
     MergingSettings,
@@ -15,6 +14,7 @@ from lidarium.envs.faces.team_exchange import (
     partners,
     team_boxes,
 )
+from lidarium.envs.floors.floor import Floor
 from lidarium.mapping.grids.occupancy import UNKNOWN
 
 STARTS = np.array([[1.0, 1.0, 0.0], [3.0, 2.0, math.pi / 2], [4.0, 1.0, 1.0]])

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import lidarium
-from lidarium.envs.onboard.radio.messages import Order
 from lidarium.envs.faces.wrapper import TeamWrapper
+from lidarium.envs.onboard.radio.messages import Order
 
 SMALL = {"robots": 2, "map_cells": 32, "lidar": "lidar_360_6m"}
 

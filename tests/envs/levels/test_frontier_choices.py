@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from driven_teams import HALL, ROBOTS, ROOMS, Teams
 
+from lidarium.envs.levels.frontier_choices import BLOCKED, MOVED, NO_PROGRESS, PATIENCE_S, UNSEEN
 from lidarium.envs.onboard.driving.path_following import ARRIVED
 from lidarium.envs.onboard.driving.path_planner import footprint_of
-from lidarium.envs.levels.frontier_choices import BLOCKED, MOVED, NO_PROGRESS, PATIENCE_S, UNSEEN
 from lidarium.mapping.planning.grid_planning import search
 
 NOBODY = np.zeros(ROBOTS, np.bool_)

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from lidarium.envs.simulation.rewards import AREA, CONTACT, ENERGY, TIME, add_rewards, reward_weights
 from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.settings.rewards import RewardSettings
+from lidarium.envs.simulation.rewards import AREA, CONTACT, ENERGY, TIME, add_rewards, reward_weights
 from lidarium.mapping.grids.occupancy import OccupancySettings
 
 

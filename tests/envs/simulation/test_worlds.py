@@ -8,12 +8,12 @@ from plain_world import PlainWorld
 
 from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.floors.floor import Floor, Raster
-from lidarium.envs.simulation.coverage import unpack_bits
 from lidarium.envs.settings.lidar import Lidar
 from lidarium.envs.settings.making import make_settings
 from lidarium.envs.settings.robots import ROBOTS
 from lidarium.envs.simulation.backends import BACKENDS, kinematic_world, simulation_of
 from lidarium.envs.simulation.bullet.bullet_world import BulletWorld
+from lidarium.envs.simulation.coverage import unpack_bits
 from lidarium.envs.simulation.kernels.arrays import ENDED
 from lidarium.envs.simulation.kernels.floor_tables import FloorTables
 from lidarium.envs.simulation.kinematic_simulation import KinematicSimulation

@@ -7,8 +7,10 @@ from lidarium.evaluation.analysis.figures import (
     compared,
     further_figure,
     further_keys,
+    over_bound,
     time_figure,
     value_figure,
+    values_of,
 )
 from lidarium.evaluation.analysis.groups import grouped
 
@@ -21,7 +23,7 @@ def test_a_time_that_none_reached_has_no_mean_but_a_success_rate(row):
 
 def test_numbers_under_other_keys_are_figures_too(row):
     runs = [row(seed=seed, sharing_lag_s=2.0 + seed, t50_s=None, auc=None) for seed in range(3)]
-    keys = further_keys(runs)
+    keys = further_keys(runs, values_of(runs))
     assert "sharing_lag_s" in keys
     assert "t50_s" in keys
     assert not {"auc", "seed", "robots", "interrupted", "t90_s", "version"} & set(keys)
@@ -38,7 +40,7 @@ def test_a_faster_policy_is_found_pair_by_pair(row):
         for seed, each in enumerate(slow)
     ]
     (group,) = grouped([*slow, *fast])
-    by_key = {each.key: each for each in compared(group, "slow", seed=0)}
+    by_key = {each.key: each for each in compared(group, values_of([*slow, *fast]), "slow", seed=0)}
     assert by_key["t90_s"].difference.estimate == pytest.approx(-5.95)
     assert by_key["t90_s"].difference.high < 0.0
     assert by_key["t90_s"].ratio.high < 1.0
@@ -52,18 +54,35 @@ def test_of_a_policy_that_never_gets_there_the_horizon_counts(row):
     never = [row("never", seed) for seed in range(10)]
     always = [row("always", seed, t90_s=30.0 + seed, t99_s=None) for seed in range(10)]
     (group,) = grouped([*never, *always])
-    by_key = {each.key: each for each in compared(group, "never", seed=0)}
+    by_key = {each.key: each for each in compared(group, values_of([*never, *always]), "never", seed=0)}
     assert by_key["t90_s"].difference.estimate == pytest.approx(34.5 - 100.0)
     assert by_key["t99_s"].difference is None
     assert by_key["t99_s"].wilcoxon.ties == 10
 
 
 def test_a_policy_without_a_pair_is_not_compared(row):
-    (group,) = grouped([row("a", 0), row("b", 1)])
-    assert compared(group, "a", seed=0) == []
+    rows = [row("a", 0), row("b", 1)]
+    (group,) = grouped(rows)
+    assert compared(group, values_of(rows), "a", seed=0) == []
 
 
 def test_the_interquartile_mean_of_a_value_leaves_out_what_lies_far_off():
     figure = value_figure([0.0, 1.0, 2.0, 1000.0], seed=0)
     assert (figure.median.estimate, figure.mean.estimate) == (1.5, 250.75)
     assert figure.interquartile_mean.estimate == 1.5
+
+
+def test_the_median_is_of_those_that_have_a_bound(row):
+    rows = [
+        row(t99_s=30.0, bound_s=20.0),
+        row(t99_s=80.0, bound_s=20.0),
+        row(t99_s=None, bound_s=20.0),
+        row(t99_s=1.0),
+        row(t99_s=1.0, bound_s=None),
+    ]
+    assert over_bound(rows, 100.0) == pytest.approx(4.0)
+
+
+def test_without_bounds_there_is_none(row):
+    assert over_bound([row(t99_s=30.0)], 100.0) is None
+    assert over_bound([], 100.0) is None

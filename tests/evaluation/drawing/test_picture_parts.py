@@ -1,7 +1,8 @@
-"""Parts of pictures, drawn from plain arrays."""
+"""Parts of pictures."""
 
 import numpy as np
 import pytest
+from matplotlib import rcParams
 from matplotlib.figure import Figure
 
 from lidarium.evaluation.drawing.picture_parts import (
@@ -12,6 +13,7 @@ from lidarium.evaluation.drawing.picture_parts import (
     hex_colours,
     list_robots,
     page,
+    plain_words,
     rgb,
     save_figure,
 )
@@ -90,3 +92,14 @@ def test_a_picture_that_cannot_be_written_leaves_nothing(tmp_path):
     with pytest.raises(OSError, match=r"a\.png"):
         save_figure(tmp_path / "a.png", Figure())
     assert [path.name for path in tmp_path.iterdir()] == ["a.png"]
+
+
+def test_a_dollar_begins_no_formula_and_what_controls_a_terminal_is_replaced():
+    figure = Figure()
+    axes = figure.subplots()
+    axes.set_title("$\\frac{$\x1b[31m\nsecond")
+    with plain_words(figure):
+        assert not axes.title.get_parse_math()
+        assert axes.title.get_text() == "$\\frac{$\N{REPLACEMENT CHARACTER}[31m\nsecond"
+        assert not rcParams["text.parse_math"]
+    assert rcParams["text.parse_math"]

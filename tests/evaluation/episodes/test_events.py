@@ -1,4 +1,4 @@
-"""What is told of orders, states and merges: in results and records, there and back."""
+"""Events of an episode in words: orders, states, merges, groups."""
 
 import json
 
@@ -6,14 +6,17 @@ import numpy as np
 import pytest
 
 from lidarium.agents import Policy
+from lidarium.agents.report import Join, PolicyReport, Supervision
+from lidarium.envs.faces.merged_maps import MergingSettings
 from lidarium.envs.floors.floor import Floor
 from lidarium.envs.onboard.radio.messages import Order, OrderKind, Target
 from lidarium.envs.settings.making import make_settings
-from lidarium.envs.faces.merged_maps import MergingSettings
+from lidarium.evaluation.episodes.events import joined_groups
 from lidarium.evaluation.episodes.result import result_of
 from lidarium.evaluation.episodes.runner import run_episode
 from lidarium.evaluation.episodes.watching import WatchedExploration
 from lidarium.evaluation.record import Recorder, read_record, rerun, write_record
+from lidarium.mapping.geometry.rigid import Transform
 
 HALL = Floor("hall", (0.0, 0.0, 20.0, 12.0))
 STARTS = [[3.0, 3.0, 0.0], [3.0, 9.0, np.pi / 2]]
@@ -130,3 +133,34 @@ def test_merges_are_in_the_record():
     assert merge["error_m"] == pytest.approx(0.0, abs=1e-6)
     # Where robot_1 was then.
     assert (merge["x"], merge["y"]) == pytest.approx((3.0, 9.0), abs=0.1)
+
+
+AGENTS = [f"robot_{robot}" for robot in range(4)]
+
+
+def report(*pairs, unused=()):
+    joins = [
+        Join(1.0, AGENTS[a], AGENTS[b], Transform(), (0.0, 0.0), is_used=(a, b) not in unused)
+        for a, b in (*pairs, *unused)
+    ]
+    return PolicyReport((), Supervision(joins=joins))
+
+
+def test_without_a_station_all_are_alone():
+    assert joined_groups(PolicyReport(), AGENTS) == ([{0}, {1}, {2}, {3}], [])
+
+
+def test_joined_pairs_make_groups():
+    groups, pairs = joined_groups(report((0, 2), (3, 2)), AGENTS)
+    assert sorted(map(sorted, groups)) == [[0, 2, 3], [1]]
+    assert pairs == [(0, 2), (3, 2)]
+
+
+def test_a_pair_within_a_group_joins_nothing_more():
+    groups, pairs = joined_groups(report((0, 1), (1, 2), (0, 2)), AGENTS)
+    assert sorted(map(sorted, groups)) == [[0, 1, 2], [3]]
+    assert pairs == [(0, 1), (1, 2)]
+
+
+def test_joins_that_wait_to_be_confirmed_do_not_count():
+    assert joined_groups(report(unused=[(0, 1)]), AGENTS)[1] == []

@@ -1,17 +1,19 @@
-"""What a history samples is what the pure functions say of the same moment."""
+"""Metrics over time."""
 
 import numpy as np
 import pytest
+from seen_truth import NEAR, begun
 
 import lidarium
 from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.floors.floor import Floor, Raster
-from lidarium.envs.simulation.coverage import unpack_bits
 from lidarium.envs.settings.making import make_settings
-from lidarium.evaluation import metrics
-from lidarium.evaluation.episodes.history import History
+from lidarium.envs.simulation.coverage import unpack_bits
+from lidarium.envs.simulation.kernels.arrays import ENDED
+from lidarium.evaluation.episodes.history import Footprints, History
 from lidarium.evaluation.episodes.runner import run_episode
 from lidarium.evaluation.episodes.watching import WatchedExploration, Watcher
+from lidarium.evaluation.metrics import cells
 from lidarium.evaluation.truth.beliefs import free_as_held, maps_on_floor
 from lidarium.evaluation.truth.true_map import truth_of
 
@@ -37,10 +39,10 @@ class Whole(Watcher):
         self.rows.append(
             (
                 env.scorer.time,
-                metrics.free_coverage(unpack_bits(env.score.team_masks[0], known.shape[1]), truth.counted),
-                metrics.known_coverage(known, truth.knowable),
-                metrics.valid_coverage(known, truth.counted, truth.occupied),
-                *(metrics.free_coverage(own, truth.counted) for own in held),
+                cells.free_coverage(unpack_bits(env.score.team_masks[0], known.shape[1]), truth.counted),
+                cells.known_coverage(known, truth.knowable),
+                cells.valid_coverage(known, truth.counted, truth.occupied),
+                *(cells.free_coverage(own, truth.counted) for own in held),
             )
         )
 
@@ -107,9 +109,9 @@ def test_the_last_milestone_has_what_each_map_knew(known_starts):
     milestone = history.milestone(0.99)
     assert milestone.time_s == episode.env.scorer.time
     assert milestone.known_shares == pytest.approx(
-        [metrics.known_coverage(own != 0, truth.knowable) for own in maps]
+        [cells.known_coverage(own != 0, truth.knowable) for own in maps]
     )
-    assert milestone.overlap == metrics.overlap(episode.env.score.masks)
+    assert milestone.overlap == cells.overlap(episode.env.score.masks)
 
 
 def test_a_lone_robot_overlaps_with_nobody():
@@ -141,3 +143,29 @@ def test_a_new_episode_is_a_new_history():
     run_episode(lidarium.policy("nearest_frontier"), episode.env, 1)
     assert np.allclose(history.curves.times, [0.0, 2.0, 4.0, 6.0])
     assert len(history.believed) == len(episode.env.scorer.track)
+
+
+def counts_of(masks):
+    sums = np.sum([np.unpackbits(mask.view(np.uint8)) for mask in masks], axis=0, dtype=np.int64)
+    return int((sums >= 1).sum()), int((sums >= 2).sum())
+
+
+@pytest.mark.parametrize("starts", [NEAR, [*NEAR, (3.0, 4.3, 3.0)], [*NEAR, NEAR[0] + (0.6, 0.0, 0.0)]])
+def test_cells_are_counted_that_one_and_that_two_see(starts):
+    env = begun(starts)
+    footprints = Footprints(env)
+    wanted = counts_of(env.score.masks)
+    assert wanted[1] > 0
+    assert footprints.count(env) == footprints.count(env) == wanted
+
+
+def test_robots_whose_footprints_cannot_meet_count_nothing():
+    env = begun([(2.5, 4.0, 0.0), (8.4, 6.3, 0.0)])
+    env.world.poses[1, 0] += 2.0 * env.settings.lidar.range_max
+    assert Footprints(env).count(env) == (0, 0)
+
+
+def test_who_has_ended_sees_nothing():
+    env = begun([*NEAR, (3.0, 4.3, 3.0)])
+    env.world.flags[2] |= ENDED
+    assert Footprints(env).count(env) == counts_of(env.score.masks[:2])

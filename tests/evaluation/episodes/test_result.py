@@ -11,7 +11,7 @@ from lidarium.evaluation.episodes.history import History
 from lidarium.evaluation.episodes.result import result_of
 from lidarium.evaluation.episodes.runner import run_episode
 from lidarium.evaluation.episodes.watching import WatchedExploration
-from lidarium.evaluation.metrics import path_lengths
+from lidarium.evaluation.metrics.progress import path_lengths
 from lidarium.evaluation.suites.episodes_file import TIMINGS
 
 KEYS = {

@@ -6,7 +6,7 @@ from polygon_scans import ring
 
 from lidarium.envs.floors.catalogue.names import load_floor
 from lidarium.evaluation.drawing.spline_picture import save_spline_picture
-from lidarium.evaluation.metrics import (
+from lidarium.evaluation.metrics.curves import (
     curve_precision,
     distances_to_walls,
     end_point_bytes,

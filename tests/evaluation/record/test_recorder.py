@@ -1,16 +1,19 @@
-"""What a record shows is what happened."""
+"""Records of episodes as they run."""
 
 import math
 
+import numba
 import numpy as np
 import pytest
 
 import lidarium
 from lidarium.agents import Policy
+from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.settings.making import make_settings
 from lidarium.evaluation.episodes.runner import run_episode
 from lidarium.evaluation.episodes.watching import WatchedExploration, Watcher
 from lidarium.evaluation.record import Recorder
+from lidarium.evaluation.record.recorder import MapSampler, made_with
 from lidarium.evaluation.truth.beliefs import team_log_odds
 from lidarium.mapping.grids.occupancy import three_levels
 
@@ -211,3 +214,49 @@ def test_an_episode_broken_off_within_a_step_is_recorded_without_its_last_state(
 def test_a_recorder_that_saw_nothing_has_no_record():
     with pytest.raises(ValueError, match="has seen no episode"):
         Recorder().finish()
+
+
+def test_versions_are_those_that_run():
+    found = made_with("kinematic")
+    assert (found["numpy"], found["numba"]) == (np.__version__, numba.__version__)
+    assert found["machine"]
+    assert "pybullet" not in found
+
+
+def test_what_moves_the_bodies_is_named():
+    pytest.importorskip("pybullet", reason="PyBullet is not installed")
+    assert made_with("bullet")["pybullet"][0].isdigit()
+
+
+@pytest.mark.parametrize("known_starts", [True, False])
+def test_each_sample_is_the_map_of_its_time(known_starts):
+    settings = make_settings(robots=2, resolution=0.05, known_starts=known_starts, noise="datasheet")
+    env = ExplorationEnv("apartment", settings)
+    env.reset(seed=1)
+    generator = np.random.default_rng(2)
+    sampler, wanted = MapSampler(env, 2.0), {}
+    for step in range(60):
+        if step % 20 == 0:
+            sampler.sample()
+            wanted[env.scorer.time] = three_levels(team_log_odds(env)[0])
+            turns = generator.uniform(-1.0, 1.0, 2)
+        env.step(
+            {agent: np.array([1.0, turn], np.float32) for agent, turn in zip(env.agents, turns, strict=True)}
+        )
+    changes = sampler.changes()
+    assert changes.times.tolist() == pytest.approx(list(wanted))
+    for time, levels in wanted.items():
+        assert np.array_equal(changes.levels_at(time), levels)
+    assert (levels != wanted[0.0]).any()
+
+
+def test_a_step_has_one_sample_and_a_map_that_rests_has_no_changes():
+    env = ExplorationEnv("apartment", make_settings(robots=1, resolution=0.05))
+    env.reset(seed=0)
+    sampler = MapSampler(env, 2.0)
+    sampler.sample()
+    first = sampler.changes()
+    assert first.times.tolist() == [0.0]
+    assert first.counts[0] == len(first.places) > 0
+    ascending = first.places[: first.counts[0]]
+    assert (np.diff(ascending) > 0).all()

@@ -1,4 +1,4 @@
-"""The same version runs a record again to the bit, without the policy."""
+"""Recorded episodes run again."""
 
 from dataclasses import replace
 
@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from lidarium.agents import Policy, Stop
+from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.floors.catalogue.names import load_floor
 from lidarium.envs.settings.making import make_settings
 from lidarium.evaluation.episodes.watching import WatchedExploration
 from lidarium.evaluation.record import Recorder, read_record, rerun, write_record
-from lidarium.evaluation.record.replay import drive_again, find_floor, is_same
+from lidarium.evaluation.record.replay import drive_again, find_floor, is_same, state_sha256
 from lidarium.mapping.files.map_files import write_ros_map
 
 
@@ -219,3 +220,30 @@ def test_a_floor_from_a_file_is_found_again_or_asked_for(recorded, tmp_path):
     other = write_ros_map(tmp_path, "other", levels, (0.0, 0.0, 0.0), 0.1)
     with pytest.raises(ValueError, match="has the hash"):
         find_floor(record.header, other)
+
+
+def test_the_hash_of_a_state_covers_poses_scans_maps_masks_and_endings():
+    env = ExplorationEnv("scene_room", make_settings(robots=1))
+    env.reset(seed=0)
+    world, hashes = env.world, {state_sha256(env)}
+    for change in (
+        lambda: world.poses.__setitem__((0, 0), np.nextafter(world.poses[0, 0], 9.0)),
+        lambda: world.velocities.__setitem__((0, 1), 1e-300),
+        lambda: env.simulation.ranges.__setitem__((0, 5), np.float32(1.0)),
+        lambda: env.beliefs.log_odds[0].__setitem__((0, 0), 1),
+        lambda: env.score.masks[0].__setitem__((0, 0), np.uint64(1)),
+        lambda: env.score.seen.__setitem__(0, 1),
+        lambda: env.scorer.ended_because.update(robot_0="stopped"),
+    ):
+        change()
+        hashes.add(state_sha256(env))
+    assert len(hashes) == 8
+
+
+def test_the_same_episode_has_the_same_hash_and_what_is_made_of_a_state_does_not_count():
+    hashes = set()
+    for observe in (("scan",), ("scan", "pose")):
+        env = ExplorationEnv("scene_room", make_settings(robots=1, observe=observe))
+        env.reset(seed=0)
+        hashes.add(state_sha256(env))
+    assert len(hashes) == 1

@@ -2,6 +2,7 @@
 
 import pytest
 
+from lidarium.evaluation.analysis.figures import values_of
 from lidarium.evaluation.analysis.groups import grouped
 from lidarium.evaluation.report.sections import _file_stem, describe_group
 
@@ -10,7 +11,7 @@ from lidarium.evaluation.report.sections import _file_stem, describe_group
 def described(tmp_path):
     def describe(rows, baseline="a"):
         (group,) = grouped(rows)
-        return describe_group(group, {}, tmp_path, baseline, 0)
+        return describe_group(group, values_of(rows), {}, tmp_path, baseline, 0)
 
     return describe
 

@@ -4,16 +4,19 @@ import math
 
 import pytest
 
-from lidarium.evaluation.analysis.figures import compared, time_figure
+from lidarium.evaluation.analysis.figures import compared, time_figure, values_of
 from lidarium.evaluation.analysis.groups import grouped
 from lidarium.evaluation.report.tables import (
     NONE,
+    as_text,
+    code,
     comparisons_table,
     floors_table,
     interval,
     markdown_table,
     number,
     p_value,
+    plain,
     times_table,
 )
 from lidarium.evaluation.statistics import Interval
@@ -73,9 +76,27 @@ def test_comparisons_say_how_many_pairs_are_less_more_and_the_same(row):
         for seed in range(4)
     ]
     (group,) = grouped(runs)
-    lines = cells(comparisons_table(compared(group, "a", seed=0)))
+    values = values_of(runs)
+    lines = cells(comparisons_table(compared(group, values, "a", seed=0), values))
     (path,) = [line for line in lines if line[1] == "path of the team [m]"]
     assert path[0] == "`b`"
     assert path[2] == "4"
     assert path[3].startswith("-0.8")
     assert path[5] == "3 / 0 / 1"
+
+
+EVIL = '</script><img src=x onerror=alert(1)>"&amp; `a|b` \\*'
+
+
+@pytest.mark.parametrize("name", [EVIL, "plain", "`", "a`b", "\\`", "&amp;", "a\\*b", "", "|"])
+def test_markdown_reads_as_the_name_that_was_written(name):
+    assert as_text(plain(name)) == name
+    assert as_text(code(name)) == name
+    assert as_text(f"1 of {code(name)}, {plain(name)}.") == f"1 of {name}, {name}."
+
+
+def test_nothing_in_a_name_makes_a_link_or_a_table():
+    assert plain("[a](b) | *c*") == r"\[a\](b) \| \*c\*"
+    assert code("a|b") == r"a\|b"
+    assert code("a_b") == "`a_b`"
+    assert code(" ") == " "

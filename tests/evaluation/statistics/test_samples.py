@@ -1,4 +1,4 @@
-"""Samples are checked before anything is made of them."""
+"""Samples, and how they are drawn again."""
 
 import numpy as np
 import pytest
@@ -9,6 +9,9 @@ from lidarium.evaluation.statistics.samples import (
     checked_confidence,
     checked_pairs,
     checked_values,
+    in_parts,
+    resample_counts,
+    studentised_interval,
 )
 
 
@@ -50,3 +53,53 @@ def test_a_confidence_lies_between_0_and_1(confidence):
 def test_an_interval_is_nominal_from_a_size_on():
     few, enough = (Interval(0.0, -1.0, 1.0, 0.95, FEWEST_FOR_NOMINAL - k) for k in (1, 0))
     assert (few.is_nominal, enough.is_nominal) == (False, True)
+
+
+def test_each_resample_draws_as_many_values_as_there_are():
+    counts = resample_counts(7, 1100, 0)
+    assert counts.shape == (1100, 7)
+    assert (counts.sum(axis=1) == 7).all()
+    assert counts.mean(axis=0) == pytest.approx(np.ones(7), abs=0.15)
+
+
+def mean_of(values):
+    """Return the mean and its standard error of each resample."""
+
+    def replicates(counts):
+        means = counts @ values / len(values)
+        return means, np.sqrt(counts @ values**2 / len(values) - means**2) / np.sqrt(len(values))
+
+    return replicates
+
+
+def test_counts_are_kept_and_cannot_be_changed():
+    counts = resample_counts(5, 100, 1)
+    assert counts is resample_counts(5, 100, 1)
+    with pytest.raises(ValueError, match="read-only"):
+        counts[0, 0] = 9
+    assert not np.array_equal(counts, resample_counts(5, 100, 2))
+
+
+def test_parts_give_what_the_whole_gives():
+    values = np.random.default_rng(0).normal(size=9)
+    counts = resample_counts(9, 1201, 3)
+    for part, whole in zip(in_parts(mean_of(values))(counts), mean_of(values)(counts), strict=True):
+        assert part.shape == (1201,)
+        assert np.allclose(part, whole)
+
+
+def test_the_symmetric_form_reaches_equally_far_to_both_sides():
+    values = np.random.default_rng(1).exponential(3.0, 40)
+    even = studentised_interval(mean_of(values), 40, 0.9, 500, 0, is_symmetric=True)
+    tailed = studentised_interval(mean_of(values), 40, 0.9, 500, 0)
+    assert even.estimate == tailed.estimate == pytest.approx(values.mean())
+    assert even.high - even.estimate == pytest.approx(even.estimate - even.low)
+    assert tailed.high - tailed.estimate > tailed.estimate - tailed.low
+    wider = studentised_interval(mean_of(values), 40, 0.99, 500, 0)
+    assert wider.low < tailed.low < tailed.high < wider.high
+
+
+@pytest.mark.parametrize("size", [0, 65_536])
+def test_sizes_that_cannot_be_counted_are_refused(size):
+    with pytest.raises(ValueError, match=f"the sample has {size:,} values; want 1 to 65,535"):
+        resample_counts(size, 100, 0)

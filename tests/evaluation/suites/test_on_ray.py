@@ -7,7 +7,7 @@ from functools import partial
 
 import pytest
 
-from lidarium.benchmarks.studies.evaluation.machines import local_cluster
+from lidarium.benchmarks.studies.machines import local_cluster
 from lidarium.evaluation.suites import on_ray as module
 from lidarium.evaluation.suites.campaign import Campaign
 from lidarium.evaluation.suites.episodes_file import TIMINGS

@@ -6,12 +6,11 @@ import time
 import cv2
 import numpy as np
 import pytest
-from browsing import Browser, chromium
+from browsing import SOLID, Browser, chromium, show_on_screen
 
 pytest.importorskip("viser", reason="viser is not installed: extra [viewer]")
 
 import lidarium
-from lidarium.benchmarks.studies.evaluation.browser import SOLID, show_on_screen
 from lidarium.envs.settings.making import make_settings
 from lidarium.evaluation.episodes.runner import run_episode
 from lidarium.evaluation.episodes.watching import WatchedExploration

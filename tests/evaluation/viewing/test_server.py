@@ -2,6 +2,7 @@
 
 import socket
 import sys
+import time
 import urllib.request
 
 import pytest
@@ -10,10 +11,24 @@ pytest.importorskip("viser", reason="viser is not installed: extra [viewer]")
 
 from lidarium.evaluation.viewing.server import HOST, address_of, view_server
 
+PATIENCE_S = 120.0
+"""How long a busy machine may take [s]."""
+
 
 def fetch(address):
-    with urllib.request.urlopen(address, timeout=20.0) as answer:
+    with urllib.request.urlopen(address, timeout=PATIENCE_S) as answer:
         return answer.status, answer.read()
+
+
+def is_gone(port):
+    """Whether nobody listens at a port any more; a server ends a moment after its block."""
+    ends = time.monotonic() + PATIENCE_S
+    while time.monotonic() < ends:
+        with socket.socket() as probe:
+            if probe.connect_ex((HOST, port)) != 0:
+                return True
+        time.sleep(0.05)
+    return False
 
 
 def test_a_page_is_served_and_gone_afterwards():
@@ -23,8 +38,7 @@ def test_a_page_is_served_and_gone_afterwards():
         assert status == 200
         assert b"<html" in content.lower()
         port = server.get_port()
-    with socket.socket() as probe:
-        assert probe.connect_ex((HOST, port)) != 0
+    assert is_gone(port)
 
 
 def test_the_page_asks_for_nothing_from_elsewhere():
@@ -47,6 +61,7 @@ def test_the_port_is_the_one_that_was_asked_for():
     for _ in range(2):  # and is free again at once
         with view_server(port) as server:
             assert server.get_port() == port
+        assert is_gone(port)
 
 
 def test_a_port_in_use_is_named():

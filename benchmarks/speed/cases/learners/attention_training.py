@@ -2,7 +2,7 @@
 
 import statistics
 
-from lidarium.benchmarks.speed.cases.learners.frontier_learner import (
+from lidarium.benchmarks.speed.cases.learners.masked_training import (
     ALL_MIB,
     FLOORS,
     FrontierLearner,

@@ -9,7 +9,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from lidarium.benchmarks.speed.cases.learners.frontier_learner import timed
+from lidarium.benchmarks.speed.cases.learners.masked_training import timed
 from lidarium.benchmarks.speed.harness.lines import Line, shown
 from lidarium.benchmarks.speed.harness.report import run_alone
 from lidarium.benchmarks.speed.harness.timing import Effort

@@ -1,18 +1,119 @@
-"""Steps a second of MaskablePPO of sb3-contrib at the level of frontiers, rollouts and updates together."""
+"""Training with masks, by attention and of learned explorers."""
 
+import importlib.util
+import os
 import statistics
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
 
-from lidarium.benchmarks.speed.cases.learners.frontier_learner import (
-    ALL_MIB,
-    FLOORS,
-    FrontierLearner,
-    is_there,
-    timings,
-)
 from lidarium.benchmarks.speed.harness.lines import Line, shown
 from lidarium.benchmarks.speed.harness.report import run_alone
 from lidarium.benchmarks.speed.harness.timing import Effort
 from lidarium.envs.simulation.kernels.floor_cache import DEFAULT_MIB, SIZE_VARIABLE
+
+FLOORS = "set:train:300"
+ROBOT = {"level": "frontier", "observe": ["frontiers", "time_left"], "robots": 1, "horizon_s": 60.0}
+ALL_MIB = 3072
+"""Memory that holds the tables of all these floors [MiB]."""
+
+WARM_DECISIONS, TIMED_ROLLOUTS = 25_000, 4
+
+
+@dataclass(frozen=True, slots=True)
+class FrontierLearner:
+    """A learner of sb3-contrib, with one robot an episode.
+
+    Attributes
+    ----------
+    policy : str or type
+        As ``MaskablePPO`` takes it.
+    episodes, rollout : int
+        Episodes side by side, and decisions of each between two updates.
+    batch, epochs : int
+        Decisions of a step of gradients, and how often an update sees all.
+    threads : int
+        Of PyTorch.
+    """
+
+    policy: Any
+    episodes: int
+    rollout: int
+    batch: int
+    epochs: int
+    threads: int = 1
+
+
+def is_there() -> bool:
+    """Whether sb3-contrib and PyTorch are installed."""
+    return all(importlib.util.find_spec(name) is not None for name in ("torch", "sb3_contrib"))
+
+
+def timings(learner: FrontierLearner, rounds: int, mebibytes: int | None = None) -> list[tuple[float, float]]:
+    """Return decisions a second, and the share of the time within environments, of each round."""
+    import torch
+    from sb3_contrib import MaskablePPO
+    from stable_baselines3.common.vec_env import VecMonitor
+
+    import lidarium
+
+    threads = torch.get_num_threads()
+    torch.set_num_threads(learner.threads)
+    try:
+        with _floors_in_memory(mebibytes):
+            env = VecMonitor(lidarium.sb3_vec_env(learner.episodes, FLOORS, **ROBOT))
+            inside = timed(env)
+            model = MaskablePPO(
+                learner.policy,
+                env,
+                n_steps=learner.rollout,
+                batch_size=learner.batch,
+                n_epochs=learner.epochs,
+                seed=0,
+            )
+            model.learn(WARM_DECISIONS)  # floors come into the store, and from it into memory
+            count, found = TIMED_ROLLOUTS * learner.episodes * learner.rollout, []
+            for _ in range(rounds):
+                inside[0], began = 0.0, time.perf_counter()
+                model.learn(count, reset_num_timesteps=False)
+                seconds = time.perf_counter() - began
+                found.append((count / seconds, inside[0] / seconds))
+            env.close()
+    finally:
+        torch.set_num_threads(threads)
+    return found
+
+
+def timed(environments: Any) -> list[float]:  # noqa: ANN401
+    """Add up the seconds of steps of environments; the sum is the list's only number."""
+    seconds, step_wait = [0.0], environments.step_wait
+
+    def step() -> Any:  # noqa: ANN401
+        began = time.perf_counter()
+        result = step_wait()
+        seconds[0] += time.perf_counter() - began
+        return result
+
+    environments.step_wait = step
+    return seconds
+
+
+@contextmanager
+def _floors_in_memory(mebibytes: int | None) -> Iterator[None]:
+    """Let unused floors take so many MiB of memory; as many as usual where None."""
+    before = os.environ.get(SIZE_VARIABLE)
+    if mebibytes is not None:
+        os.environ[SIZE_VARIABLE] = str(mebibytes)
+    try:
+        yield
+    finally:
+        if before is None:
+            os.environ.pop(SIZE_VARIABLE, None)
+        else:
+            os.environ[SIZE_VARIABLE] = before
+
 
 CORES = 2
 TO_REACH = 3000.0

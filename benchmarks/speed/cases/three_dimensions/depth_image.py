@@ -9,7 +9,7 @@ import lidarium
 from lidarium.benchmarks.speed.harness.lines import Line, faster, shown
 from lidarium.benchmarks.speed.harness.report import run_alone
 from lidarium.benchmarks.speed.harness.timing import Contender, Effort, interleaved, rate, repeated
-from lidarium.benchmarks.speed.peers.bullet_images import bullet_images
+from lidarium.benchmarks.speed.peers.bullet import bullet_images
 from lidarium.envs.floors.catalogue.names import load_floor
 from lidarium.envs.floors.faces import faces_of
 from lidarium.envs.floors.floor import Floor

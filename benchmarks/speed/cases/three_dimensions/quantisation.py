@@ -1,17 +1,20 @@
-"""Codes of depth images and whole floors, beside the Lloyd's steps of scikit-learn and faiss."""
+"""Quantisation of clouds, beside scikit-learn and faiss."""
 
+import importlib
+import importlib.util
 import os
 import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lidarium.benchmarks.speed.harness.lines import Line, faster, shown
 from lidarium.benchmarks.speed.harness.report import run_alone
 from lidarium.benchmarks.speed.harness.timing import Contender, Effort, interleaved, rate, repeated
-from lidarium.benchmarks.speed.peers.lloyd_peers import faiss_steps, scikit_learn_steps
 from lidarium.envs.floors.catalogue.names import load_floor
 from lidarium.envs.floors.faces import faces_of
 from lidarium.envs.floors.free_space import configuration_space
@@ -31,6 +34,46 @@ from lidarium.mapping.point_clouds.point_cloud import PointCloud
 from lidarium.mapping.sparse.quantisation.lloyd import nearest_codes
 from lidarium.mapping.sparse.quantisation.quantiser import QuantisationSettings, quantise
 from lidarium.mapping.sparse.quantisation.tiles import tiles_of
+
+Points = NDArray[np.float32]
+Quantiser = Callable[[], NDArray[np.floating]]
+"""Takes Lloyd's steps, labels every point, and returns the codes, shape (k, 3)."""
+
+
+def scikit_learn_steps(points: Points, start: Points, steps: int) -> Quantiser | None:
+    """Return the quantiser of scikit-learn; None where it is not installed."""
+    if importlib.util.find_spec("sklearn") is None:
+        return None
+    cluster: Any = importlib.import_module("sklearn.cluster")
+    limits: Any = importlib.import_module("threadpoolctl")
+
+    def quantise() -> NDArray[np.floating]:
+        with limits.threadpool_limits(1):
+            model = cluster.KMeans(
+                len(start), init=start, n_init=1, max_iter=steps, tol=0.0, algorithm="lloyd"
+            )
+            codes: NDArray[np.floating] = model.fit(points).cluster_centers_
+        return codes
+
+    return quantise
+
+
+def faiss_steps(points: Points, start: Points, steps: int) -> Quantiser | None:
+    """Return the quantiser of faiss; None where it is not installed."""
+    if importlib.util.find_spec("faiss") is None:
+        return None
+    faiss: Any = importlib.import_module("faiss")
+
+    def quantise() -> NDArray[np.floating]:
+        faiss.omp_set_num_threads(1)
+        model = faiss.Kmeans(3, len(start), niter=steps, max_points_per_centroid=len(points))
+        model.train(points, init_centroids=start)
+        model.index.search(points, 1)
+        codes: NDArray[np.floating] = model.centroids
+        return codes
+
+    return quantise
+
 
 CORES = 1
 FRAME, FLOOR, CODES, STEPS = 307_200, 2_570_000, 512, 7

@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 from lidarium.benchmarks.studies.merging.bank.drives import RUNS, SNAPSHOTS, STARTS, bank_starts, drive
 from lidarium.benchmarks.studies.merging.bank.floors import BankFloor
 from lidarium.envs.floors.floor import Floor
-from lidarium.evaluation.episodes.output import whole_file, write_json
-from lidarium.evaluation.suites.workers import shared_out
+from lidarium.evaluation.processes import shared_out
+from lidarium.mapping.files.output import whole_file, write_json
 from lidarium.mapping.geometry.rigid import Transform
 
 MAPS_FOLDER, PAIRS_FILE = "maps", "pairs.json"
@@ -137,13 +137,7 @@ def fill(folder: Path, floors: list[BankFloor], workers: int) -> Iterator[tuple[
 
 
 def read_maps(folder: Path, floors: list[BankFloor]) -> dict[str, BankMap]:
-    """Return the maps of a bank that is filled, by key.
-
-    Raises
-    ------
-    FileNotFoundError
-        Where a drive is missing.
-    """
+    """Return the maps of a bank that is filled, by key."""
     maps: dict[str, BankMap] = {}
     for drive_ in drives_of(floors):
         path = _file_of(folder, drive_)

@@ -171,16 +171,8 @@ def drive(
 
     Parameters
     ----------
-    floor : Floor
-        Where.
     start : (3,) float64
         From where [m, rad].
-    seed : int
-        Of the laser's noise and of the errors of the pose.
-    error : PoseError or None
-        How large these are; the defaults where None.
-    shares : tuple of float
-        Shares of the floor at which the map is kept.
     """
     maker = MapMaker(error or PoseError(), seed, shares)
     env = WatchedExploration(floor, bank_settings(), watchers=[maker])

@@ -15,8 +15,8 @@ from lidarium.benchmarks.studies.merging.bank.bank import (
 )
 from lidarium.benchmarks.studies.merging.bank.floors import BankFloor
 from lidarium.benchmarks.studies.merging.bank.pairs import choose_pairs
-from lidarium.benchmarks.studies.shared.kept import Progress
-from lidarium.evaluation.episodes.output import write_json
+from lidarium.benchmarks.studies.shared.study import Progress
+from lidarium.mapping.files.output import write_json
 
 DATA_FILE = "floors.json"
 
@@ -25,11 +25,6 @@ def make_bank(folder: Path, floors: list[BankFloor], workers: int) -> Progress:
     """Drive on the floors what is missing, and choose the pairs.
 
     Yields what is being done, how much is, and of how much.
-
-    Raises
-    ------
-    ValueError
-        Where the folder holds a bank of other floors or another version, or a drive has failed.
     """
     _check_same(folder / DATA_FILE, floors)
     total = len(drives_of(floors))
@@ -57,13 +52,7 @@ def kept_floors(folder: Path) -> list[BankFloor]:
 
 
 def _check_same(path: Path, floors: list[BankFloor]) -> None:
-    """Note which floors the bank has; a bank of others is refused.
-
-    Raises
-    ------
-    ValueError
-        Where the folder holds a bank of other floors or another version.
-    """
+    """Note which floors the bank has; a bank of others is refused."""
     asked = {"version": lidarium.__version__, "floors": [_entry(floor) for floor in floors]}
     if path.exists() and json.loads(path.read_text(encoding="utf-8")) != asked:
         raise ValueError(

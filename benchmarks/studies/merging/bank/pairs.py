@@ -112,17 +112,7 @@ class _Known:
 
 
 def choose_pairs(maps: dict[str, BankMap], seed: int = 0, wanted: Wanted | None = None) -> Iterator[Pair]:
-    """Yield the pairs of a bank, those of the tuning half first.
-
-    Parameters
-    ----------
-    maps : dict of str to BankMap
-        All of them.
-    seed : int
-        Of the draws.
-    wanted : Wanted or None
-        How many; the defaults where None.
-    """
+    """Yield the pairs of a bank, those of the tuning half first."""
     wanted = wanted or Wanted()
     for half in HALVES:
         generator = np.random.default_rng([seed, HALVES.index(half)])

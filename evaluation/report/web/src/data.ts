@@ -39,10 +39,16 @@ export type Episodes = {
 
 export type Listed = { title: string; lacks: string };
 
+/** A column of tables; which values are better, and whether policies are told by their mean and on the leaderboard. */
+export type ValueColumn = {
+  title: string; unit: string; digits: number; direction: "higher" | "lower" | null; summary: string;
+  by_mean: boolean; is_main: boolean;
+};
+
 export type Report = {
   kind: "report"; title: string; episodes_version: string; baseline: string; seed: number; records: number;
   warnings: string[]; policies: Record<string, string>; times: Record<TimeKey, string>;
-  values: Record<string, { title: string; unit: string }>;
+  values: Record<string, ValueColumn>;
   groups: Group[]; episodes: Episodes; replays: Listed[];
 };
 export type ReplayPage = { kind: "replay"; title: string; replays: Listed[] };

@@ -11,6 +11,8 @@ export type Column<Row> = {
   show: (row: Row) => Child;
   /** Numbers stand to the right. */
   isNumber?: boolean;
+  /** What the column shows, for the heading's tooltip. */
+  hint?: string;
 };
 
 const PAGE = 25;
@@ -32,7 +34,9 @@ export class SortedTable<Row> {
     private by: number, private isDescending = false, private readonly what = "row",
   ) {
     this.heads = columns.map((column, place) => {
-      const press = button("", () => this.sortBy(place), { class: "sort" });
+      const press = button("", () => this.sortBy(place), {
+        class: "sort", ...(column.hint === undefined ? {} : { title: column.hint }),
+      });
       press.append(column.title, element("span", { class: "arrow", "aria-hidden": "true" }));
       return element("th", { scope: "col", class: column.isNumber === true ? "number" : "" }, press);
     });

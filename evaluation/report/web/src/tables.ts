@@ -1,5 +1,5 @@
 // The tables of a report: policies, floors, episodes.
-import type { Comparison, Group, Interval, OfFloor, Report } from "./data";
+import type { Comparison, Group, Interval, OfFloor, Report, ValueColumn } from "./data";
 import { button, type Child, element, number, section } from "./dom";
 import { shows, type Wanted } from "./filters";
 import { type Column, SortedTable } from "./table";
@@ -43,9 +43,9 @@ export function leaderboard(report: Report): Shown {
       show: (line) => percent(successOf(line, key)),
     })),
     { title: "Runs", value: (line) => runsOf(line, timeKeys), show: (line) => String(runsOf(line, timeKeys)), isNumber: true },
-    ...["coverage_percent", "path_m", "overlap_percent"].map((key): Column<Standing> => ({
-      title: `${capital(report.values[key]?.title ?? key)} [${report.values[key]?.unit ?? ""}]`, isNumber: true,
-      value: (line) => valueOf(line, key), show: (line) => number(valueOf(line, key)),
+    ...Object.entries(report.values).filter(([, column]) => column.is_main).map(([key, column]): Column<Standing> => ({
+      title: headed(column), hint: hinted(column), isNumber: true,
+      value: (line) => valueOf(line, key, column), show: (line) => number(valueOf(line, key, column), column.digits),
     })),
     { title: "Floors", value: floorsOf, show: floorsOf },
     { title: "Realism", value: (line) => line.group.settings, show: (line) => line.group.settings },
@@ -58,10 +58,10 @@ export function leaderboard(report: Report): Shown {
       .map((policy) => ({ group, policy, floor: wanted.floor }))));
   return {
     root: section("leaderboard", "Leaderboard", element("p", { class: "note" },
-      "Times are medians with 95 % intervals; path and overlap are medians, coverage is the mean. "
-      + "The difference is that of the restricted mean of the last time to the baseline's, bold where it is beyond "
-      + "chance (Holm). Of a single floor there are no intervals."
-      + (isBounded(report) ? " Multiples are of the time that a team needs that knows the floor: medians of the last time." : "")),
+      "Times are medians with 95 % confidence intervals. Coverage is a mean, other columns are medians. "
+      + "The difference to the baseline is that of the restricted mean of the last time, in bold if it is significant "
+      + "at 5 % (Holm). A single floor has no intervals."
+      + (isBounded(report) ? " \"Over the bound\" is the last time relative to a team that has the floor plan (median)." : "")),
       table.root),
     update: repainted(update),
   };
@@ -106,8 +106,8 @@ export function episodeTable(report: Report, replay: (place: number) => void): S
   const episodes = report.episodes;
   const policies = Object.keys(report.policies);
   const groupOf = (k: number): Group => report.groups[episodes.group[k] ?? 0] as Group;
-  const figure = (key: string, title: string, digits: number): Column<number> => ({
-    title, isNumber: true, value: (k) => episodes[key]?.[k] ?? null, show: (k) => number(episodes[key]?.[k], digits),
+  const figure = (key: string, title: string, digits: number, more: { hint?: string } = {}): Column<number> => ({
+    title, ...more, isNumber: true, value: (k) => episodes[key]?.[k] ?? null, show: (k) => number(episodes[key]?.[k], digits),
   });
   const columns: Column<number>[] = [
     { title: "Floor", value: (k) => episodes.floors[episodes.floor[k] ?? 0] ?? "", show: (k) => episodes.floors[episodes.floor[k] ?? 0] ?? "" },
@@ -116,7 +116,8 @@ export function episodeTable(report: Report, replay: (place: number) => void): S
     { title: "Realism", value: (k) => groupOf(k).settings, show: (k) => groupOf(k).settings },
     { title: "Seed", value: (k) => episodes.seed[k] ?? 0, show: (k) => String(episodes.seed[k]), isNumber: true },
     ...Object.keys(report.times).map((key) => figure(key, `${capital(report.times[key] ?? key)} [s]`, 1)),
-    ...Object.entries(report.values).map(([key, { title, unit }]) => figure(key, capital(title) + (unit === "" ? "" : ` [${unit}]`), key === "collisions" ? 0 : 1)),
+    ...Object.entries(report.values).map(([key, column]) => figure(
+      key, headed(column), isWhole(episodes[key]) ? 0 : column.digits, { hint: hinted(column) })),
     {
       title: "Replay", value: (k) => ((episodes.replay[k] ?? -1) < 0 ? 1 : 0),
       show: (k) => {
@@ -177,11 +178,23 @@ function medianOf(line: Standing, key: string): Interval {
     : line.group.times[key]?.[line.policy]?.median ?? NONE;
 }
 
-function valueOf(line: Standing, key: string): number | null {
-  if (line.floor !== null) return key === "coverage_percent" ? onFloor(line)?.coverage_percent ?? null : null;
+function valueOf(line: Standing, key: string, column: ValueColumn): number | null {
+  if (line.floor !== null) {
+    const found = onFloor(line)?.[key];
+    return typeof found === "number" ? found : null;
+  }
   const figure = line.group.values[line.policy]?.[key];
-  return (key === "coverage_percent" ? figure?.mean.estimate : figure?.median.estimate) ?? null;
+  return (column.by_mean ? figure?.mean.estimate : figure?.median.estimate) ?? null;
 }
+
+const headed = ({ title, unit }: ValueColumn): string => capital(title) + (unit === "" ? "" : ` [${unit}]`);
+
+/** Returns what a column shows, and which values are better. */
+const hinted = ({ summary, direction, by_mean: byMean }: ValueColumn): string =>
+  `${capital(summary)}; ${byMean ? "mean" : "median"} of the runs${direction === null ? "" : `; ${direction} is better`}`;
+
+const isWhole = (values: readonly (number | null)[] | undefined): boolean =>
+  values?.every((value) => value === null || Number.isInteger(value)) === true;
 
 function comparisonOf(line: Standing, keys: readonly string[]): Comparison | undefined {
   return line.floor !== null ? undefined

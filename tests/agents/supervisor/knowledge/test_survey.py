@@ -84,6 +84,16 @@ def test_robots_meet_whose_goals_are_near_and_in_sight_and_bring_them_nearer():
     )
 
 
+def test_robots_without_a_goal_or_with_goals_far_apart_do_not_meet():
+    idle = survey_of((WEST,), a=((2.0, 2.0), None), b=((6.0, 2.0), (4.2, 2.0)))
+    assert idle.are_meeting("a", "b") is False
+    assert idle.are_meeting("b", "a") is False
+    limit = SupervisorSettings().rendezvous_m
+    # Each goes to the other's place: the goals are nearer to each other than the robots, and still far apart.
+    far = survey_of((WEST,), a=((0.5, 2.0), (1.0, 2.0)), b=((7.5, 2.0), (1.2 + limit, 2.0)))
+    assert far.are_meeting("a", "b") is False
+
+
 def test_goals_see_each_other_less_the_farther_they_are_apart():
     survey = survey_of((WEST, EAST, NORTH), a=((2.0, 2.0), None))
     seen = survey.seen()

@@ -3,12 +3,13 @@ import pytest
 
 from lidarium.benchmarks.speed.cases.histories import Histories, drawn_drives
 from lidarium.benchmarks.speed.growth.idle_memory import IdleMemory, array_bytes, measure, own_bytes
-from lidarium.benchmarks.speed.growth.question import growth_with_floors, growth_with_robots
-from lidarium.benchmarks.speed.growth.report import (
+from lidarium.benchmarks.speed.growth.question import (
     Growth,
     growth_page,
     growth_result,
     growth_table,
+    growth_with_floors,
+    growth_with_robots,
     memory_table,
 )
 from lidarium.benchmarks.speed.harness.report import about

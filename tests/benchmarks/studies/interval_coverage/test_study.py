@@ -5,8 +5,8 @@ from itertools import islice
 import pytest
 
 from lidarium.benchmarks.studies import STUDIES
-from lidarium.benchmarks.studies.interval_coverage import study as coverage
-from lidarium.benchmarks.studies.interval_coverage.cases import cases
+from lidarium.benchmarks.studies import interval_coverage as cases
+from lidarium.benchmarks.studies import interval_coverage as coverage
 
 FEW = 6
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from lidarium.benchmarks.studies.learned import tables
+from lidarium.benchmarks.studies import learned
 
 
 def episode(t99_s, path_m=10.0):
@@ -22,45 +22,45 @@ def episodes():
 
 
 def test_a_row_compares_pairs(episodes):
-    row = tables._row(episodes, "learned", "tour_frontier", 1)
+    row = learned._row(episodes, "learned", "tour_frontier", 1)
     cells = [cell.strip() for cell in row.strip("|").split("|")]
     assert cells[:4] == ["1", "`learned`", "`tour_frontier`", "8"]
     assert cells[4].startswith("0.835 (")
     assert cells[6:] == ["100 %", "8, 8", "0.800"]
-    assert tables._row(episodes, "learned", "tour_frontier", 2) == ""
+    assert learned._row(episodes, "learned", "tour_frontier", 2) == ""
 
 
 def test_two_pairs_are_too_few_for_an_interval(episodes):
     few = {policy: dict(list(of_policy.items())[:2]) for policy, of_policy in episodes.items()}
-    cells = [cell.strip() for cell in tables._row(few, "learned", "tour_frontier", 1).strip("|").split("|")]
+    cells = [cell.strip() for cell in learned._row(few, "learned", "tour_frontier", 1).strip("|").split("|")]
     assert cells[4] == "0.805 (too few for an interval)"
     assert "inf" not in " ".join(cells)
 
 
 def test_the_best_classic_has_the_least_mean_and_the_horizon_counts(episodes):
-    assert tables.best_classic(episodes, 1) == "utility_frontier"
-    assert tables.best_classic(episodes, 3) is None
+    assert learned.best_classic(episodes, 1) == "utility_frontier"
+    assert learned.best_classic(episodes, 3) is None
 
 
 def test_bounds_say_what_is_saved(episodes):
     bounds = [{"floor": f"f{number}", "robots": 1, "known_s": 60.0} for number in range(2)]
     bounds.append({"floor": "f3", "robots": 1, "known_s": None})
-    lines = tables.bounds_table(bounds, episodes).splitlines()
+    lines = learned.bounds_table(bounds, episodes).splitlines()
     cells = [cell.strip() for cell in lines[-1].strip("|").split("|")]
     assert cells == ["1", "2", "3.33", "2.50", "30.00", "1.67", "1.34", "49 %"]
-    assert tables.bounds_table([], episodes).startswith("No floor")
+    assert learned.bounds_table([], episodes).startswith("No floor")
 
 
 def test_kinds_that_did_not_run_are_named():
-    assert tables.missing_text([]) == ""
-    assert "LIFULL apartments" in tables.missing_text(["slam", "lifull"])
+    assert learned.missing_text([]) == ""
+    assert "LIFULL apartments" in learned.missing_text(["slam", "lifull"])
 
 
 def test_what_sends_the_robots_is_summed_over_runs(episodes):
     runs = list(episodes["learned"].values())
     runs[0]["decided_by"] = {"tours": 6, "corrected": 2}
     runs[1]["decided_by"] = {"tours": 7, "corrected": 3, "nearest": 2}
-    lines = tables.senders_table({"test": episodes}).splitlines()
+    lines = learned.senders_table({"test": episodes}).splitlines()
     cells = [cell.strip() for cell in lines[-1].strip("|").split("|")]
-    assert cells == [tables.KINDS["test"], "1", "10.0", "65.0 %", "25.0 %", "10.0 %", "50 %"]
-    assert tables.senders_table({"kth": {}}) == "No run says."
+    assert cells == [learned.KINDS["test"], "1", "10.0", "65.0 %", "25.0 %", "10.0 %", "50 %"]
+    assert learned.senders_table({"kth": {}}) == "No run says."

@@ -12,9 +12,9 @@ from lidarium.benchmarks.studies.merging.real_maps import (
     REAL_M,
     correspondence_error,
     merge_real_maps,
+    real_maps,
     transform_of_pixels,
 )
-from lidarium.benchmarks.studies.merging.real_tables import real_maps
 from lidarium.mapping.files.map_files import write_ros_map
 from lidarium.mapping.geometry.rigid import Transform
 

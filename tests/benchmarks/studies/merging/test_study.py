@@ -8,7 +8,7 @@ from lidarium.benchmarks.studies.merging import study as merging
 from lidarium.benchmarks.studies.merging.bank import bank, drives, making
 from lidarium.benchmarks.studies.merging.bank.floors import BankFloor
 from lidarium.benchmarks.studies.merging.bank.pairs import Wanted, choose_pairs
-from lidarium.evaluation.suites.workers import shared_out
+from lidarium.evaluation.processes import shared_out
 
 FLOORS = [
     BankFloor("scene_room", "tuning", "drawn"),

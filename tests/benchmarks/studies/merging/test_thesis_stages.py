@@ -7,7 +7,7 @@ from drawn_maps import about_middle, apartment, moved, noisy
 
 from lidarium.benchmarks.studies.merging.bank.bank import BankMap, Pair
 from lidarium.benchmarks.studies.merging.bank.floors import BankFloor
-from lidarium.benchmarks.studies.merging.thesis_stages import (
+from lidarium.benchmarks.studies.merging.thesis import (
     stages_text,
     thesis_stages,
     twelve_pairs,

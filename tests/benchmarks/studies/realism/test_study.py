@@ -2,9 +2,7 @@
 
 import pytest
 
-from lidarium.benchmarks.studies import STUDIES
-from lidarium.benchmarks.studies.realism import episodes
-from lidarium.benchmarks.studies.realism import study as realism
+from lidarium.benchmarks.studies import STUDIES, realism
 
 
 @pytest.fixture
@@ -12,9 +10,9 @@ def tiny(monkeypatch):
     monkeypatch.setattr(realism, "FLOORS", ("apartment",))
     monkeypatch.setattr(realism, "SEEDS", range(1))
     monkeypatch.setattr(realism, "REPEATED", 1)
-    monkeypatch.setattr(episodes, "REPEATS", 1)
-    monkeypatch.setattr(episodes, "HORIZON_S", 8.0)
-    monkeypatch.setattr(episodes, "TEAM_HORIZON_S", 1.0)
+    monkeypatch.setattr(realism, "REPEATS", 1)
+    monkeypatch.setattr(realism, "HORIZON_S", 8.0)
+    monkeypatch.setattr(realism, "TEAM_HORIZON_S", 1.0)
 
 
 def test_a_tiny_share_runs_and_is_not_run_again(tiny, tmp_path, monkeypatch):
@@ -26,7 +24,7 @@ def test_a_tiny_share_runs_and_is_not_run_again(tiny, tmp_path, monkeypatch):
         ("episodes", 2, 2),
         ("longest corrections", 1, 1),
     ]
-    monkeypatch.setattr(episodes, "run_episode", None)
+    monkeypatch.setattr(realism, "run_episode", None)
     assert list(study.work(tmp_path, None, 1, 1)) == []
     page = study.page(tmp_path, "lidarium reproduce realism")
     assert "Measured with `lidarium reproduce realism` on " in page

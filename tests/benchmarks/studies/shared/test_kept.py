@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import pytest
 
 import lidarium
-from lidarium.benchmarks.studies.shared.kept import do_missing, kept_lines
+from lidarium.benchmarks.studies.shared.study import do_missing, kept_lines
 
 
 @dataclass(frozen=True)

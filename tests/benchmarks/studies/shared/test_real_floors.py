@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from lidarium.benchmarks.studies.shared.real_floors import real_floors
+from lidarium.benchmarks.studies.shared.study import real_floors
 
 
 def test_floors_are_found_by_kind_and_only_connected_ones_of_kth(tmp_path):

@@ -7,8 +7,7 @@ import pytest
 from scipy import ndimage
 
 from lidarium.benchmarks.studies.sparse.grids import OctoMap
-from lidarium.benchmarks.studies.sparse.places import load_place
-from lidarium.benchmarks.studies.sparse.survey import frames_of
+from lidarium.benchmarks.studies.sparse.places import frames_of, load_place
 
 pytestmark = pytest.mark.skipif(
     importlib.util.find_spec("octomap") is None, reason="octomap-python is not installed"

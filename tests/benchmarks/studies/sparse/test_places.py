@@ -4,9 +4,18 @@ import numpy as np
 import pytest
 
 from lidarium.benchmarks.studies.sparse.grids import laser_grid
-from lidarium.benchmarks.studies.sparse.optimum import ShortestPaths
-from lidarium.benchmarks.studies.sparse.places import BODY, CELL_M, CLEAR_M, Place, load_place, requests_of
-from lidarium.benchmarks.studies.sparse.survey import CAMERA, frames_of, stops_of
+from lidarium.benchmarks.studies.sparse.paths import ShortestPaths
+from lidarium.benchmarks.studies.sparse.places import (
+    BODY,
+    CAMERA,
+    CELL_M,
+    CLEAR_M,
+    Place,
+    frames_of,
+    load_place,
+    requests_of,
+    stops_of,
+)
 from lidarium.envs.floors.catalogue.names import load_floor
 from lidarium.envs.floors.floor import Floor, Solid
 from lidarium.mapping.sparse.planning import points_along

@@ -6,10 +6,15 @@ import pytest
 from lidarium.benchmarks.studies import STUDIES
 from lidarium.benchmarks.studies.supervisor import study as supervisor
 from lidarium.benchmarks.studies.supervisor import suites as plan
-from lidarium.benchmarks.studies.supervisor.event_tables import bumper_table, failing_table, left_table
 from lidarium.benchmarks.studies.supervisor.goals import Goal
 from lidarium.benchmarks.studies.supervisor.study import failing_suite, typical_runs
-from lidarium.benchmarks.studies.supervisor.tables import alone_table, team_table
+from lidarium.benchmarks.studies.supervisor.tables import (
+    alone_table,
+    bumper_table,
+    failing_table,
+    left_table,
+    team_table,
+)
 from lidarium.envs.floors.catalogue.names import load_floor
 from lidarium.envs.floors.free_space import reachable_free_space
 from lidarium.envs.floors.starts import draw_starts

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import lidarium
+from lidarium.envs.floors.floor import Floor, Raster, Solid
 from lidarium.envs.onboard.driving.path_following import (
     ARRIVED,
     BLOCKED,
@@ -17,7 +18,6 @@ from lidarium.envs.onboard.driving.path_following import (
     follow_paths,
 )
 from lidarium.envs.onboard.driving.safety_stop import FORESIGHT_TIMES, Bodies, Sensed
-from lidarium.envs.floors.floor import Floor, Raster, Solid
 from lidarium.envs.onboard.radio.messages import DriveState, Target
 from lidarium.envs.settings.lidar import Lidar
 from lidarium.envs.settings.robots import ROBOTS

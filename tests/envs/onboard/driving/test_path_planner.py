@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from driven_teams import Teams
 
+from lidarium.envs.floors.floor import Floor
 from lidarium.envs.onboard.driving.path_following import DRIVING
 from lidarium.envs.onboard.driving.path_planner import footprint_of
 from lidarium.envs.onboard.driving.planning import TEAMMATE_DISTANCE
-from lidarium.envs.floors.floor import Floor
 from lidarium.envs.simulation.kernels.arrays import ENDED
 
 OPEN = Floor("open", (0.0, 0.0, 6.0, 4.0), (), starts=np.array([[1.0, 2.0, 0.0], [3.0, 2.0, 0.0]]))

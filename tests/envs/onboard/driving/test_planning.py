@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from driven_teams import HALL, Teams
 
+from lidarium.envs.floors.floor import Floor
 from lidarium.envs.onboard.driving.path_following import BLOCKED, DRIVING, IDLE
 from lidarium.envs.onboard.driving.planning import (
     TEAMMATE_DISTANCE,
@@ -14,7 +15,6 @@ from lidarium.envs.onboard.driving.planning import (
     prepare_teams_parallel,
     prepare_teams_serial,
 )
-from lidarium.envs.floors.floor import Floor
 from lidarium.envs.onboard.navigation import CLEARANCE_LIMIT
 from lidarium.envs.simulation.kernels.arrays import ENDED
 from lidarium.mapping.kernels.work_queue import new_work

@@ -5,12 +5,12 @@ import pytest
 
 import lidarium
 from lidarium.agents import Policy, Stop
-from lidarium.envs.onboard.driving.path_following import BACKING_SPEED
 from lidarium.envs.floors.floor import Floor
+from lidarium.envs.onboard.driving.path_following import BACKING_SPEED
 from lidarium.envs.onboard.radio.messages import OperatingState, Order, OrderKind, Target
+from lidarium.envs.onboard.station.operating import RETREAT_S
 from lidarium.envs.settings.faults import Fault, FaultSettings
 from lidarium.envs.settings.radio import RadioSettings
-from lidarium.envs.onboard.station.operating import RETREAT_S
 from lidarium.evaluation.episodes.runner import run_episode
 
 HALL = Floor("hall", (0.0, 0.0, 20.0, 12.0))

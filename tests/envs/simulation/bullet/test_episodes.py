@@ -15,8 +15,7 @@ from lidarium.envs.settings.making import make_settings
 from lidarium.envs.settings.robots import ROBOTS
 from lidarium.evaluation.episodes.runner import run_episode
 from lidarium.evaluation.record.recorder import Recorder
-from lidarium.evaluation.record.replay import WatchedExploration, is_same, rerun
-from lidarium.evaluation.record.state import state_sha256
+from lidarium.evaluation.record.replay import WatchedExploration, is_same, rerun, state_sha256
 
 pybullet = pytest.importorskip("pybullet", reason="the extra bullet is not installed")
 FLOOR = "building:5"

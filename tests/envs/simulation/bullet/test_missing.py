@@ -7,7 +7,7 @@ import pytest
 from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.settings.making import make_settings
 from lidarium.envs.simulation.backends import BACKENDS
-from lidarium.scripts.run import Run
+from lidarium.scripts.commands.run import Run
 
 
 def test_the_error_names_the_extra_before_anything_starts(monkeypatch):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from lidarium.benchmarks.speed.peers.bullet_images import BulletImages
+from lidarium.benchmarks.speed.peers.bullet import BulletImages
 from lidarium.envs.floors.catalogue.names import load_floor
 from lidarium.envs.floors.faces import faces_of
 from lidarium.envs.settings.sensors.cameras import DepthCamera

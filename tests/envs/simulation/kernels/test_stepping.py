@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from scored_halls import hall, tables_of
 
-from lidarium.envs.simulation.rewards import TERMS
 from lidarium.envs.settings.faults import Fault, FaultSettings
 from lidarium.envs.settings.lidar import Lidar
 from lidarium.envs.settings.odometry import ODOMETRY, OdometrySettings
@@ -25,6 +24,7 @@ from lidarium.envs.simulation.kernels.stepping import (
     step_serial,
 )
 from lidarium.envs.simulation.kinematic_simulation import KinematicSimulation
+from lidarium.envs.simulation.rewards import TERMS
 from lidarium.mapping.grids.occupancy import OccupancySettings
 
 KOBUKI, HALL = ROBOTS["kobuki"], tables_of(hall())

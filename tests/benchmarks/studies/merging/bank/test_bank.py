@@ -18,9 +18,9 @@ from lidarium.benchmarks.studies.merging.bank.floors import (
     HALVES,
     BankFloor,
     bank_floors,
+    like_rooms,
     without_some_furniture,
 )
-from lidarium.benchmarks.studies.merging.bank.like_rooms import like_rooms
 from lidarium.benchmarks.studies.merging.bank.pairs import Wanted, choose_pairs, overlap_of
 from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.grids.occupancy import FREE, OCCUPIED, UNKNOWN

@@ -3,9 +3,16 @@
 import numpy as np
 import pytest
 
-from lidarium.benchmarks.studies.merging.structure.drawn_floors import KINDS, SIDE_M, drawn_floor, seen_by
-from lidarium.benchmarks.studies.merging.structure.tables import draw_regions, structure_text
-from lidarium.benchmarks.studies.merging.structure.trials import compare_structures, floor_pairs
+from lidarium.benchmarks.studies.merging.structure import (
+    KINDS,
+    SIDE_M,
+    compare_structures,
+    draw_regions,
+    drawn_floor,
+    floor_pairs,
+    seen_by,
+    structure_text,
+)
 from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.grids.occupancy import FREE, OCCUPIED
 from lidarium.mapping.merging.settings import STRUCTURES

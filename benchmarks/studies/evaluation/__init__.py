@@ -1,1 +1,0 @@
-"""The study of what evaluations cost, with what survives killed ones."""

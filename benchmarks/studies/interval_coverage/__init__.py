@@ -1,1 +1,0 @@
-"""The study of how often intervals hold a known truth."""

@@ -1,0 +1,309 @@
+"""The study ``learned``: learned explorers beside classic ones, on floors that no training has seen."""
+
+import json
+import platform
+from collections.abc import Mapping, Sequence
+from datetime import date
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import lidarium
+from lidarium.agents.learned.policy import CORRECTED
+from lidarium.agents.learned.weights import CARD
+from lidarium.agents.tours.policy import NEAREST
+from lidarium.agents.tours.policy import TOURS as BY_TOURS
+from lidarium.benchmarks.studies.shared.study import (
+    Bounded,
+    Progress,
+    Study,
+    do_missing,
+    kept_lines,
+    measure_bound,
+    real_floors,
+)
+from lidarium.envs.floors.catalogue.names import set_floors
+from lidarium.evaluation.statistics import Interval
+from lidarium.evaluation.statistics.estimates import median_interval, paired_ratio
+from lidarium.evaluation.suites.campaign import EPISODES_FILE
+from lidarium.evaluation.suites.episodes_file import KEY, read_episodes
+from lidarium.evaluation.suites.suite import Suite
+from lidarium.evaluation.suites.trial import DEFAULT_VARIANT
+
+LEARNED, TOURS = "learned", "tour_frontier"
+CLASSICS = ("nearest_frontier", "utility_frontier", "explore_lite")
+TEAMS = (1, 2, 3)
+HORIZON_S = 1800.0
+
+KINDS = {
+    "test": "generated floors of the set `test`",
+    "kth": "KTH campus floors",
+    "lifull": "LIFULL apartments",
+    "slam": "maps that robots made of real buildings",
+}
+"""Kinds of floors."""
+
+Times = dict[str, dict[tuple[str, int], Mapping[str, Any]]]
+"""Episodes by policy, floor and size of team."""
+
+
+def times_table(kind: str, episodes: Times) -> str:
+    """Return the table of a kind of floor."""
+    about, rows = KINDS[kind], []
+    for robots in TEAMS:
+        best = best_classic(episodes, robots)
+        rows.append(_row(episodes, LEARNED, TOURS, robots))
+        rows.append(_row(episodes, TOURS, best, robots) if best else "")
+    header = (
+        "| robots | policy | over | floors | median | mean | faster | reached 99 % | path |\n"
+        "|---:|---|---|---:|---:|---:|---:|---:|---:|"
+    )
+    lines = "\n".join(row for row in rows if row)
+    return f"### {about[0].upper()}{about[1:]}\n\n{header}\n{lines}"
+
+
+def best_classic(episodes: Times, robots: int) -> str | None:
+    """Return the classic explorer that took least time in the mean, None where none ran."""
+    means = {
+        name: float(np.mean([_time(each) for (_, size), each in episodes[name].items() if size == robots]))
+        for name in CLASSICS
+        if any(size == robots for _, size in episodes.get(name, {}))
+    }
+    return min(means, key=lambda name: means[name]) if means else None
+
+
+def _row(episodes: Times, ours: str, theirs: str, robots: int) -> str:
+    """Return a row of the table of times."""
+    first, second = episodes.get(ours, {}), episodes.get(theirs, {})
+    pairs = sorted(key for key in set(first) & set(second) if key[1] == robots)
+    if len(pairs) < 2:
+        return ""
+    a, b = ([_time(found[key]) for key in pairs] for found in (first, second))
+    ratios = np.array(a) / np.array(b)
+    median, mean = median_interval(ratios), paired_ratio(a, b)
+    longest = [[max(found[key]["path_m"]) for key in pairs] for found in (first, second)]
+    paths = paired_ratio(longest[0], longest[1])
+    reached = [sum(found[key]["t99_s"] is not None for key in pairs) for found in (first, second)]
+    cells = (
+        robots,
+        f"`{ours}`",
+        f"`{theirs}`",
+        len(pairs),
+        _with_interval(median),
+        _with_interval(mean),
+        f"{100 * np.mean(ratios < 1.0):.0f} %",
+        f"{reached[0]}, {reached[1]}",
+        f"{paths.estimate:.3f}",
+    )
+    return "| " + " | ".join(str(cell) for cell in cells) + " |"
+
+
+def _with_interval(found: Interval) -> str:
+    """Return an estimate with its interval, where so few pairs have one."""
+    is_bounded = np.isfinite(found.low) and np.isfinite(found.high)
+    interval = f"{found.low:.3f} to {found.high:.3f}" if is_bounded else "too few for an interval"
+    return f"{found.estimate:.3f} ({interval})"
+
+
+def senders_table(episodes: Mapping[str, Times]) -> str:
+    """Return what sent the robots of the learned explorer, by kind of floor and size of team."""
+    rows = [
+        "| floors | robots | set out, a run | by tours | by the network, elsewhere | to the nearest frontier "
+        "| runs with that |",
+        "|---|---:|---:|---:|---:|---:|---:|",
+    ]
+    for kind, found in episodes.items():
+        for robots in TEAMS:
+            runs = [each for (_, size), each in found.get(LEARNED, {}).items() if size == robots]
+            counts = [run["decided_by"] for run in runs if run.get("decided_by")]
+            if not counts:
+                continue
+            sums = [
+                sum(count.get(sender, 0) for count in counts) for sender in (BY_TOURS, CORRECTED, NEAREST)
+            ]
+            shares = " | ".join(f"{100 * each / sum(sums):.1f} %" for each in sums)
+            ending = np.mean([NEAREST in count for count in counts])
+            often = f"{sum(sums) / len(counts):.1f}"
+            rows.append(f"| {KINDS[kind]} | {robots} | {often} | {shares} | {100 * ending:.0f} % |")
+    return "\n".join(rows) if len(rows) > 2 else "No run says."
+
+
+def _time(episode: Mapping[str, Any]) -> float:
+    return HORIZON_S if episode["t99_s"] is None else float(episode["t99_s"])
+
+
+def bounds_table(bounds: Sequence[Mapping[str, Any]], episodes: Times) -> str:
+    """Return multiples of the bound by size of team, and what is saved of the time above it."""
+    names = [name for name in (*CLASSICS, TOURS, LEARNED) if name in episodes]
+    rows = [
+        "| robots | floors | " + " | ".join(f"`{name}`" for name in names) + " | saved |",
+        "|---:|" + "---:|" * (len(names) + 2),
+    ]
+    for robots in TEAMS:
+        known = {
+            (line["floor"], robots): line["known_s"]
+            for line in bounds
+            if line["robots"] == robots and line["known_s"] is not None
+        }
+        both = [key for key in known if all(key in episodes.get(name, {}) for name in (TOURS, LEARNED))]
+        if not both:
+            continue
+        cells = []
+        for name in names:
+            multiples = [_time(episodes[name][key]) / known[key] for key in both if key in episodes[name]]
+            cells.append(f"{np.median(multiples):.2f}" if multiples else "-")
+        tours, ours = (np.array([_time(episodes[name][key]) for key in both]) for name in (TOURS, LEARNED))
+        above = tours - np.array([known[key] for key in both])
+        saved = f"{100 * (tours - ours).sum() / above.sum():.0f} %"
+        rows.append(f"| {robots} | {len(both)} | " + " | ".join(cells) + f" | {saved} |")
+    return "\n".join(rows) if len(rows) > 2 else "No floor has a bound in this run."
+
+
+def card_text(card: Mapping[str, Any]) -> str:
+    """Return what the card of the weights says."""
+    training, lines = card["training"], []
+    floors = sum(each["floors"] for each in training["rounds"])
+    lessons = max((each["samples"] for each in card["fits"].values()), default=0)
+    lines.append(
+        f"`lidarium train docs/tutorials/learned.toml`: {floors:,} floors of the training set in "
+        f"{len(training['rounds'])} rounds, {lessons:,} decisions taught, {card['hours']:.1f} hours with "
+        f"{card['workers']} workers, PyTorch {card['versions']['torch']}, seed {training['seed']}. "
+        f"Best on the floors of the validation: `{card['best']}`."
+    )
+    lines.append(
+        "| weights | over `tour_frontier`, mean | faster | episodes |\n|---|---:|---:|---:|\n"
+        + "\n".join(
+            f"| `{name}` | {found['ratio']:.3f} | {100 * found['better']:.0f} % | {found['episodes']} |"
+            for name, found in card["validation"].items()
+        )
+    )
+    return "\n\n".join(lines)
+
+
+def missing_text(kinds: Sequence[str]) -> str:
+    """Return which kinds of floors a run lacks, as a paragraph."""
+    return f"\nNot in it: {', '.join(KINDS[kind] for kind in kinds)}.\n" if kinds else ""
+
+
+SETTINGS: dict[str, Any] = {"resolution": 0.05, "stop_coverage": 0.99, "horizon_s": HORIZON_S}
+CLASSICS_EVERY, BOUNDS_EVERY = 4, 8
+"""Classic explorers run on every so many-th floor of the set; every so many-th has a bound."""
+
+REAL_FLOORS = {"kth": slice(0, None, 4), "lifull": slice(1, None, 2), "slam": slice(0, None, 6)}
+"""Which real floors run; settings of tours were chosen on some of the others."""
+
+BOUNDS_FILE = "bounds.jsonl"
+
+PAGE = """# Learned explorers
+
+`learned` beside `tour_frontier`, whose tours it corrects, and `tour_frontier` beside the other classic
+explorers: simulated time to 99 % of `C_free`, pair by pair, from the same starts. Kobuki, URG-04LX, perfect
+poses, no noise, maps of 5 cm, cut at {horizon:.0f} s; runs that did not get there count as that. Nothing was
+chosen by these floors. Beside `srt`, with SLAM and with unknown starts it is on the
+[leaderboard](leaderboard.md).
+
+Made with `{command}` on {date}: lidarium {version}, Python {python}.
+
+## The weights
+
+{card}
+
+## Times
+
+A ratio below 1 is less time. *Mean* is the geometric mean with its 95 % interval; *path* is the ratio of the
+longest path of a robot.
+
+{times}
+{missing}
+## What sends the robots
+
+How often robots of `learned` set out, a run, and by what: where tours begin; elsewhere, as the network has
+it; or to the nearest frontier, when what is left is too little for a stop of a tour.
+
+{senders}
+
+## Beside bounds
+
+What a team needs that [knows the floor](../reference/bounds.md), on {bounded} floors of the set `test` that
+have a bound: medians of multiples of its time, and the share of the time between `tour_frontier` and the
+bound that `learned` saves.
+
+{bounds}
+
+## What limits it
+
+The teacher knows the floor, and is what the network learns from. As a policy it takes 0.77 of the time of
+tours with one robot, 0.85 with two and 0.87 with three
+([decision 22](../decisions/0022-learned-corrections.md)).
+A training on 2,700 floors, all of them furnished, gave 0.878, 0.896 and 0.938 on the set `test`. On LIFULL
+it gave 1.03, 0.99 and 0.98. So neither more floors nor bare ones are what is missing.
+"""
+
+
+def suites(data: Path | None, every: int = 1) -> dict[str, Suite]:
+    """Return the suites: all floors for the two, a part of them for classic explorers."""
+    floors = {"test": list(set_floors("test"))[::every]}
+    if data is not None:
+        real = {kind: paths for kind, paths in real_floors(data).items() if kind in KINDS}
+        floors |= {
+            kind: [str(path) for path in paths[REAL_FLOORS[kind]][::every]] for kind, paths in real.items()
+        }
+    found = {}
+    for kind, names in floors.items():
+        found[kind] = _suite((TOURS, LEARNED), names)
+        part = names[::CLASSICS_EVERY] if kind == "test" else names
+        found[f"{kind}_classic"] = _suite(CLASSICS, part)
+    return {kind: suite for kind, suite in found.items() if suite.floors}
+
+
+def _suite(policies: Sequence[str], floors: Sequence[str]) -> Suite:
+    return Suite(
+        policies=tuple(policies),
+        floors=tuple(floors),
+        robots=TEAMS,
+        seeds=(0,),
+        variants={DEFAULT_VARIANT: SETTINGS},
+    )
+
+
+def work(folder: Path, _data: Path | None, every: int, workers: int) -> Progress:
+    """Bound a part of the floors."""
+    floors = set_floors("test")[:: BOUNDS_EVERY * every]
+    teams = [Bounded(floor, robots, SETTINGS) for floor in floors for robots in TEAMS]
+    yield from do_missing(folder / BOUNDS_FILE, "bounds", teams, measure_bound, workers)
+
+
+def page(folder: Path, command: str) -> str:
+    """Return the results as markdown."""
+    episodes = {kind: _times_in(folder, kind) for kind in KINDS}
+    bounds = kept_lines(folder / BOUNDS_FILE) if (folder / BOUNDS_FILE).exists() else []
+    return PAGE.format(
+        command=command,
+        date=date.today().isoformat(),
+        version=lidarium.__version__,
+        python=platform.python_version(),
+        horizon=HORIZON_S,
+        card=card_text(json.loads((resources.files("lidarium.agents.learned") / "data" / CARD).read_text())),
+        times="\n\n".join(times_table(kind, found) for kind, found in episodes.items() if found),
+        missing=missing_text([kind for kind, found in episodes.items() if not found]),
+        senders=senders_table(episodes),
+        bounded=len({line["floor"] for line in bounds if line["known_s"] is not None}),
+        bounds=bounds_table(bounds, episodes["test"]),
+    )
+
+
+def _times_in(folder: Path, kind: str) -> Times:
+    """Return the episodes of a kind of floor by policy, floor and size of team."""
+    found: Times = {}
+    for name in (kind, f"{kind}_classic"):
+        path = folder / name / EPISODES_FILE
+        for episode in read_episodes(path) if path.exists() else []:
+            # Floors by the names that were asked for; `building:3000000` calls itself by its kind.
+            floor = episode[KEY].split(" | ")[1]
+            found.setdefault(episode["policy"], {})[floor, episode["robots"]] = episode
+    return found
+
+
+STUDY = Study(page, suites, work)

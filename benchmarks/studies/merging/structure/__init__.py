@@ -1,1 +1,0 @@
-"""Pairs of maps with few corners, joined by corners or by regions of free space."""

@@ -1,1 +1,0 @@
-"""The study of robots in worlds that are not ideal."""

@@ -1,1 +1,0 @@
-"""Films: what they show, how their frames become a file."""

@@ -1,1 +1,0 @@
-"""Commands about what a team that knew the floor could do."""

@@ -1,0 +1,88 @@
+"""`lidarium plan`: plan a path on a sparse map."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from time import perf_counter
+from typing import Annotated, ClassVar
+
+from tyro.conf import Positional, arg
+
+from lidarium.scripts.commands.sparse_map import numbers_of
+from lidarium.scripts.common import DONE, NO, Answer, Command, table
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Plan(Command):
+    """Plan a path on a sparse map.
+
+    With --out, path.json and pictures are written there. Exit code 3 if there is no path.
+    """
+
+    compiles: ClassVar[bool] = True
+
+    map: Positional[Path]
+    """the map, as `lidarium sparse-map` writes it"""
+    start: Annotated[str, arg(name="from")]
+    """x,y or x,y,z of the start [m]"""
+    goal: Annotated[str, arg(name="to")]
+    """x,y or x,y,z of the goal [m]"""
+    radius: float = 0.3
+    """radius of the robot [m]"""
+    height: float = 1.2
+    """height of the robot [m]"""
+    clearance_weight: float = 0.0
+    """by how much paths beside obstacles cost more, as a share"""
+
+
+def execute(command: _Plan) -> Answer:
+    """Plan a path."""
+    import numpy as np
+
+    from lidarium.evaluation.drawing.sparse_picture import save_sparse_pictures
+    from lidarium.mapping.files.output import check_writable, write_json
+    from lidarium.mapping.sparse.graph import GraphSettings, build_graph
+    from lidarium.mapping.sparse.map_files import read_sparse_map
+    from lidarium.mapping.sparse.planning import plan
+    from lidarium.mapping.sparse.swept_body import SweptBody
+
+    if command.out is not None:
+        check_writable(command.out)
+    start, goal = (
+        np.array(numbers_of(name, text, (2, 3)))
+        for name, text in (("--from", command.start), ("--to", command.goal))
+    )
+    sparse_map, _ = read_sparse_map(command.map)
+    body = SweptBody(radius=command.radius, height=command.height)
+    settings = GraphSettings(clearance_weight=command.clearance_weight)
+    graph = build_graph(sparse_map.free, sparse_map.boxes, body, settings)
+    plan(graph, start, goal)  # compiles
+    began = perf_counter()
+    answer = plan(graph, start, goal)
+    seconds = perf_counter() - began
+    result = {
+        "map": str(command.map),
+        "found": answer.is_found,
+        "reason": answer.reason,
+        "length_m": round(answer.length, 4) if answer.is_found else None,
+        "points": np.round(answer.path, 4).tolist(),
+        "nodes": answer.nodes,
+        "graph": {"nodes": len(graph.nodes), "edges": len(graph.edges)},
+        "seconds": round(seconds, 6),
+    }
+    files = []
+    if command.out is not None:
+        write_json(command.out / "path.json", result)
+        pictures = save_sparse_pictures(
+            command.out / "path.smap", sparse_map.boxes, sparse_map.free, graph, answer.path
+        )
+        files = [str(command.out / "path.json"), *pictures]
+    found = (
+        f"{answer.length:.2f} m, {len(answer.path)} points" if answer.is_found else f"none: {answer.reason}"
+    )
+    facts = [
+        ("path", found),
+        ("graph", f"{len(graph.nodes)} nodes, {len(graph.edges)} edges"),
+        ("time", f"{1e3 * seconds:.3f} ms"),
+        *([("files", ", ".join(files))] if files else []),
+    ]
+    return Answer(result, table(facts), DONE if answer.is_found else NO)

@@ -1,0 +1,145 @@
+"""`lidarium reproduce`: run a published study again, and write its results page."""
+
+import os
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from tyro.conf import Positional
+
+from lidarium.scripts.common import DEFECT, INTERRUPTED, Answer, Command, counted, notify
+
+if TYPE_CHECKING:
+    from lidarium.evaluation.suites.campaign import Campaign
+
+DEFAULT_FOLDER = Path("docs/results")
+SECONDS_BETWEEN_LINES = 10.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Reproduce(Command):
+    """Run the study of a page of docs/results, and write the page to --out.
+
+    Finished parts are not run again.
+    """
+
+    compiles: ClassVar[bool] = True
+
+    name: Positional[str]
+    """which study; `lidarium show studies` lists them"""
+    data: Path | None = None
+    """folder of real floors and laser logs; without it generated floors alone"""
+    every: int = 1
+    """of each kind of floor, or of other parts of a study, every N-th, for a shorter run"""
+    share: float | None = None
+    """the same as a share: 0.1 is --every 10"""
+    runs: Path = Path("runs/reproduce")
+    """folder for episodes and other work"""
+    workers: int = 0
+    """processes that run episodes; 0 for as many as there are cores; timed parts run in one"""
+    records: bool = False
+    """keep a record of every episode"""
+
+
+def execute(command: Reproduce) -> Answer:
+    """Run the missing parts, then write the page."""
+    from lidarium.benchmarks.studies import STUDIES
+    from lidarium.evaluation.suites.campaign import Campaign
+    from lidarium.mapping.files.output import check_writable, write_text
+
+    if command.every < 1 or command.workers < 0:
+        raise ValueError(
+            f"--every is {command.every} and --workers {command.workers}; want at least 1, and at least 0"
+        )
+    every = _every(command)
+    out = command.out or DEFAULT_FOLDER
+    check_writable(out)
+    study = STUDIES[command.name]
+    folder = command.runs / command.name
+    workers = command.workers or len(os.sched_getaffinity(0))
+    campaigns = {
+        name: Campaign(suite, folder / name, workers, command.records)
+        for name, suite in study.suites(command.data, every).items()
+    }
+    for name, campaign in campaigns.items():
+        if not _ran(campaign, name, command.json):
+            return Answer(_progress_of(campaigns), "interrupted; the same command goes on", INTERRUPTED)
+    if study.work is not None and not _worked(study.work(folder, command.data, every, workers), command.json):
+        return Answer(_progress_of(campaigns), "interrupted; the same command goes on", INTERRUPTED)
+    if study.pictures is not None:
+        study.pictures(folder, out)
+    page = out / f"{command.name}.md"
+    write_text(page, study.page(folder, _command_line(command)))
+    failures = [(trial, error) for campaign in campaigns.values() for trial, error in campaign.failures]
+    for trial, error in failures:
+        notify(f"{trial.key}: {type(error).__name__}: {error}")
+    return Answer(
+        {**_progress_of(campaigns), "page": str(page)}, f"{page} is written", DEFECT if failures else 0
+    )
+
+
+def _every(command: Reproduce) -> int:
+    """Return every how many-th part is run."""
+    if command.share is None:
+        return command.every
+    if command.every != 1:
+        raise ValueError(f"--share is {command.share} and --every {command.every}; want one of them")
+    if not 0.0 < command.share <= 1.0:
+        raise ValueError(f"--share is {command.share}; want a share above 0, up to 1")
+    return max(round(1.0 / command.share), 1)
+
+
+def _ran(campaign: "Campaign", name: str, is_quiet: bool) -> bool:
+    """Run a campaign; False where the user broke it off."""
+    runs = campaign.run()
+    total = sum(1 for _ in campaign.suite.trials())
+    try:
+        for _ in counted(runs, total, f"{name} episodes", is_quiet):
+            pass
+    except KeyboardInterrupt:
+        return False
+    finally:
+        runs.close()
+    return True
+
+
+def _worked(work: Iterator[tuple[str, int, int]], is_quiet: bool) -> bool:
+    """Do an experiment's own work, and show its progress now and then.
+
+    False where the user broke it off.
+    """
+    before, shown_at = "", 0.0
+    try:
+        for what, done, total in work:
+            if not is_quiet and (what != before or time.monotonic() - shown_at > SECONDS_BETWEEN_LINES):
+                notify(f"{what}: {done} of {total}" if total > done else f"{what}: {done}")
+                before, shown_at = what, time.monotonic()
+    except KeyboardInterrupt:
+        return False
+    return True
+
+
+def _progress_of(campaigns: dict[str, "Campaign"]) -> dict[str, Any]:
+    parts = {
+        name: {
+            "episodes": campaign.total,
+            "finished": campaign.done,
+            "failed": [trial.key for trial, _ in campaign.failures],
+        }
+        for name, campaign in campaigns.items()
+    }
+    return {"suites": parts}
+
+
+def _command_line(command: Reproduce) -> str:
+    data = (
+        ""
+        if command.data is None
+        else f" --data {command.data.name if command.data.is_absolute() else command.data}"
+    )
+    part = f" --every {command.every}" if command.every > 1 else ""
+    if command.share is not None:
+        part = f" --share {command.share:g}"
+    return f"lidarium reproduce {command.name}{data}{part}"

@@ -1,0 +1,296 @@
+"""`lidarium slam`: make a map and a trajectory of a recorded log of laser scans."""
+
+import math
+from collections.abc import Iterable, Iterator
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
+
+from tyro.conf import Positional
+
+from lidarium.scripts.common import Answer, Command, counted, notify, table
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from lidarium.evaluation.metrics.relations import Relations
+    from lidarium.mapping.files.laser_logs import LaserLog
+    from lidarium.mapping.localization.matching.settings.slam import SlamSettings
+    from lidarium.mapping.localization.slam.following import Followed
+
+DEFAULT_FOLDER = Path("slam")
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Slam(Command):
+    """Make a map of a log of laser scans.
+
+    Writes map.yaml, map.pgm, trajectory.tum and slam.json.
+    """
+
+    compiles: ClassVar[bool] = True
+
+    log: Positional[Path]
+    """CARMEN log, .npz file or bag of ROS 1 or 2.
+
+    CARMEN logs (.log, .clf, also .gz) have FLASER or ROBOTLASER1 lines; .npz holds ranges, stamp and
+    pose_odom; bags are .mcap, .db3 or .bag files with LaserScan messages, or folders of these (extra bags).
+    """
+    topic: str | None = None
+    """topic of the scans, if a bag has several"""
+    resolution: float = 0.05
+    """side of a cell of the map [m]"""
+    range: float = 30.0
+    """longest range that is used [m]"""
+    match_distance: float = 0.02
+    """a scan is matched after so much motion [m]; 0 for every scan"""
+    match_angle: float = 1.0
+    """or after so much of a turn [degrees]"""
+    beam_interval: float = 0.0
+    """time from beam to beam if the log does not say [s]; 0 for scans taken at once"""
+    field_of_view: float | None = None
+    """angle between the first and the last beam of FLASER lines [degrees].
+
+    These lines have no angles; without it the log's parameters count, else those of a SICK
+    """
+    ignore_odometry: bool = False
+    """do without the log's odometry: scans are matched around the last motion"""
+    clear_without_return: bool = False
+    """a beam without return says that its way is free, as in simulation.
+
+    Else it says nothing
+    """
+    reference: Path | None = None
+    """true trajectory (TUM); ATE and RPE are computed against it"""
+    relations: Path | None = None
+    """true motions between pairs of times (Kuemmerle et al. 2009)"""
+    clock_shift: float = 0.0
+    """shift added to the log's stamps [s].
+
+    For comparing them with the reference's and the relations' stamps.
+    """
+    relation_poses: Literal["between", "before"] = "between"
+    """pose at a relation's time: between the scans around it, or the last before.
+
+    The last one before is for logs that stamp scans with the odometry before.
+    """
+
+    def __post_init__(self) -> None:
+        Command.__post_init__(self)
+        for name, value, least in (
+            ("resolution", self.resolution, 1e-3),
+            ("range", self.range, 0.1),
+            ("match-distance", self.match_distance, 0.0),
+            ("match-angle", self.match_angle, 0.0),
+            ("beam-interval", self.beam_interval, 0.0),
+        ):
+            if not (math.isfinite(value) and value >= least):
+                raise ValueError(f"{name} is {value}; want at least {least}")
+        if self.field_of_view is not None and not 0.0 < self.field_of_view <= 360.0:
+            raise ValueError(f"field-of-view is {self.field_of_view} degrees; want more than 0, at most 360")
+        if not math.isfinite(self.clock_shift):
+            raise ValueError(f"clock-shift is {self.clock_shift} s; want a number")
+
+
+def execute(command: _Slam) -> Answer:
+    """Run SLAM over a log and write the results."""
+    from lidarium.mapping.files.output import check_writable
+    from lidarium.mapping.files.trajectories import read_tum
+    from lidarium.mapping.localization.slam.following import follow
+
+    out = command.out or DEFAULT_FOLDER
+    check_writable(out)
+    log = _log(command)
+    reference = None if command.reference is None else read_tum(command.reference)
+    relations = None if command.relations is None else _relations(command, log)
+
+    def watch(scans: Iterable[int]) -> Iterator[int]:
+        return counted(scans, len(log.stamps), "scans", command.json)
+
+    followed = follow(log, _settings_of(command), watch)
+    if not len(followed.slam.key_scans.poses):
+        raise ValueError(
+            f"{command.log} holds no scan with a return within {command.range} m; want a larger --range or "
+            "another log"
+        )
+    result = _result(command, log, followed)
+    if reference is not None:
+        result |= _against_reference(command, log, followed.poses, reference)
+    if relations is not None:
+        result["relations"] = _against_relations(command, log, followed.poses, relations)
+    _write(command, out, log, followed, result)
+    return Answer(result, _summary(result, out))
+
+
+def _settings_of(command: _Slam) -> "SlamSettings":
+    """Return the settings that a command asks for."""
+    from lidarium.mapping.localization.slam.following import LOG_SETTINGS
+
+    matching = replace(
+        LOG_SETTINGS.matching,
+        distance_m=command.match_distance,
+        angle=math.radians(command.match_angle),
+        beam_interval_s=command.beam_interval,
+    )
+    submaps = replace(LOG_SETTINGS.submaps, resolution=command.resolution)
+    return replace(
+        LOG_SETTINGS, uses_odometry=not command.ignore_odometry, matching=matching, submaps=submaps
+    )
+
+
+def _read(command: _Slam) -> "LaserLog":
+    from lidarium.mapping.files.bags.reading import is_bag, read_bag_log
+    from lidarium.mapping.files.carmen_logs import read_carmen_log
+    from lidarium.mapping.files.npz_logs import read_npz_log
+
+    if is_bag(command.log):
+        return read_bag_log(command.log, command.topic)
+    if command.log.suffix == ".npz":
+        return read_npz_log(command.log)
+    return read_carmen_log(
+        command.log, None if command.field_of_view is None else math.radians(command.field_of_view)
+    )
+
+
+def _log(command: _Slam) -> "LaserLog":
+    """Read the log and print the parts left out."""
+    log = _read(command)
+    for reason, count in log.skipped.items():
+        notify(f"{command.log}: left out: {count} {reason}")
+    for remark in log.remarks:
+        notify(f"{command.log}: {remark}")
+    if log.odometry is None:
+        notify(f"{command.log}: there is no odometry; scans are matched around the last motion")
+    return log.limited(command.range, command.clear_without_return)
+
+
+def _result(command: _Slam, log: "LaserLog", followed: "Followed") -> dict[str, Any]:
+    import numpy as np
+
+    from lidarium import __version__
+
+    data_s = float(log.stamps[-1] - log.stamps[0])
+    cpu_s = float(followed.scan_s.sum() + followed.finish_s)
+    steps = np.diff(followed.poses[:, :2], axis=0)
+    settings = asdict(_settings_of(command)) | {
+        "range_m": command.range,
+        "clear_without_return": command.clear_without_return,
+    }
+    return {
+        "log": command.log.name,
+        "scans": len(log.stamps),
+        "skipped": log.skipped,
+        "remarks": list(log.remarks),
+        "odometry": not command.ignore_odometry and log.odometry is not None,
+        "data_s": round(data_s, 3),
+        "cpu_s": round(cpu_s, 3),
+        "cpu_over_data": round(cpu_s / data_s, 6) if data_s > 0.0 else None,
+        "scan_ms": {
+            f"p{percent}": round(1e3 * float(np.percentile(followed.scan_s, percent)), 3)
+            for percent in (50, 95)
+        },
+        "path_m": round(float(np.hypot(steps[:, 0], steps[:, 1]).sum()), 3),
+        **asdict(followed.slam.counts),
+        "doubtful": [asdict(doubt) for doubt in followed.slam.doubts.stretches],
+        "settings": settings,
+        "version": __version__,
+    }
+
+
+def _against_reference(
+    command: _Slam,
+    log: "LaserLog",
+    poses: "NDArray[np.float64]",
+    reference: "tuple[NDArray[np.float64], NDArray[np.float64]]",
+) -> dict[str, Any]:
+    """Return ATE, and RPE over about a second."""
+    import numpy as np
+
+    from lidarium.evaluation.metrics.poses import absolute_error, relative_error
+    from lidarium.mapping.files.trajectories import interpolated
+
+    stamps, true = reference
+    times = log.stamps + command.clock_shift
+    is_known = (times >= stamps[0]) & (times <= stamps[-1])
+    if is_known.sum() < 2:
+        raise ValueError(
+            f"{command.reference} is from {stamps[0]:.3f} to {stamps[-1]:.3f} s and the log from "
+            f"{times[0]:.3f} to {times[-1]:.3f} s; "
+            "want times in common (--clock-shift)"
+        )
+    believed, known = poses[is_known], interpolated(stamps, true, times[is_known])
+    period = float(np.median(np.diff(times[is_known])))
+    relative = relative_error(believed, known, max(round(1.0 / period), 1) if period > 0.0 else 1)
+    return {
+        "ate_m": round(absolute_error(believed, known), 6),
+        "rpe_m": None if relative is None else round(relative[0], 6),
+        "rpe_rad": None if relative is None else round(relative[1], 8),
+    }
+
+
+def _relations(command: _Slam, log: "LaserLog") -> "Relations":
+    """Read the relations of times within the log, and count the others.
+
+    The number of the others is reported.
+    """
+    from lidarium.evaluation.metrics.relations import covered, read_relations
+
+    assert command.relations is not None
+    every = read_relations(command.relations)
+    try:
+        found = covered(every, log.stamps + command.clock_shift)
+    except ValueError as error:
+        raise ValueError(
+            f"{command.relations}: {error} with --clock-shift, which is {command.clock_shift}"
+        ) from error
+    if len(found.begin) < len(every.begin):
+        notify(
+            f"{command.relations}: left out: {len(every.begin) - len(found.begin)} of times beyond the log"
+        )
+    return found
+
+
+def _against_relations(
+    command: _Slam, log: "LaserLog", poses: "NDArray[np.float64]", relations: "Relations"
+) -> dict[str, float]:
+    from lidarium.evaluation.metrics.relations import log_relation_errors
+
+    errors = log_relation_errors(log, poses, relations, command.clock_shift, command.relation_poses)
+    return {name: round(value, 8) for name, value in errors.as_dict().items()}
+
+
+def _write(command: _Slam, out: Path, log: "LaserLog", followed: "Followed", result: dict[str, Any]) -> None:
+    from lidarium.mapping.files.map_files import cropped, write_ros_map
+    from lidarium.mapping.files.output import check_written, write_json
+    from lidarium.mapping.files.trajectories import write_tum
+
+    grid = followed.slam.map
+    levels, origin = cropped(grid.levels(), grid.origin, grid.settings.resolution)
+    write_ros_map(out, "map", levels, (*origin, 0.0), grid.settings.resolution)
+    write_tum(out / "trajectory.tum", log.stamps, followed.poses)
+    write_json(out / "slam.json", result)
+    check_written(out, ("map.yaml", "map.pgm", "trajectory.tum", "slam.json"))
+
+
+def _summary(result: dict[str, Any], out: Path) -> str:
+    rows = [
+        ("scans", f"{result['scans']:,} over {result['data_s']:.0f} s and {result['path_m']:.0f} m"),
+        (
+            "CPU time",
+            f"{result['cpu_s']:.1f} s, {result['scan_ms']['p50']:.1f} ms a scan (95 %: "
+            f"{result['scan_ms']['p95']:.1f} ms)",
+        ),
+        ("closures", f"{result['closures']} in {result['corrections']} corrections"),
+        ("failed matches", f"{result['failures']} of {result['failures'] + result['matches']}"),
+    ]
+    if result["doubtful"]:
+        scans = sum(doubt["scans"] for doubt in result["doubtful"])
+        rows.append(("doubtful", f"{scans} scans in {len(result['doubtful'])} stretches, see slam.json"))
+    if "ate_m" in result:
+        rows.append(("ATE", f"{result['ate_m']:.3f} m"))
+    if "relations" in result:
+        errors = result["relations"]
+        figures = f"{errors['translation_m']:.4f} m, {math.degrees(errors['rotation_rad']):.3f} deg"
+        rows.append(("relations", f"{figures} of {errors['relations']}"))
+    return "\n".join([table(rows), "", f"written to {out}: map.yaml, map.pgm, trajectory.tum, slam.json"])

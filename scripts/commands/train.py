@@ -1,0 +1,165 @@
+"""`lidarium train`: train explorers by a teacher and by rewards, into a folder."""
+
+import importlib.util
+import os
+import shlex
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from tyro.conf import Positional
+
+from lidarium.scripts import first_start
+from lidarium.scripts.common import INTERRUPTED, LINE_PERIOD_S, Answer, Command, notify, table
+
+if TYPE_CHECKING:
+    from lidarium.training.progress import Progress
+
+DEFAULT_FOLDER = Path("runs/training")
+
+EXTRA = ("torch", "stable_baselines3", "sb3_contrib", "tensorboard")
+"""Packages of the extra ``rl``."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Train(Command):
+    """Train explorers as a TOML file says.
+
+    A teacher that knows the floors rates each choice, a network is fitted to that, and goes on by rewards if
+    the file says so. Finished parts are kept, and the same command goes on where it stopped. The best weights
+    and a card with all that made them are written to --out, runs/training by default.
+    """
+
+    compiles: ClassVar[bool] = True
+
+    config: Positional[Path]
+    """TOML file of the training, with its seed; docs/tutorials/train_a_team.md shows one"""
+    workers: int = 0
+    """processes; 0 for as many as there are cores"""
+
+
+def execute(command: _Train) -> Answer:
+    """Do the missing parts of a training."""
+    from lidarium.mapping.files.output import check_writable
+
+    if command.workers < 0:
+        raise ValueError(f"--workers is {command.workers}; want 0 for as many as there are cores, or more")
+    if command.seed:
+        raise ValueError(
+            f"--seed is {command.seed}, and a training draws from the seed of its file; write "
+            f"seed = {command.seed} at the top of {command.config}"
+        )
+    _check_extra()
+    from lidarium.training.settings import read_training
+    from lidarium.training.training import Training
+
+    settings = read_training(command.config)
+    folder = command.out or DEFAULT_FOLDER
+    check_writable(folder)
+    first_start.compile_first(command.json)
+    training = Training(settings, folder, command.workers or len(os.sched_getaffinity(0)))
+    steps, show, is_interrupted = training.run(), _Shown(command.json), False
+    try:
+        for step in steps:
+            show(step)
+    except KeyboardInterrupt:
+        is_interrupted = True
+    finally:
+        steps.close()
+        show.close()
+    return _answer(folder, is_interrupted)
+
+
+def _check_extra() -> None:
+    """Check that the extra is installed."""
+    missing = [name for name in EXTRA if importlib.util.find_spec(name) is None]
+    if missing:
+        raise ValueError(
+            f"training needs {', '.join(missing)}; install the extra: "
+            'pip install -c constraints.txt "lidarium[rl]"'
+        )
+
+
+class _Shown:
+    """Shows how far a training has come.
+
+    A bar for each part on a terminal, else lines: the first and last of a part, and one every few seconds.
+    """
+
+    def __init__(self, is_quiet: bool, clock: Callable[[], float] = time.monotonic) -> None:
+        self._has_bar, self._clock = not is_quiet and sys.stderr.isatty(), clock
+        self._bar: Any = None
+        self._part, self._first, self._began, self._shown_at = "", 0, 0.0, 0.0
+
+    def __call__(self, step: "Progress") -> None:
+        """Show a step."""
+        is_new, now = step.part != self._part, self._clock()
+        if is_new:
+            self._part, self._first, self._began = step.part, step.done, now
+        if self._has_bar:
+            self._draw(step, is_new)
+        elif is_new or step.done == step.total or now - self._shown_at >= LINE_PERIOD_S:
+            self._shown_at = now
+            notify(f"{step.part}: {step.done:,} of {step.total:,}{self._left(step, now)}{_figures(step)}")
+
+    def _draw(self, step: "Progress", is_new: bool) -> None:
+        from tqdm import tqdm
+
+        if is_new:
+            self.close()
+            self._bar = tqdm(
+                desc=step.part, total=step.total, initial=step.done, file=sys.stderr, dynamic_ncols=True
+            )
+        self._bar.update(step.done - self._bar.n)
+        self._bar.set_postfix_str(_figures(step).strip(" ()"))
+
+    def _left(self, step: "Progress", now: float) -> str:
+        """Return how long the part still takes, if that can be said."""
+        if step.done in (self._first, step.total):
+            return ""
+        return f", {_span((now - self._began) * (step.total - step.done) / (step.done - self._first))} left"
+
+    def close(self) -> None:
+        """End the bar of the part that runs."""
+        if self._bar is not None:
+            self._bar.close()
+
+
+def _figures(step: "Progress") -> str:
+    figures = ", ".join(f"{name} {value:.4g}" for name, value in step.figures.items())
+    return f" ({figures})" if figures else ""
+
+
+def _span(seconds: float) -> str:
+    """Return a time in words."""
+    if seconds < 90.0:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60.0:.0f} min" if seconds < 5400.0 else f"{seconds / 3600.0:.1f} h"
+
+
+def _answer(folder: Path, is_interrupted: bool) -> Answer:
+    import json
+
+    from lidarium.mapping.files.guarded_reading import read_text
+    from lidarium.training.settings import MOST_BYTES
+    from lidarium.training.training import CARD_FILE, WEIGHTS_FILE
+
+    if is_interrupted or not (folder / CARD_FILE).exists():
+        text = f"interrupted; what is finished is in {folder}, and the same command goes on there"
+        return Answer({"folder": str(folder), "interrupted": True}, text, INTERRUPTED)
+    card = json.loads(read_text(folder / CARD_FILE, MOST_BYTES))
+    rows = [
+        (name, f"{found['ratio']:.3f}", f"{100 * found['better']:.0f} %", found["ended"], found["episodes"])
+        for name, found in card["validation"].items()
+    ]
+    header = ("weights", "time over tour_frontier", "faster", "seen enough", "episodes")
+    lines = [f"best: {card['best']}, in {folder / WEIGHTS_FILE}", table(rows, header)]
+    if card["validation"][card["best"]]["ratio"] >= 1.0:
+        lines.append("none is faster than tour_frontier on these floors; want more floors or rounds")
+    weights = shlex.quote(f"weights={folder / WEIGHTS_FILE}")
+    lines.append(f"use them: lidarium run --policy learned --policy-set {weights}")
+    text = "\n".join(lines)
+    return Answer({"folder": str(folder), "interrupted": False, **card}, text)

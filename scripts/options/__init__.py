@@ -1,1 +1,0 @@
-"""Options of commands that stand for settings of a part."""

@@ -1,1 +1,0 @@
-"""What commands leave of their results, on the screen or in files."""

@@ -1,1 +1,0 @@
-"""How a command behaves as a process: signals, streams, its first start."""

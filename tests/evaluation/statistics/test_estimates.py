@@ -1,0 +1,212 @@
+"""Medians, means and shares with intervals."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy import stats
+
+from lidarium.evaluation.statistics import (
+    interquartile_mean,
+    interquartile_mean_interval,
+    mean_interval,
+    median_bands,
+    median_interval,
+    paired_difference,
+    paired_ratio,
+)
+from lidarium.evaluation.statistics.samples import resample_counts
+
+samples = st.lists(st.floats(-1e6, 1e6), min_size=1, max_size=60)
+
+
+def test_ten_values_are_held_between_the_second_and_the_ninth():
+    found = median_interval(range(1, 11), is_interpolated=False)
+    assert (found.estimate, found.low, found.high) == (5.5, 2.0, 9.0)
+
+
+def test_the_whole_ranks_are_those_of_scipys_quantile_test():
+    for size in (6, 7, 20, 51, 200):
+        values = np.arange(size, dtype=float) ** 1.3
+        ends = stats.quantile_test(values).confidence_interval(0.95)
+        found = median_interval(values, is_interpolated=False)
+        assert (found.low, found.high) == (ends.low, ends.high), size
+
+
+def test_interpolation_goes_the_way_of_hettmansperger_and_sheather():
+    # n = 10: 97.85 % between ranks 2 and 9, 89.06 % between 3 and 8; I = 0.3243, share = 8 I / (2 + 6 I).
+    outer, inner = 1 - 2 * 11 / 1024, 1 - 2 * 56 / 1024
+    part = (outer - 0.95) / (outer - inner)
+    share = 8 * part / (2 + 6 * part)
+    found = median_interval(range(1, 11))
+    assert (found.low, found.high) == pytest.approx((2 + share, 9 - share))
+
+
+def test_too_few_values_bound_nothing():
+    assert median_interval([3.0, 1.0, 2.0, 4.0, 5.0]).low == -np.inf
+    assert median_interval([3.0, 1.0, 2.0, 4.0, 5.0]).high == np.inf
+    assert np.isfinite(median_interval(range(6)).high)
+
+
+def test_what_never_happened_is_later_than_everything():
+    found = median_interval([1, 2, 3, 4, 5, 6, 7, np.inf, np.inf, np.inf])
+    assert (found.estimate, found.high) == (5.5, np.inf)
+    assert median_interval([1.0, np.inf]).estimate == np.inf
+    assert median_interval([np.inf] * 8).low == np.inf
+
+
+@given(samples)
+def test_the_median_lies_in_its_interval_and_interpolation_makes_it_narrower(values):
+    found, whole = median_interval(values), median_interval(values, is_interpolated=False)
+    assert found.estimate == pytest.approx(np.median(values))
+    assert whole.low <= found.low <= found.estimate <= found.high <= whole.high
+
+
+@given(samples, st.floats(0.5, 0.98))
+def test_more_confidence_makes_it_no_narrower(values, confidence):
+    found, wider = median_interval(values, confidence), median_interval(values, confidence + 0.01)
+    assert wider.low <= found.low + 1e-6
+    assert wider.high >= found.high - 1e-6
+
+
+@given(samples)
+def test_it_turns_with_the_sample(values):
+    found, turned = median_interval(values), median_interval([-value for value in values])
+    assert (turned.low, turned.high) == pytest.approx((-found.high, -found.low), abs=1e-6)
+
+
+def test_bands_are_the_intervals_of_the_columns():
+    values = np.random.default_rng(1).normal(size=(30, 4))
+    bands = median_bands(values)
+    for column in range(4):
+        found = median_interval(values[:, column])
+        assert bands[:, column].tolist() == [found.estimate, found.low, found.high]
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ([], "values are empty"),
+        ([1.0, np.nan], r"values\[1\] is nan; want numbers or inf"),
+        ([-np.inf], "want numbers or inf"),
+        ([[1.0]], "one dimension"),
+    ],
+)
+def test_bad_samples_of_medians_are_refused(values, message):
+    with pytest.raises(ValueError, match=message):
+        median_interval(values)
+
+
+@pytest.mark.parametrize("confidence", [0.0, 1.0, 95.0, np.nan])
+def test_a_confidence_is_a_probability(confidence):
+    with pytest.raises(ValueError, match="more than 0 and less than 1"):
+        median_interval([1.0, 2.0], confidence)
+
+
+skewed = np.random.default_rng(3).exponential(10.0, 60)
+
+
+def test_the_mean_of_normal_values_has_about_students_interval():
+    values = np.random.default_rng(2).normal(5.0, 2.0, 80)
+    found = mean_interval(values)
+    low, high = stats.t.interval(0.95, 79, values.mean(), stats.sem(values))
+    assert found.estimate == pytest.approx(values.mean())
+    assert (found.low, found.high) == pytest.approx((low, high), abs=0.05)
+
+
+def test_of_skewed_values_the_interval_reaches_further_to_the_long_tail():
+    found = mean_interval(skewed)
+    assert found.high - found.estimate > 1.2 * (found.estimate - found.low)
+
+
+def test_the_interval_is_the_studentised_one_of_the_drawn_samples():
+    counts = resample_counts(len(skewed), 199, 4)
+    drawn = [np.repeat(skewed, row) for row in counts]
+    ratios = [(sample.mean() - skewed.mean()) / (sample.std() / np.sqrt(60)) for sample in drawn]
+    low, high = np.sort(ratios)[[5 - 1, 195 - 1]]
+    found, error = mean_interval(skewed, resamples=199, seed=4), skewed.std() / np.sqrt(60)
+    assert (found.low, found.high) == pytest.approx(
+        (skewed.mean() - high * error, skewed.mean() - low * error)
+    )
+
+
+def test_draws_come_from_the_seed():
+    assert mean_interval(skewed, resamples=500) == mean_interval(skewed, resamples=500)
+    assert mean_interval(skewed, resamples=500, seed=1) != mean_interval(skewed, resamples=500)
+
+
+def test_equal_values_have_an_interval_of_no_width():
+    for interval in (mean_interval, interquartile_mean_interval):
+        found = interval([0.1] * 30)
+        assert (found.estimate, found.low, found.high) == pytest.approx((0.1, 0.1, 0.1))
+
+
+def test_two_values_bound_nothing():
+    found = mean_interval([1.0, 2.0])
+    assert (found.low, found.high) == (-np.inf, np.inf)
+
+
+def test_the_interquartile_mean_is_scipys_trimmed_mean_where_quarters_are_whole():
+    for size in (4, 20, 60):
+        assert interquartile_mean(skewed[:size]) == pytest.approx(stats.trim_mean(skewed[:size], 0.25))
+
+
+def test_of_six_values_the_second_and_the_fifth_count_by_half():
+    assert interquartile_mean([0.0, 1.0, 2.0, 3.0, 10.0, 100.0]) == pytest.approx(
+        (0.5 * 1 + 2 + 3 + 0.5 * 10) / 3
+    )
+
+
+def test_an_outlier_does_not_move_the_interquartile_mean():
+    found, with_outlier = (
+        interquartile_mean_interval(values) for values in (skewed, np.append(skewed[:-1], 1e9))
+    )
+    assert with_outlier.estimate == pytest.approx(found.estimate, rel=0.1)
+    assert with_outlier.high < 100.0
+
+
+def test_a_paired_difference_is_symmetric_and_sees_less_noise_than_the_floors_have():
+    generator = np.random.default_rng(5)
+    floors = generator.normal(100.0, 50.0, 60)
+    a, b = floors + generator.normal(3.0, 1.0, 60), floors + generator.normal(0.0, 1.0, 60)
+    found = paired_difference(a, b)
+    assert found.low < 3.0 < found.high
+    assert found.high - found.low < 1.2
+    assert found.high - found.estimate == pytest.approx(found.estimate - found.low)
+
+
+def test_a_paired_ratio_is_the_geometric_mean_of_ratios():
+    found = paired_ratio([2.0, 8.0, 4.0], [1.0, 2.0, 4.0])
+    assert found.estimate == pytest.approx(2.0)
+    turned = paired_ratio([1.0, 2.0, 4.0], [2.0, 8.0, 4.0])
+    assert turned.estimate == pytest.approx(0.5)
+
+
+@settings(max_examples=25)
+@given(
+    st.lists(st.floats(-100.0, 100.0), min_size=8, max_size=30), st.floats(-50.0, 50.0), st.floats(0.1, 10.0)
+)
+def test_intervals_move_and_stretch_with_the_values(values, shift, scale):
+    sample = np.round(values, 3)
+    for interval in (mean_interval, interquartile_mean_interval):
+        found, moved = interval(sample, resamples=100), interval(scale * sample + shift, resamples=100)
+        expected = [scale * end + shift for end in (found.low, found.high)]
+        assert [moved.low, moved.high] == pytest.approx(expected, rel=1e-6, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: mean_interval([]), "values are empty"),
+        (lambda: mean_interval([1.0, np.inf]), r"values\[1\] is inf; want finite"),
+        (lambda: mean_interval([1.0, 2.0], resamples=10), "resamples is 10; want at least 100"),
+        (lambda: mean_interval([1.0, 2.0], confidence=95), "confidence is 95"),
+        (lambda: mean_interval(np.zeros(70_000)), "1 to 65,535"),
+        (lambda: paired_difference([1.0, 2.0], [1.0]), "a has 2 values and b has 1"),
+        (lambda: paired_difference([1.0], [np.nan]), r"b\[0\] is nan"),
+        (lambda: paired_ratio([1.0, 2.0], [1.0, 0.0]), r"b\[1\] is 0.0; want values above 0"),
+    ],
+)
+def test_bad_samples_are_refused(call, message):
+    with pytest.raises(ValueError, match=message):
+        call()

@@ -1,0 +1,54 @@
+"""Parts of a study that are asked for, and the command that a page names."""
+
+from pathlib import Path
+
+import pytest
+
+from lidarium.scripts.commands.reproduce import Reproduce, _command_line, _every, _worked, execute
+
+
+@pytest.mark.parametrize(
+    ("options", "every", "words"),
+    [
+        ({}, 1, ""),
+        ({"every": 10}, 10, " --every 10"),
+        ({"share": 0.1}, 10, " --share 0.1"),
+        ({"share": 1.0}, 1, " --share 1"),
+        ({"data": Path("/home/me/data"), "every": 2}, 2, " --data data --every 2"),
+        ({"data": Path("shared/data")}, 1, " --data shared/data"),
+    ],
+)
+def test_a_share_is_every_so_many(options, every, words):
+    command = Reproduce(name="floors", **options)
+    assert _every(command) == every
+    assert _command_line(command) == f"lidarium reproduce floors{words}"
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"every": 0}, "--every is 0"),
+        ({"workers": -1}, "--workers -1"),
+        ({"share": 0.5, "every": 2}, "want one of them"),
+        ({"share": 0.0}, "want a share above 0, up to 1"),
+        ({"share": 1.5}, "want a share above 0, up to 1"),
+    ],
+)
+def test_bad_parts_are_refused_before_anything_is_written(options, message, tmp_path):
+    with pytest.raises(ValueError, match=message):
+        execute(Reproduce(name="floors", out=tmp_path / "out", runs=tmp_path / "runs", **options))
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_work_shows_each_new_part_and_ends_where_it_is_broken_off(capsys):
+    def work(breaks):
+        yield "maps", 1, 9
+        yield "maps", 2, 9
+        if breaks:
+            raise KeyboardInterrupt
+        yield "logs", 3, 3
+
+    assert _worked(work(breaks=False), is_quiet=False)
+    assert capsys.readouterr().err == "maps: 1 of 9\nlogs: 3\n"
+    assert not _worked(work(breaks=True), is_quiet=True)
+    assert capsys.readouterr().err == ""
