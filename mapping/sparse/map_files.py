@@ -42,7 +42,7 @@ def _lists_of_columns(
     content: bytes, counts: Sequence[int], widths: Sequence[int]
 ) -> list[NDArray[np.int64]]:
     """Return the lists (count, width) whose blocks, joined, are the content."""
-    sizes = [count * width for count, width in zip(counts, _WIDTHS, strict=True)]
+    sizes = [count * width for count, width in zip(counts, widths, strict=True)]
     whole = np.frombuffer(content, np.uint8)
     lowest, upper = np.split(whole, [sum(sizes)])
     ends = np.cumsum(sizes)[:-1]

@@ -48,7 +48,7 @@ def drawn_names() -> tuple[str, ...]:
 
 
 def about_drawn(name: str) -> str:
-    """Return one sentence that describes a drawn floor is."""
+    """Return one sentence that describes a drawn floor."""
     return str(json.loads((DATA / f"{name}.json").read_text(encoding="utf-8"))["about"])
 
 

@@ -99,7 +99,7 @@ def floor_names() -> tuple[str, ...]:
 
 
 def about_floor(name: str) -> str:
-    """Return one sentence that describes the drawn floor of that name is."""
+    """Return one sentence that describes the drawn floor of that name."""
     if name not in drawn_names():
         raise ValueError(_unknown(name))
     return about_drawn(name)

@@ -285,11 +285,7 @@ def imported(path):
     [
         (
             catalogue.MADE_BY,
-            (
-                "envs/floors/generation/buildings.py",
-                "envs/floors/catalogue/names.py",
-                "envs/floors/catalogue/store.py",
-            ),
+            ("envs/floors/generation/buildings.py", "envs/floors/catalogue/store.py"),
         ),
         (
             floor_cache.MADE_BY,

@@ -39,7 +39,7 @@ def test_what_is_read_here_is_what_a_parser_reads(document, tmp_path, monkeypatc
     document.saveas(tmp_path / "plan.dxf")
     resolution = 1.0 if document.dxfversion == "AC1009" else None  # R12 has no units
     sifted = load_file(tmp_path / "plan.dxf", resolution)
-    monkeypatch.setattr(drawing_module, "sift", _Sifted)
+    monkeypatch.setattr(drawing_module, "_sift", _Sifted)
     parsed = load_file(tmp_path / "plan.dxf", resolution)
     assert sifted.bounds == parsed.bounds
 
