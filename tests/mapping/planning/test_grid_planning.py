@@ -152,5 +152,3 @@ def test_bad_input_is_named():
         Footprint(penalty=-1.0)
     with pytest.raises(ValueError, match="shape"):
         SearchSpace((0, 5), RESOLUTION)
-    with pytest.raises(ValueError, match="path has shape"):
-        shortened(np.zeros((0, 2), np.int64), belief, field, Footprint())
