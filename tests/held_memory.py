@@ -46,4 +46,4 @@ def growth(level):
     before = memory()
     reset(1_000)
     blocks, pages = memory() - before
-    return int(blocks), int(pages) * 4096, batch.batch.engine.simulation.beliefs.log_odds[0].nbytes
+    return int(blocks), int(pages) * 4096, batch.engine.simulation.beliefs.log_odds[0].nbytes

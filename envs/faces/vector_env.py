@@ -9,8 +9,9 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from lidarium.envs.engine.engine import NO_EPISODES
+from lidarium.envs.engine.engine import NO_EPISODES, Engine
 from lidarium.envs.engine.team_state import state_space
+from lidarium.envs.faces.randomized import RandomizedRows
 from lidarium.envs.faces.requests import episodes_of, options_of, seeds_of
 from lidarium.envs.faces.team import EpisodeTeam
 from lidarium.envs.faces.team_rows import ACTIVE
@@ -136,6 +137,13 @@ class ExplorationVectorEnv(VectorEnv[Any, NDArray[Any], NDArray[Any]]):
 
     def _infos(self) -> dict[str, Any]:
         return {**self.batch.infos, ACTIVE: self.batch.active, f"_{ACTIVE}": np.ones(self.num_envs, np.bool_)}
+
+    @property
+    def engine(self) -> Engine:
+        """The engine of all episodes; if settings are drawn, each has its own, see ``batch.parts``."""
+        if isinstance(self.batch, RandomizedRows):
+            raise AttributeError("episodes with drawn settings have an engine each; see batch.parts")
+        return self.batch.engine
 
     def team(self, episode: int) -> EpisodeTeam:
         """Return the handle of an episode's team, which policies ask; see ``Policy.reset``."""

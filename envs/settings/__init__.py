@@ -1,7 +1,5 @@
 """Settings of an environment."""
 
-from typing import Any
-
 from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.settings.lidar import Lidar
 from lidarium.envs.settings.making import make_settings

@@ -95,7 +95,7 @@ def _free_of_sum(world: WorldArrays, team: Team, line: int, word: int, cells: np
     return free
 
 
-@kernel(inline=True)
+@kernel(forceinline=True)
 def recount_free(maps: CountedMaps, who: int, i: int, j: int, free: np.uint64) -> None:
     """Replace old bits of free cells by new ones, and update the count.
 
@@ -107,7 +107,7 @@ def recount_free(maps: CountedMaps, who: int, i: int, j: int, free: np.uint64) -
         maps.bits[who, i, j, FREE] = free
 
 
-@kernel(inline=True)
+@kernel(forceinline=True)
 def sum_up(world: WorldArrays, team: Team, maps: CountedMaps, i: int, j: int) -> None:
     """Update a word of the team's map, and the counts by the difference."""
     truth, bits, disputed, counts, robots = maps.truth, maps.bits, maps.disputed, maps.counts, team.robots

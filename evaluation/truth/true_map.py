@@ -14,6 +14,7 @@ from lidarium.envs.floors.floor import Raster
 from lidarium.envs.floors.free_space import reachable_free_space
 from lidarium.envs.simulation.coverage import unpack_bits
 from lidarium.envs.simulation.disturbances.odometry import RADIUS
+from lidarium.envs.simulation.score import counted_cells
 from lidarium.evaluation.metrics.cells import Mask, surface
 
 

@@ -90,7 +90,7 @@ class Deciders:
 
         Seconds per robot and step of both.
         """
-        simulation, bare = self._deciding.batch.engine.simulation, self._bare.batch.engine.simulation
+        simulation, bare = self._deciding.engine.simulation, self._bare.engine.simulation
         deciding, stepping, agent_steps = 0.0, 0.0, 0
         while agent_steps == 0 or deciding + stepping < 2.0 * seconds:
             actions = self._actions()
@@ -127,7 +127,7 @@ class Deciders:
 
         They are shares of half the observed map's side.
         """
-        simulation = self._deciding.batch.engine.simulation
+        simulation = self._deciding.engine.simulation
         places = simulation.beliefs.believed[:, :2]
         self._ages += 1
         for row in np.flatnonzero(self._is_idle | (self._ages > _LONGEST)):
@@ -140,7 +140,7 @@ class Deciders:
 
         Where it stands, if none of many draws is.
         """
-        simulation = self._deciding.batch.engine.simulation
+        simulation = self._deciding.engine.simulation
         angles, distances = (
             self._generator.uniform(-math.pi, math.pi, _TRIALS),
             self._generator.uniform(NEAREST, FARTHEST, _TRIALS),

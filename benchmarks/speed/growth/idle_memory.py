@@ -129,7 +129,7 @@ def measure(few: int = 64, many: int = 1024) -> IdleMemory:
     second = standing(many)
     gc.collect()
     after = resident()
-    simulation = second.batch.engine.simulation
+    simulation = second.engine.simulation
     growth = None if before is None or after is None else (after - before) / many
     # What does not grow with the robots, such as the floor's tables, drops out of the difference.
     everything = (array_bytes(second) - array_bytes(first)) / (many - few)

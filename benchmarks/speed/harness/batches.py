@@ -77,12 +77,12 @@ class DrivenBatch:
 
     def step_kernel(self) -> None:
         """Take the same step by the kernel alone."""
-        self.env.batch.engine.run_kernel(self._modes, self._commands[self._draw()], self._nobody)
+        self.env.engine.run_kernel(self._modes, self._commands[self._draw()], self._nobody)
 
     @property
     def poses(self) -> NDArray[np.float64]:
         """True poses of all robots, (rows, 3) [m, rad]."""
-        return self.env.batch.engine.world.poses
+        return self.env.engine.world.poses
 
     def _draw(self) -> int:
         """Return which of the drawn commands holds in this step, and count the step."""

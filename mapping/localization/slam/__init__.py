@@ -1,3 +1,1 @@
 """Simultaneous localization with a graph of submaps."""
-
-from typing import Any

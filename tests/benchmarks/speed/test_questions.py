@@ -38,7 +38,7 @@ def test_the_kernel_alone_takes_the_steps_of_the_whole(few_episodes):
     assert np.array_equal(whole.poses, kernel.poses)
     assert (np.abs(whole.poses - began).max(axis=1) > 0.0).all()
     assert np.array_equal(
-        whole.env.batch.engine.simulation.beliefs.log_odds[5], kernel.env.batch.engine.simulation.beliefs.log_odds[5]
+        whole.env.engine.simulation.beliefs.log_odds[5], kernel.env.engine.simulation.beliefs.log_odds[5]
     )
 
 
@@ -46,7 +46,7 @@ def test_waypoints_are_free_cells_some_way_off(few_episodes):
     deciders = Deciders(1)
     deciders.start()
     assert min(deciders.run(0.0)) > 0.0
-    beliefs = deciders._deciding.batch.engine.simulation.beliefs
+    beliefs = deciders._deciding.engine.simulation.beliefs
     for row in range(8):
         place = deciders._drawn(row)
         distance = float(np.hypot(*(place - beliefs.believed[row, :2])))

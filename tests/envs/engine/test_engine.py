@@ -62,8 +62,8 @@ def compared(batch, alone, level, steps=20, before_step=None):
 def test_single_environments_and_batches_are_the_same_engine():
     env = lidarium.parallel_env(TWO_ROOMS, **SMALL)
     rows = lidarium.vector_env(1, TWO_ROOMS, **SMALL)
-    assert type(env.engine) is type(rows.batch.engine) is Engine
-    assert env.engine.episodes == rows.batch.engine.episodes == 1
+    assert type(env.engine) is type(rows.engine) is Engine
+    assert env.engine.episodes == rows.engine.episodes == 1
 
 
 @pytest.mark.parametrize("level", ["velocity", "waypoint", "frontier"])

@@ -58,7 +58,7 @@ def test_a_batch_leaves_nothing_behind(no_collection, level):
     def made():
         env = lidarium.vector_env(2, "apartment", level=level, robots=2)
         env.reset(seed=0)
-        return [weakref.ref(part) for part in (env.batch, env.batch.engine.perception, env.batch.engine.world)]
+        return [weakref.ref(part) for part in (env.batch, env.engine.perception, env.engine.world)]
 
     made()
     gc.collect()

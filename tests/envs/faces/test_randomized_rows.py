@@ -120,7 +120,7 @@ def test_learners_get_episodes_of_drawn_settings():
     assert all(np.array_equal(seen[name], plain[name]) for name in plain)
     dones = np.zeros(4, bool)
     for _ in range(12):
-        _, _, done, infos = rows.step(np.full((4, 2), 0.2, np.float32))
+        _, _, done, _ = rows.step(np.full((4, 2), 0.2, np.float32))
         dones |= done
     assert dones.all()
     rows.close()

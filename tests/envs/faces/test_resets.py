@@ -43,10 +43,10 @@ def test_rows_of_a_batch_start_where_single_episodes_do():
     batch.reset(seed=4)
     alone = lidarium.parallel_env(["apartment", "clinic"], **SMALL)
     starts = np.concatenate([begun(alone, 4 + episode) for episode in range(3)])
-    assert np.array_equal(batch.batch.engine.world.starts, starts)
+    assert np.array_equal(batch.engine.world.starts, starts)
     batch.reset(seed=4, options={"starts": "fixed"})
     again = np.concatenate([begun(alone, 4 + episode, starts="fixed") for episode in range(3)])
-    assert np.array_equal(batch.batch.engine.world.starts, again)
+    assert np.array_equal(batch.engine.world.starts, again)
 
 
 @pytest.mark.parametrize("starts", ["random", "fixd"])
@@ -78,7 +78,7 @@ def test_episodes_of_a_batch_are_counted_as_they_begin():
     names = []
     for _ in range(2):
         batch.reset(seed=1)
-        names += [floor.name for floor in batch.batch.engine.floors]
+        names += [floor.name for floor in batch.engine.floors]
     assert names == ["scene_room"] * 3 + ["apartment"]
 
 

@@ -186,12 +186,12 @@ def test_options_are_for_all_episodes_for_each_or_for_each_row():
     envs = lidarium.sb3_vec_env(2, ROOM, **{**FEW, "robots": 2})
     envs.set_options({"floor": ["clinic", "apartment"]})
     envs.reset()
-    assert [floor.name for floor in envs.batch.engine.floors] == ["clinic", "apartment"]
+    assert [floor.name for floor in envs.engine.floors] == ["clinic", "apartment"]
     envs.set_options([{"floor": "apartment"}, {}, {"floor": ROOM}, {}])
     envs.reset()
-    assert [floor.name for floor in envs.batch.engine.floors] == ["apartment", "room"]
+    assert [floor.name for floor in envs.engine.floors] == ["apartment", "room"]
     envs.reset()
-    assert [floor.name for floor in envs.batch.engine.floors] == ["room", "room"]
+    assert [floor.name for floor in envs.engine.floors] == ["room", "room"]
     with pytest.raises(
         ValueError, match="options has 2 entries; want one dict, or one for each of the 4 rows"
     ):

@@ -170,8 +170,8 @@ def test_some_episodes_are_reset_and_the_others_wait(level):
         assert np.array_equal(array[1], moved[name][1])
     assert infos["active"].all()
     assert set(infos) == TOLD_ALWAYS
-    assert list(batch.batch.engine.world.steps) == [0, batch.batch.engine.world.steps[1], 0]
-    assert batch.batch.engine.world.steps[1] > 0
+    assert list(batch.engine.world.steps) == [0, batch.engine.world.steps[1], 0]
+    assert batch.engine.world.steps[1] > 0
 
 
 def test_what_waits_is_not_told_of_twice():
@@ -214,11 +214,11 @@ def test_options_of_a_reset_are_for_all_or_for_each_episode():
     assert np.array_equal(infos["truth"]["pose"][0], drawn)
     assert np.allclose(infos["truth"]["pose"][1], places[0])
     batch.reset(options={"floor": "apartment"})
-    assert [floor.name for floor in batch.batch.engine.floors] == ["apartment", "apartment"]
+    assert [floor.name for floor in batch.engine.floors] == ["apartment", "apartment"]
     batch.reset(options={"floor": [load_floor("clinic"), None]})
-    assert [floor.name for floor in batch.batch.engine.floors] == ["clinic", "room"]
+    assert [floor.name for floor in batch.engine.floors] == ["clinic", "room"]
     batch.reset()
-    assert [floor.name for floor in batch.batch.engine.floors] == ["room", "room"]
+    assert [floor.name for floor in batch.engine.floors] == ["room", "room"]
 
 
 def test_goals_are_for_all_or_for_each_episode():
@@ -247,7 +247,7 @@ def test_floors_of_different_sizes_and_of_cells_of_different_sizes_are_in_one_ba
     image = dataclasses.replace(load_floor("apartment"), name="image", solids=(), cells=coarse)
     batch = lidarium.vector_env(4, **FEW)
     batch.reset(seed=0, options={"floor": [*names, image]})
-    shapes = {grid.shape for grid in batch.batch.engine.simulation.beliefs.log_odds}
+    shapes = {grid.shape for grid in batch.engine.simulation.beliefs.log_odds}
     assert len(shapes) == 4
     for _ in range(5):
         observations, *_ = batch.step(np.tile(AHEAD, (4, 1)))
@@ -265,7 +265,7 @@ def test_of_a_set_each_beginning_draws_a_floor(monkeypatch):
     alone.reset(seed=5)
     seen = []
     for _ in range(4):
-        seen.append([floor.name for floor in batch.batch.engine.floors])
+        seen.append([floor.name for floor in batch.engine.floors])
         assert seen[-1][3] == alone.floor.name
         alone.reset()
         for _ in range(2):
@@ -456,8 +456,8 @@ def test_actions_that_cannot_be_are_refused_and_change_nothing(level, actions, w
     before = batch.reset(seed=1)[1]["truth"]["pose"]
     with pytest.raises(ValueError, match=words):
         batch.step(actions)
-    assert np.array_equal(batch.batch.engine.world.poses, before)
-    assert (batch.batch.engine.world.steps == 0).all()
+    assert np.array_equal(batch.engine.world.poses, before)
+    assert (batch.engine.world.steps == 0).all()
 
 
 def test_actions_of_rows_that_do_not_act_are_ignored():

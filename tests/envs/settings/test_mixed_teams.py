@@ -80,7 +80,7 @@ def test_a_mixed_team_is_in_a_batch_what_it_is_alone(level):
         rewards = alone.step({agent: actions[3 + k] for k, agent in enumerate(alone.possible_agents)})[1]
         _, wanted, *_ = batch.step(actions)
         assert list(rewards.values()) == wanted[3:].tolist()
-        assert np.array_equal(alone.unwrapped.world.poses, batch.batch.engine.world.poses[3:])
+        assert np.array_equal(alone.unwrapped.world.poses, batch.engine.world.poses[3:])
     assert np.isfinite(alone.state()).all()
     assert alone.state_space.contains(alone.state())
 

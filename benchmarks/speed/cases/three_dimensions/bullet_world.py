@@ -13,7 +13,7 @@ from lidarium.benchmarks.speed.harness.report import run_alone
 from lidarium.benchmarks.speed.harness.timing import Effort, interleaved, repeated
 from lidarium.benchmarks.speed.peers.bullet import SUBSTEPS, BulletRig, circling
 from lidarium.envs.faces.parallel import ExplorationEnv
-from lidarium.envs.floors.floor import Floor
+from lidarium.envs.floors.floor import Floor, Solid
 from lidarium.envs.floors.generation.buildings import BuildingSettings, generate_building
 from lidarium.envs.settings.making import make_settings
 from lidarium.envs.simulation.bullet.bodies import Bodies

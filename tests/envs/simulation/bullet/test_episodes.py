@@ -52,7 +52,7 @@ def test_the_rows_of_a_batch_are_lone_environments_to_the_bit():
     batch.reset(seed=[7] * 63 + [8])
     for _ in range(4):
         batch.step(np.full((128, 2), 0.5, np.float32))
-    poses = batch.batch.engine.world.poses.reshape(64, 2, 3)
+    poses = batch.engine.world.poses.reshape(64, 2, 3)
     assert (poses[:63] == poses[0]).all()
     env = lidarium.parallel_env(FLOOR, backend="bullet", robots=2, **PLAIN)
     env.reset(seed=7)
