@@ -167,7 +167,7 @@ class ExplorationVecEnv(VecEnv):
                 ACTIVE: True,
                 **{name: _of_row(infos[name], row) for name in names if infos[f"_{name}"][row]},
             }
-            for row in rows
+            for row in rows.tolist()
         ]
 
     def _check_open(self) -> None:

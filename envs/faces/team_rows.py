@@ -245,10 +245,11 @@ class TeamRows:
             if self.engine.reasons[row]:
                 self._endings[row] = word
         if form == "full":
+            nobody = np.full(self.rows, None, object)
             of_live = {
                 name: infos[name] & ~kept if name.startswith("_") else infos[name] for name in infos
             }
-            of_live["ended_because"] = np.where(kept, self._endings, infos.get("ended_because"))
+            of_live["ended_because"] = np.where(kept, self._endings, infos.get("ended_because", nobody))
             of_live["_ended_because"] = kept | infos.get("_ended_because", np.False_)
             return of_live
         if form == "flat":

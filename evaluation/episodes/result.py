@@ -110,14 +110,14 @@ class EpisodeData:
         return truth_of(self.env)
 
     @cached_property
-    def maps(self) -> NDArray[np.int16]:
+    def maps(self) -> NDArray[np.int8]:
         """Each robot's own map on the floor, (robots, rows, columns): log-odds, 0 is unknown."""
-        return np.asarray(maps_on_floor(self.env))
+        return maps_on_floor(self.env)
 
     @cached_property
     def team_map(self) -> NDArray[np.int16]:
         """The sum of the robots' maps, (rows, columns): above 0 is occupied, below 0 is free."""
-        return np.sum(self.maps, axis=0, dtype=np.int16)
+        return np.asarray(np.sum(self.maps, axis=0, dtype=np.int16))
 
     @cached_property
     def sensed(self) -> NDArray[np.bool_]:

@@ -1,5 +1,6 @@
 """`lidarium show`: list the choices: policies, robots, metrics, settings and more."""
 
+from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from functools import partial
 from typing import Any, Literal
@@ -246,7 +247,7 @@ def _side_by_side(values: dict[str, dict[str, Any]]) -> str:
     )
 
 
-_LISTS = {
+_LISTS: dict[str, Callable[[], tuple[dict[str, Any], str]]] = {
     "policies": _policies,
     "robots": _robots,
     "lidars": _lidars,
