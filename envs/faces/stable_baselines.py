@@ -154,8 +154,8 @@ class ExplorationVecEnv(VecEnv):
         if len(over):
             batch.begin(over, is_same_step=True)
             rows = (over[:, None] * batch.robots + np.arange(batch.robots)).ravel()
-            for row, info in zip(rows, self._infos_of(rows), strict=True):
-                self.reset_infos[row] = info
+            for began, info in zip(rows.tolist(), self._infos_of(rows), strict=True):
+                self.reset_infos[began] = info
         return batch.observations, rewards, dones, infos
 
     def _infos_of(self, rows: NDArray[np.int64]) -> Infos:
