@@ -5,8 +5,7 @@ import math
 import numpy as np
 
 from lidarium.envs.simulation.kernels.face_casting import FaceTable, cast_by_faces
-from lidarium.envs.simulation.kernels.ray_casting import cast_scan
-from lidarium.envs.simulation.kernels.ray_travel import cast_by_squares
+from lidarium.envs.simulation.kernels.ray_casting import cast_by_squares, cast_scan
 from lidarium.mapping.grids.scan_geometry import Beams, beam_directions
 
 TENTH_OF_A_MILLIMETRE = 1e-4 / 0.025

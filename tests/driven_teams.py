@@ -5,12 +5,12 @@ import math
 import numpy as np
 
 from lidarium.envs.floors.floor import Floor, Solid
-from lidarium.envs.levels.frontier_offers import FrontierOffers
+from lidarium.envs.levels.frontier import FrontierOffers
 from lidarium.envs.onboard.driving.team_driver import TeamDriver
 from lidarium.envs.onboard.perception import Perception
 from lidarium.envs.onboard.radio.messages import Orders, Target
 from lidarium.envs.settings.making import make_settings
-from lidarium.envs.simulation.kernels.floor_tables import FloorTables
+from lidarium.envs.simulation.kernels.floor_cache import FloorTables
 from lidarium.envs.simulation.kinematic_simulation import KinematicSimulation
 
 ROBOTS = 2

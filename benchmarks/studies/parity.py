@@ -17,8 +17,7 @@ import lidarium
 from lidarium.benchmarks.studies.shared.study import Progress, Study, do_missing, kept_lines
 from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.settings.making import make_settings
-from lidarium.envs.simulation.bullet.bullet_world import BulletWorld
-from lidarium.envs.simulation.bullet.leaning_scans import LEAN
+from lidarium.envs.simulation.bullet.bullet_world import LEAN, BulletWorld
 
 ROBOTS = ("kobuki", "pioneer", "service")
 FLOORS = ("apartment", "clinic", "scene_room", "scene_loop", *(f"building:{seed}" for seed in range(16)))

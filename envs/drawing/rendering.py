@@ -30,7 +30,7 @@ from lidarium.envs.drawing.frame_parts import (
 )
 from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.simulation.coverage import unpack_bits
-from lidarium.envs.simulation.kernels.floor_tables import FloorTables
+from lidarium.envs.simulation.kernels.floor_cache import FloorTables
 from lidarium.envs.simulation.simulation import Simulation
 
 _NEAR = 0.125

@@ -12,8 +12,8 @@ from lidarium.envs.drawing.frame_parts import INK, Colour, Frame, team_colours
 from lidarium.envs.drawing.shading import Viewpoint, shade
 from lidarium.envs.floors.faces import Faces, faces_of, section_of
 from lidarium.envs.floors.floor import Floor
+from lidarium.envs.settings.cameras import DepthCamera
 from lidarium.envs.settings.robots import Robot
-from lidarium.envs.settings.sensors.cameras import DepthCamera
 from lidarium.envs.simulation.depth.frames import image_of, place_camera
 from lidarium.envs.simulation.disturbances.odometry import HEIGHT, RADIUS, TICKS_PER_METRE
 

@@ -15,8 +15,7 @@ from lidarium.envs.floors.starts import check_goal, check_starts, draw_starts
 from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.settings.reset_options import Curriculum, ResetOptions, of_curriculum
 from lidarium.envs.simulation.backends import BACKENDS
-from lidarium.envs.simulation.kernels.floor_cache import floor_tables
-from lidarium.envs.simulation.kernels.floor_tables import FloorTables
+from lidarium.envs.simulation.kernels.floor_cache import FloorTables, floor_tables
 from lidarium.envs.simulation.simulation import Simulation
 
 

@@ -7,8 +7,6 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.envs.levels.frontier_gains import expected_gain
-from lidarium.envs.levels.frontier_ranking import choose_offers
 from lidarium.envs.onboard.driving.drives import (
     STATE_ARRIVED,
     STATE_GIVING_WAY,
@@ -41,6 +39,96 @@ from lidarium.mapping.planning.search.swept_costs import (
     spread_costs,
     take_costs,
 )
+
+RAYS = 64
+"""Rays by which a view is measured."""
+
+
+def ray_directions() -> NDArray[np.float64]:
+    """Return the directions of the rays, (RAYS, 2): their share of a cell along rows and along columns."""
+    angles = (np.arange(RAYS) + 0.5) * (2.0 * math.pi / RAYS)
+    return np.stack([np.sin(angles), np.cos(angles)], axis=1)
+
+
+@kernel
+def expected_gain(log_odds: Array, row: int, column: int, rays: Array, reach: int) -> float:
+    """Return the unknown area in view of a cell [cells], by rays that end at occupied cells.
+
+    Parameters
+    ----------
+    log_odds : (rows, columns) int8
+        The map: 0 unknown, above 0 occupied.
+    row, column : int
+        The cell to look from.
+    rays : (rays, 2) float64
+        See `ray_directions`.
+    reach : int
+        How far the rays go [cells].
+    """
+    rows, columns = log_odds.shape
+    area = 0.0
+    for ray in range(rays.shape[0]):
+        along_rows, along_columns = rays[ray, 0], rays[ray, 1]
+        for step in range(1, reach + 1):
+            at_row = int(math.floor(row + 0.5 + step * along_rows))
+            at_column = int(math.floor(column + 0.5 + step * along_columns))
+            if not (0 <= at_row < rows and 0 <= at_column < columns):
+                break
+            level = log_odds[at_row, at_column]
+            if level > 0:
+                break
+            if level == 0:
+                area += step
+    return float(area * (2.0 * math.pi / rays.shape[0]))
+
+
+@kernel
+def _rank(values: Array, is_wanted: Array, ranked: Array, first: int, last: int) -> int:
+    """Write wanted clusters to ``ranked[first:last]``, the highest value first; return where they end.
+
+    The first of equals comes first. What is ranked is wanted no more.
+    """
+    while first < last:
+        best = -1
+        for k in range(len(values)):
+            if is_wanted[k] and (best < 0 or values[k] > values[best]):
+                best = k
+        if best < 0:
+            break
+        is_wanted[best] = False
+        ranked[first] = best
+        first += 1
+    return first
+
+
+@kernel
+def choose_offers(left: Array, sizes: Array, is_wanted: Array, by_size: int, ranked: Array) -> int:
+    """Choose which clusters are offered, and return how many.
+
+    They are the cheapest, and of the others the longest; offered in the order of their cost.
+
+    Parameters
+    ----------
+    left : (clusters,) array
+        What is left of the budget at each cluster: more is cheaper.
+    sizes : (clusters,) array
+        How long each is.
+    is_wanted : (clusters,) bool
+        Which may be offered; overwritten.
+    by_size : int
+        How many of the offers are for the longest.
+    ranked : (offers,) int64
+        Where the numbers of the chosen clusters are written.
+    """
+    count = int(_rank(left, is_wanted, ranked, 0, len(ranked) - by_size))
+    if by_size == 0:
+        return count
+    count = _rank(sizes, is_wanted, ranked, count, len(ranked))
+    is_wanted[:] = False
+    for i in range(count):
+        is_wanted[ranked[i]] = True
+    return int(_rank(left, is_wanted, ranked, 0, count))
+
 
 FARTHEST = 1000.0
 """Largest number in a table of offers [m]."""

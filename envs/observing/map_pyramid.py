@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from lidarium.envs.observing.rows import Rows
 from lidarium.envs.settings.exploration import ExplorationSettings
-from lidarium.envs.settings.sensors.observables import Observable
+from lidarium.envs.settings.observables import Observable
 from lidarium.mapping.grids.occupancy import FREE, OCCUPIED, UNKNOWN
 from lidarium.mapping.kernels.compilation import Array, kernel
 

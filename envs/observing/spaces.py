@@ -9,7 +9,7 @@ from lidarium.envs.observing.observables import computed
 from lidarium.envs.observing.rows import FARTHEST
 from lidarium.envs.settings.exploration import OBSERVABLES, ExplorationSettings
 from lidarium.envs.settings.limits import GAINS, LEVEL_OBSERVABLES
-from lidarium.envs.settings.sensors.observables import SENSED
+from lidarium.envs.settings.observables import SENSED
 
 KERNEL_SUMMARIES = {
     "scan": "ranges [m], (beams,)",

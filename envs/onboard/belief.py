@@ -3,10 +3,10 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from lidarium.envs.onboard.known_poses import Teammate
 from lidarium.envs.onboard.navigation import NavigationMap
 from lidarium.envs.onboard.perception import Perception
 from lidarium.envs.onboard.sparse_belief import SparseBelief
-from lidarium.envs.onboard.teammate import Teammate
 from lidarium.envs.settings.lidar import Lidar
 from lidarium.envs.settings.robots import Robot
 

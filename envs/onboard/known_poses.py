@@ -1,14 +1,37 @@
 """What the robots know of where they are, and where their teammates are."""
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.envs.onboard.radio.exchange import NEVER, Exchange
-from lidarium.envs.onboard.teammate import Teammate
 from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.simulation.kernels.arrays import ENDED
 from lidarium.envs.simulation.simulation import Simulation
 from lidarium.mapping.localization.dead_reckoning.localizer import Localizer
+
+
+@dataclass(frozen=True, slots=True)
+class Teammate:
+    """What a robot knows of another.
+
+    Attributes
+    ----------
+    pose : (3,) float64
+        x, y, theta in the knowing robot's map frame [m, rad].
+    age_s : float
+        Age of what is known [s].
+    radius : float
+        Radius of the body [m].
+    has_ended : bool
+        Whether it has ended and stands where it is.
+    """
+
+    pose: NDArray[np.float64]
+    age_s: float
+    radius: float
+    has_ended: bool
 
 
 class KnownPoses:

@@ -1,5 +1,6 @@
 """The sparse maps of the robots of all episodes, made from when they are first asked for."""
 
+import math
 from collections.abc import Iterable
 from dataclasses import replace
 
@@ -8,14 +9,248 @@ from numpy.typing import NDArray
 
 from lidarium.envs.onboard.known_poses import KnownPoses
 from lidarium.envs.onboard.sparse_belief import SparseBelief
-from lidarium.envs.onboard.sparse_mapping import SparseMapper, sparse_body
 from lidarium.envs.settings.exploration import ExplorationSettings
+from lidarium.envs.simulation.depth.point_cloud import camera_pose
 from lidarium.envs.simulation.kernels.arrays import ENDED
 from lidarium.envs.simulation.simulation import Simulation
-from lidarium.mapping.geometry.rigid import Transform
+from lidarium.mapping.geometry.rigid import Transform, composed, relative
+from lidarium.mapping.grids.growing_array import GrowingArray
 from lidarium.mapping.localization.dead_reckoning.localizer import KeyScans
-from lidarium.mapping.sparse.exploring.ground import ground_map, joined_ground
+from lidarium.mapping.localization.matching.wall_direction import wall_direction, within_quarter
+from lidarium.mapping.point_clouds.cameras import points_of_depth
+from lidarium.mapping.sparse.exploring.ground import (
+    GroundCamera,
+    SeenGround,
+    are_seen_through,
+    ground_map,
+    joined_ground,
+)
 from lidarium.mapping.sparse.exploring.navigation import SparseNavigation, sparse_navigation
+from lidarium.mapping.sparse.floor_plane import FloorPlane
+from lidarium.mapping.sparse.mapper.incremental import IncrementalMapper
+from lidarium.mapping.sparse.settings import MapperSettings
+from lidarium.mapping.sparse.sparse_map import SparseMap
+from lidarium.mapping.sparse.swept_body import SweptBody
+
+SEEN_MOTION_M, SEEN_TURN = 0.1, math.radians(5.0)
+"""An image shows new ground where the robot has moved or turned by so much since the last one [m, rad]."""
+
+SHORTFALL = 0.4
+"""Ground may be seen so far too near, as a share of a cell: less than from a wall to the cell behind it."""
+
+LEAST_WALL_M, MOST_WALL_POINTS = 0.15, 3000
+"""Points lower than this show no wall; of the others so many show how walls run [m]."""
+
+LEAST_TURN = math.radians(1.0)
+"""Walls that run along the axes of the believed poses to within this are taken to [rad]."""
+
+TRAIL_M = 0.2
+"""Distance between the places of the trail on which a robot can go back [m]."""
+
+BODY_HEIGHT_MARGIN_M = 0.03
+"""What hangs no more than this above the body is in its way [m]."""
+
+MERGE_RADIUS_M = 0.20
+"""Free codes of a robot that drives on its map merge within this [m].
+
+It needs them closer than a finished map does: with 0.25 m, robots that face a wall found no path past it.
+"""
+
+
+class SparseMapper:
+    """Makes the sparse map of one robot.
+
+    Boxes of codes lie along axes, so that walls which run otherwise would become thick: the map's axes are
+    those of the walls that the first image shows.
+
+    Parameters
+    ----------
+    settings : ExplorationSettings
+        The robot, its camera, and how it maps.
+    axes : float or None
+        Direction of the map's x axis in the frame of the robot's believed poses [rad]; both have one origin.
+        None for that of the walls.
+
+    Attributes
+    ----------
+    axes : float or None
+        The same, None before the first image.
+    ground : SeenGround
+        The ground that it has seen.
+    version : int
+        Counts up where map or ground change.
+    corrections : int
+        How often poses of the past were corrected.
+
+    Raises
+    ------
+    ValueError
+        Where the robot has no depth camera, or one that sees no ground.
+    """
+
+    def __init__(self, settings: ExplorationSettings, axes: float | None = None) -> None:
+        camera, sparse = settings.camera, settings.sparse_map
+        if camera is None:
+            raise ValueError(
+                "the robots have no depth camera, which sparse maps are made by; want one, such as "
+                "camera='xtion' with observe=[..., 'depth']"
+            )
+        self._mount, self._intrinsics, self._range = camera_pose(camera), camera.intrinsics, camera.depth_max
+        mapping = MapperSettings(
+            robot_height_m=settings.robot.height,
+            range_m=camera.depth_max,
+            most_boxes=sparse.most_boxes,
+            least_motion_m=sparse.least_motion_m,
+            least_turn=sparse.least_turn,
+            merge_radius_m=MERGE_RADIUS_M,
+        )
+        # The camera stands on its robot, and the robot on the floor.
+        self._mapper = IncrementalMapper(sparse.codes, mapping, floor=FloorPlane())
+        eye = GroundCamera(
+            intrinsics=camera.intrinsics,
+            pose=self._mount,
+            shape=(camera.rows, camera.columns),
+            range_m=camera.depth_max,
+            lowest_m=-mapping.noise_depth_m,
+            highest_m=mapping.floor_height_m,
+            shortfall_m=SHORTFALL * sparse.cell_m,
+        )
+        self.ground = SeenGround(eye, settings.robot.radius, sparse.cell_m)
+        self._times, self._poses = GrowingArray((), np.float64), GrowingArray((3,), np.float64)
+        # At which steps images were coded, and showed new ground.
+        self._coded: list[int] = []
+        self._viewed: list[int] = []
+        self.axes, self.version, self.corrections = axes, 0, 0
+
+    @property
+    def map(self) -> SparseMap | None:
+        """The map; None before the first image that shows anything."""
+        return self._mapper.map if self._coded else None
+
+    @property
+    def trail(self) -> NDArray[np.float64]:
+        """Where the robot has been on the map, a place every ``TRAIL_M``, the last one last, (T, 3) [m]."""
+        poses = self._poses.rows
+        steps = np.hypot(*np.diff(poses[:, :2], axis=0, prepend=poses[:1, :2]).T)
+        firsts = np.unique(np.floor(np.cumsum(steps) / TRAIL_M), return_index=True)[1]
+        return np.pad(poses[firsts, :2], ((0, 0), (0, 1)))
+
+    def sense(
+        self,
+        time_s: float,
+        pose: NDArray[np.float64],
+        depth: NDArray[np.float32] | None,
+        bodies: NDArray[np.float64],
+    ) -> None:
+        """Take in where the robot is, and what its camera sees there.
+
+        Parameters
+        ----------
+        time_s : float
+            When, later than all before [s].
+        pose : (3,) float64
+            x, y, theta as the robot believes [m, rad].
+        depth : (rows, columns) float32 or None
+            The image [m]; None where none was taken now.
+        bodies : (K, 3) float64
+            x, y and radius of other robots, whose points are no part of the map [m].
+        """
+        if self.axes is None and depth is not None:
+            self.axes = self._axes_of_walls(pose, depth)
+            self._poses.rows[:] = self._on_map(self._poses.rows)
+        pose = self._on_map(pose)
+        self._times.append(time_s)
+        self._poses.append(pose)
+        if depth is None:
+            return
+        step, frame = len(self._times) - 1, self._frame(pose)
+        if self._is_new_view(pose):
+            self.ground.add(pose, depth)
+            self._viewed.append(step)
+            self._forget_what_is_gone(depth, frame)
+            self.version += 1
+        if self._mapper.is_due(frame):
+            points = self._usable_points(depth, frame, bodies)
+            if len(points) and self._mapper.add(points, frame):
+                self._coded.append(step)
+                self.version += 1
+
+    def correct(self, scans: KeyScans) -> None:
+        """Move all that was mapped with the poses of scans, as they are believed now.
+
+        Each pose of the robot moves with the last scan before it.
+        """
+        times, poses, scan_poses = self._times.rows, self._poses.rows, self._on_map(scans.poses)
+        scan = np.searchsorted(scans.times_s, times, side="right") - 1
+        step = np.searchsorted(times, scans.times_s[np.maximum(scan, 0)])
+        # A scan from before this map was begun, or without a step of its own, moves nothing.
+        is_known = (scan >= 0) & (step < len(times))
+        is_known[is_known] &= times[step[is_known]] == scans.times_s[scan[is_known]]
+        beside = relative(poses[step[is_known]], poses[is_known])
+        corrected = poses.copy()
+        corrected[is_known] = composed(scan_poses[scan[is_known]], beside)
+        poses[:] = corrected
+        if self._coded:
+            self._mapper.correct(np.stack([self._frame(pose) for pose in poses[self._coded]]))
+        self.ground.move(poses[self._viewed])
+        self.version += 1
+        self.corrections += 1
+
+    def _forget_what_is_gone(self, depth: NDArray[np.float32], frame: NDArray[np.float64]) -> None:
+        """Leave out the boxes of what has moved, as other robots do."""
+        if self._coded:
+            boxes = self._mapper.map.boxes
+            gone = are_seen_through(boxes, depth, self._intrinsics, frame, self._range)
+            if gone.any():
+                self._mapper.forget(gone)
+
+    def _on_map(self, poses: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return believed poses (..., 3) along the axes of the map [m, rad]."""
+        return composed(np.array([0.0, 0.0, -(self.axes or 0.0)]), poses)
+
+    def _axes_of_walls(self, pose: NDArray[np.float64], depth: NDArray[np.float32]) -> float:
+        """Return in which direction the walls of an image run [rad]; 0 where they hardly differ from that."""
+        points = points_of_depth(depth, self._intrinsics) @ self._mount[:3, :3].T + self._mount[:3, 3]
+        upright = points[points[:, 2] >= LEAST_WALL_M, :2]
+        chosen = np.ascontiguousarray(upright[:: len(upright) // MOST_WALL_POINTS + 1], np.float64)
+        direction, information = wall_direction(chosen)
+        axes = within_quarter(float(pose[2]) + direction)
+        return float(axes) if information > 0.0 and abs(axes) >= LEAST_TURN else 0.0
+
+    def _is_new_view(self, pose: NDArray[np.float64]) -> bool:
+        if not self._viewed:
+            return True
+        last = self._poses.rows[self._viewed[-1]]
+        turned = abs(math.remainder(float(pose[2] - last[2]), 2.0 * math.pi))
+        return math.dist(pose[:2], last[:2]) >= SEEN_MOTION_M or turned >= SEEN_TURN
+
+    def _frame(self, pose: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the pose (4, 4) of the camera of a robot at x, y, theta (3,)."""
+        base = np.eye(4)
+        cosine, sine = math.cos(pose[2]), math.sin(pose[2])
+        base[:2, :2], base[:2, 3] = [[cosine, -sine], [sine, cosine]], pose[:2]
+        return np.asarray(base @ self._mount)
+
+    def _usable_points(
+        self, depth: NDArray[np.float32], frame: NDArray[np.float64], bodies: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Return the points of an image within range that are not on other robots."""
+        points = points_of_depth(depth, self._intrinsics).astype(np.float64)
+        points = points[np.einsum("ij,ij->i", points, points) <= self._range**2]
+        if len(bodies) == 0 or len(points) == 0:
+            return np.asarray(points)
+        places = points @ frame[:2, :3].T + frame[:2, 3]
+        is_body = np.zeros(len(points), np.bool_)
+        centres = Transform(0.0, 0.0, -(self.axes or 0.0)).apply(bodies[:, :2])
+        for centre, radius in zip(centres, bodies[:, 2], strict=True):
+            is_body |= np.hypot(*(places - centre).T) <= radius
+        return np.asarray(points[~is_body])
+
+
+def sparse_body(settings: ExplorationSettings) -> SweptBody:
+    """Return the body by which a robot plans on sparse maps."""
+    return SweptBody(radius=settings.robot.radius, height=settings.robot.height + BODY_HEIGHT_MARGIN_M)
+
 
 BODY_MARGIN_M = 0.1
 """What is so near to the body of another robot is taken to be that robot [m]."""

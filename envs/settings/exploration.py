@@ -9,18 +9,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.envs.settings.battery import BATTERIES, Battery
+from lidarium.envs.settings.cameras import CAMERAS as CAMERAS
+from lidarium.envs.settings.cameras import DepthCamera
 from lidarium.envs.settings.faults import NO_FAULTS, FaultSettings
 from lidarium.envs.settings.lidar import LIDARS, Lidar
 from lidarium.envs.settings.limits import OBSERVABLES as OBSERVABLES
 from lidarium.envs.settings.limits import check_workload, egocentric_scales_of, observed_names
+from lidarium.envs.settings.observables import check_sensed
 from lidarium.envs.settings.odometry import ODOMETRY, OdometrySettings
 from lidarium.envs.settings.radio import RADIO, RadioSettings
 from lidarium.envs.settings.rewards import RewardSettings
 from lidarium.envs.settings.robots import ROBOTS, Robot, envelope_of, kinds_of
-from lidarium.envs.settings.sensors.cameras import CAMERAS as CAMERAS
-from lidarium.envs.settings.sensors.cameras import DepthCamera
-from lidarium.envs.settings.sensors.observables import check_sensed
-from lidarium.envs.settings.sensors.sparse_maps import SparseMapSettings
 from lidarium.mapping.geometry.bounds import (
     above,
     check_anything,
@@ -33,6 +32,36 @@ from lidarium.mapping.geometry.bounds import (
 from lidarium.mapping.grids.occupancy import OccupancySettings
 from lidarium.mapping.localization.registry import LOCALIZERS
 from lidarium.registry import REGISTRIES, registry
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SparseMapSettings:
+    """How a robot makes its sparse map; it does from when the map is first asked for.
+
+    Attributes
+    ----------
+    codes : int
+        Codes of an image, at most, of floor and obstacles together.
+    most_boxes : int
+        A map with more boxes merges them with a larger slack.
+    least_motion_m, least_turn : float
+        An image is coded where the robot has moved or turned by so much since the last one [m, rad].
+    cell_m : float
+        Side of the cells of seen ground [m].
+    margin_m : float
+        Paths on the map keep the body so far from boxes [m].
+    """
+
+    codes: Annotated[int, within(2, 65_536)] = 256
+    most_boxes: Annotated[int, within(1, 1_000_000)] = 1500
+    least_motion_m: Annotated[float, within(0.0, 1e3)] = 0.3
+    least_turn: Annotated[float, within(0.0, 2.0 * math.pi)] = math.radians(25.0)
+    cell_m: Annotated[float, above(0.0, 10.0)] = 0.1
+    margin_m: Annotated[float, within(0.0, 10.0)] = 0.05
+
+    def __post_init__(self) -> None:
+        check_settings(self, "the sparse map")
+
 
 MAX_ROBOTS = 64
 MAX_FRONTIERS = 1024

@@ -15,7 +15,7 @@ from lidarium.envs.simulation.disturbances.faults import FAULT_NUMBERS, plan_fau
 from lidarium.envs.simulation.disturbances.noise import GAUSSIAN_TABLE
 from lidarium.envs.simulation.disturbances.odometry import RADIUS, WHEEL_NUMBERS, begin_wheels
 from lidarium.envs.simulation.kernels.arrays import sensor_numbers, table_of_owners
-from lidarium.envs.simulation.kernels.floor_tables import FloorTables
+from lidarium.envs.simulation.kernels.floor_cache import FloorTables
 from lidarium.envs.simulation.kernels.stepping import move_and_sense
 
 

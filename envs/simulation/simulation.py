@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.envs.floors.free_space import reachable_free_space
+from lidarium.envs.settings.cameras import DepthCamera
 from lidarium.envs.settings.lidar import Lidar
-from lidarium.envs.settings.sensors.cameras import DepthCamera
 from lidarium.envs.simulation.backend import World
 from lidarium.envs.simulation.beliefs import Beliefs
 from lidarium.envs.simulation.depth.depth_sensor import DepthSensor
@@ -25,7 +25,7 @@ from lidarium.envs.simulation.kernels.arrays import (
     sensor_numbers,
     table_of_owners,
 )
-from lidarium.envs.simulation.kernels.floor_tables import FloorTables
+from lidarium.envs.simulation.kernels.floor_cache import FloorTables
 from lidarium.envs.simulation.kernels.stepping import (
     perceive_parallel,
     perceive_serial,

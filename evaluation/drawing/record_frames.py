@@ -33,8 +33,8 @@ from lidarium.envs.drawing.frame_parts import (
 from lidarium.envs.drawing.views import camera_panel, views_of
 from lidarium.envs.engine.tally import THRESHOLDS
 from lidarium.envs.floors.floor import Floor
+from lidarium.envs.settings.cameras import DepthCamera
 from lidarium.envs.settings.robots import Robot
-from lidarium.envs.settings.sensors.cameras import DepthCamera
 from lidarium.evaluation.drawing.picture_parts import (
     INK,
     SOLID,

@@ -5,8 +5,7 @@ import json
 from dataclasses import asdict
 
 from lidarium.envs.settings.exploration import ExplorationSettings
-from lidarium.envs.settings.making import make_settings
-from lidarium.envs.settings.realism import REALISM
+from lidarium.envs.settings.making import REALISM, make_settings
 
 
 def realism_of(settings: ExplorationSettings) -> str:

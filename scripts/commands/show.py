@@ -104,7 +104,7 @@ def _robots() -> tuple[dict[str, Any], str]:
 def _cameras() -> tuple[dict[str, Any], str]:
     import math
 
-    from lidarium.envs.settings.sensors.cameras import CAMERAS
+    from lidarium.envs.settings.cameras import CAMERAS
 
     header = ("camera", "pixels", "view [deg]", "from [m]", "to [m]", "height [m]", "noisy")
     rows = [
@@ -172,8 +172,7 @@ def _formats() -> tuple[dict[str, Any], str]:
 
 def _realism() -> tuple[dict[str, Any], str]:
     from lidarium.envs.settings.faults import KINDS
-    from lidarium.envs.settings.making import make_settings
-    from lidarium.envs.settings.realism import REALISM
+    from lidarium.envs.settings.making import REALISM, make_settings
 
     header = ("realism", "noise", "odometry", "localization", "radio", "faults [1/h]")
     rows, values = [], {}
@@ -220,7 +219,7 @@ def _localizers() -> tuple[dict[str, Any], str]:
 
 def _observables() -> tuple[dict[str, Any], str]:
     from lidarium.envs.observing.spaces import KERNEL_SUMMARIES
-    from lidarium.envs.settings.sensors.observables import SENSED
+    from lidarium.envs.settings.observables import SENSED
 
     summaries = {**KERNEL_SUMMARIES, **SENSED.summaries}
     return {"observables": summaries}, table(summaries.items(), indent="")

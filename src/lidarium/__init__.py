@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from lidarium.envs.observing.observables import observable
     from lidarium.envs.onboard.radio.messages import Order, OrderKind, Route, Target
     from lidarium.envs.settings.battery import Battery
+    from lidarium.envs.settings.cameras import DepthCamera
     from lidarium.envs.settings.exploration import ExplorationSettings
     from lidarium.envs.settings.faults import Fault, FaultSettings
     from lidarium.envs.settings.lidar import Lidar
@@ -40,7 +41,6 @@ if TYPE_CHECKING:
     from lidarium.envs.settings.radio import RadioSettings
     from lidarium.envs.settings.rewards import RewardSettings
     from lidarium.envs.settings.robots import Robot
-    from lidarium.envs.settings.sensors.cameras import DepthCamera
     from lidarium.evaluation.episodes.runner import run_episode
     from lidarium.mapping.merging.merger import merge_maps
     from lidarium.mapping.merging.settings import MergeSettings
@@ -50,7 +50,7 @@ __version__ = "0.3.0"
 
 _FACE: dict[str, str] = {
     "Battery": "lidarium.envs.settings.battery",
-    "DepthCamera": "lidarium.envs.settings.sensors.cameras",
+    "DepthCamera": "lidarium.envs.settings.cameras",
     "ExplorationEnv": "lidarium.envs.faces.parallel",
     "ExplorationSettings": "lidarium.envs.settings.exploration",
     "Fault": "lidarium.envs.settings.faults",

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from lidarium.envs.settings.sensors.cameras import DepthCamera
+from lidarium.envs.settings.cameras import DepthCamera
 from lidarium.envs.settings.table import markdown_table
 
 PAGES = Path(__file__).parents[2] / "docs" / "reference"

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from lidarium.benchmarks.speed.scenes.floors import BenchFloor, team_poses
 from lidarium.benchmarks.speed.scenes.teams import LIDAR
 from lidarium.envs.settings.robots import ROBOTS
-from lidarium.envs.simulation.kernels.floor_tables import FloorTables
+from lidarium.envs.simulation.kernels.floor_cache import FloorTables
 from lidarium.envs.simulation.kinematic_simulation import KinematicSimulation
 from lidarium.mapping.grids.occupancy import OccupancySettings
 

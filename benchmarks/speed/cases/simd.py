@@ -22,8 +22,8 @@ from llvmlite import binding
 from numpy.typing import NDArray
 
 from lidarium.benchmarks.speed.harness.timing import Effort, compared, interleaved, repeated
+from lidarium.envs.simulation.kernels.ray_casting import cast_in_lanes, cast_one_by_one
 from lidarium.envs.simulation.kernels.ray_tables import RayTables
-from lidarium.envs.simulation.kernels.ray_travel import cast_in_lanes, cast_one_by_one
 from lidarium.mapping.grids.map_crops import turn_by_cells, turn_in_registers
 from lidarium.mapping.grids.scan_geometry import Beams, ScanGeometry, beam_directions
 from lidarium.mapping.kernels.compilation import Array

@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.envs.floors.floor import Floor
+from lidarium.envs.settings.cameras import DepthCamera
 from lidarium.envs.settings.lidar import Lidar
 from lidarium.envs.settings.robots import Robot
-from lidarium.envs.settings.sensors.cameras import DepthCamera
+from lidarium.envs.simulation.bullet.bodies import FloorShapes
 from lidarium.envs.simulation.bullet.client import Client
-from lidarium.envs.simulation.bullet.floor_shapes import FloorShapes
 from lidarium.envs.simulation.bullet.robot_text import LEFT, RIGHT, urdf_of
 
 HEIGHT = 0.3

@@ -16,7 +16,7 @@ from scipy import ndimage
 
 from lidarium.envs.floors.floor import Floor, Raster
 from lidarium.envs.simulation.kernels.contact import distance_bound
-from lidarium.envs.simulation.kernels.floor_tables import FloorTables
+from lidarium.envs.simulation.kernels.floor_cache import FloorTables
 from lidarium.envs.simulation.kernels.ray_tables import RayTables
 
 RESOLUTION = 0.025

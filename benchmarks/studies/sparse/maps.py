@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from lidarium.benchmarks.studies.sparse.grids import OctoMap, TreeSizes, laser_grid
 from lidarium.benchmarks.studies.sparse.places import BODY, CAMERA, Frame, Place, frames_of
-from lidarium.envs.settings.sensors.cameras import CAMERAS
+from lidarium.envs.settings.cameras import CAMERAS
 from lidarium.mapping.sparse.graph import TopologicalGraph, build_graph
 from lidarium.mapping.sparse.map_files import binary_content, text_content
 from lidarium.mapping.sparse.mapper.full import map_cloud

@@ -11,8 +11,8 @@ from scipy import ndimage
 from lidarium.envs.floors.catalogue.names import load_floor
 from lidarium.envs.floors.faces import faces_of
 from lidarium.envs.floors.floor import Floor
+from lidarium.envs.settings.cameras import CAMERAS, DepthCamera
 from lidarium.envs.settings.robots import ROBOTS
-from lidarium.envs.settings.sensors.cameras import CAMERAS, DepthCamera
 from lidarium.envs.simulation.depth.frames import image_of
 from lidarium.envs.simulation.depth.point_cloud import camera_pose
 from lidarium.mapping.geometry.rigid import Transform

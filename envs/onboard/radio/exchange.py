@@ -12,26 +12,204 @@ robots themselves or from those that hold copies.
 """
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.envs.onboard.radio.map_blocks import (
-    BLOCK,
-    BLOCK_BYTES,
-    HEADER_BYTES,
-    NO_BLOCKS,
-    NO_CELLS,
-    POSE_BYTES,
-    STATUS_BYTES,
-    Message,
-    differing_blocks,
-)
 from lidarium.envs.onboard.radio.messages import Status
-from lidarium.envs.onboard.radio.radio_links import RadioLinks
 from lidarium.envs.settings.exploration import ExplorationSettings
+from lidarium.envs.simulation.backend import World
+from lidarium.envs.simulation.disturbances.faults import DEAD_RADIO, has_fault
+from lidarium.envs.simulation.disturbances.radio import RADIO_STREAM, links, links_to
 from lidarium.envs.simulation.kernels.arrays import ENDED
 from lidarium.envs.simulation.simulation import Simulation
+from lidarium.mapping.kernels.compilation import Array, kernel
+
+STATION_STREAM = 1
+"""Separates the draws for the station's links from those of the robots.
+
+The robots' draws are the same with and without the station.
+"""
+
+
+class RadioLinks:
+    """The links of the robots of one episode.
+
+    Parameters
+    ----------
+    world : World
+        Where the robots are.
+    settings : ExplorationSettings
+        The team and its radio.
+    episode : int
+        Which episode of the world.
+
+    Attributes
+    ----------
+    links : (robots, robots) bool
+        Who reached whom when links were found last: sender, receiver.
+    station_links : (robots,) bool
+        Who reached the station, and was reached by it, when that was found last.
+    """
+
+    def __init__(self, world: World, settings: ExplorationSettings, episode: int) -> None:
+        self._world, self._settings, self._episode = world, settings.radio, episode
+        self._rows = range(episode * settings.robots, (episode + 1) * settings.robots)
+        self._is_shadowed = settings.radio.shadowing > 0.0
+        self.start(0)
+
+    def start(self, seed: int) -> None:
+        """Begin an episode without links; chance comes from ``seed``."""
+        robots = len(self._rows)
+        self._generator = np.random.default_rng([seed, RADIO_STREAM])
+        self._station_generator = np.random.default_rng([seed, RADIO_STREAM, STATION_STREAM])
+        self._chance, self._station_chance = np.zeros((robots, robots)), np.zeros(robots)
+        self.links, self.station_links = np.zeros((robots, robots), np.bool_), np.zeros(robots, np.bool_)
+
+    def find(self, step: int, *, draws: bool) -> None:
+        """Find out which robots reach each other.
+
+        The shadowing is drawn again where ``draws``.
+        """
+        if draws and self._is_shadowed:
+            self._chance = self._generator.standard_normal(self._chance.shape)
+        world, team = self._world, slice(self._rows.start, self._rows.stop)
+        floor = world.floors[self._episode]
+        assert floor is not None
+        self.links = links(
+            self._settings, world.poses[team], floor.laser, self._chance if self._is_shadowed else None
+        )
+        works = self._works(step)
+        self.links &= works[:, None] & works[None, :]
+
+    def find_station(self, *, draws: bool = False) -> None:
+        """Find out which robots reach the place where the first of them started."""
+        if draws and self._is_shadowed:
+            self._station_chance = self._station_generator.standard_normal(len(self.station_links))
+        world, team = self._world, slice(self._rows.start, self._rows.stop)
+        floor = world.floors[self._episode]
+        assert floor is not None
+        is_linked = links_to(
+            self._settings,
+            world.poses[team],
+            world.starts[self._rows.start],
+            floor.laser,
+            self._station_chance if self._is_shadowed else None,
+        )
+        self.station_links = is_linked & self._works(int(world.steps[self._episode]))
+
+    def reached(self) -> NDArray[np.bool_]:
+        """Return whom the station reaches, from robot to robot, (robots,)."""
+        reached, known = self.station_links.copy(), np.zeros_like(self.station_links)
+        while (reached != known).any():
+            known = reached
+            reached = known | self.links[known].any(axis=0)
+        return reached
+
+    def is_lost(self, *, is_of_station: bool) -> bool:
+        """Draw whether a message is lost, one of the station or between robots."""
+        generator = self._station_generator if is_of_station else self._generator
+        return self._settings.loss > 0.0 and bool(generator.random() < self._settings.loss)
+
+    def _works(self, step: int) -> NDArray[np.bool_]:
+        """Return whose radio works, (robots,)."""
+        world = self._world
+        return np.array(
+            [
+                world.failed[row] == 0 and not has_fault(world.faults[row], DEAD_RADIO, step)
+                for row in self._rows
+            ]
+        )
+
+
+BLOCK = 64
+"""Cells of a block of a map."""
+
+POSE_BYTES = 32
+"""A message with a pose: x, y, theta and the time, 8 bytes each."""
+
+HEADER_BYTES, BLOCK_BYTES = 32, 4 + BLOCK
+"""A message with a part of a map: sender, whose map, when, and how many blocks.
+
+Each block is its number and a byte for each cell.
+"""
+
+STATUS_BYTES = 80
+"""Bytes of the status that a robot sends with its map.
+
+The status is pose, target and three figures, 8 bytes each, and the robot's states.
+"""
+
+
+@kernel
+def _differing_blocks(source: Array, target: Array, low: int, high: int, found: Array) -> int:
+    """Fill ``found`` with the differing blocks of two maps; return their count.
+
+    Blocks are numbered, over rows ``low`` to ``high``.
+    """
+    columns, count = source.shape[1], 0
+    words = columns // 64
+    for row in range(low, high):
+        for word in range(words):
+            for column in range(64 * word, 64 * word + 64):
+                if source[row, column] != target[row, column]:
+                    found[count] = row * words + word
+                    count += 1
+                    break
+    return count
+
+
+@dataclass(frozen=True, slots=True)
+class Message:
+    """Something that is being sent: a pose, or blocks of a map where there are any.
+
+    Attributes
+    ----------
+    arrives : int
+        The step at which it is there.
+    receiver, source : int
+        Who gets it, and whom it is about.
+    step : int
+        The step at which it was true.
+    pose : (3,) float64 or None
+        x, y, theta as the source believed [m, rad].
+    has_ended : bool
+        Whether the source had ended.
+    blocks, cells : (blocks,) int64, (blocks, 64) int8
+        Blocks of the source's map.
+    status : Status or None
+        What the source reported of itself with its map.
+    """
+
+    arrives: int
+    receiver: int
+    source: int
+    step: int
+    pose: NDArray[np.float64] | None
+    has_ended: bool
+    blocks: NDArray[np.int64]
+    cells: NDArray[np.int8]
+    status: Status | None = None
+
+
+NO_BLOCKS, NO_CELLS = np.zeros(0, np.int64), np.zeros((0, BLOCK), np.int8)
+
+
+def differing_blocks(
+    held: NDArray[np.int8], copy: NDArray[np.int8]
+) -> tuple[NDArray[np.int64], NDArray[np.int8]]:
+    """Return the blocks in which a map differs from an older copy.
+
+    Their numbers (blocks,) and their cells (blocks, 64).
+    """
+    # A correction of the past may have emptied rows that the receiver still holds.
+    used = np.flatnonzero(held.view(np.uint64).any(axis=1) | copy.view(np.uint64).any(axis=1))
+    low, high = (int(used[0]), int(used[-1]) + 1) if len(used) else (0, 0)
+    found = np.empty((high - low) * (held.shape[1] // BLOCK), np.int64)
+    blocks = found[: _differing_blocks(held, copy, low, high, found)].copy()
+    return blocks, held.reshape(-1, BLOCK)[blocks]
+
 
 NEVER = -2
 """Step of a message that never came.

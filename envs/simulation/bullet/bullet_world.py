@@ -17,12 +17,41 @@ from lidarium.envs.settings.odometry import ODOMETRY, OdometrySettings
 from lidarium.envs.settings.robots import Robot
 from lidarium.envs.simulation.bullet.bodies import Bodies, Motion
 from lidarium.envs.simulation.bullet.client import has_display
-from lidarium.envs.simulation.bullet.leaning_scans import LEAN, scan_leaning
 from lidarium.envs.simulation.kernels.arrays import BROKEN_PHYSICS, DEAD, ENDED
 from lidarium.envs.simulation.kernels.contact import CENTRE_BUMPER, SIDE_BUMPER
-from lidarium.envs.simulation.kernels.floor_tables import FloorTables
+from lidarium.envs.simulation.kernels.floor_cache import FloorTables
 from lidarium.envs.simulation.kernels.stepping import disturb_scan, drive, encode, sense
 from lidarium.envs.simulation.kinematic_world import KinematicWorld
+
+LEAN = math.radians(2.0)
+"""From this on a scan is taken along the tilted plane [rad]."""
+
+_OWN_BODY = 1e-3
+"""How far outside of its own body a ray begins [m]."""
+
+
+def scan_leaning(bodies: Bodies, robot: int, lidar: Lidar, ranges: NDArray[np.float32]) -> None:
+    """Take the scan of a robot that leans.
+
+    Beams meet the floor, the ground and other robots; they begin at the side of the own body.
+
+    Parameters
+    ----------
+    bodies : Bodies
+        All of the episode.
+    robot : int
+        Whose scan.
+    lidar : Lidar
+        Its laser.
+    ranges : (beams,) float32
+        Result: true ranges [m], inf for no return.
+    """
+    motion, first = bodies.motion(robot), bodies.team[robot].radius + _OWN_BODY
+    eye = motion.place + lidar.height * motion.axes[:, 2]
+    beams = np.stack([np.cos(lidar.angles), np.sin(lidar.angles)], axis=1) @ motion.axes[:, :2].T
+    shares = bodies.rays(eye + first * beams, eye + lidar.range_max * beams)
+    ranges[:] = np.where(shares < 1.0, first + shares * (lidar.range_max - first), np.inf)
+
 
 TILT = math.radians(30.0)
 """A robot that leans by more than this has fallen [rad]."""

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.envs.floors.faces import Faces
-from lidarium.envs.settings.sensors.cameras import DepthCamera
+from lidarium.envs.settings.cameras import DepthCamera
 from lidarium.envs.simulation.backend import World
 from lidarium.envs.simulation.depth.frames import (
     Cameras,
@@ -16,7 +16,7 @@ from lidarium.envs.simulation.depth.frames import (
 )
 from lidarium.envs.simulation.disturbances.noise import GAUSSIAN_TABLE
 from lidarium.envs.simulation.kernels.arrays import ENDED
-from lidarium.envs.simulation.kernels.floor_tables import FloorTables
+from lidarium.envs.simulation.kernels.floor_cache import FloorTables
 from lidarium.mapping.kernels.compilation import use_threads
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.envs.floors.faces import Faces
-from lidarium.envs.settings.sensors.cameras import DepthCamera
+from lidarium.envs.settings.cameras import DepthCamera
 from lidarium.envs.simulation.depth.body_drawing import draw_body
 from lidarium.envs.simulation.depth.face_drawing import (
     CORNERS,

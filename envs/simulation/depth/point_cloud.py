@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.envs.settings.sensors.cameras import DepthCamera
+from lidarium.envs.settings.cameras import DepthCamera
 from lidarium.mapping.point_clouds.cameras import points_of_depth
 
 

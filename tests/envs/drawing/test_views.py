@@ -9,8 +9,8 @@ from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.floors.faces import SECTION, section_of
 from lidarium.envs.floors.floor import Floor, Solid
 from lidarium.envs.floors.raster import Raster
+from lidarium.envs.settings.cameras import CAMERAS
 from lidarium.envs.settings.making import make_settings
-from lidarium.envs.settings.sensors.cameras import CAMERAS
 
 BOX = Solid(np.array([(2.0, 2.0), (3.0, 2.0), (3.0, 3.0), (2.0, 3.0)]), 0.0, 0.8)
 WALL = Solid(np.array([(0.0, 0.0), (4.0, 0.0), (4.0, 0.2), (0.0, 0.2)]))

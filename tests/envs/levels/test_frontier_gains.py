@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import lidarium
-from lidarium.envs.levels.frontier_gains import expected_gain, ray_directions
+from lidarium.envs.levels.frontier_choices import expected_gain, ray_directions
 
 OPTIONS = {"robots": 2, "map_cells": 32, "lidar": "lidar_360_6m", "level": "frontier"}
 OBSERVE = ["frontiers", "frontier_gains"]

@@ -3,7 +3,7 @@
 import numpy as np
 from driven_teams import HALL, ROBOTS, ROOMS, Teams
 
-from lidarium.envs.levels.frontier_offers import REASONS
+from lidarium.envs.levels.frontier import REASONS
 
 
 def test_what_is_not_offered_lets_a_robot_stay():

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from lidarium.envs.levels.frontier_ranking import choose_offers
+from lidarium.envs.levels.frontier_choices import choose_offers
 
 
 def plain_offers(left, sizes, is_wanted, by_size, most):

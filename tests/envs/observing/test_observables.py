@@ -5,8 +5,8 @@ import pytest
 
 import lidarium
 from lidarium.envs.observing.observables import observable
+from lidarium.envs.settings.observables import SENSED
 from lidarium.envs.settings.radio import RadioSettings
-from lidarium.envs.settings.sensors.observables import SENSED
 
 SMALL = {"robots": 3, "map_cells": 32, "lidar": "lidar_360_6m"}
 AHEAD = np.array([0.6, 0.2], np.float32)

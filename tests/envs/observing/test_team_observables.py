@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from lidarium.envs.observing.team_observables import TEAMMATES, coverage, teammate_box, teammates, time_left
+from lidarium.envs.observing.observables import TEAMMATES, coverage, teammate_box, teammates, time_left
 from lidarium.envs.settings.making import make_settings
 
 

@@ -11,7 +11,7 @@ from lidarium.envs.onboard.driving.drives import (
     STATE_GIVING_WAY,
 )
 from lidarium.envs.onboard.radio.messages import Orders, Target
-from lidarium.envs.simulation.kernels.floor_tables import FloorTables
+from lidarium.envs.simulation.kernels.floor_cache import FloorTables
 
 
 def of_team(log, episode):

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 import lidarium
-from lidarium.envs.settings.making import make_settings
-from lidarium.envs.settings.realism import REALISM
+from lidarium.envs.settings.making import REALISM, make_settings
 from lidarium.evaluation.episodes.runner import run_episode
 from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.localization.dead_reckoning.localizer import KeyScans

@@ -7,9 +7,9 @@ import pytest
 
 import lidarium
 from lidarium.envs.floors.floor import Floor, Solid
-from lidarium.envs.onboard.sparse_mapping import SparseMapper
+from lidarium.envs.onboard.sparse_maps import SparseMapper
+from lidarium.envs.settings.cameras import CAMERAS
 from lidarium.envs.settings.making import make_settings
-from lidarium.envs.settings.sensors.cameras import CAMERAS
 from lidarium.mapping.geometry.rigid import Transform, composed, relative
 from lidarium.mapping.localization.dead_reckoning.localizer import KeyScans
 from lidarium.mapping.sparse.exploring.ground import BLOCKED, SEEN

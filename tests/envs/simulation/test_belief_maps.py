@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lidarium.envs.simulation.belief_maps import blank, wipe
+from lidarium.envs.simulation.beliefs import blank, wipe
 from lidarium.mapping.grids.pooled_maps import pool_touched, touch, untouched
 
 SHAPE = (96, 128)

@@ -12,8 +12,7 @@ from lidarium.envs.floors.catalogue.names import load_floor
 from lidarium.envs.floors.floor import Floor, Solid
 from lidarium.envs.floors.free_space import reachable_free_space
 from lidarium.envs.simulation.coverage import count_bits, mark_seen, pack_bits, share_new_cells, unpack_bits
-from lidarium.envs.simulation.kernels.floor_cache import floor_tables
-from lidarium.envs.simulation.kernels.floor_tables import FloorTables
+from lidarium.envs.simulation.kernels.floor_cache import FloorTables, floor_tables
 from lidarium.envs.simulation.score import counted_cells
 from lidarium.mapping.kernels.compilation import kernel
 

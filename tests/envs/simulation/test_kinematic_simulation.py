@@ -5,13 +5,13 @@ import pytest
 from linked_rooms import TWO_ROOMS
 from scored_halls import hall, tables_of
 
+from lidarium.envs.settings.cameras import DepthCamera
 from lidarium.envs.settings.faults import Fault, FaultSettings
 from lidarium.envs.settings.lidar import Lidar
 from lidarium.envs.settings.odometry import ODOMETRY
 from lidarium.envs.settings.robots import ROBOTS
-from lidarium.envs.settings.sensors.cameras import DepthCamera
 from lidarium.envs.simulation.kernels.arrays import DEAD_RECKONING, KNOWN_TEAMMATES, SOME_TEAMMATES, TRUE_POSE
-from lidarium.envs.simulation.kernels.floor_tables import FloorTables
+from lidarium.envs.simulation.kernels.floor_cache import FloorTables
 from lidarium.envs.simulation.kinematic_simulation import KinematicSimulation
 from lidarium.envs.simulation.rewards import TERMS
 from lidarium.envs.simulation.simulation import Simulation

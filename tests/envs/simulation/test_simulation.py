@@ -9,9 +9,9 @@ from linked_rooms import TWO_ROOMS
 from scored_halls import hall, tables_of
 
 from lidarium.envs.floors.floor import Raster
+from lidarium.envs.settings.cameras import DepthCamera
 from lidarium.envs.settings.lidar import Lidar
 from lidarium.envs.settings.robots import ROBOTS
-from lidarium.envs.settings.sensors.cameras import DepthCamera
 from lidarium.envs.simulation.kernels.arrays import (
     DEAD_RECKONING,
     KNOWN_TEAMMATES,
@@ -19,7 +19,7 @@ from lidarium.envs.simulation.kernels.arrays import (
     SOME_TEAMMATES,
     TRUE_POSE,
 )
-from lidarium.envs.simulation.kernels.floor_tables import FloorTables
+from lidarium.envs.simulation.kernels.floor_cache import FloorTables
 from lidarium.envs.simulation.kernels.ray_tables import RayTables
 from lidarium.envs.simulation.kinematic_world import KinematicWorld
 from lidarium.envs.simulation.simulation import PoseSources, Simulation, within_half_turns

@@ -15,7 +15,7 @@ from lidarium.envs.simulation.backends import BACKENDS, kinematic_world, simulat
 from lidarium.envs.simulation.bullet.bullet_world import BulletWorld
 from lidarium.envs.simulation.coverage import unpack_bits
 from lidarium.envs.simulation.kernels.arrays import ENDED
-from lidarium.envs.simulation.kernels.floor_tables import FloorTables
+from lidarium.envs.simulation.kernels.floor_cache import FloorTables
 from lidarium.envs.simulation.kinematic_simulation import KinematicSimulation
 from lidarium.envs.simulation.kinematic_world import KinematicWorld
 from lidarium.envs.simulation.simulation import Simulation

@@ -5,8 +5,7 @@ from dataclasses import replace
 import pytest
 
 from lidarium.envs.settings.exploration import ExplorationSettings
-from lidarium.envs.settings.making import make_settings
-from lidarium.envs.settings.realism import REALISM
+from lidarium.envs.settings.making import REALISM, make_settings
 from lidarium.evaluation.episodes.settings_identity import realism_of, settings_sha256
 
 

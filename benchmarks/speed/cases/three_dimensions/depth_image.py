@@ -14,8 +14,8 @@ from lidarium.envs.floors.catalogue.names import load_floor
 from lidarium.envs.floors.faces import faces_of
 from lidarium.envs.floors.floor import Floor
 from lidarium.envs.floors.free_space import configuration_space
+from lidarium.envs.settings.cameras import CAMERAS, DepthCamera
 from lidarium.envs.settings.robots import ROBOTS
-from lidarium.envs.settings.sensors.cameras import CAMERAS, DepthCamera
 from lidarium.envs.simulation.depth.frames import image_of
 
 CORES = 1

@@ -18,8 +18,8 @@ from lidarium.benchmarks.speed.harness.timing import Contender, Effort, interlea
 from lidarium.envs.floors.catalogue.names import load_floor
 from lidarium.envs.floors.faces import faces_of
 from lidarium.envs.floors.free_space import configuration_space
+from lidarium.envs.settings.cameras import CAMERAS
 from lidarium.envs.settings.robots import ROBOTS
-from lidarium.envs.settings.sensors.cameras import CAMERAS
 from lidarium.envs.simulation.depth.frames import image_of
 from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.point_clouds.cameras import (

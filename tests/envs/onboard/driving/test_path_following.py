@@ -22,7 +22,7 @@ from lidarium.envs.onboard.radio.messages import DriveState, Target
 from lidarium.envs.settings.lidar import Lidar
 from lidarium.envs.settings.robots import ROBOTS
 from lidarium.envs.simulation.kernels.contact import distance_bound
-from lidarium.envs.simulation.kernels.floor_tables import FloorTables
+from lidarium.envs.simulation.kernels.floor_cache import FloorTables
 from lidarium.envs.simulation.kernels.ray_tables import RayTables
 from lidarium.envs.simulation.kinematic_simulation import KinematicSimulation
 from lidarium.mapping.grids.occupancy import OccupancySettings

@@ -8,8 +8,7 @@ from driven_teams import CORRIDOR, Teams
 
 from lidarium.envs.floors.floor import Floor
 from lidarium.envs.onboard.driving.path_following import ARRIVED, BLOCKED, DRIVING
-from lidarium.envs.onboard.driving.right_of_way import BACKING_STEPS, REFUGE_STAY_S, RightOfWay
-from lidarium.envs.onboard.driving.traffic import obstructing
+from lidarium.envs.onboard.driving.right_of_way import BACKING_STEPS, REFUGE_STAY_S, RightOfWay, obstructing
 from lidarium.envs.onboard.radio.messages import Orders, Target
 from lidarium.envs.simulation.kernels.arrays import ENDED
 

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lidarium.envs.onboard.driving.path_planner import footprint_of
-from lidarium.envs.onboard.driving.traffic import find_refuge, obstructing
+from lidarium.envs.onboard.driving.right_of_way import find_refuge, obstructing
 from lidarium.envs.onboard.navigation import NavigationMap
 from lidarium.mapping.planning.grid_planning import Until, centres_of, search
 

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 import lidarium
-from lidarium.envs.onboard.radio.exchange import NEVER
-from lidarium.envs.onboard.radio.map_blocks import BLOCK_BYTES, HEADER_BYTES, POSE_BYTES
+from lidarium.envs.onboard.radio.exchange import BLOCK_BYTES, HEADER_BYTES, NEVER, POSE_BYTES
 from lidarium.envs.settings.faults import Fault, FaultSettings
 from lidarium.envs.settings.radio import RadioSettings
 from lidarium.evaluation.episodes.runner import run_episode
@@ -38,7 +37,7 @@ def set_links(monkeypatch, matrix):
     """Let the robots reach each other as a matrix (or a function of the call's number) says."""
     calls = iter(range(10**6))
     monkeypatch.setattr(
-        "lidarium.envs.onboard.radio.radio_links.links",
+        "lidarium.envs.onboard.radio.exchange.links",
         lambda *_: np.array(matrix(next(calls)) if callable(matrix) else matrix, np.bool_).copy(),
     )
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from lidarium.envs.onboard.radio.map_blocks import BLOCK, differing_blocks
+from lidarium.envs.onboard.radio.exchange import BLOCK, differing_blocks
 
 
 @pytest.mark.parametrize("seed", range(4))

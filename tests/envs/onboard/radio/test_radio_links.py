@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from seen_truth import begun
 
-from lidarium.envs.onboard.radio.radio_links import RadioLinks
+from lidarium.envs.onboard.radio.exchange import RadioLinks
 
 NEAR_AND_FAR = np.array([(2.0, 4.0, 0.0), (3.0, 4.0, 0.0), (8.4, 6.3, 0.0)])
 

@@ -8,7 +8,7 @@ import lidarium
 from lidarium.agents import Policy
 from lidarium.agents.policy import PerRobot
 from lidarium.envs.floors.floor import Floor, Solid
-from lidarium.envs.onboard.radio.map_blocks import BLOCK_BYTES, HEADER_BYTES, STATUS_BYTES
+from lidarium.envs.onboard.radio.exchange import BLOCK_BYTES, HEADER_BYTES, STATUS_BYTES
 from lidarium.envs.onboard.radio.messages import DriveState, OperatingState, Order, OrderKind, Target
 from lidarium.envs.settings.faults import Fault, FaultSettings
 from lidarium.envs.settings.radio import RadioSettings

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from lidarium.envs.settings.sensors.cameras import CAMERAS, DepthCamera
+from lidarium.envs.settings.cameras import CAMERAS, DepthCamera
 
 
 def test_the_rim_of_an_image_is_at_half_the_field_of_view():

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from lidarium.envs.settings.making import make_settings
-from lidarium.envs.settings.sensors.observables import SENSED, check_sensed
+from lidarium.envs.settings.observables import SENSED, check_sensed
 
 
 def test_depth_needs_a_camera_and_has_its_size():

@@ -2,7 +2,7 @@
 
 import pytest
 
-from lidarium.envs.settings.sensors.sparse_maps import SparseMapSettings
+from lidarium.envs.settings.exploration import SparseMapSettings
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ from lidarium.envs.floors.generation.furniture import place
 from lidarium.envs.settings.lidar import Lidar
 from lidarium.envs.settings.robots import ROBOTS
 from lidarium.envs.simulation.kernels.arrays import BROKEN_PHYSICS
-from lidarium.envs.simulation.kernels.floor_tables import FloorTables
+from lidarium.envs.simulation.kernels.floor_cache import FloorTables
 from lidarium.envs.simulation.kinematic_world import KinematicWorld
 
 pytest.importorskip("pybullet", reason="the extra bullet is not installed")

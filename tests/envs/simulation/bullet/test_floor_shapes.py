@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from lidarium.envs.floors.floor import Floor, Raster, Solid
-from lidarium.envs.simulation.bullet.floor_shapes import FloorShapes
+from lidarium.envs.simulation.bullet.bodies import FloorShapes
 
 
 def test_turned_rectangles_are_boxes_and_other_outlines_prisms():

@@ -11,7 +11,7 @@ from lidarium.envs.settings.robots import ROBOTS
 
 pytest.importorskip("pybullet", reason="the extra bullet is not installed")
 from lidarium.envs.simulation.bullet.bodies import Bodies
-from lidarium.envs.simulation.bullet.leaning_scans import scan_leaning
+from lidarium.envs.simulation.bullet.bullet_world import scan_leaning
 
 KOBUKI = ROBOTS["kobuki"]
 LIDAR = Lidar(beams=5, field_of_view=math.pi, range_max=2.5, height=0.3)

@@ -5,7 +5,7 @@ import pytest
 
 from lidarium.envs.settings.making import make_settings
 from lidarium.envs.simulation.backends import BACKENDS
-from lidarium.envs.simulation.kernels.floor_tables import FloorTables
+from lidarium.envs.simulation.kernels.floor_cache import FloorTables
 
 pytest.importorskip("pybullet", reason="the extra bullet is not installed")
 from linked_rooms import TWO_ROOMS

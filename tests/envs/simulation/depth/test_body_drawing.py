@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from lidarium.envs.settings.sensors.cameras import DepthCamera
+from lidarium.envs.settings.cameras import DepthCamera
 from lidarium.envs.simulation.depth.body_drawing import draw_body
 from lidarium.envs.simulation.depth.frames import place_camera, view_numbers
 

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from linked_rooms import ROOM, TWO_ROOMS
 
+from lidarium.envs.settings.cameras import DepthCamera
 from lidarium.envs.settings.lidar import Lidar
 from lidarium.envs.settings.robots import ROBOTS
-from lidarium.envs.settings.sensors.cameras import DepthCamera
 from lidarium.envs.simulation.depth.depth_sensor import DepthSensor
 from lidarium.envs.simulation.kernels.arrays import ENDED
-from lidarium.envs.simulation.kernels.floor_tables import FloorTables
+from lidarium.envs.simulation.kernels.floor_cache import FloorTables
 from lidarium.envs.simulation.kinematic_world import KinematicWorld
 
 CAMERA = DepthCamera(columns=17, rows=13, depth_min=0.1, depth_max=6.0, field_of_view=0.1, rate_hz=5.0)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from lidarium.envs.floors.faces import Faces
-from lidarium.envs.settings.sensors.cameras import DepthCamera
+from lidarium.envs.settings.cameras import DepthCamera
 from lidarium.envs.simulation.depth.face_drawing import (
     FaceArrays,
     cover,

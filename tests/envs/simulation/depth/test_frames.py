@@ -10,8 +10,8 @@ from scipy.spatial import ConvexHull
 from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.floors.floor import Floor, Solid
 from lidarium.envs.floors.generation.furniture import place
+from lidarium.envs.settings.cameras import CAMERAS, DepthCamera
 from lidarium.envs.settings.making import make_settings
-from lidarium.envs.settings.sensors.cameras import CAMERAS, DepthCamera
 from lidarium.envs.simulation.depth.point_cloud import camera_pose, point_cloud
 
 BOUNDS = (0.0, 0.0, 6.0, 5.0)

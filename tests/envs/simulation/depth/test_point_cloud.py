@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from lidarium.envs.settings.sensors.cameras import DepthCamera
+from lidarium.envs.settings.cameras import DepthCamera
 from lidarium.envs.simulation.depth.point_cloud import camera_pose, point_cloud
 
 

@@ -6,7 +6,7 @@ import pytest
 from lidarium.benchmarks.speed.peers.bullet import BulletImages
 from lidarium.envs.floors.catalogue.names import load_floor
 from lidarium.envs.floors.faces import faces_of
-from lidarium.envs.settings.sensors.cameras import DepthCamera
+from lidarium.envs.settings.cameras import DepthCamera
 from lidarium.envs.simulation.depth.face_drawing import CENTRE_COLUMN, CENTRE_ROW, FaceArrays
 from lidarium.envs.simulation.depth.frames import draw_view, place_camera, view_numbers
 

@@ -23,11 +23,11 @@ from lidarium.envs.simulation.kernels import floor_cache
 from lidarium.envs.simulation.kernels.floor_cache import (
     REMEMBERED_SHARE,
     SIZE_VARIABLE,
+    FloorTables,
     TablesCache,
     floor_tables,
     prepare_tables,
 )
-from lidarium.envs.simulation.kernels.floor_tables import FloorTables
 
 HEIGHTS = (0.05, 0.3, 0.52)
 
@@ -270,7 +270,7 @@ def test_another_process_finds_what_this_one_made(own_store, tmp_path):
         "import sys, numpy as np\n"
         "from lidarium.envs.floors import catalogue\n"
         "from lidarium.envs.simulation.kernels.floor_cache import floor_tables\n"
-        "from lidarium.envs.simulation.kernels.floor_tables import FloorTables\n"
+        "from lidarium.envs.simulation.kernels.floor_cache import FloorTables\n"
         "catalogue.generate_building = FloorTables.of_floor = None\n"
         f"tables = floor_tables(catalogue.load_floor('building:5'), *{HEIGHTS})\n"
         "np.savez(sys.argv[1], squares=tables.rays.squares, faces=tables.rays.faces, bound=tables.bound, "

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from lidarium.envs.floors.floor import Floor, Solid
-from lidarium.envs.simulation.kernels.floor_tables import FloorTables
+from lidarium.envs.simulation.kernels.floor_cache import FloorTables
 
 TABLE = Solid(np.array([(1.0, 1.0), (2.0, 1.0), (2.0, 2.0), (1.0, 2.0)]), 0.7, 0.75)
 WALL = Solid(np.array([(3.0, 0.0), (3.2, 0.0), (3.2, 2.0), (3.0, 2.0)]))

@@ -13,8 +13,7 @@ from lidarium.envs.settings.lidar import Lidar
 from lidarium.envs.settings.robots import ROBOTS
 from lidarium.envs.simulation.kernels.arrays import ENDED, KNOWN_TEAMMATES
 from lidarium.envs.simulation.kernels.contact import distance_bound
-from lidarium.envs.simulation.kernels.floor_cache import floor_tables
-from lidarium.envs.simulation.kernels.floor_tables import FloorTables
+from lidarium.envs.simulation.kernels.floor_cache import FloorTables, floor_tables
 from lidarium.envs.simulation.kernels.ray_tables import RayTables
 from lidarium.envs.simulation.kinematic_simulation import KinematicSimulation
 from lidarium.mapping.grids.occupancy import OccupancyGrid, OccupancySettings

@@ -12,8 +12,8 @@ from cast_rays import (
     walled,
 )
 
+from lidarium.envs.simulation.kernels.ray_casting import cast_in_lanes, cast_one_by_one
 from lidarium.envs.simulation.kernels.ray_tables import RayTables
-from lidarium.envs.simulation.kernels.ray_travel import cast_in_lanes, cast_one_by_one
 from lidarium.mapping.grids.scan_geometry import ScanGeometry
 
 

@@ -55,7 +55,7 @@ SENSED.register(
 )
 
 
-_OF_THE_TEAM = "lidarium.envs.observing.team_observables"
+_OF_THE_TEAM = "lidarium.envs.observing.observables"
 
 SENSED.register("time_left", f"{_OF_THE_TEAM}:TIME_LEFT", "share of the horizon that is left, (1,)")
 SENSED.register("coverage", f"{_OF_THE_TEAM}:COVERAGE", "true share of F that the team has seen, (1,)")

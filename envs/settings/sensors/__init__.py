@@ -1,1 +1,0 @@
-"""What robots sense beside their laser, as settings say it."""
