@@ -15,7 +15,7 @@ INTERRUPTED = 130
 def main(arguments: Sequence[str] | None = None) -> int:
     """Import the command line and run it; return its exit code.
 
-    The arguments are those of the process where None is given.
+    The arguments are those of the process if None is given.
 
     While it is imported nothing is under way that could be kept, so that Ctrl-C ends the process at once.
     """

@@ -50,7 +50,7 @@ class Decisions:
         return Decisions(*(getattr(self, field.name)[rows] for field in fields(self)))
 
     def narrowed(self, width: int) -> "Decisions":
-        """Return the same decisions, none of which has more than so many options, in less memory."""
+        """Return the same decisions, none of which has more than that many options, in less memory."""
         parts = {name: np.ascontiguousarray(getattr(self, name)[:, :width]) for name in PER_OPTION}
         return replace(self, **parts)
 

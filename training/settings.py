@@ -36,9 +36,9 @@ class Round:
     Attributes
     ----------
     floors : int
-        How many.
+        Number of these.
     kinds : dict of float
-        How often each kind of floor comes, beside the others.
+        How often each kind of floor comes, besides the others.
     bare_share : float
         So many of the floors have no furniture, as plans of real buildings.
     robots : tuple of int

@@ -1,4 +1,4 @@
-"""How fast the package is, beside other simulators.
+"""How fast the package is, besides other simulators.
 
 ``all`` runs every question.
 """

@@ -1,4 +1,4 @@
-"""Steps of this code beside those of another checkout.
+"""Steps of this code besides those of another checkout.
 
 Both are driven alternately; the comparison shows what a change of the kernels gained.
 
@@ -98,7 +98,7 @@ def times(pythons: list[str], threads: int, rounds: int, blocks: int) -> dict[st
 
 
 def _answer(process: "subprocess.Popen[str]", question: str) -> str:
-    """Return the line with which a process answers; nothing where it has ended."""
+    """Return the line with which a process answers; nothing if it has ended."""
     assert process.stdin is not None
     assert process.stdout is not None
     with suppress(BrokenPipeError):

@@ -3,7 +3,7 @@
     python benchmarks/speed/all.py                  # writes docs/results/speed.md and speed.json
     python benchmarks/speed/all.py --effort quick
 
-``lidarium bench`` measures the same. The peers take part where they are installed, see
+``lidarium bench`` measures the same. The peers take part if they are installed, see
 ``peers/catalogue.py``.
 """
 

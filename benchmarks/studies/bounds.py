@@ -1,4 +1,4 @@
-"""Bounds: what a team that knows the floor needs, how tight that is, and what explorers need beside it."""
+"""Bounds: what a team that knows the floor needs, how tight that is, and what explorers need besides it."""
 
 import math
 import statistics

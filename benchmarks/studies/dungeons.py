@@ -1,4 +1,4 @@
-"""Ways on public dungeon maps, beside those of the planners of the project that they are from.
+"""Ways on public dungeon maps, besides those of the planners of the project that they are from.
 
 The project's code halves the pictures, so that a cell of 0.4 m is two pixels. Here floors have half of its
 lengths, 0.1 m a pixel as all dungeons; ways are shown in its metres.
@@ -132,7 +132,7 @@ def maps_of(data: Path) -> list[Path]:
 
 
 def work(folder: Path, data: Path | None, _every: int, _workers: int) -> Any:  # noqa: ANN401
-    """Keep the planners' ways beside the episodes."""
+    """Keep the planners' ways besides the episodes."""
     if data is not None and (Path(data) / "floorplans" / WAYS).is_file():
         write_text(folder / WAYS_FILE, (Path(data) / "floorplans" / WAYS).read_text(encoding="utf-8"))
     yield "ways of planners", 1, 1

@@ -65,7 +65,7 @@ def times_table(kind: str, episodes: Times) -> str:
 
 
 def best_classic(episodes: Times, robots: int) -> str | None:
-    """Return the classic explorer that took least time in the mean, None where none ran."""
+    """Return the classic explorer that took least time in the mean, None if none ran."""
     means = {
         name: float(np.mean([_time(each) for (_, size), each in episodes[name].items() if size == robots]))
         for name in CLASSICS

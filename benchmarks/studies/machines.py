@@ -122,7 +122,7 @@ def gain_of_nodes(seeds: int) -> dict[str, Any]:
 
 
 def kill_nodes(count: int, seed: int = 0) -> dict[str, Any]:
-    """Kill a node of a cluster so many times while an evaluation runs; each time another one joins."""
+    """Kill a node of a cluster that many times while an evaluation runs; each time another one joins."""
     generator, killed = np.random.default_rng(seed), 0
     with tempfile.TemporaryDirectory() as name:
         there, here = Path(name, "there"), Path(name, "here")

@@ -1,4 +1,4 @@
-"""The world of PyBullet beside the kinematic one: the same commands, from the same starts.
+"""The world of PyBullet besides the kinematic one: the same commands, from the same starts.
 
 A robot drives at random for ten seconds in both worlds. Drives that touch nothing in either tell how far the
 bodies come apart; in all, scans of both worlds at the same poses are compared, and contacts counted.

@@ -15,13 +15,6 @@ TILE_SIZE = 320
 def batch_frames(scenes: Sequence[Scene], size: int = TILE_SIZE) -> list[Frame]:
     """Draw scenes into pictures of one size, whatever their floors.
 
-    Parameters
-    ----------
-    scenes : sequence of Scene
-        One for each episode.
-    size : int
-        Longer side of each floor [pixels].
-
     Returns
     -------
     list of (rows, columns, 3) uint8
@@ -39,13 +32,7 @@ def _padded(frame: Frame, shape: tuple[int, ...]) -> Frame:
 
 
 def tiled(frames: Sequence[Frame]) -> Frame:
-    """Put pictures of one size side by side, in about as many rows as columns.
-
-    Raises
-    ------
-    ValueError
-        Where there are none.
-    """
+    """Put pictures of one size side by side, in about as many rows as columns."""
     if not len(frames):
         raise ValueError("frames are empty; want at least one picture")
     columns = math.ceil(math.sqrt(len(frames)))

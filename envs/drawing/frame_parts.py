@@ -76,7 +76,7 @@ class View:
     height, width : int
         Size of the picture [pixels].
     block : int
-        Side of the blocks of cells that are drawn as one, where there are more cells than pixels.
+        Side of the blocks of cells that are drawn as one, if there are more cells than pixels.
     """
 
     rows: slice
@@ -110,8 +110,6 @@ def view_around(shown: NDArray[np.bool_], origin: tuple[float, float], resolutio
         Lower left corner of cell (0, 0) [m].
     resolution : float
         Side of a cell [m].
-    size : int
-        Longer side [pixels].
     """
     rows, columns = (
         _span(np.asarray(shown.any(axis=axis)), math.ceil(_MARGIN / resolution)) for axis in (1, 0)
@@ -132,7 +130,7 @@ def _span(is_used: NDArray[np.bool_], margin: int) -> slice:
 def blocks_of(levels: NDArray[np.uint8], view: View) -> NDArray[np.uint8]:
     """Return a map's three levels with blocks of cells as one.
 
-    That is where there are more cells than pixels; occupied cells show.
+    That is if there are more cells than pixels; occupied cells show.
     """
     if view.block == 1:
         return levels

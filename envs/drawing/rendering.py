@@ -55,7 +55,7 @@ class Scene:
     has_ended : list of bool
         Which robots have ended.
     track : list of (robots, 3) float64
-        True poses of the last time; none where they are not kept.
+        True poses of the last time; none if they are not kept.
     episode : int
         Which episode.
     """
@@ -93,28 +93,14 @@ def draw_frame(
 ) -> Frame:
     """Draw an environment from above.
 
-    The truth: free floor is faint where unexplored and white where the team has sensed it, walls are dark
-    where the team has been near. On it the robots with their headings, their last scans as fans, and their
-    ways of the last minute. Beside it, where robots have cameras, what the first one sees.
-
-    Parameters
-    ----------
-    scene : Scene
-        After a ``reset``.
-    size : int
-        Longer side of the floor in the frame [pixels], at least 64.
-    draw_over : callable or None
-        Takes the picture and the view on the floor, and draws what else is to be seen.
+    The truth: free floor is faint where unexplored and white if the team has sensed it, walls are dark where the
+    team has been near. On it the robots with their headings, their last scans as fans, and their ways of the last
+    minute. Beside it, if robots have cameras, what the first one sees.
 
     Returns
     -------
     (rows, columns, 3) uint8
         Red, green, blue; both sides even, as video codecs want them. The caller's own.
-
-    Raises
-    ------
-    ValueError
-        Where the size is too small, or the environment was not reset.
     """
     if size < 64:
         raise ValueError(f"size of the frame is {size} pixels; want at least 64")
@@ -137,7 +123,7 @@ def draw_frame(
 
 
 def _with_panel(frame: Frame, scene: Scene, tables: FloorTables) -> Frame:
-    """Put what the first robot's camera sees beside a frame, where there is a camera."""
+    """Put what the first robot's camera sees beside a frame, if there is a camera."""
     sensor, world = scene.simulation.camera, scene.simulation.world
     if sensor is None or tables.floor is None:
         return frame

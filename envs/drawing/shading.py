@@ -49,7 +49,7 @@ _WALL = (214, 216, 222)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Viewpoint:
-    """From where a picture is taken.
+    """From if a picture is taken.
 
     Attributes
     ----------
@@ -109,7 +109,7 @@ def _number_body(
     numbers: Array,
     number: int,
 ) -> None:
-    """Draw a body into inverse depths, and its number where it is the nearest.
+    """Draw a body into inverse depths, and its number if it is the nearest.
 
     The next number is that of its top.
     """
@@ -126,7 +126,7 @@ def _number_body(
 
 
 def view_of_size(viewpoint: Viewpoint, size: tuple[int, int]) -> NDArray[np.float64]:
-    """Return the numbers of a picture of so many rows and columns, as drawing kernels take them."""
+    """Return the numbers of a picture of that many rows and columns, as drawing kernels take them."""
     rows, columns = size
     view = np.array([0.0, 0.5 * (columns - 1), 0.5 * (rows - 1), 0.0, FAR, columns, rows])
     view[FOCAL] = 0.5 * columns / math.tan(0.5 * viewpoint.field_of_view)
@@ -147,16 +147,10 @@ def shade(
 
     Parameters
     ----------
-    faces : Faces
-        What stands there.
-    viewpoint : Viewpoint
-        From where.
     size : (rows, columns)
         Of the picture [pixels].
     bodies : (N, 5) float64
         x, y, height of the base, radius and height of upright cylinders [m].
-    colours : list of Colour
-        Of the bodies.
     walls : (solids,) bool or (solids, 3) float64
         Which solids are walls, the others being furniture; or the colour of each.
 

@@ -139,16 +139,10 @@ def camera_panel(
 
     Parameters
     ----------
-    views : FloorViews
-        Of the floor.
     poses, attitudes : (robots, 3) float64
         Of the robots, see ``World``.
     depth : (rows, columns) float32
         The first robot's depth image [m].
-    camera : DepthCamera
-        The camera.
-    height : int
-        Of the panel [pixels].
 
     Returns
     -------

@@ -47,24 +47,7 @@ class EpisodeStart:
 def begin(
     generator: np.random.Generator, choice: FloorChoice, chosen: ResetOptions, settings: ExplorationSettings
 ) -> EpisodeStart:
-    """Draw how an episode begins.
-
-    Parameters
-    ----------
-    generator : numpy.random.Generator
-        Where all draws come from.
-    choice : FloorChoice
-        The floor, or a set of which one is drawn.
-    chosen : ResetOptions
-        Floor, starts and goal where the caller names them.
-    settings : ExplorationSettings
-        The team.
-
-    Raises
-    ------
-    ValueError, FileNotFoundError
-        Where the floor or an option cannot be used.
-    """
+    """Draw how an episode begins."""
     compile_first_reset()
     choice_here = choice if chosen.floor is None else choice.instead(chosen.floor)
     floor = choice_here.load(generator)
@@ -88,13 +71,7 @@ def begin(
 
 
 def _check_height(floor: Floor, height: float) -> None:
-    """Refuse robots that would not fit below the ceiling.
-
-    Raises
-    ------
-    ValueError
-        Where the robot is as high as the ceiling, or higher.
-    """
+    """Refuse robots that would not fit below the ceiling."""
     if height >= floor.ceiling:
         raise ValueError(
             f"floor {floor.name!r} has its ceiling at {floor.ceiling:g} m, the robot is {height:g} m high; "
@@ -103,7 +80,7 @@ def _check_height(floor: Floor, height: float) -> None:
 
 
 def make_simulation(settings: ExplorationSettings, episodes: int = 1) -> Simulation:
-    """Return the simulation of so many episodes, by the backend of the settings."""
+    """Return the simulation of that many episodes, by the backend of the settings."""
     return BACKENDS[settings.backend](settings, episodes)
 
 
@@ -123,7 +100,7 @@ def map_frames(beginning: EpisodeStart, settings: ExplorationSettings) -> NDArra
 def goal_of_robots(beginning: EpisodeStart, settings: ExplorationSettings) -> tuple[float, float]:
     """Return the goal as the robots know it, in the frame of their believed poses [m].
 
-    Nan where they know none.
+    Nan if they know none.
 
     A robot that does not know where it starts does not know where the goal is either.
     """
@@ -140,7 +117,7 @@ class Beginnings:
     settings : ExplorationSettings
         Of every episode.
     episodes : int
-        How many.
+        Number of these.
     curriculum : callable or None
         Options of ``reset`` by the number of an episode, counted over all as they begin.
     """
@@ -168,15 +145,6 @@ class Beginnings:
         ----------
         beginning : (K,) int64
             Which episodes.
-        seeds : sequence of int or None
-            A seed for each of them; None goes on with the episode's own generator.
-        options : mapping
-            Options by episode.
-
-        Raises
-        ------
-        ValueError, FileNotFoundError
-            Where the floor or an option cannot be used; the generators are as they were then.
         """
         drawn: dict[int, EpisodeStart] = {}
         generators = self._generators.copy()

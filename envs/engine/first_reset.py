@@ -1,4 +1,4 @@
-"""The kernels of a first reset, compiled side by side where the cache has none."""
+"""The kernels of a first reset, compiled side by side if the cache has none."""
 
 import json
 import multiprocessing

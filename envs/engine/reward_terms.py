@@ -1,4 +1,4 @@
-"""Terms of the reward beside those of the kernels: users register them."""
+"""Terms of the reward besides those of the kernels: users register them."""
 
 from collections.abc import Callable
 from typing import Any, Protocol
@@ -47,13 +47,7 @@ class FunctionTerm:
         """Start an episode."""
 
     def amounts(self, rows: Rows) -> NDArray[np.float64]:
-        """Return what the function does.
-
-        Raises
-        ------
-        ValueError
-            Where it is not a number for each row.
-        """
+        """Return what the function does."""
         amounts = np.asarray(self._function(rows), np.float64)
         wanted = (rows.robots * rows.episodes,)
         if amounts.shape != wanted:
@@ -67,20 +61,7 @@ class FunctionTerm:
 def reward_term(
     name: str, summary: str = ""
 ) -> Callable[[Callable[[Rows], NDArray[Any]]], Callable[[Rows], NDArray[Any]]]:
-    """Make a function known as a term of the reward; ``reward.more`` then takes its name.
-
-    Parameters
-    ----------
-    name : str
-        What users call it.
-    summary : str
-        One line that says what it is; that of the function's docstring where empty.
-
-    Returns
-    -------
-    callable
-        A decorator of a function that takes ``Rows`` and returns an amount for each row, (rows,).
-    """
+    """Make a function known as a term of the reward; ``reward.more`` then takes its name."""
 
     def register(function: Callable[[Rows], NDArray[Any]]) -> Callable[[Rows], NDArray[Any]]:
         said = summary or (function.__doc__ or name).strip().splitlines()[0]
@@ -164,7 +145,7 @@ class Completion:
         self._is_paid[rows_of(rows, episode)] = False
 
     def amounts(self, rows: Rows) -> NDArray[np.float64]:
-        """Return 1 where it has been completed since the last call."""
+        """Return 1 if it has been completed since the last call."""
         is_complete = rows.is_covered & (rows.time_s > 0.0)
         paid = is_complete & ~self._is_paid
         self._is_paid |= is_complete

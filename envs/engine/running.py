@@ -105,8 +105,8 @@ def note_ends(modes: Array, robots: int, table: Array, drives: Drives, rules: Ru
 def _run_episode(run: Run, episode: int, drives: Drives, following: Following, rules: Rules) -> None:
     """Run one episode for a step, or for a decision.
 
-    A decision ends before its longest time when the episode is over, when something happens to a robot, or
-    when a robot with a target has newly arrived or found no path.
+    A decision ends before its longest time when the episode is over, when something happens to a robot, or when a
+    robot with a target has newly arrived or found no path.
     """
     world, robots, commands = world_at(run.table), run.robots, run.commands
     mode, first, last = run.modes[episode], episode * robots, (episode + 1) * robots

@@ -33,18 +33,9 @@ def team_state(
     """Return the true state of a team.
 
     Numbers of each robot (``ROBOT_NUMBERS``), then of the team (``TEAM_NUMBERS``), then two pictures of S x S
-    cells, S = ``settings.state_cells``: the share of each cell that counts (F), and that the team has seen.
-    A picture's row 0 is at the lowest y; its cells are the least whole number of map cells with which the
-    whole floor fits. Places are shares of its side from its lower left corner.
-
-    Parameters
-    ----------
-    simulation : Simulation
-        Of all episodes.
-    settings : ExplorationSettings
-        The team.
-    episode : int
-        Which episode, after it began.
+    cells, S = ``settings.state_cells``: the share of each cell that counts (F), and that the team has seen. A
+    picture's row 0 is at the lowest y; its cells are the least whole number of map cells with which the whole floor
+    fits. Places are shares of its side from its lower left corner.
 
     Returns
     -------

@@ -78,7 +78,7 @@ def split_options(options: Mapping[str, Any]) -> tuple[Conventions, dict[str, An
     Raises
     ------
     ValueError
-        Where a convention is unknown.
+        If a convention is unknown.
     """
     chosen = {name: value for name, value in options.items() if name in NAMES}
     return Conventions(**chosen), {name: value for name, value in options.items() if name not in NAMES}
@@ -108,7 +108,7 @@ class ObservationForm:
     Raises
     ------
     ValueError
-        Where a mask is to be beside or apart from observations that have none, or nothing else is observed.
+        If a mask is to be beside or apart from observations that have none, or nothing else is observed.
     """
 
     def __init__(self, space: spaces.Space[Any], conventions: Conventions) -> None:
@@ -192,7 +192,7 @@ def ending_number(reason: str | None) -> int:
 def flat_row_infos(infos: Mapping[str, Any], rows: int) -> dict[str, Any]:
     """Return the numbers among the infos of a batch, with names joined by a point, (rows,) float32 each.
 
-    Each has its mask beside it, as in Gymnasium's vector environments; all rows have all.
+    Each has its mask besides it, as in Gymnasium's vector environments; all rows have all.
     """
     found = _rows(infos, "")
     reasons = infos.get("ended_because")

@@ -27,7 +27,7 @@ class SoloExploration(gymnasium.Env[Observation, Any]):
     render_mode : str or None
         ``human``, ``rgb_array`` or None.
     image_resolution : float or None
-        Side of a pixel [m] where the floor is a plain image.
+        Side of a pixel [m] if the floor is a plain image.
     curriculum : callable or None
         As for ``lidarium.parallel_env``.
     **options
@@ -36,7 +36,7 @@ class SoloExploration(gymnasium.Env[Observation, Any]):
     Raises
     ------
     ValueError
-        Where an option has a bad value, or more than one robot is asked for.
+        If an option has a bad value, or more than one robot is asked for.
     """
 
     metadata: dict[str, Any] = {"render_modes": ["human", "rgb_array"], "render_fps": 10}  # noqa: RUF012

@@ -57,12 +57,12 @@ class MessageBoard:
     ----------
     box : Box
         The space of what a robot has heard, (robots - 1, floats + 2): of each of the others, in their order,
-        the numbers within [-1, 1], their age [s], and 1 where there are any.
+        the numbers within [-1, 1], their age [s], and 1 if there are any.
 
     Raises
     ------
     ValueError
-        Where a robot is alone.
+        If a robot is alone.
     """
 
     def __init__(self, perception: Perception, settings: ExplorationSettings, floats: int) -> None:
@@ -144,7 +144,7 @@ def split_action(action: Any, floats: int, has_vectors: bool, whose: str) -> tup
     Raises
     ------
     ValueError
-        Where there is no message of so many finite numbers.
+        If there is no message of that many finite numbers.
     """
     rest, message = None, np.zeros(0)
     try:

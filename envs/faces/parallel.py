@@ -144,7 +144,7 @@ class ExplorationEnv(ParallelEnv[str, Any, Any]):
         name : str
             A name in the registry ``level``.
         shares_map : bool, optional
-            Whether robots plan on the team's map, where it reaches them. True by default.
+            Whether robots plan on the team's map, if it reaches them. True by default.
         decision_period_s : float, optional
             Longest time of a decision at the level of waypoints [s]. That of the settings by default.
         """

@@ -26,12 +26,12 @@ def seeds_of(
         ``s`` gives episode e the seed s + e; a sequence has one entry per episode; None goes on with the
         episodes' generators.
     episodes : int
-        How many.
+        Number of these.
 
     Raises
     ------
     ValueError
-        Where a sequence has another length, or a seed is not a whole number of zero or more.
+        If a sequence has another length, or a seed is not a whole number of zero or more.
     """
     if seed is None:
         return [None] * episodes
@@ -52,7 +52,7 @@ def episodes_of(options: dict[str, Any] | None, episodes: int) -> NDArray[np.int
     Raises
     ------
     ValueError
-        Where the mask is not (episodes,) bool with at least one True.
+        If the mask is not (episodes,) bool with at least one True.
     """
     check_options(options, (*OPTIONS, "episodes"))
     mask = (options or {}).get("episodes")
@@ -77,7 +77,7 @@ def options_of(
     Raises
     ------
     ValueError
-        Where an option has a bad value, or as many entries as there are not episodes.
+        If an option has a bad value, or as many entries as there are not episodes.
     """
     if not options:
         return {}

@@ -32,7 +32,7 @@ class SparsePlanning(TeamWrapper):
     env : ParallelEnv
         The environment at the level of waypoints or frontiers, with ``camera`` set.
     shares_map : bool, optional
-        Whether robots plan on what the whole team knows, where it reaches them at once. True by default.
+        Whether robots plan on what the whole team knows, if it reaches them at once. True by default.
 
     Raises
     ------

@@ -52,7 +52,7 @@ class ExplorationVecEnv(VecEnv):
     Raises
     ------
     ValueError, FileNotFoundError
-        Where an option cannot be used.
+        If an option cannot be used.
     """
 
     def __init__(
@@ -77,7 +77,7 @@ class ExplorationVecEnv(VecEnv):
     def reset(self) -> Any:  # noqa: ANN401
         """Begin all episodes.
 
-        It uses the seeds of ``seed`` and the options of ``set_options`` where they were called.
+        It uses the seeds of ``seed`` and the options of ``set_options`` if they were called.
         """
         self._check_open()
         batch = self.batch
@@ -106,7 +106,7 @@ class ExplorationVecEnv(VecEnv):
         Raises
         ------
         ValueError
-            Where a sequence has another length, or an option has a bad value.
+            If a sequence has another length, or an option has a bad value.
         """
         batch = self.batch
         if options is None or isinstance(options, dict):

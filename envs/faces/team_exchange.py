@@ -34,7 +34,7 @@ def check_links(links: NDArray[Any], robots: int) -> NDArray[np.bool_]:
     Raises
     ------
     ValueError
-        Where they are of another shape.
+        If they are of another shape.
     """
     if links.shape != (robots, robots):
         raise ValueError(
@@ -128,7 +128,7 @@ class TeamExchange:
     merging : MergingSettings
         How.
     can_talk : (robots, robots) bool, callable or None
-        Which robots reach each other, at all times or as a function (see `CanTalk`); where None, those that
+        Which robots reach each other, at all times or as a function (see `CanTalk`); if None, those that
         the radio joins.
     episode : int
         Which episode.
@@ -143,7 +143,7 @@ class TeamExchange:
     Raises
     ------
     ValueError
-        Where there is but one robot, or ``can_talk`` is of another shape.
+        If there is but one robot, or ``can_talk`` is of another shape.
     """
 
     def __init__(
@@ -300,7 +300,7 @@ class MergedRows:
     Raises
     ------
     ValueError
-        Where a team is one robot.
+        If a team is one robot.
     """
 
     def __init__(
@@ -318,7 +318,7 @@ class MergedRows:
         self._events: list[list[MergeEvent]] = [[] for _ in self.teams]
 
     def exchange(self, seen: NDArray[np.bool_], began: NDArray[np.bool_]) -> None:
-        """Exchange maps where it is time, after a run of the batch.
+        """Exchange maps if it is time, after a run of the batch.
 
         Parameters
         ----------

@@ -148,7 +148,7 @@ class FrontierOffers:
         Returns
         -------
         (rows,) int8
-            Why each robot's chosen frontier was given up, by number in ``REASONS``; 0 where it was not.
+            Why each robot's chosen frontier was given up, by number in ``REASONS``; 0 if it was not.
         """
         reasons = np.zeros(len(is_live), np.int8)
         rows = np.flatnonzero(is_offered | is_live & self.choices.is_chosen)

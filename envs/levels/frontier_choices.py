@@ -58,8 +58,6 @@ def expected_gain(log_odds: Array, row: int, column: int, rays: Array, reach: in
     ----------
     log_odds : (rows, columns) int8
         The map: 0 unknown, above 0 occupied.
-    row, column : int
-        The cell to look from.
     rays : (rays, 2) float64
         See `ray_directions`.
     reach : int
@@ -115,8 +113,6 @@ def choose_offers(left: Array, sizes: Array, is_wanted: Array, by_size: int, ran
         How long each is.
     is_wanted : (clusters,) bool
         Which may be offered; overwritten.
-    by_size : int
-        How many of the offers are for the longest.
     ranked : (offers,) int64
         Where the numbers of the chosen clusters are written.
     """
@@ -166,7 +162,7 @@ class Offers(NamedTuple):
     cells : (rows, offers, 2) int64
         The frontier cell (row, column) to observe.
     gains : (rows, offers) float32
-        Area that may be expected to be seen anew at the target [m2]; (0, 0) where nobody asks.
+        Area that may be expected to be seen anew at the target [m2]; (0, 0) if nobody asks.
     """
 
     tables: NDArray[np.float32]
@@ -214,7 +210,7 @@ class ViewReach(NamedTuple):
     time_step : float
         Length of a step [s].
     least_size : float
-        Shorter frontiers are offered only where there is no longer one [m].
+        Shorter frontiers are offered only if there is no longer one [m].
     by_size : int
         How many of the offers are the longest ones, the others are the cheapest.
     rays : (rays, 2) float64
@@ -240,7 +236,7 @@ class Renewal(NamedTuple):
     is_live, is_offered : (rows,) bool
         Whose choices are examined, and who is offered frontiers.
     reasons : (rows,) int8
-        Result: why each robot's chosen frontier was given up, 0 where it was not.
+        Result: why each robot's chosen frontier was given up, 0 if it was not.
     memory : (pieces, 5) int64
         For the costs of paths, a piece for each thread, see ``SweepMemory``.
     """
@@ -344,7 +340,7 @@ def _offer(
 def _leave_and_spread(
     planning: Planning, swept: SweptCosts, record: Array, row: int, column: int, piece: int
 ) -> None:
-    """Find the costs of paths from a cell where the body does not fit.
+    """Find the costs of paths from a cell if the body does not fit.
 
     It leaves by where there is no less room. Few robots stand so: a search cell by cell does it.
     """

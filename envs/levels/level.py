@@ -39,7 +39,7 @@ class Turn(NamedTuple):
     commands : (rows, 2) float64
         Speeds and turn rates for episodes that take one step [m/s, rad/s]; written by the level.
     modes : (episodes,) int8
-        How each episode runs: ``STEPS`` where it is to run, which the level may change to ``DECIDES``.
+        How each episode runs: ``STEPS`` if it is to run, which the level may change to ``DECIDES``.
     operating : Operating
         The operating states and orders of all robots.
     """
@@ -63,7 +63,7 @@ class Level(ABC):
     settings : ExplorationSettings
         The team of every episode.
     shares_map : bool, optional
-        Whether robots plan on the team's map, where it reaches them. True by default.
+        Whether robots plan on the team's map, if it reaches them. True by default.
     decision_period_s : float, optional
         Longest time of a decision [s]. That of the settings by default.
 
@@ -189,7 +189,7 @@ def numbers_of(action: Any) -> NDArray[np.float64]:  # noqa: ANN401
 
 
 def add_info(infos: dict[str, Any], name: str, rows: Mask, values: list[Any]) -> None:
-    """Add an info for some rows, with the mask that Gymnasium's vector environments put beside it."""
+    """Add an info for some rows, with the mask that Gymnasium's vector environments put besides it."""
     described = np.full(len(rows), None, object)
     for row, value in zip(np.flatnonzero(rows).tolist(), values, strict=True):
         described[row] = value

@@ -71,7 +71,7 @@ RESOLUTION, LONGEST_RANGE, TOP_SPEED, TOP_TURN_RATE = range(4)
 
 @kernel(inline="always")
 def _write_maps(row: int, world: WorldArrays, given: Sources, maps: Array, egocentric_maps: Array) -> None:
-    """Write the crops of a robot's map, each where it is observed."""
+    """Write the crops of a robot's map, each if it is observed."""
     believed, origins, beliefs = world.believed, world.origins, world.belief_rows
     resolution = given.limits[RESOLUTION]
     x, y = (

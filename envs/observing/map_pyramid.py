@@ -45,8 +45,8 @@ def least_level(log_odds: Array, first_row: int, first_column: int, scale: int) 
 def write_pyramid(log_odds: Array, row: int, column: int, pictures: Array) -> None:
     """Write pictures (levels, side, side) uint8 of a map around a cell.
 
-    The first one has the map's own cells; in the last one the whole known map has room. Between them the
-    sides of cells grow by the same factor, in whole cells.
+    The first one has the map's own cells; in the last one the whole known map has room. Between them the sides of
+    cells grow by the same factor, in whole cells.
     """
     levels, side = pictures.shape[0], pictures.shape[1]
     widest = max(int(math.ceil((known_reach(log_odds, row, column) + 1) / (side // 2))), 1)

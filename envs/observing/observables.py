@@ -21,7 +21,7 @@ def _share(settings: ExplorationSettings) -> spaces.Box:
 
 
 def time_left(rows: Rows) -> NDArray[np.float64]:
-    """Return the share of the horizon that is left; 1 where there is none."""
+    """Return the share of the horizon that is left; 1 if there is none."""
     horizon = rows.settings.horizon_steps
     if horizon is None:
         return np.ones((rows.robots * rows.episodes, 1))
@@ -64,24 +64,7 @@ TEAMMATES = Observable(teammate_box, _missing_others, teammates)
 def observable(
     name: str, low: float, high: float, shape: tuple[int, ...], summary: str = ""
 ) -> Callable[[Callable[[Rows], NDArray[Any]]], Callable[[Rows], NDArray[Any]]]:
-    """Make a function known as an observable; ``observe`` then takes its name.
-
-    Parameters
-    ----------
-    name : str
-        What users call it.
-    low, high : float
-        Bounds of its numbers; what lies beyond is clipped.
-    shape : tuple of int
-        Of one robot's value.
-    summary : str
-        One line that says what it is; that of the function's docstring where empty.
-
-    Returns
-    -------
-    callable
-        A decorator of a function that takes ``Rows`` and returns an array of shape ``(rows, *shape)``.
-    """
+    """Make a function known as an observable; ``observe`` then takes its name."""
     box = spaces.Box(low, high, shape, np.float32)
 
     def register(function: Callable[[Rows], NDArray[Any]]) -> Callable[[Rows], NDArray[Any]]:
@@ -118,13 +101,7 @@ class ComputedObservations:
         self.boxes = {name: each.box(rows.settings) for name, each in self._observables.items()}
 
     def write(self, out: Mapping[str, NDArray[Any]], seen: NDArray[np.bool_] | None = None) -> None:
-        """Write the observables of rows, all or those that are seen.
-
-        Raises
-        ------
-        ValueError
-            Where a function returns values of another shape.
-        """
+        """Write the observables of rows, all or those that are seen."""
         for name, each in self._observables.items():
             box, compute = self.boxes[name], each.compute
             assert compute is not None

@@ -28,7 +28,7 @@ class Rows:
     settings : ExplorationSettings
         The team of every episode.
     poses : KnownPoses or None
-        What the robots know of where they and the others are; None where no observable asks.
+        What the robots know of where they and the others are; None if no observable asks.
 
     Attributes
     ----------
@@ -58,12 +58,12 @@ class Rows:
 
     @property
     def scan(self) -> NDArray[np.float32]:
-        """Measured ranges [m], (rows, beams); inf for no return, nan where invalid."""
+        """Measured ranges [m], (rows, beams); inf for no return, nan if invalid."""
         return self._world.sensors["scan"]
 
     @property
     def bumper(self) -> NDArray[np.int8]:
-        """Left, centre, right; 1 where pressed, (rows, 3)."""
+        """Left, centre, right; 1 if pressed, (rows, 3)."""
         return self._world.sensors["bumper"]
 
     @property
@@ -142,7 +142,7 @@ class Rows:
 
     @property
     def is_covered(self) -> NDArray[np.bool_]:
-        """Whether the team has seen ``stop_coverage`` of F, or all of it where there is none, (rows,)."""
+        """Whether the team has seen ``stop_coverage`` of F, or all of it if there is none, (rows,)."""
         wanted = self.settings.stop_coverage
         return np.asarray(self.coverage >= (1.0 if wanted is None else wanted))
 

@@ -33,8 +33,8 @@ class ObservationWriter:
     offsets : (rows, 2) float64
         Origin of each robot's map frame in the frame of its believed pose [m]; read at each call.
     goals : (rows, 2) float64 or None
-        Each robot's goal in the frame of its believed pose [m], nan where it does not know one; read at each
-        call. None where there are no goals, which are not observed then.
+        Each robot's goal in the frame of its believed pose [m], nan if it does not know one; read at each
+        call. None if there are no goals, which are not observed then.
 
     Attributes
     ----------
@@ -44,7 +44,7 @@ class ObservationWriter:
     Raises
     ------
     ValueError
-        Where the offsets or goals are of another type, or the world does not pool its maps at the scales that
+        If the offsets or goals are of another type, or the world does not pool its maps at the scales that
         are observed.
     """
 
@@ -110,20 +110,8 @@ class ObservationWriter:
 
         Parameters
         ----------
-        out : dict of arrays or None
-            Where to write, as ``buffers`` makes it; new arrays where None.
         active : (rows,) bool or None
-            Which rows to write, the others keep what they hold; all where None.
-
-        Returns
-        -------
-        dict of arrays
-            ``out``, or the new arrays.
-
-        Raises
-        ------
-        ValueError
-            Where an array is missing or is not of the shape, type and order that is written.
+            Which rows to write, the others keep what they hold; all by default.
         """
         arrays = list(starmap(np.empty, self._kinds)) if out is None else self.check(out)
         self._write(arrays, active)
@@ -157,10 +145,9 @@ class ObservationWriter:
                 arrays[place][active] = measured[active]
 
     def arguments(self, out: Mapping[str, NDArray[Any]]) -> tuple[Array, Arrays]:
-        """Return what ``write_row`` takes beside the row.
+        """Return what ``write_row`` takes besides the row.
 
-        These are where the sources of the observations lie, and where to write, as ``buffers`` makes
-        it.
+        These are where the sources of the observations lie, and where to write, as ``buffers`` makes it.
         """
         sources = self._table() if self._sources is None else self._sources
         return sources, self._in_order([out[name] for name in self.keys] + self._absent)
@@ -178,13 +165,7 @@ class ObservationWriter:
         return {**self.__dict__, "_sources": None}
 
     def check(self, out: Mapping[str, NDArray[Any]]) -> list[NDArray[Any]]:
-        """Check arrays that a caller gives, and return them in the order of the keys.
-
-        Raises
-        ------
-        ValueError
-            Where an array is missing or is not of the shape, type and order that is written.
-        """
+        """Check arrays that a caller gives, and return them in the order of the keys."""
         arrays = []
         for name, (shape, dtype) in zip(self.keys, self._kinds, strict=True):
             array = out.get(name)

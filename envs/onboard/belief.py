@@ -78,7 +78,7 @@ class Belief:
 
     @property
     def shared_map(self) -> NavigationMap | None:
-        """The team's map, where it reached this robot.
+        """The team's map, if it reached this robot.
 
         With unknown starts None until the robot is sent what others know.
         """
@@ -86,13 +86,7 @@ class Belief:
 
     @property
     def sparse_map(self) -> SparseBelief:
-        """The own sparse map, ready to be planned on; it is made from when it is first asked for.
-
-        Raises
-        ------
-        ValueError
-            Where the robot has no depth camera, or one that sees no ground.
-        """
+        """The own sparse map, ready to be planned on; it is made from when it is first asked for."""
         return self._perception.sparse_maps.belief(self._row, shares_map=False)
 
     @property
@@ -110,7 +104,7 @@ class Belief:
 
     @property
     def energy_left_j(self) -> float | None:
-        """What is left in the battery [J]; None where it has no limit."""
+        """What is left in the battery [J]; None if it has no limit."""
         meters = self._perception.meters
         return None if meters is None else meters.left_j(self._row)
 

@@ -53,16 +53,9 @@ class ForgottenTrails:
 
         Parameters
         ----------
-        row : int
-            Which robot.
         trail : (N, 2) float64
             Where the other one was, in the map frame of this [m]; what may show it where it stands at the end
             is kept.
-
-        Raises
-        ------
-        ValueError
-            Where the trail is not that of a robot: of another shape, without a place, or not finite.
         """
         if trail.ndim != 2 or trail.shape[1] != 2 or not len(trail) or not np.isfinite(trail).all():
             raise ValueError(

@@ -25,7 +25,7 @@ class Teammate:
     radius : float
         Radius of the body [m].
     has_ended : bool
-        Whether it has ended and stands where it is.
+        Whether it has ended and stands if it is.
     """
 
     pose: NDArray[np.float64]
@@ -46,16 +46,16 @@ class KnownPoses:
     offsets : (rows, 2) float64
         Origin of each robot's map frame in the frame of its believed pose [m]; the environment's own array.
     exchanges : list of Exchange
-        The radio traffic of each episode; none where the radio is ideal.
+        The radio traffic of each episode; none if the radio is ideal.
 
     Attributes
     ----------
     knows_teammates : bool
         Whether all teammates' poses are known at once.
     localizers : list of Localizer or None
-        What estimates each robot's pose, by row; None where kernels do.
+        What estimates each robot's pose, by row; None if kernels do.
     goals : list of tuple or None
-        The goal of each episode in the frame of the floor (x, y) [m]; None where it has none.
+        The goal of each episode in the frame of the floor (x, y) [m]; None if it has none.
     """
 
     def __init__(
@@ -95,9 +95,9 @@ class KnownPoses:
     def table(self) -> NDArray[np.float64]:
         """Return what all robots know of their teammates, (rows, robots - 1, 8), in a new array.
 
-        Of each of the others in their order: x, y [m], theta [rad]; x, y of its target [m], and 1 where it is
-        known; age of the pose [s], and 1 where that is known. Zeros where nothing is. All in the knowing
-        robot's map frame. A target is known with a pose of this step.
+        Of each of the others in their order: x, y [m], theta [rad]; x, y of its target [m], and 1 if it is
+        known; age of the pose [s], and 1 if that is known. Zeros if nothing is. All in the knowing robot's
+        map frame. A target is known with a pose of this step.
         """
         robots, episodes = self._robots, len(self.goals)
         table = np.zeros((episodes, robots, robots, 8))
@@ -160,8 +160,7 @@ class KnownPoses:
     def teammates(self, row: int) -> dict[str, Teammate]:
         """Return what a robot knows of its teammates.
 
-        With known starts and the ideal radio these are their current poses, else the last reported
-        ones.
+        With known starts and the ideal radio these are their current poses, else the last reported ones.
         """
         if not self._settings.known_starts:
             return {}

@@ -170,7 +170,7 @@ def tiles_of(record: Array) -> Any:  # noqa: ANN401
 def refresh_map(record: Array, limit: int, stamp: Array, window: Array) -> None:
     """Update clearance and frontiers in a window (4,) of a map (kernel).
 
-    The window is where the map changed; frontiers are updated where they are kept.
+    The window is where the map changed; frontiers are updated if they are kept.
     """
     inside = is_inside(record, window)
     take_in(

@@ -4,7 +4,7 @@ This includes what reached each of the others.
 
 With known starts and the ideal radio all robots of a team share one map, the sum of their log-odds. A robot
 that does not know its start can be sent what others know, overlaid on its own map. All maps come with what
-planning needs (clearance and frontiers), brought up to date only where the map has changed.
+planning needs (clearance and frontiers), brought up to date only if the map has changed.
 """
 
 from typing import Any
@@ -54,7 +54,7 @@ class Perception:
     memory : SearchMemory
         For the searches of kernels, a piece for each thread.
     exchanges : list of Exchange
-        The radio traffic of each episode; none where the radio is ideal.
+        The radio traffic of each episode; none if the radio is ideal.
     poses : KnownPoses
         Where the robots know themselves and their teammates to be.
     received : ReceivedMaps
@@ -62,7 +62,7 @@ class Perception:
     trails : ForgottenTrails
         The trails of others along which robots forget the walls of their maps.
     sparse_maps : SparseMaps
-        The sparse maps that they make by their depth cameras, where these were asked for.
+        The sparse maps that they make by their depth cameras, if these were asked for.
     meters : Meters or None
         Odometers and battery gauges of the robots of a lone episode; None in batches, which have none.
     """
@@ -143,7 +143,7 @@ class Perception:
         )
 
     def threads_for(self, episodes: int) -> int:
-        """Return the number of threads for kernels over so many episodes.
+        """Return the number of threads for kernels over that many episodes.
 
         Parallel kernels are set to run on as many.
         """
@@ -224,14 +224,12 @@ class Perception:
     def provide_records(
         self, rows: NDArray[np.int64], shares_map: bool, *, with_frontiers: bool = False
     ) -> tuple[NDArray[np.int64], int]:
-        """Make the maps that robots plan on where there are none yet, for kernels.
+        """Make the maps that robots plan on if there are none yet, for kernels.
 
         Returns
         -------
         records : (maps, 10) int64
             A table of records; kernels bring them up to date by ``refresh_team``.
-        sharing : int
-            How many rows share one record: that of a row is number ``row // sharing``.
         """
         records, sharing = self._own_records, 1
         if shares_map and self._shares:

@@ -19,7 +19,7 @@ from lidarium.mapping.planning.frontiers.frontier_map import IGNORED
 class ReceivedMaps:
     """What the robots of all episodes know together with what reached them from others.
 
-    That is what came by radio where the starts are known, else what the station sent to a robot.
+    That is what came by radio if the starts are known, else what the station sent to a robot.
 
     Parameters
     ----------
@@ -30,7 +30,7 @@ class ReceivedMaps:
     poses : KnownPoses
         Where the map frames of the robots are.
     exchanges : list of Exchange
-        The radio traffic of each episode; none where the radio is ideal.
+        The radio traffic of each episode; none if the radio is ideal.
 
     Attributes
     ----------
@@ -39,7 +39,7 @@ class ReceivedMaps:
     adds_up : bool
         Whether robots plan on sums of their own map and of what came from others.
     records : (rows, 10) int64
-        The sums as kernels see them, zeros where there is none yet.
+        The sums as kernels see them, zeros if there is none yet.
     """
 
     def __init__(
@@ -120,20 +120,6 @@ class ReceivedMaps:
         """Let a robot that does not know its start receive what others know.
 
         It plans and explores on that as on its own map.
-
-        Parameters
-        ----------
-        row : int
-            Which robot.
-        others : FusedMap or None
-            What the others know, in the robot's map frame; it takes the place of what was received before.
-            None takes that back.
-
-        Raises
-        ------
-        ValueError
-            Where the starts are known, so that the team's map is there anyway, or the sides of the cells
-            differ.
         """
         resolution = self._settings.occupancy.resolution
         if self._settings.known_starts:

@@ -1,6 +1,6 @@
 """Onboard steps between sensing and deciding: localization and radio.
 
-They cover who reports where a robot is, and what the radio brings.
+They cover who reports if a robot is, and what the radio brings.
 
 In the ideal world the kernels of a step do all of it. Localizers and radios that are not kernels run here,
 between and after the two stages of a step, robot by robot.
@@ -87,7 +87,7 @@ class Software:
         perception.sparse_maps.sense(runs)
 
     def _localize(self, episode: int) -> None:
-        """Let the robots of an episode find out where they are."""
+        """Let the robots of an episode find out if they are."""
         simulation, robots = self._perception.simulation, self._settings.robots
         world = simulation.world
         time_s = float(world.steps[episode]) * self._settings.time_step

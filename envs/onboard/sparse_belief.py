@@ -75,7 +75,7 @@ class SparseBelief:
         return self.navigation.is_free(self._own(points))
 
     def nearest_standing(self, place: NDArray[np.float64], within_m: float) -> NDArray[np.float64] | None:
-        """Return the node nearest to a place (2,) within a distance [m], (2,); None where there is none."""
+        """Return the node nearest to a place (2,) within a distance [m], (2,); None if there is none."""
         node = self.navigation.nearest_standing(self._own(place), within_m)
         return None if node is None else self.frame.apply(node)
 
@@ -97,7 +97,7 @@ class SparseBelief:
     ) -> View | None:
         """Return the best view of unknown ground (F, 2), for a robot at x, y, theta (3,).
 
-        Its place is (2,) and what it shows (K, 2); None where the robot cannot come to see enough.
+        Its place is (2,) and what it shows (K, 2); None if the robot cannot come to see enough.
         """
         view = self.navigation.best_view(self._own_pose(pose), self._own(frontier), sight)
         return None if view is None else self._out(view)

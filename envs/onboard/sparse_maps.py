@@ -85,7 +85,7 @@ class SparseMapper:
     Raises
     ------
     ValueError
-        Where the robot has no depth camera, or one that sees no ground.
+        If the robot has no depth camera, or one that sees no ground.
     """
 
     def __init__(self, settings: ExplorationSettings, axes: float | None = None) -> None:
@@ -142,7 +142,7 @@ class SparseMapper:
         depth: NDArray[np.float32] | None,
         bodies: NDArray[np.float64],
     ) -> None:
-        """Take in where the robot is, and what its camera sees there.
+        """Take in if the robot is, and what its camera sees there.
 
         Parameters
         ----------
@@ -151,7 +151,7 @@ class SparseMapper:
         pose : (3,) float64
             x, y, theta as the robot believes [m, rad].
         depth : (rows, columns) float32 or None
-            The image [m]; None where none was taken now.
+            The image [m]; None if none was taken now.
         bodies : (K, 3) float64
             x, y and radius of other robots, whose points are no part of the map [m].
         """
@@ -209,7 +209,7 @@ class SparseMapper:
         return composed(np.array([0.0, 0.0, -(self.axes or 0.0)]), poses)
 
     def _axes_of_walls(self, pose: NDArray[np.float64], depth: NDArray[np.float32]) -> float:
-        """Return in which direction the walls of an image run [rad]; 0 where they hardly differ from that."""
+        """Return in which direction the walls of an image run [rad]; 0 if they hardly differ from that."""
         points = points_of_depth(depth, self._intrinsics) @ self._mount[:3, :3].T + self._mount[:3, 3]
         upright = points[points[:, 2] >= LEAST_WALL_M, :2]
         chosen = np.ascontiguousarray(upright[:: len(upright) // MOST_WALL_POINTS + 1], np.float64)
@@ -293,23 +293,11 @@ class SparseMaps:
         return dict(self._mappers)
 
     def check(self) -> None:
-        """Check that the robots can make sparse maps.
-
-        Raises
-        ------
-        ValueError
-            Where they have no depth camera, or one that sees no ground.
-        """
+        """Check that the robots can make sparse maps."""
         SparseMapper(self._settings)
 
     def of(self, row: int) -> SparseMapper:
-        """Return what makes a robot's map; from the first call on, it is made.
-
-        Raises
-        ------
-        ValueError
-            Where the robot has no depth camera, or one that sees no ground.
-        """
+        """Return what makes a robot's map; from the first call on, it is made."""
         mapper = self._mappers.get(row)
         if mapper is None:
             # Robots that share their maps have common axes.
@@ -319,15 +307,7 @@ class SparseMaps:
         return mapper
 
     def belief(self, row: int, shares_map: bool = True) -> SparseBelief:
-        """Return what a robot knows, in its map frame, up to date.
-
-        Parameters
-        ----------
-        row : int
-            The robot.
-        shares_map : bool
-            Whether what its teammates know counts, where it reaches the robot at once.
-        """
+        """Return what a robot knows, in its map frame, up to date."""
         own = self.of(row)
         sharing = self._sharing(row, shares_map)
         mappers = [self.of(each) for each in sharing]
@@ -366,7 +346,7 @@ class SparseMaps:
         mapper.sense(step * self._settings.time_step, pose, depth, self._bodies(row))
 
     def _bodies(self, row: int) -> NDArray[np.float64]:
-        """Return where a robot knows others to be, with what may show them around, (K, 3) [m]."""
+        """Return if a robot knows others to be, with what may show them around, (K, 3) [m]."""
         known, robots = self._known_poses, self._settings.robots
         if not self._settings.known_starts:
             return np.empty((0, 3))

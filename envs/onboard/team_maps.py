@@ -94,7 +94,7 @@ class TeamMaps(NamedTuple):
     robots : int
         Robots of a team.
     own, shared : (rows, 10), (episodes, 10) int64
-        Records of the robots' own maps and of the teams', zeros where there is none.
+        Records of the robots' own maps and of the teams', zeros if there is none.
     beliefs : (rows, 3) int64
         Address, rows and columns of each robot's log-odds.
     windows, known : (rows, 4) int64

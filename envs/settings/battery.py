@@ -21,11 +21,11 @@ class Battery:
     Attributes
     ----------
     capacity_j : float or None
-        What it holds at the beginning [J]; None for no limit, where nothing is counted.
+        What it holds at the beginning [J]; None for no limit, if nothing is counted.
     idle_w : float
         What electronics and sensors take, whatever the robot does [W].
     per_metre_j : float
-        What a metre of way costs beside it [J/m].
+        What a metre of way costs besides it [J/m].
     per_radian_j : float
         What a radian of turning costs [J/rad]. By default what it costs to move the wheels of a Kobuki, 0.115
         m off the middle, so far.

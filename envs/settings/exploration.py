@@ -45,7 +45,7 @@ class SparseMapSettings:
     most_boxes : int
         A map with more boxes merges them with a larger slack.
     least_motion_m, least_turn : float
-        An image is coded where the robot has moved or turned by so much since the last one [m, rad].
+        An image is coded if the robot has moved or turned by so much since the last one [m, rad].
     cell_m : float
         Side of the cells of seen ground [m].
     margin_m : float
@@ -103,8 +103,8 @@ class ExplorationSettings:
         The body of each; with ``kinds`` a body with room for all of them and the limits of the slowest, by
         which paths are planned.
     kinds : tuple of str
-        Names of the robots of a mixed team, in order, from the front again where these are too few; empty
-        where all are ``robot``.
+        Names of the robots of a mixed team, in order, from the front again if these are too few; empty
+        if all are ``robot``.
     lidar : Lidar
         The laser of each.
     camera : DepthCamera or None
@@ -149,10 +149,10 @@ class ExplorationSettings:
     stop_on_contact : bool
         Whether a robot that touches anything ends as ``collision``.
     goal_radius : float
-        Distance to the goal, where the floor has one, at which a robot ends as ``reached`` [m].
+        Distance to the goal, if the floor has one, at which a robot ends as ``reached`` [m].
     observe : tuple of str
         What the robots observe: any of ``OBSERVABLES``, kept in that order, and of the registry
-        ``observable``. The makers of environments leave out ``pose`` where it is not named.
+        ``observable``. The makers of environments leave out ``pose`` if it is not named.
     map_cells : int
         Side of the observed ``map`` [cells], a multiple of 2; half of it is how far a waypoint of the level
         of waypoints can lie.
@@ -167,7 +167,7 @@ class ExplorationSettings:
     frontiers : int
         How many frontiers the level of frontiers offers at most.
     least_frontier : float
-        Length of a frontier that is offered [m]; shorter ones are where there is no longer one.
+        Length of a frontier that is offered [m]; shorter ones are if there is no longer one.
     frontiers_by_size : float
         Share of the frontiers that are offered because they are the longest; the others are those with the
         cheapest way.
@@ -265,7 +265,7 @@ class ExplorationSettings:
         check_workload(self)
 
     def _check_camera(self, camera: DepthCamera) -> None:
-        """Check that the mount is on the robot, where no wall can be."""
+        """Check that the mount is on the robot, if no wall can be."""
         if math.hypot(camera.forward, camera.left) > self.robot.radius:
             raise ValueError(
                 f"the camera is mounted at forward {camera.forward} m, left {camera.left} m, beyond the "
@@ -355,7 +355,7 @@ def localizer_settings(localization: str, values: Mapping[str, Any]) -> Any:  # 
     Raises
     ------
     ValueError
-        Where the localization has no settings, or not these.
+        If the localization has no settings, or not these.
     """
     if localization not in LOCALIZERS:
         raise ValueError(

@@ -49,7 +49,7 @@ class Fault:
     wheel : str
         Which wheel sticks: ``left`` or ``right``.
     place : (x, y, theta) or None
-        Where a kidnapped robot is put, in the floor's frame [m, rad]; drawn where None.
+        Where a kidnapped robot is put, in the floor's frame [m, rad]; drawn if None.
     """
 
     kind: str

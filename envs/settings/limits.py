@@ -128,13 +128,7 @@ PRODUCTS = (
 
 
 def check_workload(settings: Any) -> None:  # noqa: ANN401
-    """Check that no step of these settings takes more memory or time than there is.
-
-    Raises
-    ------
-    ValueError
-        Where a product of settings is too large; the message names them.
-    """
+    """Check that no step of these settings takes more memory or time than there is."""
     for product in PRODUCTS:
         found = product.of(settings)
         if found > product.most:
@@ -161,13 +155,7 @@ def observed_names(names: Iterable[str]) -> tuple[str, ...]:
 
 
 def check_level(names: Iterable[str], level: str) -> None:
-    """Check that what is observed is there at a level of decision.
-
-    Raises
-    ------
-    ValueError
-        Where it is at the level of frontiers only, and the level is another.
-    """
+    """Check that what is observed is there at a level of decision."""
     absent = [name for name in names if name in LEVEL_OBSERVABLES]
     if absent and level != "frontier":
         raise ValueError(f"observe has {absent[0]!r}, which needs level='frontier'; level is {level!r}")

@@ -72,7 +72,7 @@ def make_settings(settings: ExplorationSettings | None = None, **options: Any) -
     Parameters
     ----------
     settings : ExplorationSettings or None
-        Where to start from; the defaults where None.
+        Where to start from; the defaults if None.
     **options
         Any attribute of ``ExplorationSettings``; a part such as ``robot`` or ``reward`` also as a mapping of
         its values, and ``robot``, ``lidar``, ``camera``, ``odometry``, ``radio`` and ``battery`` by name.
@@ -89,7 +89,7 @@ def make_settings(settings: ExplorationSettings | None = None, **options: Any) -
     Raises
     ------
     ValueError, TypeError
-        Where an option has a bad value or is unknown.
+        If an option has a bad value or is unknown.
     """
     base = settings or ExplorationSettings()
     assigned = options.pop("assigned", ())
@@ -133,7 +133,7 @@ def makers_settings(settings: ExplorationSettings | None, options: Mapping[str, 
 
 
 def _horizon(max_cycles: Any, options: Mapping[str, Any], base: ExplorationSettings) -> float:  # noqa: ANN401
-    """Return the horizon [s] of so many steps."""
+    """Return the horizon [s] of that many steps."""
     if "horizon_s" in options:
         raise ValueError(
             f"max_cycles is {shown(max_cycles)} and horizon_s is {shown(options['horizon_s'])}; want one of "
@@ -147,7 +147,7 @@ def _horizon(max_cycles: Any, options: Mapping[str, Any], base: ExplorationSetti
 
 
 def _part(name: str, value: Any) -> Any:  # noqa: ANN401
-    """Return the value of an option, where it is a part by its name or by its values."""
+    """Return the value of an option, if it is a part by its name or by its values."""
     if name in PARTS and isinstance(value, Mapping):
         check_values(value, rules_of(ExplorationSettings)[name].inner, name)
         return with_parts(PARTS[name], value)
@@ -170,7 +170,7 @@ def assign(settings: ExplorationSettings, assignments: Iterable[str]) -> Explora
     Raises
     ------
     ValueError
-        Where an assignment has no ``=``, names no setting, or has a bad value.
+        If an assignment has no ``=``, names no setting, or has a bad value.
     """
     for assignment in assignments:
         name, equals, text = assignment.partition("=")
@@ -191,7 +191,7 @@ def set_values(settings: ExplorationSettings, values: Mapping[str, Any]) -> Expl
     Raises
     ------
     ValueError
-        Where a name is no setting, or a value is not one of its own.
+        If a name is no setting, or a value is not one of its own.
     """
     for name, value in values.items():
         settings = _replaced(settings, name.split("."), value, name)

@@ -1,4 +1,4 @@
-"""What robots can observe beside what the kernels write.
+"""What robots can observe besides what the kernels write.
 
 An entry of the registry ``observable`` is a function of named arrays, or has the name of an array of
 ``Simulation.sensors`` and is observed as that array has it, row by row.
@@ -24,7 +24,7 @@ class Observable:
     box : callable
         The space of one robot's observation, from the settings; bounded.
     missing : callable
-        What the settings lack for it, in words; empty where nothing.
+        What the settings lack for it, in words; empty if nothing.
     compute : callable or None
         Takes ``Rows``, named arrays over the robots of all episodes, and returns the values of all, (rows,
         ...); it keeps nothing from call to call. None for the array of sensors of this name.
@@ -79,7 +79,7 @@ def check_sensed(settings: Any) -> None:  # noqa: ANN401
     Raises
     ------
     ValueError
-        Where one is not; the message says what is missing.
+        If one is not; the message says what is missing.
     """
     for name in settings.observe:
         missing = SENSED[name].missing(settings) if name in SENSED else ""

@@ -15,7 +15,7 @@ from lidarium.mapping.geometry.bounds import shown
 
 @dataclass(frozen=True, slots=True)
 class ResetOptions:
-    """Options of ``reset``, checked; None where not given."""
+    """Options of ``reset``, checked; None if not given."""
 
     floor: Floors | None = None
     starts: NDArray[np.float64] | str | None = None
@@ -36,11 +36,6 @@ def check_options(options: Any, known: Iterable[str] = OPTIONS) -> None:  # noqa
     """Check that options are a mapping, and that no name is a known one misspelt.
 
     Other unknown names are no error: wrappers and trainers pass options of their own.
-
-    Raises
-    ------
-    ValueError
-        Where they are no mapping, or a name is nearly a known one.
     """
     if options is not None and not isinstance(options, Mapping):
         raise ValueError(
@@ -53,13 +48,7 @@ def check_options(options: Any, known: Iterable[str] = OPTIONS) -> None:  # noqa
 
 
 def checked_seed(seed: Any) -> int | None:  # noqa: ANN401
-    """Return a seed as a number; None stays None.
-
-    Raises
-    ------
-    ValueError
-        Where it is not a whole number of zero or more.
-    """
+    """Return a seed as a number; None stays None."""
     if seed is None:
         return None
     if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
@@ -68,13 +57,7 @@ def checked_seed(seed: Any) -> int | None:  # noqa: ANN401
 
 
 def read_options(options: Mapping[str, Any] | None, robots: int) -> ResetOptions:
-    """Check the options that are known and ignore the others.
-
-    Raises
-    ------
-    ValueError
-        Where these are no options, or a known one has a bad value.
-    """
+    """Check the options that are known and ignore the others."""
     check_options(options)
     if not options:
         return ResetOptions()
@@ -98,7 +81,7 @@ def read_options(options: Mapping[str, Any] | None, robots: int) -> ResetOptions
 
 
 def _numbers(value: Any) -> NDArray[np.float64] | None:  # noqa: ANN401
-    """Return a value as an array, or None where it is not one of finite numbers."""
+    """Return a value as an array, or None if it is not one of finite numbers."""
     try:
         array = np.asarray(value, np.float64)
     except (TypeError, ValueError):
@@ -114,13 +97,7 @@ def of_number(curriculum: Curriculum | None, number: int) -> Mapping[str, Any]:
 def of_curriculum(
     curriculum: Curriculum | None, number: int, chosen: ResetOptions, robots: int
 ) -> ResetOptions:
-    """Return the options of an episode: the chosen ones, and those of a curriculum beside them.
-
-    Raises
-    ------
-    ValueError
-        Where the curriculum returns bad options; the episode's number is named.
-    """
+    """Return the options of an episode: the chosen ones, and those of a curriculum besides them."""
     if curriculum is None:
         return chosen
     try:

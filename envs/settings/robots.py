@@ -261,7 +261,7 @@ def kinds_of(names: Any) -> tuple[str, ...]:  # noqa: ANN401
     Raises
     ------
     ValueError
-        Where they are no names, or one is unknown.
+        If they are no names, or one is unknown.
     """
     if not isinstance(names, list | tuple):
         raise ValueError(f"kinds is {shown(names)}; want names of robots ({', '.join(ROBOTS)}) in a list")

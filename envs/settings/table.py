@@ -36,15 +36,7 @@ class Setting:
 
 
 def settings_table(settings: Any = None, prefix: str = "") -> Iterator[Setting]:  # noqa: ANN401
-    """Yield every setting in the order of its declaration; those of a part follow under its name.
-
-    Parameters
-    ----------
-    settings : dataclass instance or None
-        Whose fields; the defaults of ``ExplorationSettings`` where None.
-    prefix : str
-        What precedes the names.
-    """
+    """Yield every setting in the order of its declaration; those of a part follow under its name."""
     settings = ExplorationSettings() if settings is None else settings
     kind: Any = type(settings)
     documented, rules = documented_attributes(kind), rules_of(kind)

@@ -83,16 +83,10 @@ class World(Protocol):
 
         Parameters
         ----------
-        episode : int
-            Which.
-        floor : FloorTables
-            The floor.
         starts : (robots, 3) float64
             x, y, theta of each robot, headings in (-pi, pi] [m, rad].
         free : (rows, columns) bool
             Cells of the floor's raster that robots can reach.
-        seed : int
-            Where all draws come from.
         """
         ...
 
@@ -111,15 +105,13 @@ class World(Protocol):
         ----------
         commands : (rows, 2) float64
             Wanted speed and turn rate [m/s, rad/s].
-        moves_bodies : bool
-            False for the first scan of an episode, taken where the robots stand.
         runs : (episodes,) bool or None
-            Which episodes take the step; all where None.
+            Which episodes take the step; all by default.
         """
         ...
 
     def show(self) -> bool:
-        """Show the bodies in a window of the world's own; returns False where it has none."""
+        """Show the bodies in a window of the world's own; returns False if it has none."""
         ...
 
     def close(self) -> None:

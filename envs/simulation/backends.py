@@ -15,7 +15,7 @@ BACKENDS: Registry[Callable[[ExplorationSettings, int], Simulation]] = Registry(
 
 
 def kinematic_world(settings: ExplorationSettings, episodes: int = 1) -> KinematicWorld:
-    """Return the kinematic world of so many episodes."""
+    """Return the kinematic world of that many episodes."""
     return KinematicWorld(
         settings.team,
         settings.lidar,

@@ -117,7 +117,7 @@ class Beliefs:
     Attributes
     ----------
     believed : (rows, 3) float64
-        Poses as the localizers believe, in the floor's axes where starts are known [m, rad].
+        Poses as the localizers believe, in the floor's axes if starts are known [m, rad].
     log_odds : list of (map rows, map columns) int8
         The map of each robot.
     origins : (rows, 2) float64
@@ -162,16 +162,10 @@ class Beliefs:
 
         Parameters
         ----------
-        row : int
-            The robot.
-        floor : FloorTables
-            Where it is.
         start : (3,) float64 or None
-            Its start in the floor's frame; None where it does not know it.
+            Its start in the floor's frame; None if it does not know it.
         shape : (rows, columns)
             Size of the floor [map cells].
-        pages : Pages
-            Where maps are kept.
         """
         resolution = self.occupancy.resolution
         self.believed[row] = 0.0 if start is None else start

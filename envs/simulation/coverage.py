@@ -64,18 +64,9 @@ def mark_seen(
         What the robot has seen (updated), and F.
     bits : (window rows, words) uint64
         The seen area.
-    box : tuple of int
-        row_low, row_high, word_low, word_high of the window that may hold bits.
-    row_offset, word_offset : int
-        Place of the window in the masks.
     changes : (4,) int64
         Result: the part of the mask that holds the cells new to the robot (row_low, row_high, word_low,
         word_high).
-
-    Returns
-    -------
-    int
-        Cells new to the robot.
     """
     rows, words = own.shape
     new = 0
@@ -119,15 +110,8 @@ def share_new_cells(owns: Array, team: Array, changes: Array, first: int, robots
         What the team has seen; updated.
     changes : (maps, 4) int64
         Where ``mark_seen`` found cells that are new to each robot.
-    first, robots : int
-        The episode's robots in these arrays.
     gains : (maps,) float64
         Result: cells credited to each robot.
-
-    Returns
-    -------
-    int
-        Cells new to the team.
     """
     rows, words = team.shape
     total = 0

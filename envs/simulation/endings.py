@@ -89,7 +89,7 @@ def is_near(x: float, y: float, goal_x: float, goal_y: float, radius: float) -> 
 
 @kernel(nrt=False)
 def ending_of(world: WorldArrays, row: int, episode: int, rules: Rules) -> int:
-    """Return why a robot ends now, by number in ``REASONS``; 0 where it goes on or has ended."""
+    """Return why a robot ends now, by number in ``REASONS``; 0 if it goes on or has ended."""
     if not rules.live[row]:
         return 0
     bounds = rules.bounds
@@ -113,8 +113,8 @@ def ending_of(world: WorldArrays, row: int, episode: int, rules: Rules) -> int:
 def note_endings(table: Array, robots: int, rules_table: Array, reasons: Array) -> int:
     """Write why each robot ends now into ``reasons`` (rows,) int8.
 
-    Returns how many end. ``rules_table`` is the table of ``Rules``: handing over one array takes less time
-    than five.
+    Returns how many end. ``rules_table`` is the table of ``Rules``: handing over one array takes less time than
+    five.
     """
     world, rules = world_at(table), arrays_at(rules_table, Rules)
     count = 0

@@ -33,15 +33,7 @@ class KinematicSimulation(Simulation):
         episodes: int = 1,
         **options: Any,  # noqa: ANN401
     ) -> "KinematicSimulation":
-        """Return the simulation of a team in a kinematic world of its own.
-
-        Parameters
-        ----------
-        robots, lidar, occupancy, time_step, episodes
-            As for ``KinematicWorld`` and ``Simulation``.
-        **options
-            Further parameters of either and of ``PoseSources``, by name.
-        """
+        """Return the simulation of a team in a kinematic world of its own."""
         of_world = {
             name: options.pop(name) for name in ("odometry", "faults", "horizon_s") if name in options
         }

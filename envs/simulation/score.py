@@ -34,7 +34,7 @@ class Score:
     robots, episodes : int
         Size of a team, and number of episodes.
     weights : (4,) float64 or None
-        Weight of each of ``rewards.TERMS``; 0 where None.
+        Weight of each of ``rewards.TERMS``; 0 if None.
 
     Attributes
     ----------
@@ -85,10 +85,6 @@ class Score:
         ----------
         free : (rows, columns) bool
             World cells that count.
-        multiple : int
-            World cells along a map cell.
-        same : sequence of int
-            Episodes on the same floor: one array for all is less memory to go through in a step.
         """
         counted = pack_bits(counted_cells(free, multiple))
         others = (self.counted_masks[other] for other in same)

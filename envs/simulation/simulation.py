@@ -91,7 +91,7 @@ class Simulation:
     scales : sequence of int
         Scales at which maps are pooled for observations [cells].
     reward_weights : (4,) float64 or None
-        Weights of ``scoring.rewards.TERMS``; nothing where None.
+        Weights of ``scoring.rewards.TERMS``; nothing if None.
     pose_sources : PoseSources
         Where robots know their poses from.
 
@@ -100,7 +100,7 @@ class Simulation:
     world, beliefs, score : World, Beliefs, Score
         Its three parts.
     camera : DepthSensor or None
-        The depth cameras of the robots, where they have any.
+        The depth cameras of the robots, if they have any.
     """
 
     is_fused = False
@@ -159,11 +159,6 @@ class Simulation:
         """Start an episode: robots at ``starts`` (robots, 3) of a floor, blank maps and masks.
 
         All draws come from ``seed``.
-
-        Raises
-        ------
-        ValueError
-            Where the maps' cell is not a whole multiple of the floor's raster cell.
         """
         multiple = self._multiple(floor)
         first, last = episode * self.robots, (episode + 1) * self.robots
@@ -219,7 +214,7 @@ class Simulation:
 
     @property
     def threads(self) -> int:
-        """Threads that kernels over the rows may use: 1 where there are too few rows to share out."""
+        """Threads that kernels over the rows may use: 1 if there are too few rows to share out."""
         return self._threads if self.robots * self.episodes >= ROWS_FOR_THREADS else 1
 
     def use_threads(self) -> int:
@@ -240,12 +235,8 @@ class Simulation:
         ----------
         commands : (rows, 2) float64
             Wanted speed and turn rate [m/s, rad/s].
-        moves_bodies : bool
-            False for the first scan of an episode, taken where the robots stand.
-        perceives : bool
-            False to leave the maps as they are; ``perceive`` updates them.
         runs : (episodes,) bool or None
-            Which episodes take the step; all where None.
+            Which episodes take the step; all by default.
         """
         self.world.move_and_sense(commands, moves_bodies=moves_bodies, runs=runs)
         if self.camera is not None:
@@ -260,7 +251,7 @@ class Simulation:
         Parameters
         ----------
         runs : (episodes,) bool or None
-            Of which episodes; all where None.
+            Of which episodes; all by default.
         """
         perceive = perceive_parallel if self.use_threads() > 1 else perceive_serial
         perceive(self._table, self.robots, self._everywhere if runs is None else runs)
@@ -274,8 +265,6 @@ class Simulation:
 
         Parameters
         ----------
-        row : int
-            The robot.
         poses : (scans, 3) float64
             Where the scans were taken, in the frame of its believed pose [m, rad].
         ranges : (scans, beams) float32

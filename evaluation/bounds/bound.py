@@ -53,7 +53,7 @@ class Walk:
     points : (P, 2) float64
         x, y in the floor's frame, from the start on [m].
     room : (P,) float64
-        Room beside the body on the piece that leads to each [m].
+        Room besides the body on the piece that leads to each [m].
     headings : (P,) float64
         Heading to turn to there [rad]; nan for none.
     """

@@ -101,7 +101,7 @@ def cost_of(graph: ViewGraph, stops: Stops) -> float:
 
 
 def covered(graph: ViewGraph, stops: Stops, wanted: int) -> Stops:
-    """Add stops to tours until so many points are seen.
+    """Add stops to tours until that many points are seen.
 
     It is each time the one that shows most for its way.
     """

@@ -46,9 +46,9 @@ class ViewGraph:
     places : (N, 2) float64
         x, y in the floor's frame [m]; the first ones are where the robots start.
     room : (N,) float64
-        Room beside the body there [m].
+        Room besides the body there [m].
     robots : int
-        How many start.
+        Number of start.
     links : (N, N) csr_array
         Lengths of the straight lines between neighbours [m].
     lengths : (N, N) float64

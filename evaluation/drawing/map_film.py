@@ -231,5 +231,5 @@ def _known(env: ExplorationEnv, view: View, groups: Sequence[set[int]], colours:
 
 
 def _enlarged_cells(levels: NDArray[np.uint8], multiple: int) -> NDArray[np.uint8]:
-    """Return a map of cells that are so many cells of the floor's raster wide."""
+    """Return a map of cells that are that many cells of the floor's raster wide."""
     return levels if multiple == 1 else np.repeat(np.repeat(levels, multiple, axis=0), multiple, axis=1)

@@ -81,7 +81,7 @@ def box_around(free: NDArray[np.bool_], origin: tuple[float, float], resolution:
 def page(aspect: float) -> tuple[Figure, Axes, Axes, Axes]:
     """Arrange a picture: the floor, the curve and the team.
 
-    The curve and the team are beside the floor, or below it if it is wide.
+    The curve and the team are besides the floor, or below it if it is wide.
     """
     if aspect > _WIDE:
         width = 14.0

@@ -100,7 +100,7 @@ class _Tiles:
 
 
 def _columns(count: int) -> int:
-    """Return the columns of so many tiles: three at most, two of four tiles."""
+    """Return the columns of that many tiles: three at most, two of four tiles."""
     return min(count, 2 if count == 4 else 3)
 
 

@@ -163,7 +163,7 @@ class _Curves:
         Shares of F that were sensed, of all that can be known, and of F and its surface that the team's map
         knows.
     c_own : (samples, robots) float64
-        Share of F that each robot holds to be free, by its own map or, where it reaches the robot, the
+        Share of F that each robot holds to be free, by its own map or, if it reaches the robot, the
         team's.
     lengths : (samples, robots) float64
         Length of each robot's path [m].

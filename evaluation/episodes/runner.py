@@ -153,7 +153,7 @@ def _show_decision(
 
 
 def _merges_of(policy: Policy, env: ExplorationEnv) -> list[MergeEvent]:
-    """Return the joins that a policy's decisions were built on, beside the truth."""
+    """Return the joins that a policy's decisions were built on, besides the truth."""
     station = policy.report().supervision
     used = [] if station is None else [join for join in station.joins if join.is_used]
     if not used:

@@ -1,6 +1,6 @@
 """Rules for when an episode of an evaluation ends, from other projects.
 
-They apply beside what the environment's settings say.
+They apply besides what the environment's settings say.
 """
 
 from collections.abc import Callable, Mapping
@@ -61,7 +61,7 @@ class StopRule:
             raise ValueError("the stop rule ends nothing; want a figure with its bound, decisions, or both")
 
     def is_met(self, env: ExplorationEnv, history: History, decisions: int) -> bool:
-        """Whether the episode ends now, after so many decisions."""
+        """Whether the episode ends now, after that many decisions."""
         if self.decisions is not None and decisions >= self.decisions:
             return True
         if self.figure is None:

@@ -84,7 +84,7 @@ def relative_error(believed: Poses, true: Poses, steps: int) -> tuple[float, flo
 
 
 def _motions(poses: Poses, steps: int) -> Poses:
-    """Return the motions from each pose to the one so many steps later.
+    """Return the motions from each pose to the one that many steps later.
 
     They are in the frame of the former.
     """

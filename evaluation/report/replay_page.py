@@ -127,7 +127,7 @@ class ReplaySampler(Watcher):
             samples.believed.append(believed_on_floor(env))
 
     def _places(self, env: ExplorationEnv) -> NDArray[np.float64]:
-        """Return where robots are and believe to be, (2 robots, 2) [m]."""
+        """Return if robots are and believe to be, (2 robots, 2) [m]."""
         return np.concatenate([env.world.poses[:, :2], believed_on_floor(env)[:, :2]])
 
     def _sample_maps(self, env: ExplorationEnv, *, is_whole: bool = False) -> None:
@@ -189,7 +189,7 @@ class Replay:
     text : str
         Output of `packed`.
     lacks : str
-        Why scans, the truth and own maps are not there; empty where they are.
+        Why scans, the truth and own maps are not there; empty if they are.
     """
 
     title: str

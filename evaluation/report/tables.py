@@ -40,7 +40,7 @@ def markdown_table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
 
 
 def number(value: float, horizon_s: float | None = None, digits: int = 1) -> str:
-    """Return a number with so many digits behind the point.
+    """Return a number with that many digits behind the point.
 
     Inf as later than the horizon.
     """

@@ -1,6 +1,6 @@
 """Suites as other projects evaluate: sensor, team, stop rule and figures.
 
-They run on these projects' floors where any are at hand. Sources: the projects' own scripts at the commits
+They run on these projects' floors if any are at hand. Sources: the projects' own scripts at the commits
 named. Differences that remain are listed in ``differences``; figures of such a run may be compared with a
 project's only if none of them matters.
 """

@@ -82,7 +82,7 @@ def listed(content: Mapping[str, Any], name: str) -> tuple[Any, ...]:
 
 
 def seeds_of(seeds: Any, content: Mapping[str, Any]) -> tuple[Any, ...]:  # noqa: ANN401
-    """Return the seeds of a suite: those of a list, or so many from 0 on."""
+    """Return the seeds of a suite: those of a list, or that many from 0 on."""
     if isinstance(seeds, int) and not isinstance(seeds, bool):
         if not 1 <= seeds <= MOST_EACH:
             raise ValueError(
@@ -154,7 +154,7 @@ class Suite:
         Metres per pixel, if floors are plain images.
     policy_settings : dict
         By a name among the policies: options that the policy is made with, and ``policy``, which one it is,
-        where the name is another.
+        if the name is another.
     """
 
     policies: tuple[str, ...]

@@ -352,7 +352,7 @@ class MapTally:
         self.shares = shares_one_map(env)
 
     def note_step(self, env: ExplorationEnv) -> None:
-        """Note where maps have changed; wanted after every step."""
+        """Note if maps have changed; wanted after every step."""
         note_changes(env.beliefs.windows, self._last.changes)
 
     def take_in(self, env: ExplorationEnv) -> None:

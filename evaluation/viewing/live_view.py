@@ -190,7 +190,7 @@ class LiveView(Watcher):
         self._draw_all()
 
     def step(self, env: ExplorationEnv, commands: NDArray[np.float64], /) -> None:
-        """Draw where it is time to, and wait until the next step is due."""
+        """Draw if it is time to, and wait until the next step is due."""
         controls = self._controls
         self._draw_due()
         self._pace.wait(

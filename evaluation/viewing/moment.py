@@ -140,7 +140,7 @@ def _on_floor(env: ExplorationEnv, row: int, points: NDArray[np.float64]) -> NDA
 
 
 def _trails(env: ExplorationEnv) -> NDArray[np.float64]:
-    """Return where the robots have been, (T, robots, 2), thinned out."""
+    """Return if the robots have been, (T, robots, 2), thinned out."""
     track = env.scorer.track
     shown = track[:: max(-(-len(track) // MOST_TRAIL), 1)]
     return np.stack([*(poses[:, :2] for _, poses in shown), env.world.poses[:, :2]])

@@ -1,4 +1,4 @@
-"""`lidarium bench`: measure speed on this machine, beside other simulators that are installed."""
+"""`lidarium bench`: measure speed on this machine, besides other simulators that are installed."""
 
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal
@@ -10,7 +10,7 @@ from lidarium.scripts.common import INTERRUPTED, Answer, Command, notify, table
 class _Bench(Command):
     """Measure the lines of the speed budget on this machine.
 
-    The other simulators that are installed are measured beside it.
+    The other simulators that are installed are measured besides it.
     """
 
     compiles: ClassVar[bool] = True

@@ -329,7 +329,7 @@ def _save_picture(path: Path, floor: "Floor") -> None:
 
 
 def check_out(command: Command) -> None:
-    """Check that ``--out`` can be written to, where it is given."""
+    """Check that ``--out`` can be written to, if it is given."""
     from lidarium.mapping.files.output import check_writable
 
     if command.out is not None:

@@ -281,7 +281,7 @@ def write_merged(
 ) -> list[str]:
     """Write transforms, the picture and the fused map of each group of two maps or more.
 
-    In the ROS frame of the group's first map; bent where the groups were.
+    In the ROS frame of the group's first map; bent if the groups were.
     """
     from lidarium.evaluation.drawing.merge_picture import save_merge_picture
     from lidarium.mapping.files.map_files import write_ros_map

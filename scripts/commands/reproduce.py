@@ -92,7 +92,7 @@ def _every(command: Reproduce) -> int:
 
 
 def _ran(campaign: "Campaign", name: str, is_quiet: bool) -> bool:
-    """Run a campaign; False where the user broke it off."""
+    """Run a campaign; False if the user broke it off."""
     runs = campaign.run()
     total = sum(1 for _ in campaign.suite.trials())
     try:
@@ -108,7 +108,7 @@ def _ran(campaign: "Campaign", name: str, is_quiet: bool) -> bool:
 def _worked(work: Iterator[tuple[str, int, int]], is_quiet: bool) -> bool:
     """Do an experiment's own work, and show its progress now and then.
 
-    False where the user broke it off.
+    False if the user broke it off.
     """
     before, shown_at = "", 0.0
     try:

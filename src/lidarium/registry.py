@@ -67,7 +67,7 @@ class Registry(Mapping[str, T], Generic[T]):
         Raises
         ------
         ValueError
-            Where the name is taken.
+            If the name is taken.
         """
         if name in self._items:
             raise ValueError(f"{self.kind} {name!r} is registered already; choose another name")
@@ -80,7 +80,7 @@ class Registry(Mapping[str, T], Generic[T]):
         Raises
         ------
         ValueError
-            Where the name is unknown.
+            If the name is unknown.
         """
         self._check(name)
         del self._items[name], self._summaries[name]
@@ -91,7 +91,7 @@ class Registry(Mapping[str, T], Generic[T]):
         Raises
         ------
         UnknownNameError
-            Where the name is unknown; the message suggests the nearest one.
+            If the name is unknown; the message suggests the nearest one.
         """
         self._check(name)
         item = self._items[name]
@@ -130,7 +130,7 @@ class UnknownNameError(KeyError, ValueError):
 def unknown(kind: str, name: object, known: Iterable[str], most: int | None = None) -> str:
     """Return the message for an unknown name: the nearest known one, and all of them.
 
-    With ``most`` as many as fit into so many characters.
+    With ``most`` as many as fit into that many characters.
     """
     names = list(known)
     listed = names
@@ -154,7 +154,7 @@ def registry(kind: str) -> Registry[Any]:
     Raises
     ------
     ValueError
-        Where there is no such kind.
+        If there is no such kind.
     """
     if kind not in REGISTRIES:
         raise ValueError(unknown("registry", kind, REGISTRIES))

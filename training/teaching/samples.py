@@ -38,7 +38,7 @@ class Samples:
         return Samples(self.decisions.take(rows), self.regrets[rows])
 
     def narrowed(self, width: int) -> "Samples":
-        """Return the same samples, none of which has more than so many options, in less memory."""
+        """Return the same samples, none of which has more than that many options, in less memory."""
         return Samples(self.decisions.narrowed(width), np.ascontiguousarray(self.regrets[:, :width]))
 
 
@@ -82,7 +82,7 @@ def by_width(parts: Sequence[Samples], widths: Sequence[int]) -> list[Samples]:
 
 
 def _widened(samples: Samples, width: int) -> Samples:
-    """Return the same samples with room for exactly so many options."""
+    """Return the same samples with room for exactly that many options."""
     room = width - samples.regrets.shape[1]
     if room <= 0:
         return samples.narrowed(width)

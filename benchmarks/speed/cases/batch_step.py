@@ -1,6 +1,6 @@
 """Whole steps of a batch on two threads.
 
-They stand beside one thread and beside the kernel alone.
+They stand beside one thread and besides the kernel alone.
 
 Three batches are in the same state and take the same steps, some at a time in turn: one takes whole steps on
 two threads, one on one thread, and of the third the kernel alone runs on two threads.

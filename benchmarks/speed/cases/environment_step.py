@@ -1,4 +1,4 @@
-"""A whole step of the environment, beside the kernel alone.
+"""A whole step of the environment, besides the kernel alone.
 
 Two environments are in the same state and get the same actions. One takes whole steps with observations,
 rewards, endings and infos; of the other the kernel alone is called.

@@ -1,6 +1,6 @@
 """Scan and map update at the settings of the exploration projects.
 
-They stand beside the rates that those projects quote.
+They stand besides the rates that those projects quote.
 
 ARiADNE, Explore-Bench and HouseExpo are not on PyPI. Their rates were measured once on an AMD Zen 5 core,
 each with its own code, map and defaults, and are quoted; ours runs with one robot on floors of our own of the

@@ -58,7 +58,7 @@ class Choosers:
         return int(infos["active"].sum())
 
     def run(self, seconds: float) -> float:
-        """Decide for about so many seconds; return the processor's seconds a row."""
+        """Decide for about that many seconds; return the processor's seconds a row."""
         rows, began = 0, time.process_time()
         while rows == 0 or time.process_time() - began < seconds:
             rows += self.decide()

@@ -29,7 +29,7 @@ def fastest_irsim_step(
 ) -> Callable[[], object] | None:
     """Return a function that steps IR-SIM with one robot.
 
-    The robot is at the pose where IR-SIM is fastest; None where it is not installed.
+    The robot is at the pose where IR-SIM is fastest; None if it is not installed.
 
     Its time depends on what is in the robot's reach, several times over on a grid map.
 

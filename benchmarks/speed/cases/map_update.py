@@ -1,4 +1,4 @@
-"""Updates of maps by scans, beside other mappers."""
+"""Updates of maps by scans, besides other mappers."""
 
 import itertools
 import math

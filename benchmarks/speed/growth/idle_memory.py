@@ -1,4 +1,4 @@
-"""How much memory a robot takes that stands still, beside that of its map.
+"""How much memory a robot takes that stands still, besides that of its map.
 
 python benchmarks/speed/growth/idle_memory.py
 """
@@ -34,7 +34,7 @@ class IdleMemory:
         Of all arrays of the environment, by the number of robots: the team's masks and the observations'
         buffers, too.
     resident_bytes : float or None
-        By how much a robot makes the process grow, as the system tells; None where it does not.
+        By how much a robot makes the process grow, as the system tells; None if it does not.
     """
 
     robots: int
@@ -87,7 +87,7 @@ def array_bytes(thing: Any) -> int:  # noqa: ANN401
 def resident() -> int | None:
     """Return how much memory of this process lies in the machine's [bytes].
 
-    None where the system does not tell.
+    None if the system does not tell.
     """
     try:
         status = Path("/proc/self/status").read_text()
@@ -97,7 +97,7 @@ def resident() -> int | None:
 
 
 def standing(robots: int) -> ExplorationVectorEnv:
-    """Return an environment in which so many robots stood still for a second.
+    """Return an environment in which that many robots stood still for a second.
 
     They are in teams on the straight floor.
     """

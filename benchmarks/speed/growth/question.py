@@ -22,7 +22,7 @@ MIB = 2**20
 
 @dataclass(frozen=True, slots=True)
 class Growth:
-    """The times of one size beside those of the first of its group.
+    """The times of one size besides those of the first of its group.
 
     Attributes
     ----------
@@ -35,7 +35,7 @@ class Growth:
     seconds, first : list of float
         Seconds per agent step in each repeat, of this size and of the first one.
     allowed : float or None
-        How many times the first's time it may take; None where that is only told.
+        How many times the first's time it may take; None if that is only told.
     """
 
     group: str
@@ -57,7 +57,7 @@ class Growth:
 
     @property
     def is_kept(self) -> bool | None:
-        """Whether the median of the ratios is allowed; None where that is only told."""
+        """Whether the median of the ratios is allowed; None if that is only told."""
         return None if self.allowed is None else self.ratio.median <= self.allowed
 
 
@@ -189,7 +189,7 @@ ALLOWED_TO_64, ALLOWED_TO_1024, ALLOWED_FLOORS = 1.25, {0.025: 1.8, 0.05: 1.4}, 
 
 
 def repeated_in_turn(histories: dict[str, Histories], repeats: int) -> dict[str, list[float]]:
-    """Run all in turn so many times, after once to warm up.
+    """Run all in turn that many times, after once to warm up.
 
     Seconds per agent step of each.
     """

@@ -24,7 +24,7 @@ Egocentric maps of 64 x 64 cells at the scales 1 and 4.
 
 
 def can_use(threads: int) -> bool:
-    """Whether so many threads of kernels can run at once here."""
+    """Whether that many threads of kernels can run at once here."""
     return min(len(cores()), available_threads()) >= threads
 
 

@@ -22,11 +22,11 @@ class Line:
     peer : str
         The other side's figure, and who it is.
     ratio : Comparison or None
-        Our speed over theirs; None where the peer is not installed or the line is not a ratio.
+        Our speed over theirs; None if the peer is not installed or the line is not a ratio.
     figure : float or None
-        The figure that is judged where the line is not a ratio of speeds.
+        The figure that is judged if the line is not a ratio of speeds.
     to_reach : float or None
-        What was to be reached; None where the line only informs.
+        What was to be reached; None if the line only informs.
     is_upper_bound : bool
         Whether the figure must stay below ``to_reach``.
     unit : str
@@ -49,7 +49,7 @@ class Line:
 
     @property
     def is_reached(self) -> bool | None:
-        """Whether it is reached; None where nothing was measured."""
+        """Whether it is reached; None if nothing was measured."""
         if self.judged is None or self.to_reach is None:
             return None
         return self.judged <= self.to_reach if self.is_upper_bound else self.judged >= self.to_reach
@@ -88,7 +88,7 @@ def faster(
     to_reach: float | None,
     unit: str = "agent steps/s",
 ) -> Line:
-    """Make the line of a measured peer; ``peer`` is None where it is not installed."""
+    """Make the line of a measured peer; ``peer`` is None if it is not installed."""
     own = f"{shown(rate(ours))} {unit}"
     if peer is None:
         return Line(name, own, f"{peer_name}: {NOT_INSTALLED}", None, to_reach)
@@ -119,7 +119,7 @@ def within(
     allowed: float,
     unit: str = "agent steps/s",
 ) -> Line:
-    """Make the line of a whole that may take so many times as long as a part.
+    """Make the line of a whole that may take that many times as long as a part.
 
     Both are in seconds per unit.
     """

@@ -36,7 +36,7 @@ def machine() -> str:
 
 
 def versions() -> dict[str, str]:
-    """Return the versions of what takes part where it is installed."""
+    """Return the versions of what takes part if it is installed."""
     found = {"Python": platform.python_version()}
     for package in PACKAGES:
         try:

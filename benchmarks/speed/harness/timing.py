@@ -65,7 +65,7 @@ def cores() -> list[int]:
 
 @contextmanager
 def on_cores(count: int) -> Iterator[None]:
-    """Keep this process, and those that it starts, on so many cores.
+    """Keep this process, and those that it starts, on that many cores.
 
     It applies where the system allows it, and is undone at the end.
     """

@@ -1,4 +1,4 @@
 """What the package is compared with.
 
-Other simulators are optional: where one is not installed, its lines say so.
+Other simulators are optional: if one is not installed, its lines say so.
 """

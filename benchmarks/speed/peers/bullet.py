@@ -26,7 +26,7 @@ def bullet_scan(
 ) -> Callable[[], object] | None:
     """Return a function that casts the scan of the next pose in one thread.
 
-    None where PyBullet is not installed.
+    None if PyBullet is not installed.
 
     Parameters
     ----------
@@ -137,7 +137,7 @@ NEAR = 0.05
 
 
 def _has_egl() -> bool:
-    """Whether EGL can be used; its plug-in ends the process where the system has no EGL."""
+    """Whether EGL can be used; its plug-in ends the process if the system has no EGL."""
     return bool(_egl_library()) and find_library("EGL") is not None
 
 
@@ -206,7 +206,7 @@ class BulletImages:
 
 
 def _egl_library() -> str:
-    """Return the file of PyBullet's plug-in for EGL, empty where there is none."""
+    """Return the file of PyBullet's plug-in for EGL, empty if there is none."""
     spec = importlib.util.find_spec("eglRenderer")
     return "" if spec is None or spec.origin is None else spec.origin
 
@@ -214,7 +214,7 @@ def _egl_library() -> str:
 def bullet_images(
     floor: Floor, camera: DepthCamera, poses: NDArray[np.float64], is_egl: bool = False
 ) -> Callable[[], object] | None:
-    """Return a function that takes the image of the next pose; None where its renderer is not there."""
+    """Return a function that takes the image of the next pose; None if its renderer is not there."""
     if importlib.util.find_spec("pybullet") is None or (is_egl and not _has_egl()):
         return None
     images, count = BulletImages(floor, camera, is_egl), 0

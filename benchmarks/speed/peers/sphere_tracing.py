@@ -2,7 +2,7 @@
 
 It follows the manner of f1tenth's scan simulator.
 
-This is code of our own after its published method, a second yardstick beside the original: directions from a
+This is code of our own after its published method, a second yardstick besides the original: directions from a
 table of 2000 angles, and along each beam steps of the distance that the transform of the cell tells, until
 that is zero or the range is out. Like the original it passes through corners now and then.
 

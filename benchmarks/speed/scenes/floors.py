@@ -37,9 +37,9 @@ class BenchFloor:
     name : str
         What the tables call it.
     solid : (rows, columns) uint8
-        1 where solid; row 0 at the lowest y.
+        1 if solid; row 0 at the lowest y.
     boxes : (B, 4) float64
-        The walls and boxes as x_low, y_low, x_high, y_high [m]; empty where they are not along the axes.
+        The walls and boxes as x_low, y_low, x_high, y_high [m]; empty if they are not along the axes.
     resolution : float
         Side of a cell [m].
     """
@@ -181,7 +181,7 @@ def _roomy_places(floor: BenchFloor, clearance: float) -> NDArray[np.float64]:
 def _divided(
     room: Rectangle, generator: np.random.Generator
 ) -> tuple[list[Rectangle], list[Rectangle]] | None:
-    """Halve a room by a wall with a door; None where it is small enough."""
+    """Halve a room by a wall with a door; None if it is small enough."""
     x_low, y_low, x_high, y_high = room
     is_wide = x_high - x_low >= y_high - y_low
     if max(x_high - x_low, y_high - y_low) <= _LARGEST_ROOM + _WALL:

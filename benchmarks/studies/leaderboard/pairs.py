@@ -1,4 +1,4 @@
-"""Policies beside each other pair by pair, and how the maps of supervised teams were joined."""
+"""Policies besides each other pair by pair, and how the maps of supervised teams were joined."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any

@@ -114,7 +114,7 @@ def page(folder: Path, command: str) -> str:
 
 
 def beside(folder: Path, out: Path) -> None:
-    """Write the page for browsers beside the other, and the README's table where there is one."""
+    """Write the page for browsers besides the other, and the README's table if there is one."""
     write_text(out / "leaderboard.html", _browser_page(folder).read_text(encoding="utf-8"))
     readme = out.resolve().parent.parent / "README.md"
     text = readme.read_text(encoding="utf-8") if readme.is_file() else ""
@@ -160,7 +160,7 @@ def _parts_in(folder: Path) -> dict[str, list[Part]]:
 
 
 def _report(path: Path, baseline: str) -> dict[str, Any]:
-    """Return the numbers of a report, which is written where the episodes are newer."""
+    """Return the numbers of a report, which is written if the episodes are newer."""
     episodes, made = path / EPISODES_FILE, path / "report" / "report.json"
     if made.exists() and made.stat().st_mtime > episodes.stat().st_mtime:
         return dict(json.loads(made.read_text(encoding="utf-8")))
@@ -185,7 +185,7 @@ def _multiples(path: Path, bounds: Mapping[tuple[str, int], float]) -> Multiples
 def _bounded(
     episodes: Iterable[dict[str, Any]], bounds: Mapping[tuple[str, int], float]
 ) -> Iterator[dict[str, Any]]:
-    """Yield episodes with the bound of their floor and team, where it is known."""
+    """Yield episodes with the bound of their floor and team, if it is known."""
     for episode in episodes:
         # Floors by the names that were asked for; `building:3000000` calls itself by its kind.
         team = episode[KEY].split(" | ")[1], episode["robots"]

@@ -38,7 +38,7 @@ class World:
     settings : dict
         What differs from `SETTINGS`.
     every : int
-        Of the floors that run, every so many-th runs in this world.
+        Of the floors that run, every that many-th runs in this world.
     teams : tuple of int
         Numbers of robots.
     """
@@ -82,7 +82,7 @@ BOUNDED = {"test": 2, "lifull": 1}
 
 
 def floors_of(data: Path | None, every: int) -> dict[str, list[str]]:
-    """Return the floors by kind, every so many-th; generated ones alone where there are no data."""
+    """Return the floors by kind, every that many-th; generated ones alone if there are no data."""
     found = {"test": list(set_floors("test"))}
     if data is not None:
         found |= {kind: [str(path) for path in paths] for kind, paths in real_floors(data).items()}

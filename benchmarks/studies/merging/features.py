@@ -1,6 +1,6 @@
 """Detectors, descriptors and methods of matching side by side.
 
-They are compared as in the thesis, beside those of OpenCV.
+They are compared as in the thesis, besides those of OpenCV.
 """
 
 import math

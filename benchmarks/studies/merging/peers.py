@@ -34,7 +34,7 @@ class PeerResult:
     Attributes
     ----------
     confidence : float
-        By which a pair is accepted; 0 where no motion was found.
+        By which a pair is accepted; 0 if no motion was found.
     a_from_b : Transform or None
         The motion [m], its scale left out.
     scale : float

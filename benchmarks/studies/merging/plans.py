@@ -70,7 +70,7 @@ class PlanRow:
 
 
 def merge_plans(data: Path) -> Rows:
-    """Lay all sensor maps below a folder on plans, and strangers on each other; none where it has none."""
+    """Lay all sensor maps below a folder on plans, and strangers on each other; none if it has none."""
     cv2.setNumThreads(1)
     folder = Path(data) / "map_pairs" / "halmstad"
     if not (folder / "ground_truth.json.gz").is_file():

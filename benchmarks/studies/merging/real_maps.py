@@ -92,7 +92,7 @@ class Row:
 def merge_real_maps(data: Path, settings: MergeSettings | None = None) -> list[dict[str, Any]]:
     """Merge all pairs of real maps below a folder, those of one building first.
 
-    Returns a `Row` of each; none where the folder has none.
+    Returns a `Row` of each; none if the folder has none.
     """
     settings = settings or merge_settings()
     cv2.setNumThreads(1)

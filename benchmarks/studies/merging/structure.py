@@ -202,7 +202,7 @@ class FloorPair(NamedTuple):
 
 
 def compare_structures(data: Path | None, floors: int = FLOORS) -> list[dict[str, Any]]:
-    """Join pairs of drawn floors, and of real maps where there are some, by each structure.
+    """Join pairs of drawn floors, and of real maps if there are some, by each structure.
 
     Returns a `StructureRow` of each collection and structure.
     """

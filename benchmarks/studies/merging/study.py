@@ -1,4 +1,4 @@
-"""The study ``merging``: merging of robots' maps, beside the thesis and ROS map_merge."""
+"""The study ``merging``: merging of robots' maps, besides the thesis and ROS map_merge."""
 
 import json
 import platform
@@ -241,7 +241,7 @@ def _about_thesis(extra: dict[str, Any]) -> str:
 
 
 def pictures(folder: Path, out: Path) -> None:
-    """Draw pairs of the bank, and regions of a corridor, beside the page."""
+    """Draw pairs of the bank, and regions of a corridor, besides the page."""
     draw_regions(out / "merging_regions.png")
     floors = kept_floors(folder)
     pairs = [pair for pair in read_pairs(folder) or [] if pair.half == "test"]

@@ -1,4 +1,4 @@
-"""The tables of the page on map merging, each beside what the thesis printed."""
+"""The tables of the page on map merging, each besides what the thesis printed."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -195,7 +195,7 @@ def detectors(rows: list[dict[str, Any]]) -> str:
 
 
 def _stabilities(rows: list[dict[str, Any]]) -> str:
-    """Return how many points detectors find in all runs, where that was measured."""
+    """Return how many points detectors find in all runs, if that was measured."""
     if not all("stable" in row for row in rows):
         return ""
     names = list(rows[0]["stable"])

@@ -72,7 +72,7 @@ def do_missing(
 ) -> Progress:
     """Do the tasks that a file lacks, and keep a line for each.
 
-    A file beside it says which tasks were asked for, since the file may hold others of an earlier call.
+    A file besides it says which tasks were asked for, since the file may hold others of an earlier call.
     """
     with EpisodesFile(path) as file:
         if any(line[VERSION] != lidarium.__version__ for line in file.episodes):
@@ -143,7 +143,7 @@ class Bounded:
 
 
 def measure_bound(team: Bounded) -> dict[str, Any]:
-    """Return what a team needs that knows the floor, None where it cannot see 99 %."""
+    """Return what a team needs that knows the floor, None if it cannot see 99 %."""
     settings = make_settings(robots=team.robots, **team.settings)
     starts = drawn_starts(team.floor, settings, 0) or starts_in(team.floor, settings, 0)
     bound = known_floor_bound(team.floor, settings, starts)

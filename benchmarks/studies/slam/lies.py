@@ -59,7 +59,7 @@ def lies() -> list[Lie]:
 
 
 def measure(logs: Path | None, lie: Lie) -> dict[str, Any]:
-    """Follow a log that lies; return its error beside that of the whole one, and what is said of it."""
+    """Follow a log that lies; return its error besides that of the whole one, and what is said of it."""
     assert logs is not None
     path = logs / "carmen" / f"{lie.log}-corrected.log.gz"
     whole = _error_of_whole(path)
@@ -115,7 +115,7 @@ def _without_lines(path: Path) -> LaserLog:
 def _with_hidden_turn(log: LaserLog, number: int) -> tuple[LaserLog | None, float | None]:
     """Return a log without the scans of a turn, which odometry does not know, and when it ends [s].
 
-    None where there is no such turn.
+    None if there is no such turn.
     """
     odometry = log.odometry
     assert odometry is not None

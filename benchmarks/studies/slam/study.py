@@ -128,7 +128,7 @@ def work(folder: Path, data: Path | None, every: int, _workers: int) -> Progress
 
 
 def _follow_log(logs: Path | None, task: Task) -> dict[str, Any]:
-    """Return the lines of a log; relations only where there are some."""
+    """Return the lines of a log; relations only if there are some."""
     assert logs is not None
     _warm_up(logs)
     log, shift = read(logs, task.key)

@@ -1,1 +1,1 @@
-"""Sparse maps of furnished places: their quantisation, their paths beside those on grids, their size."""
+"""Sparse maps of furnished places: their quantisation, their paths besides those on grids, their size."""

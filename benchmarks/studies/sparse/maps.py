@@ -1,4 +1,4 @@
-"""All maps of a place: sparse ones in both modes and both usages, and the grids beside them."""
+"""All maps of a place: sparse ones in both modes and both usages, and the grids besides them."""
 
 import zlib
 from collections.abc import Callable

@@ -65,7 +65,7 @@ class ShortestPaths:
         return np.concatenate(parts) if parts else np.zeros(0, np.bool_)
 
     def lengths(self, requests: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the length of the shortest path of each request (N, 2, 2) [m]; inf where there is none."""
+        """Return the length of the shortest path of each request (N, 2, 2) [m]; inf if there is none."""
         count, corners = len(self._corners), self._corners
         found = np.empty(len(requests))
         for k, (start, goal) in enumerate(requests):

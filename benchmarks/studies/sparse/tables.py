@@ -34,7 +34,7 @@ PLANNERS = ("grid", "laser", "incremental", "full", "thesis incremental", "thesi
 
 
 def answers_of(line: Line, planner: str) -> NDArray[np.float64]:
-    """Return what is kept of a planner's answers, (requests, 8); nan where there was no path."""
+    """Return what is kept of a planner's answers, (requests, 8); nan if there was no path."""
     nothing = [math.nan] * (COLLIDES + 1)
     return np.array([nothing if each is None else each for each in line["answers"][planner]])
 
@@ -85,7 +85,7 @@ def failure_table(lines: Sequence[Line]) -> str:
 
 
 def thesis_failure_table(lines: Sequence[Line]) -> str:
-    """Return failures of the grid and of the thesis's form, beside what it prints."""
+    """Return failures of the grid and of the thesis's form, besides what it prints."""
     header = ("place", "usage", "grid none", "thesis's form none", "both", "printed")
     rows = []
     for line in lines:

@@ -18,7 +18,7 @@ Place = tuple[float, float]
 def shortest_path(tables: FloorTables, start: Place, goal: Place, radius: float) -> float | None:
     """Return the length of the shortest way [m], to a cell of the floor's raster.
 
-    None where there is none.
+    None if there is none.
 
     Parameters
     ----------

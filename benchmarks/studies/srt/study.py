@@ -50,7 +50,7 @@ TUNED_ON = (
 
 
 def suites(_data: Path | None, every: int = 1) -> dict[str, Suite]:
-    """Return the suite of full exploration, with every so many-th floor and start."""
+    """Return the suite of full exploration, with every that many-th floor and start."""
     from lidarium.envs.floors.catalogue.names import set_floors
 
     floors = (*SCENES, *set_floors("validation:10"))[::every]
@@ -61,7 +61,7 @@ def suites(_data: Path | None, every: int = 1) -> dict[str, Suite]:
 
 
 def work(folder: Path, _data: Path | None, every: int, workers: int) -> Progress:
-    """Drive towards the goals with every so many-th seed, then let variants follow.
+    """Drive towards the goals with every that many-th seed, then let variants follow.
 
     What is there is not done again.
     """
@@ -132,7 +132,7 @@ def page(folder: Path, command: str) -> str:
 
 
 def pictures(folder: Path, out: Path) -> None:
-    """Draw a picture of each world, and the curves of coverage, beside the page."""
+    """Draw a picture of each world, and the curves of coverage, besides the page."""
     draw_coverage(out / "srt_coverage.png", read_episodes(folder / GOALS_FILE))
     for world in WORLDS:
         draw_world(out / f"srt_world_{world.removeprefix('srt_')}.png", world, PICTURE_SEED)

@@ -27,7 +27,7 @@ UNHINDERED = WORLDS[:3]
 
 
 def goals(lines: Sequence[Line]) -> str:
-    """Return the endings, times, nodes and ways of both modes beside the thesis's."""
+    """Return the endings, times, nodes and ways of both modes besides the thesis's."""
     rows = [
         "| world | mode | runs | ended | nodes | curves | time [s] | path [m] | of the shortest | area "
         "covered | from the start [m] | "
@@ -177,7 +177,7 @@ def exploration(episodes: Sequence[Line], policies: Sequence[str]) -> str:
 def _means(episodes: Sequence[Line], floor: str, policy: str) -> tuple[float, float]:
     """Return mean time [s] and path [m] to 99 %.
 
-    Infinite where a run did not get there.
+    Infinite if a run did not get there.
     """
     runs = [episode for episode in episodes if episode["floor"] == floor and episode["policy"] == policy]
     if not runs or any(run["t99_s"] is None for run in runs):

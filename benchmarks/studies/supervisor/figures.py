@@ -1,6 +1,6 @@
 """Figures of supervised teams.
 
-Runs stand beside those of one robot and of teams that know their starts, on the same floors and seeds.
+Runs stand besides those of one robot and of teams that know their starts, on the same floors and seeds.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -72,7 +72,7 @@ def with_alone(rows: Sequence[Row], alone: Iterable[Row]) -> list[tuple[Row, lis
 
 
 def time_of(row: Row) -> float:
-    """Return when a run reached 99 % [s], inf where it did not."""
+    """Return when a run reached 99 % [s], inf if it did not."""
     return float("inf") if row["t99_s"] is None else float(row["t99_s"])
 
 
@@ -122,7 +122,7 @@ def has_energy(rows: Iterable[Row]) -> bool:
 
 
 def energy_of(row: Row) -> float:
-    """Return what all robots of a run used [kJ], nan where it was not counted."""
+    """Return what all robots of a run used [kJ], nan if it was not counted."""
     used = row.get("energy_j")
     return float("nan") if used is None else float(sum(used)) / 1e3
 

@@ -25,7 +25,7 @@ BUMPER = "bumper"
 
 @dataclass(frozen=True, slots=True)
 class Goal:
-    """A figure beside what it is to be.
+    """A figure besides what it is to be.
 
     Attributes
     ----------
@@ -34,13 +34,13 @@ class Goal:
     wanted : str
         What it is to be, for people.
     found : Interval or None
-        What it is; None where nothing was run for it.
+        What it is; None if nothing was run for it.
     is_reached : bool
         Whether the estimate is as wanted.
     digits : int
         Behind the point, for people.
     robots : int or None
-        Size of the teams that it is about; None where it is about others, too.
+        Size of the teams that it is about; None if it is about others, too.
     missed_by : tuple of dict
         Where runs are counted that do something, those that do not do as is wanted.
     """
@@ -100,7 +100,7 @@ def goals_of(rows: Mapping[str, Sequence[Row]], failing: Sequence[Row]) -> list[
 
 
 def _path_goals(rows: Mapping[str, Sequence[Row]], robots: int) -> list[Goal]:
-    """Return how long the paths of a team may be, beside those of one robot."""
+    """Return how long the paths of a team may be, besides those of one robot."""
     scenario = [*rows["pairs"], *rows["three"]]
     flat = chosen(scenario, SUPERVISED, robots, lambda floor: floor == "apartment")
     large = chosen(rows["teams"], SUPERVISED, robots, lambda floor: area_m2(floor) >= LARGE_M2)
@@ -152,7 +152,7 @@ def _at_most(
 def _share(title: str, rows: Sequence[Row], holds: Callable[[Row], bool], wanted: float | None) -> Goal:
     """Return a share of runs [%], of which all or none are wanted.
 
-    Without one that is wanted it is beside the others.
+    Without one that is wanted it is besides the others.
     """
     if not rows:
         return Goal(title, "-" if wanted is None else f"{100.0 * wanted:.0f} %", None, False)

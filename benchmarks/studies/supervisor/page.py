@@ -139,7 +139,7 @@ def _wrong_section(rows: Sequence[Row]) -> list[str]:
 
 
 def _bumper_section(rows: Sequence[Row]) -> list[str]:
-    """Return the thesis's experiment with the bumper (4.2.3), where it was run."""
+    """Return the thesis's experiment with the bumper (4.2.3), if it was run."""
     words = (
         f"Robots of kind `{BUMPED['robot']}`, taller than what their lasers see, pause where they touch "
         "something, or something stands in their way for a second. By the thesis's rule a paused robot gets "
@@ -152,7 +152,7 @@ def _bumper_section(rows: Sequence[Row]) -> list[str]:
 def _left_section(failing: Sequence[Row]) -> list[str]:
     """Return the runs in which the others left a dead robot's area uncovered.
 
-    They did not cover what the robot leaves; the other policies' runs stand beside them.
+    They did not cover what the robot leaves; the other policies' runs stand besides them.
     """
     words = (
         "Runs in which a supervised team covered less than 99 % of that, and what the others covered of it "

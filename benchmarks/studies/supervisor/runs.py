@@ -27,5 +27,5 @@ def asked_runs(folder: Path, name: str) -> list[Row]:
 
 
 def read_json(path: Path) -> dict[str, Any]:
-    """Return what a file holds; nothing where there is none."""
+    """Return what a file holds; nothing if there is none."""
     return dict(json.loads(path.read_text(encoding="utf-8"))) if path.exists() else {}

@@ -137,7 +137,7 @@ def floors_of(data: Path | None) -> dict[str, tuple[str, ...]]:
 def area_m2(floor: str) -> float:
     """Return the area that a robot's footprint covers of a floor [m2].
 
-    It is for floors of these experiments; 0 where that is not known.
+    It is for floors of these experiments; 0 if that is not known.
     """
     known = {**GENERATED, **{Path(name).name: area for name, area in REAL.items()}}
     return known.get(floor, known.get(Path(floor).name, 0.0))

@@ -256,7 +256,7 @@ def failing_table(rows: Sequence[Row]) -> str:
 def left_table(rows: Sequence[Row]) -> str:
     """Return the runs in which a supervised team left a dead robot's area uncovered.
 
-    The other policies' runs of the same death stand beside them.
+    The other policies' runs of the same death stand besides them.
     """
     lines = []
     for row in chosen(rows, SUPERVISED):

@@ -91,7 +91,7 @@ _CHECK_RESOLUTION = 0.05
 def _passable(
     bounds: Rectangle, walls: tuple[Solid, ...], furniture: list[Furnished], labels: Labels
 ) -> tuple[list[Furnished], NDArray[np.bool_], tuple[float, float]] | None:
-    """Leave out furniture until a disc can go everywhere; also where a start may be.
+    """Leave out furniture until a disc can go everywhere; also if a start may be.
 
     None if no furniture is in the way.
     """

@@ -122,7 +122,7 @@ def load_file(path: Path, resolution: float | None = None) -> Floor:
 
 
 def takes_resolution(path: Path) -> bool:
-    """Whether a file needs a resolution beside it, because it does not state its scale."""
+    """Whether a file needs a resolution besides it, because it does not state its scale."""
     with reading(path, "a floor"):
         known = _format_of(path)
         return known is not None and not known.has_scale(path)

@@ -42,7 +42,7 @@ class Drives(NamedTuple):
     is_given : (rows,) bool
         Whether the path was given: then it is followed as it is, and none is planned.
     paths, room : (rows, points, 2), (rows, points) float64
-        Points x, y in the frame of the believed pose [m], and the room beside the body on the piece that
+        Points x, y in the frame of the believed pose [m], and the room besides the body on the piece that
         leads to each [m].
     cells : (rows, points, 2) int64
         The cells (row, column) of the points.
@@ -53,7 +53,7 @@ class Drives(NamedTuple):
     states, stood, backing : (rows,) int64
         State of the drive and its counters, see ``follow_paths``.
     passing : (rows,) int64
-        The row that a robot has moved aside for, -1 where it has not.
+        The row that a robot has moved aside for, -1 if it has not.
     stations : (rows, 2) float64
         Where a robot that moved aside stood in the way [m].
     since : (rows,) int64

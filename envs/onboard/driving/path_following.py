@@ -92,7 +92,7 @@ class Courses(NamedTuple):
     Attributes
     ----------
     paths, margins : (robots, points, 2), (robots, points) float64
-        Points x, y [m], and the room beside the body on the piece that leads to each [m].
+        Points x, y [m], and the room besides the body on the piece that leads to each [m].
     counts, places : (robots,) int64
         Number of points, and the point that each robot drives to now.
     headings : (robots,) float64
@@ -124,8 +124,6 @@ def follow_paths(sensed: Sensed, courses: Courses, bodies: Bodies, commands: Arr
 
     Parameters
     ----------
-    sensed, courses, bodies : Sensed, Courses, Bodies
-        What is known of the robots, where they drive (updated), and what they are.
     commands : (robots, 2) float64
         Result: speed and turn rate [m/s, rad/s].
     """

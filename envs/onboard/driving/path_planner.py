@@ -26,7 +26,7 @@ PREFERRED_MARGIN = 0.15
 def footprint_of(radius: float) -> Footprint:
     """Return the footprint by which a robot of this radius plans.
 
-    It just fits through where it must, and keeps off the walls where it can.
+    It just fits through where it must, and keeps off the walls if it can.
     """
     return Footprint(radius + BODY_MARGIN, radius + PREFERRED_MARGIN, 3.0)
 
@@ -47,7 +47,7 @@ class PathPlanner:
     footprint : Footprint
         By which the robots plan.
     shares_map : bool
-        Whether robots plan on the team's map, where it reaches them.
+        Whether robots plan on the team's map, if it reaches them.
 
     Attributes
     ----------
@@ -135,7 +135,7 @@ class PathPlanner:
     ) -> bool:
         """Plan a path round the bodies of ``avoided`` and start on it.
 
-        False where there is none.
+        False if there is none.
         """
         chosen = np.zeros(self._settings.robots, np.bool_)
         chosen[np.array(avoided, np.int64) % self._settings.robots] = True
@@ -146,7 +146,7 @@ class PathPlanner:
     def remaining(self, row: int) -> NDArray[np.float64]:
         """Return the rest of a robot's path, shape (N, 2) [m].
 
-        It begins where the robot is.
+        It begins if the robot is.
         """
         place, count = int(self._drives.places[row]), int(self._drives.counts[row])
         here = self._perception.beliefs.believed[row : row + 1, :2]

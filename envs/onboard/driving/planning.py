@@ -1,6 +1,6 @@
 """Path planning for many robots at once, in kernels.
 
-Paths lead to their targets, round teammates, and are planned again where one is blocked.
+Paths lead to their targets, round teammates, and are planned again if one is blocked.
 """
 
 import math
@@ -124,7 +124,7 @@ def _place_along(first: int, last: int, step: int, steps: int, is_straight: bool
 
 @kernel
 def _room_before(cells: Array, k: int, closeness: Array, planning: Planning) -> float:
-    """Least room beside the body on the piece of a path that leads to its point k [m]."""
+    """Least room besides the body on the piece of a path that leads to its point k [m]."""
     before = max(k - 1, 0)
     row, column, to_row, to_column = cells[before, 0], cells[before, 1], cells[k, 0], cells[k, 1]
     steps = max(abs(to_row - row), abs(to_column - column)) // 2 + 1
@@ -166,21 +166,8 @@ def drive_to(
 
     Parameters
     ----------
-    planning, drives : Planning, Drives
-        All robots.
-    row : int
-        Which one.
-    destination : Destination
-        Where to.
     avoided : (robots,) bool
         Whose bodies to go round.
-    piece : int
-        Which piece of the memory to use.
-
-    Returns
-    -------
-    bool
-        Whether there is a way; where there is none nothing changes.
     """
     record, goal = planning.records[row // planning.sharing], (destination.row, destination.column)
     if not (0 <= goal[0] < record[ROWS] and 0 <= goal[1] < record[COLUMNS]):
@@ -225,7 +212,7 @@ def _write_points(planning: Planning, drives: Drives, row: int, path: Array, ter
 def _end_within_cell(
     planning: Planning, drives: Drives, row: int, last: int, closeness: Array, destination: Destination
 ) -> None:
-    """Move the last point of a path to the target itself where there is room.
+    """Move the last point of a path to the target itself if there is room.
 
     Within the last cell the target is as good as the cell's centre there.
     """
@@ -259,7 +246,7 @@ def _path_is_clear(planning: Planning, drives: Drives, row: int) -> bool:
 
 @kernel
 def prepare_robot(planning: Planning, drives: Drives, row: int, piece: int) -> None:
-    """Drop a robot's path that is not clear, and plan one where it has none.
+    """Drop a robot's path that is not clear, and plan one if it has none.
 
     The plan leads to its target; a path that was given is left as it is (kernel).
     """
@@ -308,7 +295,7 @@ def _standing(planning: Planning, drives: Drives, row: int) -> tuple[Array, Arra
 def _prepare_teams(planning: Planning, drives: Drives, maps: TeamMaps, work: Work, is_blocked: Array) -> None:
     """Prepare the live robots of some teams, in their order, on fresh maps.
 
-    The items of the work are episodes; it is noted where a robot is blocked.
+    The items of the work are episodes; it is noted if a robot is blocked.
     """
     for piece in numba.prange(work.threads):
         k = take_next(work.taken)

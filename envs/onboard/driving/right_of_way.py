@@ -52,14 +52,10 @@ def find_refuge(
 
     Parameters
     ----------
-    navigation : NavigationMap
-        The map to plan on.
     origin : (x, y)
         Its lower left corner [m].
     start : (row, column)
         Where the robot is.
-    footprint : Footprint
-        Its body.
     discs : list of (row, column, radius)
         Bodies of the others, in cells.
     path : (N, 2) float64
@@ -70,7 +66,7 @@ def find_refuge(
     Returns
     -------
     (row, column) or None
-        The cell that costs least to reach; None where there is none.
+        The cell that costs least to reach; None if there is none.
     """
     tree = cKDTree(_sampled(path))
     for farthest in FARTHEST_REFUGE:
@@ -129,7 +125,7 @@ class RightOfWay:
         self._perception, self._settings, self._drives, self._planner = perception, settings, drives, planner
 
     def end_refuges(self, episode: int) -> None:
-        """Let robots of a team that gave way go on, where the others have passed."""
+        """Let robots of a team that gave way go on, if the others have passed."""
         for row in self._live(episode):
             self._end_refuge(row)
             if self._drives.passing[row] < 0 and self._drives.is_ordered[row]:
@@ -236,7 +232,7 @@ class RightOfWay:
     def _yield_to(self, row: int, to: int) -> bool:
         """Send a robot out of the way of another's path.
 
-        False where there is no such place.
+        False if there is no such place.
         """
         drives, world, distance = (
             self._drives,

@@ -51,14 +51,14 @@ class TeamDriver:
     settings : ExplorationSettings
         The team of every episode.
     shares_map : bool
-        Whether robots plan on the team's map, where it reaches them.
+        Whether robots plan on the team's map, if it reaches them.
 
     Attributes
     ----------
     drives : Drives
         What every robot's drive is at; row = episode * robots + robot.
     following : Following
-        What ``follow_team`` needs beside it.
+        What ``follow_team`` needs besides it.
     planner : PathPlanner
         What plans the paths.
     """
@@ -156,7 +156,7 @@ class TeamDriver:
     def route_left(self, row: int) -> NDArray[np.float64] | None:
         """Return what is left of the route that a robot follows, from the last point that it has passed.
 
-        It is (P, 2) in its map frame [m]; None where it follows none.
+        It is (P, 2) in its map frame [m]; None if it follows none.
         """
         drives = self.drives
         if not (drives.is_given[row] and drives.has_path[row]):
@@ -169,7 +169,7 @@ class TeamDriver:
         return Orders(self.drives.is_ordered, self.drives.targets, self.drives.target_headings)
 
     def target(self, row: int) -> Target | None:
-        """Return where a robot drives to, None where it has no target."""
+        """Return where a robot drives to, None if it has no target."""
         if not self.drives.is_ordered[row]:
             return None
         (x, y), heading = self.drives.targets[row].tolist(), float(self.drives.target_headings[row])
@@ -233,7 +233,7 @@ class TeamDriver:
     def path(self, row: int) -> NDArray[np.float64]:
         """Return the rest of a robot's path, in its map frame, shape (N, 2) [m].
 
-        It begins where the robot is.
+        It begins if the robot is.
         """
         return self.planner.remaining(row) - self._perception.poses.offset(row)
 

@@ -162,7 +162,7 @@ def _differing_blocks(source: Array, target: Array, low: int, high: int, found: 
 
 @dataclass(frozen=True, slots=True)
 class Message:
-    """Something that is being sent: a pose, or blocks of a map where there are any.
+    """Something that is being sent: a pose, or blocks of a map if there are any.
 
     Attributes
     ----------
@@ -249,7 +249,7 @@ class Exchange:
         What each robot, and last the station, holds of what each robot reported of itself with its map
         (receiver, source).
     report_of : callable or None
-        Takes the number of a robot and returns what it reports of itself; where None, nobody reports and
+        Takes the number of a robot and returns what it reports of itself; if None, nobody reports and
         there is no station.
     windows : (robots, 4) int64
         What part of the copies that each robot holds has changed since it was last taken: rows and
@@ -309,7 +309,7 @@ class Exchange:
     def take_window(self, robot: int) -> NDArray[np.int64]:
         """Return the window of a robot's copies that changed since the last call.
 
-        It holds rows and columns (4,), and is empty where low is not below high.
+        It holds rows and columns (4,), and is empty if low is not below high.
         """
         window: NDArray[np.int64] = self.windows[robot].copy()
         self._forget_changes(robot)
@@ -340,8 +340,8 @@ class Exchange:
     def order_delay(self, receiver: int) -> int | None:
         """Return the delay in steps of an order of the station sent now to a robot.
 
-        An order goes over links that stand now, from robot to robot; None where there are none, or it is lost
-        by chance.
+        An order goes over links that stand now, from robot to robot; None if there are none, or it is lost by
+        chance.
         """
         self._radio.find_station()
         is_reached, is_lost = self._radio.reached()[receiver], self._radio.is_lost(is_of_station=True)
@@ -394,7 +394,7 @@ class Exchange:
     def _best_sender(self, receiver: int, source: int) -> int | None:
         """Return which of the robots that reach a receiver holds the latest copy of a map.
 
-        None where none has a later one, or it is being sent.
+        None if none has a later one, or it is being sent.
         """
         if any(
             message.pose is None and (message.receiver, message.source) == (receiver, source)

@@ -58,7 +58,7 @@ class Route:
     points : (P, 2) float64
         x, y from where the robot is to where it should come [m].
     room : (P,) float64
-        Room beside the body on the piece that leads to each point: where there is more of it, the robot cuts
+        Room besides the body on the piece that leads to each point: if there is more of it, the robot cuts
         corners a little and drives faster through them [m].
     heading : float or None
         Heading to turn to at the end [rad]; None for any.
@@ -66,7 +66,7 @@ class Route:
     Raises
     ------
     ValueError
-        Where there is no point, too many, or something is not finite.
+        If there is no point, too many, or something is not finite.
     """
 
     points: NDArray[np.float64]
@@ -158,7 +158,7 @@ class Order:
 
 @dataclass(frozen=True, slots=True)
 class Status:
-    """What a robot reports of itself beside its map; positions are in its map frame.
+    """What a robot reports of itself besides its map; positions are in its map frame.
 
     Attributes
     ----------
@@ -175,9 +175,9 @@ class Status:
     travelled_m : float
         How far it has come by its own odometry [m].
     energy_left_j : float or None
-        What is left in its battery; None where it has no limit [J].
+        What is left in its battery; None if it has no limit [J].
     pause_cause : str
-        Why it is paused: ``order``, ``contact`` or ``blocked``; empty where it is not.
+        Why it is paused: ``order``, ``contact`` or ``blocked``; empty if it is not.
     """
 
     pose: Transform
@@ -196,7 +196,7 @@ class Orders(NamedTuple):
     Attributes
     ----------
     is_ordered : (rows,) bool
-        Whether the robot has a target; otherwise it stays where it is and gives way.
+        Whether the robot has a target; otherwise it stays if it is and gives way.
     targets : (rows, 2) float64
         Positions in the robots' map frames, finite where ordered [m].
     headings : (rows,) float64

@@ -172,7 +172,7 @@ class Operating:
         return self._why_paused[row] if self.states[row] is OperatingState.PAUSED else ""
 
     def take_sent(self) -> dict[int, Target]:
-        """Return where robots have been ordered to go since the last call, by row."""
+        """Return if robots have been ordered to go since the last call, by row."""
         sent, self.sent = self.sent, {}
         return sent
 
@@ -263,7 +263,7 @@ class Operating:
             self.sent[row] = order.target
 
     def _why_refused(self, row: int, order: Order) -> str:
-        """Return why a robot does not take an order, nothing where it does."""
+        """Return why a robot does not take an order, nothing if it does."""
         if order.kind not in TAKES[self.states[row]]:
             return self.states[row].value
         if order.target is None:

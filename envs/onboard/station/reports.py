@@ -38,7 +38,7 @@ class Report(Status):
     start : Transform
         Where it began, in its map frame.
     frame : Transform or None
-        How its map frame lies in the floor's; None where it does not know: with unknown starts that are not
+        How its map frame lies in the floor's; None if it does not know: with unknown starts that are not
         revealed to the station.
     """
 

@@ -120,19 +120,8 @@ class TeamMapping:
 
         Parameters
         ----------
-        clusters : list of list of str
-            Robots that reach each other, some perhaps through others; each robot is in one.
         time_s : float
             Now [s].
-        frames : dict or None
-            How the map frames of all robots lie, where the robots know; then nothing is merged by what maps
-            show.
-
-        Returns
-        -------
-        dict
-            How the frames of robots lie that were joined in this exchange, each pair in the order of the
-            agents.
         """
         agents = self.perception.settings.agents
         first = self.episode * len(agents)

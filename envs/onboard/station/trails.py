@@ -1,4 +1,4 @@
-"""Trails of the robots, where no walls can be.
+"""Trails of the robots, if no walls can be.
 
 Other robots may have mapped the robots themselves as walls.
 
@@ -25,8 +25,6 @@ def without_own_trail(
 
     Parameters
     ----------
-    one : GrowingMap
-        The robot's map.
     trail : (N, 2) float64
         Where the robot was, in its map frame [m].
     radius, resolution : float
@@ -44,8 +42,6 @@ def without_bodies(
 
     Parameters
     ----------
-    one : GrowingMap
-        The map.
     trails : iterable of (N, 2) float64
         Where the others were, in the frame of the map [m].
     radius, resolution : float

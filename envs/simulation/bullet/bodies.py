@@ -88,7 +88,7 @@ class FloorShapes:
 
     @property
     def obj(self) -> str:
-        """The prisms as the text of an OBJ file, an object each; empty where there are none."""
+        """The prisms as the text of an OBJ file, an object each; empty if there are none."""
         lines, first = [], 1
         for number, (outline, low, high) in enumerate(self.prisms):
             count = len(outline)
@@ -111,7 +111,7 @@ def _outer_walls(floor: Floor) -> Iterator[Box]:
 
 
 def _box_of(solid: Solid, low: float, high: float) -> Box | None:
-    """Return the box that a solid is; None where it is none."""
+    """Return the box that a solid is; None if it is none."""
     corners = solid.polygon
     if len(corners) != 4 or solid.holes:
         return None
@@ -262,7 +262,7 @@ class Bodies:
         return np.asarray(turned * self._wheel_radii / self._time_step)
 
     def motion(self, robot: int) -> Motion:
-        """Return where a robot is and how it moves."""
+        """Return if a robot is and how it moves."""
         body, client = self._robots[robot], self.client
         centre, turn = client.call("getBasePositionAndOrientation", body)
         velocity, turning = client.call("getBaseVelocity", body)
@@ -290,7 +290,7 @@ class Bodies:
         )
 
     def rays(self, begins: NDArray[np.float64], ends: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the shares of rays (N, 3) at which they meet anything, (N,); 1 where they meet nothing."""
+        """Return the shares of rays (N, 3) at which they meet anything, (N,); 1 if they meet nothing."""
         shares: list[float] = []
         for first in range(0, len(begins), RAYS_AT_ONCE):
             some = slice(first, first + RAYS_AT_ONCE)

@@ -37,12 +37,6 @@ def scan_leaning(bodies: Bodies, robot: int, lidar: Lidar, ranges: NDArray[np.fl
 
     Parameters
     ----------
-    bodies : Bodies
-        All of the episode.
-    robot : int
-        Whose scan.
-    lidar : Lidar
-        Its laser.
     ranges : (beams,) float32
         Result: true ranges [m], inf for no return.
     """
@@ -75,7 +69,7 @@ class BulletWorld(KinematicWorld):
     Raises
     ------
     MissingBulletError
-        Where PyBullet is not installed.
+        If PyBullet is not installed.
     """
 
     def __init__(
@@ -138,7 +132,7 @@ class BulletWorld(KinematicWorld):
         self._sense_leaning(chosen)
 
     def show(self) -> bool:
-        """Show the bodies of the first episode in PyBullet's window; False where there is no display."""
+        """Show the bodies of the first episode in PyBullet's window; False if there is no display."""
         if not has_display():
             return False
         self._physics[0].close()
@@ -187,7 +181,7 @@ class BulletWorld(KinematicWorld):
         return speed, turn_rate
 
     def _follow(self, row: int, motion: Motion) -> None:
-        """Take over where a body is, and see whether it has fallen."""
+        """Take over if a body is, and see whether it has fallen."""
         axes = motion.axes
         x, y, height = motion.place.tolist()
         theta = math.atan2(axes[1, 0], axes[0, 0])
@@ -226,7 +220,7 @@ class BulletWorld(KinematicWorld):
 
 
 def _floor_of(tables: FloorTables) -> Floor:
-    """Return the floor of tables; that of the bodies' cells where they know none."""
+    """Return the floor of tables; that of the bodies' cells if they know none."""
     if tables.floor is not None:
         return tables.floor
     rows, columns = tables.body.solid.shape

@@ -19,13 +19,7 @@ class MissingBulletError(ImportError, ValueError):
 
 
 def load_bullet() -> Any:  # noqa: ANN401
-    """Return the module ``pybullet``.
-
-    Raises
-    ------
-    MissingBulletError
-        Where it is not installed; the message says how to install it.
-    """
+    """Return the module ``pybullet``."""
     try:
         return importlib.import_module("pybullet")
     except ImportError as error:
@@ -50,7 +44,7 @@ class Client:
     Raises
     ------
     MissingBulletError
-        Where PyBullet is not installed.
+        If PyBullet is not installed.
     """
 
     def __init__(self, is_shown: bool = False) -> None:

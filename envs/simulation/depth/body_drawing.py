@@ -80,8 +80,6 @@ def draw_body(
         Middle of its base in the world [m].
     radius, height : float
         Its size [m].
-    axes, eye, view, inverse
-        As in ``face_drawing.draw_faces``.
     """
     x, y, z = eye[0] - centre[0], eye[1] - centre[1], eye[2] - centre[2]
     if math.hypot(x, y) > radius + view[DEPTH_MAX] / math.cos(math.atan(view[COLUMNS] / view[FOCAL])):

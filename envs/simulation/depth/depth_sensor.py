@@ -39,9 +39,9 @@ class DepthSensor:
     camera : DepthCamera
         The camera of every robot.
     frames : (rows, image rows, image columns) float32
-        The last image of each robot [m]; 0 where nothing was measured.
+        The last image of each robot [m]; 0 if nothing was measured.
     taken_at : (rows,) int64
-        After how many steps of its episode each was taken, -1 where none was yet.
+        After how many steps of its episode each was taken, -1 if none was yet.
     """
 
     def __init__(self, world: World, camera: DepthCamera, time_step: float, threads: int = 1) -> None:
@@ -70,7 +70,7 @@ class DepthSensor:
         steps : (episodes,) int64
             The step that was taken; -1 for the start.
         runs : (episodes,) bool or None
-            Which episodes took a step; all where None.
+            Which episodes took a step; all by default.
         """
         world = self._world
         is_due = (steps + 1) % self._period == 0

@@ -60,7 +60,7 @@ class Span(NamedTuple):
     bounds : (2, rows) float64
         Where the face begins and ends on each row [columns].
     columns : (2, rows) int64
-        First and last column of each row whose centre it covers; none where the first is greater.
+        First and last column of each row whose centre it covers; none if the first is greater.
     """
 
     camera_corners: Array
@@ -78,8 +78,8 @@ def new_span(rows: int) -> Span:
 def is_in_view(faces: FaceArrays, face: int, axes: Array, eye: Array, view: Array, sides: Array) -> bool:
     """Whether a face looks at the camera and its sphere touches what the camera sees.
 
-    ``axes`` (3, 3) are the optical axes in the world, ``eye`` (3,) is the optical centre [m]. ``sides``
-    (4, 3) are the inward normals of the four planes around the view, in the world.
+    ``axes`` (3, 3) are the optical axes in the world, ``eye`` (3,) is the optical centre [m]. ``sides`` (4, 3) are
+    the inward normals of the four planes around the view, in the world.
     """
     plane, sphere = faces.planes[face], faces.spheres[face]
     if plane[0] * eye[0] + plane[1] * eye[1] + plane[2] * eye[2] - plane[3] <= 0.0:
@@ -88,7 +88,7 @@ def is_in_view(faces: FaceArrays, face: int, axes: Array, eye: Array, view: Arra
     along = axes[2, 0] * x + axes[2, 1] * y + axes[2, 2] * z
     if along + radius <= 0.0 or along - radius > view[DEPTH_MAX]:
         return False
-    for side in sides:  # noqa: SIM110
+    for side in sides:
         if side[0] * x + side[1] * y + side[2] * z < -radius:
             return False
     return True
@@ -162,13 +162,6 @@ def cover(corners: Array, axes: Array, eye: Array, view: Array, span: Span) -> t
         Optical axes and centre in the world.
     view : (7,) float64
         Numbers of the view.
-    span : Span
-        Result: the corners in the optical frame, and the covered columns of each row.
-
-    Returns
-    -------
-    first, last : int
-        Rows that it may cover; none where ``first > last``.
     """
     places = span.camera_corners
     for k in range(CORNERS):
@@ -228,12 +221,6 @@ def draw_faces(faces: FaceArrays, axes: Array, eye: Array, view: Array, span: Sp
 
     Parameters
     ----------
-    faces : FaceArrays
-        The faces.
-    axes, eye, view
-        As in ``cover``.
-    span : Span
-        Scratch.
     inverse : (rows, columns + padding) float32
         Greatest inverse depths so far; raised [1/m]. Its columns are a multiple of ``PIXELS``.
     """

@@ -209,16 +209,10 @@ def image_of(
 
     Parameters
     ----------
-    faces : Faces
-        Of the floor.
     poses, attitudes : (robots, 3) float64
         Of the robots, see ``World``.
     bodies : (robots, 8) float64
         ``Robot.numbers`` of each.
-    robot : int
-        Whose image.
-    camera : DepthCamera
-        Its camera.
 
     Returns
     -------

@@ -38,8 +38,6 @@ def point_cloud(depth: NDArray[np.floating], camera: DepthCamera) -> NDArray[np.
     ----------
     depth : (1, rows, columns) or (rows, columns) float
         The image, such as the observation ``depth`` [m].
-    camera : DepthCamera
-        The camera.
 
     Returns
     -------

@@ -50,18 +50,12 @@ def plan_faults(
 
     Parameters
     ----------
-    settings : FaultSettings
-        What goes wrong.
-    robots : int
-        Size of the team; scheduled faults of robots beyond it are left out.
-    seed : int
-        Where what is not set is drawn from.
     time_step : float
         Length of a step [s].
     horizon_s : float or None
         How long the episode lasts at most [s].
     places : (places, 2) float64
-        Where a kidnapped robot may be put [m]; needed where one may be.
+        Where a kidnapped robot may be put [m]; needed if one may be.
 
     Returns
     -------
@@ -137,7 +131,7 @@ def _is_active(faults: Array, k: int, kind: int, step: int) -> bool:
 @kernel(nrt=False)
 def has_fault(faults: Array, kind: int, step: int) -> bool:
     """Whether a robot with ``faults`` (capacity * 6,) has one of a kind in a step."""
-    for k in range(0, faults.shape[0], FAULT_NUMBERS):  # noqa: SIM110
+    for k in range(0, faults.shape[0], FAULT_NUMBERS):
         if _is_active(faults, k, kind, step):
             return True
     return False
@@ -145,7 +139,7 @@ def has_fault(faults: Array, kind: int, step: int) -> bool:
 
 @kernel(nrt=False)
 def stick_wheels(faults: Array, step: int, wheel_base: float, command: Array) -> None:
-    """Reduce a robot's speed and turn rate (2,) where a wheel does not turn.
+    """Reduce a robot's speed and turn rate (2,) if a wheel does not turn.
 
     The command becomes what is left of it.
     """

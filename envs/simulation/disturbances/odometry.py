@@ -106,12 +106,8 @@ def read_encoders(
         ``OdometrySettings.numbers``.
     noise_table : (4096,) float32
         ``GAUSSIAN_TABLE``.
-    key : uint32
-        Of the robot's draws in this step, ``stream_key``.
     body : (8,) float64
         ``Robot.numbers``, the distance between the wheels and their ticks per metre among them.
-    encoders : Encoders
-        Of the robot; updated.
     velocity : (2,) float64
         Speed and turn rate that the wheels drove at [m/s, rad/s].
     duration : float

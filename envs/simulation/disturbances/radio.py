@@ -37,7 +37,7 @@ def solid_length(solid: Array, x: float, y: float, to_x: float, to_y: float) -> 
     Parameters
     ----------
     solid : (rows, columns) uint8
-        1 where the world is solid.
+        1 if the world is solid.
     x, y, to_x, to_y : float
         The ends of the line [cells].
     """
@@ -87,9 +87,6 @@ def path_loss(
 
     Parameters
     ----------
-    settings : RadioSettings
-        Parameters of the formula ``PL = PL0 + 10 g_wall log10(d_wall) + K + 10 g log10(d_free / d0) + X``,
-        without ``X``.
     distance, walls : (...) float64
         Length of the whole way, and of what is solid of it [m]. Less than ``reference_distance`` of free way
         loses no less than it does.
@@ -140,14 +137,10 @@ def links(
 
     Parameters
     ----------
-    settings : RadioSettings
-        The radio.
     places : (robots, 2 or more) float64
         True places of the robots [m].
-    raster : Raster
-        What is solid.
     chance : (robots, robots) float64 or None
-        Standard Gaussian draws for the shadowing, of which those above the diagonal count; none where None.
+        Standard Gaussian draws for the shadowing, of which those above the diagonal count; none if None.
     """
     robots = len(places)
     distance = np.hypot(places[:, None, 0] - places[None, :, 0], places[:, None, 1] - places[None, :, 1])
@@ -173,12 +166,10 @@ def links_to(
 
     Parameters
     ----------
-    settings, places, raster : as of ``links``
-        The radio, the robots and the floor.
     place : (2,) float64
         Where the other end is [m].
     chance : (robots,) float64 or None
-        Standard Gaussian draws for the shadowing; none where None.
+        Standard Gaussian draws for the shadowing; none if None.
     """
     distance = np.hypot(places[:, 0] - place[0], places[:, 1] - place[1])
     walls = np.zeros(len(places))

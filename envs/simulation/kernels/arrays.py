@@ -2,7 +2,7 @@
 
 They are one table of addresses in place of thirty arguments.
 
-A kernel views the arrays where they lie. Arrays handed over as arguments would be counted as references at
+A kernel views the arrays if they lie. Arrays handed over as arguments would be counted as references at
 every use, by all threads in the same places of memory; views are not.
 """
 
@@ -124,7 +124,7 @@ class WorldArrays(NamedTuple):
     driven : (rows, 2) float64
         Scratch: speeds and turn rates that drives make of their commands.
     contact, heard : (rows, robots) uint8, (rows, robots * 3) float64
-        Of which teammates a robot knows the poses although not all are known (0 where all are), and these
+        Of which teammates a robot knows the poses although not all are known (0 if all are), and these
         poses.
     """
 

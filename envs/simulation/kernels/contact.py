@@ -37,7 +37,7 @@ class BodyGrids(NamedTuple):
     Attributes
     ----------
     bound, solid : (rows, columns) uint8
-        ``distance_bound``, and 1 where the floor is solid.
+        ``distance_bound``, and 1 if the floor is solid.
     frame : (3,) float64
         Origin x, y [m] and resolution [m/cell] of the raster.
     """
@@ -59,7 +59,7 @@ class TeamBodies(NamedTuple):
     poses, velocities : (robots, 3), (robots, 2) float64
         x, y, theta and speed, turn rate.
     bumpers : (robots, 3) int8
-        Left, centre, right; 1 where pressed in this step.
+        Left, centre, right; 1 if pressed in this step.
     contacts : (robots,) uint8
         Whether the robot touched anything in this step.
     travelled : (robots,) float64
@@ -86,7 +86,7 @@ def distance_bound(solid: NDArray[np.uint8]) -> NDArray[np.uint8]:
     Parameters
     ----------
     solid : (rows, columns) uint8
-        1 where the world is solid.
+        1 if the world is solid.
 
     Returns
     -------
@@ -106,13 +106,7 @@ def wrapped(angle: float) -> float:
 
 @kernel(nrt=False)
 def deepest_wall(solid: Array, x: float, y: float, radius: float) -> tuple[float, float, float]:
-    """Find the solid cell that a disc enters deepest; positions and radius in cells.
-
-    Returns
-    -------
-    depth, normal_x, normal_y : float
-        How far the disc reaches into it (0 where it enters none), and the unit vector that leads out.
-    """
+    """Find the solid cell that a disc enters deepest; positions and radius in cells."""
     rows, columns = solid.shape
     depth, normal_x, normal_y = 0.0, 0.0, 0.0
     low_row, high_row = max(int(y - radius), 0), min(int(y + radius), rows - 1)
@@ -192,8 +186,7 @@ def push_out(
 ) -> tuple[float, float, bool, bool]:
     """Push the disc out of walls and robots.
 
-    Returns x, y [m], whether it touched, and whether it is free now; presses the bumpers on the sides of
-    contact.
+    Returns x, y [m], whether it touched, and whether it is free now; presses the bumpers on the sides of contact.
     """
     frame, bumpers = grids.frame, team.bumpers[robot]
     resolution = frame[FRAME_RESOLUTION]

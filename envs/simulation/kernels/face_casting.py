@@ -65,8 +65,7 @@ def _draw_face(
 ) -> None:
     """Lower the ranges of the beams that meet a face.
 
-    The beams are those from ``first`` to ``last`` and some beside them. The face spans low to high along its
-    run.
+    The beams are those from ``first`` to ``last`` and some besides them. The face spans low to high along its run.
     """
     if first > last:
         return
@@ -157,14 +156,8 @@ def cast_by_faces(table: FaceTable, window: tuple[int, int, int, int], beams: Be
 
     Parameters
     ----------
-    table : FaceTable
-        Of the floor.
-    window : tuple of int
-        row_low, row_high, column_low, column_high of the tiles in reach, high ends included.
-    beams : Beams
-        Of the scan, in the floor's cells.
     ranges : (beams,) float64
-        Result; the reach where nothing is met.
+        Result; the reach if nothing is met.
     """
     starts, count_of_beams = table.starts, ranges.shape[0]
     for beam in range(count_of_beams):

@@ -44,7 +44,7 @@ class FloorTables:
     bound : (rows, columns) uint8
         Lower bound of the distance to the bodies' solid cells [cells].
     floor : Floor or None
-        What stands there; None where the tables were made of rasters alone.
+        What stands there; None if the tables were made of rasters alone.
     """
 
     laser: Raster
@@ -61,8 +61,6 @@ class FloorTables:
 
         Parameters
         ----------
-        floor : Floor
-            What stands there.
         resolution : float
             Side of a cell of the world's raster [m].
         laser_height, body_height : float
@@ -89,7 +87,7 @@ class FloorTables:
     def packed(self) -> dict[str, NDArray[Any]]:
         """Return the parts that are expensive to make: rasters, bound and frame.
 
-        Rasters are packed as bits, ``laser`` where it is not the body's.
+        Rasters are packed as bits, ``laser`` if it is not the body's.
         """
         arrays: dict[str, NDArray[Any]] = {
             "frame": self.frame,
@@ -100,13 +98,7 @@ class FloorTables:
 
     @cached_property
     def faces(self) -> Faces:
-        """Faces of the floor, for cameras.
-
-        Raises
-        ------
-        ValueError
-            Where the tables were made of rasters alone.
-        """
+        """Faces of the floor, for cameras."""
         if self.floor is None:
             raise ValueError("these tables know no floor (floor is None); want those of a floor for a camera")
         return faces_of(self.floor)
@@ -219,7 +211,7 @@ class TablesCache:
         return self._kept.nbytes + self._remembered.nbytes
 
     def get(self, key: str, make: Callable[[], FloorTables]) -> FloorTables:
-        """Return the tables of a key; ``make`` is called where nobody has them."""
+        """Return the tables of a key; ``make`` is called if nobody has them."""
         tables = self._alive.get(key)
         if tables is None:
             tables = make()
@@ -241,13 +233,13 @@ class _UsedLast(Generic[Value]):
         self._values: OrderedDict[str, tuple[Value, int]] = OrderedDict()
 
     def pop(self, key: str) -> Value | None:
-        """Take a value out, None where it is not there."""
+        """Take a value out, None if it is not there."""
         value, size = self._values.pop(key, (None, 0))
         self.nbytes -= size
         return value
 
     def put(self, key: str, value: Value, size: int) -> list[tuple[str, Value]]:
-        """Keep a value of so many bytes; return what had to go, with its key."""
+        """Keep a value of that many bytes; return what had to go, with its key."""
         self.pop(key)
         self._values[key] = value, size
         self.nbytes += size
@@ -268,17 +260,10 @@ def floor_tables(
 
     Parameters
     ----------
-    floor : Floor
-        What stands there.
     raster_resolution : float
         Side of a cell of the world's raster [m].
     laser_height, body_height : float
         Height of the laser's plane and of the highest body [m].
-
-    Returns
-    -------
-    FloorTables
-        Shared and read-only.
     """
     key = _key(floor, raster_resolution, laser_height, body_height)
 
@@ -298,7 +283,7 @@ def prepare_tables(
 ) -> bool:
     """Put a floor's tables into a store.
 
-    Returns False where they are there already, whole.
+    Returns False if they are there already, whole.
     """
     key = _key(floor, raster_resolution, laser_height, body_height)
     if store.load(key) is not None:

@@ -114,8 +114,8 @@ def update_map(
 ) -> None:
     """Update one robot's map from its scan, whose beams' directions ``scratch`` holds.
 
-    Where ``is_filled``, its ends and first window hold the seen area, of this ``box``, already; whatever
-    window is not filled is zero.
+    Where ``is_filled``, its ends and first window hold the seen area, of this ``box``, already; whatever window is
+    not filled is zero.
     """
     directions, lengths, ends, bits = scratch.directions, scratch.lengths, scratch.ends, scratch.windows[0]
     sensor, believed, origin = world.sensor, world.believed[row], world.origins[row]

@@ -112,19 +112,8 @@ def footprint(
 
     Parameters
     ----------
-    world : WorldArrays
-        The world after a step.
-    row, first, robots : int
-        The robot's row, the first row of its episode, and the size of its team.
     bits : (window rows, words) uint64
         Zero on entry; of the shape of ``window_rows`` and ``window_words``.
-
-    Returns
-    -------
-    box : tuple of int
-        row_low, row_high, word_low, word_high of the window that may hold bits, high ends exclusive.
-    row_offset, word_offset : int
-        Place of the window in the scorer's masks.
     """
     sensor, beams = world.sensor, world.ranges.shape[1]
     directions, lengths, ends = np.empty((4, beams)), np.empty(beams), np.empty((2, beams))

@@ -1,7 +1,7 @@
 """Motion of bodies: differential drives with limits, and contact.
 
 Far from everything a robot drives its arc in one piece. Near contact the arc is cut into short pieces, and
-after each the disc is pushed out of what it entered; where there is no way out the piece is undone. No robot
+after each the disc is pushed out of what it entered; if there is no way out the piece is undone. No robot
 ever ends a step inside a solid cell or another robot.
 """
 
@@ -89,14 +89,10 @@ def _along_arc(
 def move_robots(grids: BodyGrids, team: TeamBodies, commands: Array, duration: float) -> None:
     """Drive the robots of one episode for one step, in their order.
 
-    Each meets the others where they are by then.
+    Each meets the others if they are by then.
 
     Parameters
     ----------
-    grids : BodyGrids
-        Of the episode's floor.
-    team : TeamBodies
-        The robots; all but ``bodies`` and ``moves`` is updated.
     commands : (robots, 2) float64
         Wanted speed and turn rate [m/s, rad/s]; cut to the limits of the drive.
     duration : float

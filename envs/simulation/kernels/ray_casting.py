@@ -7,7 +7,7 @@ long and straight. Which one runs is decided for each pose by the number of face
 on the pose and the floor alone.
 
 A ray ends where it enters a solid cell. A ray that runs exactly through a corner of the lattice enters the
-cell beside it in x first.
+cell besides it in x first.
 """
 
 import math
@@ -98,9 +98,8 @@ def _travel_together(squares: Array, offset: int, columns: int, beams: Beams, fi
 
     The beams are those from ``first`` to ``last``, of one quadrant.
 
-    The beams between the two outer ones lie within the box of these two at every distance. A square that
-    opens from the box's nearest corner and holds the box is free for all, up to where the first of the outer
-    beams leaves it.
+    The beams between the two outer ones lie within the box of these two at every distance. A square that opens from
+    the box's nearest corner and holds the box is free for all, up to where the first of the outer beams leaves it.
     """
     x, y, directions = beams.x, beams.y, beams.directions
     first_x, first_y = directions[0, first], directions[1, first]
@@ -159,7 +158,7 @@ def cast_one_by_one(squares: Array, rows: int, columns: int, beams: Beams, range
 
 @kernel(forceinline=True, nrt=False)
 def _list_bundles(beams: Beams, count: int, listed: Array) -> None:
-    """List what ``travel_bundles`` takes of each bundle of a scan of so many beams.
+    """List what ``travel_bundles`` takes of each bundle of a scan of that many beams.
 
     Bundles that are none stay where they begin: a border at no distance is the next for them.
     """
@@ -182,7 +181,7 @@ def _list_bundles(beams: Beams, count: int, listed: Array) -> None:
 
 @kernel(nrt=False)
 def cast_in_lanes(squares: Array, rows: int, columns: int, beams: Beams, ranges: Array) -> None:
-    """Fill ``ranges`` as ``cast_by_squares`` does, 32 beams at once: at least so many."""
+    """Fill ``ranges`` as ``cast_by_squares`` does, 32 beams at once: at least that many."""
     count, table, shape = ranges.shape[0], squares.ctypes.data, (rows * columns, columns)
     origin = (beams.x, beams.y, beams.reach)
     width = (count + BUNDLE * RAYS - 1) // (BUNDLE * RAYS) * RAYS
@@ -236,10 +235,8 @@ def cast_scan(tables: Array, beams: Beams, ranges: Array) -> None:
     ----------
     tables : (8,) int64
         ``RayTables.addresses`` of the floor.
-    beams : Beams
-        Of the scan, in the floor's cells.
     ranges : (beams,) float64
-        Result [cells]; the reach where nothing is met.
+        Result [cells]; the reach if nothing is met.
     """
     x, y, reach = beams.x, beams.y, beams.reach
     rows, columns, tile_columns = tables[FLOOR_ROWS], tables[FLOOR_COLUMNS], tables[TILE_COLUMNS]

@@ -67,7 +67,7 @@ class RayTables:
     Parameters
     ----------
     solid : (rows, columns) uint8
-        1 where the world is solid; the outermost ring must be solid.
+        1 if the world is solid; the outermost ring must be solid.
 
     Attributes
     ----------

@@ -234,7 +234,7 @@ def encode(table: Array, robots: int, velocities: Array, runs: Array) -> None:
 
 @kernel
 def sense(table: Array, robots: int, runs: Array) -> None:
-    """Take the scans of all robots that have not ended, where they are."""
+    """Take the scans of all robots that have not ended, if they are."""
     world = world_at(table)
     scratch = scan_scratch(world)
     for episode in range(runs.shape[0]):
@@ -309,7 +309,7 @@ def render_row(table: Array, row: int, robots: int, poses: Array, ranges: Array)
 def ranges_without_teammates(table: Array, row: int, robots: int, ranges: Array) -> None:
     """Copy a robot's scan into ``ranges`` (beams,), without teammates.
 
-    Beams that met teammates are made invalid where the robot knows these.
+    Beams that met teammates are made invalid if the robot knows these.
     """
     world = world_at(table)
     ranges[:] = world.ranges[row]

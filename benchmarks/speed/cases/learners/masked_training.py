@@ -102,7 +102,7 @@ def timed(environments: Any) -> list[float]:  # noqa: ANN401
 
 @contextmanager
 def _floors_in_memory(mebibytes: int | None) -> Iterator[None]:
-    """Let unused floors take so many MiB of memory; as many as usual where None."""
+    """Let unused floors take that many MiB of memory; as many as usual if None."""
     before = os.environ.get(SIZE_VARIABLE)
     if mebibytes is not None:
         os.environ[SIZE_VARIABLE] = str(mebibytes)

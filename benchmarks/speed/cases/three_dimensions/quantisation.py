@@ -41,7 +41,7 @@ Quantiser = Callable[[], NDArray[np.floating]]
 
 
 def scikit_learn_steps(points: Points, start: Points, steps: int) -> Quantiser | None:
-    """Return the quantiser of scikit-learn; None where it is not installed."""
+    """Return the quantiser of scikit-learn; None if it is not installed."""
     if importlib.util.find_spec("sklearn") is None:
         return None
     cluster: Any = importlib.import_module("sklearn.cluster")
@@ -59,7 +59,7 @@ def scikit_learn_steps(points: Points, start: Points, steps: int) -> Quantiser |
 
 
 def faiss_steps(points: Points, start: Points, steps: int) -> Quantiser | None:
-    """Return the quantiser of faiss; None where it is not installed."""
+    """Return the quantiser of faiss; None if it is not installed."""
     if importlib.util.find_spec("faiss") is None:
         return None
     faiss: Any = importlib.import_module("faiss")
@@ -178,7 +178,7 @@ def error_of(points: np.ndarray, codes: np.ndarray) -> float:
 
 
 def real_frames() -> dict[str, np.ndarray]:
-    """Return points of real depth images by name; none where there are no data."""
+    """Return points of real depth images by name; none if there are no data."""
     beside = Path(__file__).resolve().parents[5] / "shared" / "data"
     folder = Path(os.environ.get("LIDARIUM_DATA", beside)) / "clouds" / "redkitchen"
     pinhole = Intrinsics(585.0, 585.0, 320.0, 240.0)

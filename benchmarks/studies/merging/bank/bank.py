@@ -158,7 +158,7 @@ def write_pairs(folder: Path, pairs: list[Pair]) -> None:
 
 
 def read_pairs(folder: Path) -> list[Pair] | None:
-    """Return the pairs of a bank, None where there are none yet."""
+    """Return the pairs of a bank, None if there are none yet."""
     path = folder / PAIRS_FILE
     if not path.exists():
         return None

@@ -90,7 +90,7 @@ class MapMaker(Watcher):
         self.step(env, np.zeros((1, 2)))
 
     def step(self, env: ExplorationEnv, _commands: NDArray[np.float64]) -> None:
-        """Draw a scan; keep the map where it is time for a snapshot."""
+        """Draw a scan; keep the map if it is time for a snapshot."""
         world, scorer = env.world, env.scorer
         x, y, theta = self._waves.at(scorer.time)
         pose = self._start.inverse() @ Transform(*world.poses[0].tolist())

@@ -163,7 +163,7 @@ class BankFloor:
 
     @property
     def original(self) -> str:
-        """Name of the floor that it is a copy of; its own where it is none."""
+        """Name of the floor that it is a copy of; its own if it is none."""
         return self.name.removesuffix("-copy")
 
     def load(self) -> Floor:

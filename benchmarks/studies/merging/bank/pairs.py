@@ -213,7 +213,7 @@ def _copies(known: list[_Known], half: str, wanted: Wanted, generator: np.random
 def _across_floors(
     known: list[_Known], half: str, wanted: Wanted, generator: np.random.Generator
 ) -> Iterator[Pair]:
-    """Yield pairs of maps of different floors, where there are any."""
+    """Yield pairs of maps of different floors, if there are any."""
     if len({one.map.floor for one in known}) < 2:
         return
     for _ in range(wanted.negative):
