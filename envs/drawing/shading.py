@@ -125,7 +125,7 @@ def _number_body(
                 numbers[row, column] = number + (1 if is_top else 0)
 
 
-def view_of_size(viewpoint: Viewpoint, size: tuple[int, int]) -> NDArray[np.float64]:
+def _view_of_size(viewpoint: Viewpoint, size: tuple[int, int]) -> NDArray[np.float64]:
     """Return the numbers of a picture of that many rows and columns, as drawing kernels take them."""
     rows, columns = size
     view = np.array([0.0, 0.5 * (columns - 1), 0.5 * (rows - 1), 0.0, FAR, columns, rows])
@@ -159,7 +159,7 @@ def shade(
     (rows, columns, 3) uint8
         The picture.
     """
-    view = view_of_size(viewpoint, size)
+    view = _view_of_size(viewpoint, size)
     inverse, numbers = np.full(size, 1.0 / FAR, np.float32), np.full(size, NOTHING, np.int64)
     arrays = FaceArrays(faces.corners, faces.planes, faces.spheres)
     _number_faces(arrays, viewpoint.axes, viewpoint.eye, view, new_span(size[0]), inverse, numbers)

@@ -323,10 +323,11 @@ class Engine:
         self.acted = acted
         self._note_endings(acted)
         self._report(terms)
-        level_live = self.live & seen
-        if self.operating.is_active:
-            level_live &= ~self.operating.held
-        self.level.observe(acted, level_live, seen, self.observations, self.infos)
+        if self.level.observes:
+            live = self.live & seen
+            if self.operating.is_active:
+                live &= ~self.operating.held
+            self.level.observe(acted, live, seen, self.observations, self.infos)
 
     def _place(self, episode: int, start: EpisodeStart) -> None:
         """Put the robots of an episode where they begin."""
@@ -483,7 +484,7 @@ class Engine:
         infos: dict[str, Any] = {
             "truth": {
                 "pose": self.world.poses.copy(),
-                "coverage": np.repeat(score.coverages(), self.robots),
+                "coverage": np.repeat(score.coverages(), self.robots) if self.episodes > 1 else self._coverage(),
                 "seen_cells": score.seen.copy(),
             },
             "_truth": everyone,
@@ -507,6 +508,11 @@ class Engine:
             infos["camera"] = self._calibration
             infos["_camera"] = everyone
         self.infos = infos
+
+    def _coverage(self) -> NDArray[np.float64]:
+        """Return the coverage of a lone episode for each row; its steps are short."""
+        score = self.score
+        return np.full(self.rows, score.team_seen.item(0) / max(score.counted.item(0), 1))
 
     def _calibration_rows(self) -> dict[str, Any] | None:
         """Return the calibration of the robots' cameras in arrays over rows, None without cameras."""

@@ -10,7 +10,7 @@ from lidarium.envs.observing.rows import Rows
 from lidarium.registry import Registry
 
 
-class RewardTerm(Protocol):
+class _RewardTerm(Protocol):
     """A term that users add: an amount per robot, weighted by ``settings.reward.more[name]``."""
 
     def start(self, rows: Rows, episode: int) -> None:
@@ -22,16 +22,16 @@ class RewardTerm(Protocol):
         ...
 
 
-REWARD_TERMS: Registry[Callable[[], RewardTerm]] = Registry("reward term")
+REWARD_TERMS: Registry[Callable[[], _RewardTerm]] = Registry("reward term")
 """Terms that ``settings.reward.more`` can weigh, by name: what makes one."""
 
 
-def rows_of(rows: Rows, episode: int) -> slice:
+def _rows_of(rows: Rows, episode: int) -> slice:
     """Return the rows of an episode."""
     return slice(episode * rows.robots, (episode + 1) * rows.robots)
 
 
-class FunctionTerm:
+class _FunctionTerm:
     """A term that is a plain function of ``Rows``, and keeps nothing.
 
     Parameters
@@ -65,13 +65,13 @@ def reward_term(
 
     def register(function: Callable[[Rows], NDArray[Any]]) -> Callable[[Rows], NDArray[Any]]:
         said = summary or (function.__doc__ or name).strip().splitlines()[0]
-        REWARD_TERMS.register(name, lambda: FunctionTerm(function), said)
+        REWARD_TERMS.register(name, lambda: _FunctionTerm(function), said)
         return function
 
     return register
 
 
-class Turning:
+class _Turning:
     """Amount: by how much a robot has turned [rad]."""
 
     def __init__(self) -> None:
@@ -81,7 +81,7 @@ class Turning:
         """Start an episode at the headings of the starts."""
         if self._headings.shape != (len(rows.poses),):
             self._headings = np.zeros(len(rows.poses))
-        own = rows_of(rows, episode)
+        own = _rows_of(rows, episode)
         self._headings[own] = rows.poses[own, 2]
 
     def amounts(self, rows: Rows) -> NDArray[np.float64]:
@@ -91,7 +91,7 @@ class Turning:
         return np.asarray(turns)
 
 
-class Failing:
+class _Failing:
     """Amount: 1 when a robot fails."""
 
     def __init__(self) -> None:
@@ -101,7 +101,7 @@ class Failing:
         """Start an episode with nobody failed."""
         if self._failed.shape != rows.failed.shape:
             self._failed = np.zeros_like(rows.failed)
-        self._failed[rows_of(rows, episode)] = 0
+        self._failed[_rows_of(rows, episode)] = 0
 
     def amounts(self, rows: Rows) -> NDArray[np.float64]:
         """Return 1 for each robot that has failed since the last call."""
@@ -110,7 +110,7 @@ class Failing:
         return np.asarray(fell, np.float64)
 
 
-class FloorShare:
+class _FloorShare:
     """Amount: the robot's part of what the team has seen anew, as a share of F; at most 1 over an episode.
 
     What the first scans see is not paid. Robots get equal parts.
@@ -123,7 +123,7 @@ class FloorShare:
         """Start an episode at what has been seen."""
         if self._coverage.shape != rows.live.shape:
             self._coverage = np.zeros(len(rows.live))
-        own = rows_of(rows, episode)
+        own = _rows_of(rows, episode)
         self._coverage[own] = rows.coverage[own]
 
     def amounts(self, rows: Rows) -> NDArray[np.float64]:
@@ -132,7 +132,7 @@ class FloorShare:
         return np.asarray(gained / rows.robots)
 
 
-class Completion:
+class _Completion:
     """Amount: 1 for each robot when the team has covered its floor."""
 
     def __init__(self) -> None:
@@ -142,7 +142,7 @@ class Completion:
         """Start an episode that is not complete."""
         if self._is_paid.shape != rows.live.shape:
             self._is_paid = np.zeros(len(rows.live), np.bool_)
-        self._is_paid[rows_of(rows, episode)] = False
+        self._is_paid[_rows_of(rows, episode)] = False
 
     def amounts(self, rows: Rows) -> NDArray[np.float64]:
         """Return 1 if it has been completed since the last call."""
@@ -152,7 +152,7 @@ class Completion:
         return np.asarray(paid, np.float64)
 
 
-class FirstView:
+class _FirstView:
     """Amount: the area of F that the robot's first scan has seen [m2], in the first step."""
 
     def __init__(self) -> None:
@@ -162,7 +162,7 @@ class FirstView:
         """Start an episode."""
         if self._seen.shape != rows.live.shape:
             self._seen = np.zeros(len(rows.live))
-        own = rows_of(rows, episode)
+        own = _rows_of(rows, episode)
         self._seen[own] = rows.seen_m2[own]
 
     def amounts(self, rows: Rows) -> NDArray[np.float64]:
@@ -173,11 +173,11 @@ class FirstView:
         return paid
 
 
-REWARD_TERMS.register("turning", Turning, "radians turned since the last reward")
-REWARD_TERMS.register("failing", Failing, "1 when a robot fails")
-REWARD_TERMS.register("floor_share", FloorShare, "share of F seen anew, in equal parts; 1 over an episode")
-REWARD_TERMS.register("completion", Completion, "1 when the floor is covered")
-REWARD_TERMS.register("first_view", FirstView, "area that the first scan sees [m2], in the first step")
+REWARD_TERMS.register("turning", _Turning, "radians turned since the last reward")
+REWARD_TERMS.register("failing", _Failing, "1 when a robot fails")
+REWARD_TERMS.register("floor_share", _FloorShare, "share of F seen anew, in equal parts; 1 over an episode")
+REWARD_TERMS.register("completion", _Completion, "1 when the floor is covered")
+REWARD_TERMS.register("first_view", _FirstView, "area that the first scan sees [m2], in the first step")
 
 
 class ExtraTerms:

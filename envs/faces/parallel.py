@@ -132,6 +132,7 @@ class ExplorationEnv(ParallelEnv[str, Any, Any]):
         # A world with a window of its own draws itself.
         self._shows_itself = render_mode == "human" and self.world.show()
         self._rows = TeamRows(self.engine, conventions)
+        self._named: dict[str, tuple[Any, list[Any]]] = {"state": (None, []), "order": (None, [])}
         camera = self.simulation.camera
         self._calibrations = [] if camera is None else [camera.camera.calibration] * self.settings.robots
         self._note_level()
@@ -245,7 +246,7 @@ class ExplorationEnv(ParallelEnv[str, Any, Any]):
 
     def _by_row(self, actions: Any) -> dict[int, Any]:  # noqa: ANN401
         """Return the actions of live agents by row."""
-        check_agents(actions, self._index)
+        _check_agents(actions, self._index)
         live, operating, index = self.engine.live, self.operating, self._index
         takes_none = self.engine.level.takes_none
         given = {}
@@ -319,7 +320,13 @@ class ExplorationEnv(ParallelEnv[str, Any, Any]):
         for name, values in whole.items():
             if name[0] == "_":
                 continue
-            listed = self._calibrations if name == "camera" and form == "full" else _listed(values)
+            if name in self._named:  # states and orders are the same object until one changes
+                kept, listed = self._named[name]
+                if kept is not values:
+                    listed = values.tolist()
+                    self._named[name] = values, listed
+            else:
+                listed = self._calibrations if name == "camera" and form == "full" else _listed(values)
             mask = whole.get("_" + name, everyone)
             for info, row in pairs:
                 if mask is everyone or mask[row]:
@@ -492,7 +499,7 @@ def _listed(values: Any) -> list[Any]:  # noqa: ANN401
     return listed
 
 
-def check_agents(actions: Any, agents: Collection[str]) -> None:  # noqa: ANN401
+def _check_agents(actions: Any, agents: Collection[str]) -> None:  # noqa: ANN401
     """Check that actions are given by agent, and that there are such agents.
 
     Those of agents that have ended are no error: trainers go on with them.

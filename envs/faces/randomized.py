@@ -71,7 +71,7 @@ class Draws:
         Raises
         ------
         ValueError
-            If it cannot be known, or a draw is no number of robots.
+            If it cannot be known, or a _draw is no number of robots.
         """
         sizes = self._distributions.get(ROBOTS)
         if sizes is None:
@@ -83,16 +83,16 @@ class Draws:
             "numbers of 1 or more, so that the largest team is known"
         )
 
-    def draw(self, generator: np.random.Generator) -> dict[str, Any]:
+    def _draw(self, generator: np.random.Generator) -> dict[str, Any]:
         """Return a value for each setting that is drawn, by name."""
-        return {name: draw(each, generator) for name, each in self._distributions.items()}
+        return {name: _draw(each, generator) for name, each in self._distributions.items()}
 
     def settings_of(self, drawn: Mapping[str, Any]) -> ExplorationSettings:
         """Return the settings with values that were drawn."""
         return set_values(self._settings, drawn)
 
 
-def draw(distribution: Distribution, generator: np.random.Generator) -> Any:  # noqa: ANN401
+def _draw(distribution: Distribution, generator: np.random.Generator) -> Any:  # noqa: ANN401
     """Return a value; between whole numbers it is one, both ends included."""
     if isinstance(distribution, list):
         return distribution[int(generator.integers(len(distribution)))]
@@ -130,7 +130,7 @@ class RandomizedTeam(TeamWrapper):
     Raises
     ------
     ValueError
-        If a name or a distribution is none, a draw is no value of its setting, or draws change the spaces of
+        If a name or a distribution is none, a _draw is no value of its setting, or draws change the spaces of
         observations or actions.
     """
 
@@ -216,7 +216,7 @@ class RandomizedTeam(TeamWrapper):
 
     def state(self) -> NDArray[np.float32]:
         """Return the true state of the team, zeros for robots that it lacks."""
-        return padded_state(super().state(), self.settings.robots, self._state_space)
+        return _padded_state(super().state(), self.settings.robots, self._state_space)
 
 
 class RandomizedRows:
@@ -403,7 +403,7 @@ class RandomizedRows:
         space = state_space(self.settings)
         return np.stack(
             [
-                padded_state(
+                _padded_state(
                     team_state(part.engine.simulation, part.engine.settings), part.robots, space
                 )
                 for part in self.parts
@@ -508,7 +508,7 @@ def padded(observation: Any, space: spaces.Space[Any]) -> Any:  # noqa: ANN401
     return whole
 
 
-def padded_state(state: NDArray[np.float32], robots: int, space: spaces.Box) -> NDArray[np.float32]:
+def _padded_state(state: NDArray[np.float32], robots: int, space: spaces.Box) -> NDArray[np.float32]:
     """Return the state of a team of ``robots`` with zeros for those that it lacks."""
     own = robots * len(ROBOT_NUMBERS)
     lacking = np.zeros(len(space.low) - len(state), np.float32)

@@ -44,7 +44,7 @@ class SparsePlanning(TeamWrapper):
         base = exploration_below(getattr(env, "unwrapped", env), "SparsePlanning")
         super().__init__(env)
         self.metadata = {**env.metadata, "name": str(env.metadata["name"]).replace("_v1", "_sparse_v1")}
-        self._router = Router(base.engine, shares_map)
+        self._router = _Router(base.engine, shares_map)
 
     def reset(
         self, seed: int | None = None, options: dict[str, Any] | None = None
@@ -69,7 +69,7 @@ class SparsePlanning(TeamWrapper):
         return infos
 
 
-class Router:
+class _Router:
     """Plans the routes of all robots of an engine on their sparse maps.
 
     Parameters

@@ -110,14 +110,16 @@ class TeamRows:
     def step(self, actions: Any, beginning: NDArray[np.int64] = NO_EPISODES) -> None:  # noqa: ANN401
         """Run all live episodes for one step or decision by an array of actions, and begin others."""
         engine = self.engine
-        acting = engine.live.copy()
-        acting.reshape(self.episodes, self.robots)[beginning] = False
+        acting = engine.live
+        if len(beginning):
+            acting = engine.live.copy()
+            acting.reshape(self.episodes, self.robots)[beginning] = False
         if self._board is not None:
             actions = self._without_messages(actions)
         decoded = engine.level.read_rows(actions, acting)
-        masked = ~engine.live
+        masked = self._nobody if engine.is_whole else ~engine.live
         if len(beginning):
-            masked &= ~np.repeat(engine.is_over, self.robots)
+            masked = masked & ~np.repeat(engine.is_over, self.robots)
         engine.run(decoded, beginning)
         self.came_out(masked)
 
@@ -138,7 +140,7 @@ class TeamRows:
         if len(actions) < self.rows:
             given = np.zeros(self.rows, np.bool_)
             given[[*actions, *engine.operating.stopping]] = True
-        masked = ~engine.live
+        masked = self._nobody if engine.is_whole else ~engine.live
         engine.run(decoded, given=given, after_step=after_step)
         self.came_out(masked, given)
 
@@ -148,8 +150,9 @@ class TeamRows:
         """Take in the results of a run; ``masked`` are the rows of robots that had ended before it."""
         engine = self.engine
         self._kept = masked
-        self.active = ~masked
-        self.exchange(spoke)
+        self.active = engine.everyone if masked is self._nobody else ~masked
+        if self._board is not None or self._merged is not None:
+            self.exchange(spoke)
         self.terminated = self.truncated = self._nobody
         if engine.has_endings or (is_step and not engine.is_whole):
             self.terminated, self.truncated = engine.terminated, engine.truncated
@@ -182,8 +185,6 @@ class TeamRows:
 
     def exchange(self, spoke: NDArray[np.bool_] | None = None) -> None:
         """Let messages and maps be exchanged, after a run."""
-        if self._board is None and self._merged is None:
-            return
         engine = self.engine
         began = np.asarray(engine.world.steps <= 0)
         self._seen = engine.acted | np.repeat(began, self.robots)

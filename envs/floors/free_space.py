@@ -21,7 +21,7 @@ It keeps components for radii, and the footprints covered from some of them.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Components:
+class _Components:
     """The 4-connected components of the configuration space of a disc.
 
     Attributes
@@ -66,7 +66,7 @@ def configuration_space(raster: Raster, radius: float) -> NDArray[np.bool_]:
     return space
 
 
-def components(raster: Raster, radius: float) -> Components:
+def components(raster: Raster, radius: float) -> _Components:
     """Return the components of the configuration space of a disc, read-only.
 
     The disc has a radius [m]; ``ValueError`` is raised as by ``configuration_space``.
@@ -78,7 +78,7 @@ def components(raster: Raster, radius: float) -> Components:
         return np.asarray(labels, np.min_scalar_type(count - 1))
 
     runs = _kept(raster, ("components", radius), make)
-    return Components(runs.grid(), _frozen(runs.counts()))
+    return _Components(runs.grid(), _frozen(runs.counts()))
 
 
 def reachable_free_space(raster: Raster, radius: float, starts: NDArray[np.float64]) -> NDArray[np.bool_]:
@@ -247,7 +247,7 @@ _BODY_HEIGHT = 2.0
 
 
 @dataclass(frozen=True, slots=True)
-class BuildingMeasures:
+class _BuildingMeasures:
     """Figures of a building.
 
     Attributes
@@ -268,7 +268,7 @@ class BuildingMeasures:
     rooms: int
 
 
-def measure_building(floor: Floor) -> BuildingMeasures:
+def measure_building(floor: Floor) -> _BuildingMeasures:
     """Measure a floor at a resolution of 0.05 m."""
     walls = floor
     if floor.solids:
@@ -287,7 +287,7 @@ def measure_building(floor: Floor) -> BuildingMeasures:
     )
     between_walls = int(inside.sum())
     free = int((inside & (full.solid == 0)).sum())
-    return BuildingMeasures(
+    return _BuildingMeasures(
         area_m2=round(free * _RESOLUTION**2, 3),
         loops=_holes(largest),
         clutter=round(1.0 - free / between_walls, 4),

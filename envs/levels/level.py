@@ -86,6 +86,9 @@ class Level(ABC):
     takes_none: ClassVar[bool] = False
     """Whether None is an action; otherwise it counts as a missing one."""
 
+    observes: ClassVar[bool] = True
+    """Whether `observe` does anything."""
+
     action_space: spaces.Space[Any]
     driver: TeamDriver | None = None
     drives: Drives

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from gymnasium import spaces
@@ -16,7 +16,7 @@ from lidarium.mapping.kernels.compilation import Array, kernel
 
 
 @kernel
-def scale_shares(commands: Array, limits: Array) -> bool:
+def _scale_shares(commands: Array, limits: Array) -> bool:
     """Turn shares within [-1, 1] into speeds and turn rates.
 
     Limits are those of each robot of a team, (robots * 2,); commands are of one team or of many. False if one is nan
@@ -33,6 +33,8 @@ def scale_shares(commands: Array, limits: Array) -> bool:
 
 class VelocityLevel(Level):
     """An action is speed and turn rate as shares of the robot's limits."""
+
+    observes: ClassVar[bool] = False
 
     def __init__(
         self,
@@ -56,7 +58,7 @@ class VelocityLevel(Level):
                     "[-1, 1]: shares of speed and turn rate"
                 )
             commands[row] = shares
-        if not scale_shares(commands, self._limits):
+        if not _scale_shares(commands, self._limits):
             given = {names[row % len(names)]: action for row, action in actions.items()}
             raise ValueError(
                 f"an action is nan or infinite ({given}); want two finite numbers within [-1, 1] for each "
@@ -70,7 +72,7 @@ class VelocityLevel(Level):
         commands = np.array(shares, np.float64)
         if not live.all():
             commands[~live] = 0.0
-        scale_shares(commands, self._limits)
+        _scale_shares(commands, self._limits)
         return commands
 
     def carry_out(self, decoded: NDArray[np.float64], turn: Turn) -> None:

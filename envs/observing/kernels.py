@@ -40,7 +40,7 @@ A tuple costs no more than its arrays alone, where a named one costs twice as mu
 """
 
 
-class Sources(NamedTuple):
+class _Sources(NamedTuple):
     """What observations are written from.
 
     Attributes
@@ -66,11 +66,11 @@ class Sources(NamedTuple):
 
 
 RESOLUTION, LONGEST_RANGE, TOP_SPEED, TOP_TURN_RATE = range(4)
-"""Places in ``Sources.limits``."""
+"""Places in ``_Sources.limits``."""
 
 
 @kernel(inline="always")
-def _write_maps(row: int, world: WorldArrays, given: Sources, maps: Array, egocentric_maps: Array) -> None:
+def _write_maps(row: int, world: WorldArrays, given: _Sources, maps: Array, egocentric_maps: Array) -> None:
     """Write the crops of a robot's map, each if it is observed."""
     believed, origins, beliefs = world.believed, world.origins, world.belief_rows
     resolution = given.limits[RESOLUTION]
@@ -109,7 +109,7 @@ def write_row(row: int, sources: Array, observed: Arrays) -> None:
 
     Those of keys that are not observed hold no elements. See ``ObservationWriter.arguments``.
     """
-    given = arrays_at(sources, Sources)
+    given = arrays_at(sources, _Sources)
     world, offsets, goals, limits = world_at(given.world), given.offsets, given.goals, given.limits
     ranges, believed, velocities, bumpers = world.ranges, world.believed, world.measured, world.bumpers
     scans, poses, motions, presses = observed[SCAN], observed[POSE], observed[VELOCITY], observed[BUMPER]

@@ -17,7 +17,7 @@ _FREE, _OCCUPIED, _UNKNOWN = np.uint8(FREE), np.uint8(OCCUPIED), np.uint8(UNKNOW
 
 
 @kernel
-def known_reach(log_odds: Array, row: int, column: int) -> int:
+def _known_reach(log_odds: Array, row: int, column: int) -> int:
     """Return how far from a cell the farthest known one is, along rows or columns [cells]."""
     reach = 0
     for i in range(log_odds.shape[0]):
@@ -28,7 +28,7 @@ def known_reach(log_odds: Array, row: int, column: int) -> int:
 
 
 @kernel
-def least_level(log_odds: Array, first_row: int, first_column: int, scale: int) -> int:
+def _least_level(log_odds: Array, first_row: int, first_column: int, scale: int) -> int:
     """Return the least level of a block of cells: occupied, else unknown, else free."""
     rows, columns = log_odds.shape
     found = _FREE
@@ -49,14 +49,14 @@ def write_pyramid(log_odds: Array, row: int, column: int, pictures: Array) -> No
     cells grow by the same factor, in whole cells.
     """
     levels, side = pictures.shape[0], pictures.shape[1]
-    widest = max(int(math.ceil((known_reach(log_odds, row, column) + 1) / (side // 2))), 1)
+    widest = max(int(math.ceil((_known_reach(log_odds, row, column) + 1) / (side // 2))), 1)
     for level in range(levels):
         share = 1.0 if levels == 1 else level / (levels - 1)
         scale = max(int(round(float(widest) ** share)), 1)
         top, left = row - scale * (side // 2), column - scale * (side // 2)
         for i in range(side):
             for j in range(side):
-                pictures[level, i, j] = least_level(log_odds, top + i * scale, left + j * scale, scale)
+                pictures[level, i, j] = _least_level(log_odds, top + i * scale, left + j * scale, scale)
 
 
 def pyramid(rows: Rows) -> NDArray[np.uint8]:

@@ -247,7 +247,7 @@ class SparseMapper:
         return np.asarray(points[~is_body])
 
 
-def sparse_body(settings: ExplorationSettings) -> SweptBody:
+def _sparse_body(settings: ExplorationSettings) -> SweptBody:
     """Return the body by which a robot plans on sparse maps."""
     return SweptBody(radius=settings.robot.radius, height=settings.robot.height + BODY_HEIGHT_MARGIN_M)
 
@@ -366,7 +366,7 @@ class SparseMaps:
         boxes = np.concatenate([np.empty((0, 2, 3)), *(each.boxes for each in maps)])
         # Where a robot has been it can drive.
         nodes = np.concatenate([*(mapper.trail for mapper in mappers), *(each.free for each in maps)])
-        body, sparse = sparse_body(self._settings), self._settings.sparse_map
+        body, sparse = _sparse_body(self._settings), self._settings.sparse_map
         cells, low = joined_ground([mapper.ground for mapper in mappers])
         x, y = (low * sparse.cell_m).tolist()
         ground = ground_map(cells, (x, y), sparse.cell_m, boxes, body)

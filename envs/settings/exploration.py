@@ -232,9 +232,9 @@ class ExplorationSettings:
         object.__setattr__(self, "kinds", kinds_of(self.kinds))
         if self.kinds:
             object.__setattr__(self, "robot", envelope_of(self.team))
-        if self.localization not in localizations():
+        if self.localization not in _localizations():
             raise ValueError(
-                f"localization is {self.localization!r}; want one of {', '.join(localizations())}"
+                f"localization is {self.localization!r}; want one of {', '.join(_localizations())}"
             )
         if self.starts is not None and self.starts not in STARTS:
             raise ValueError(f"starts is {shown(self.starts)}; want {', '.join(STARTS)} or None")
@@ -344,7 +344,7 @@ OPTIONAL_PARTS = tuple(name for name in PARTS if type(None) in _KINDS[name])
 """Those that may be None."""
 
 
-def localizations() -> tuple[str, ...]:
+def _localizations() -> tuple[str, ...]:
     """Return the names of all who can say where a robot is."""
     return (TRUE_POSE, *LOCALIZERS)
 

@@ -40,7 +40,7 @@ MOST_DECISION = 100_000
 
 
 @dataclass(frozen=True, slots=True)
-class Product:
+class _Product:
     """A product of settings, and how large it may be.
 
     Attributes
@@ -81,43 +81,43 @@ def _observed(settings: Any) -> float:  # noqa: ANN401
 
 
 PRODUCTS = (
-    Product(
+    _Product(
         "the path that a scan covers in cells of the maps, lidar.range_max / occupancy.resolution,",
         lambda settings: settings.lidar.range_max / settings.occupancy.resolution,
         MOST_SCAN_CELLS,
         "a shorter range or coarser maps",
     ),
-    Product(
+    _Product(
         "the number of beams of the team, robots * lidar.beams,",
         lambda settings: settings.robots * settings.lidar.beams,
         MOST_BEAMS,
         "fewer robots or beams",
     ),
-    Product(
+    _Product(
         "the number of pieces that a way is driven in, robot.max_speed * time_step / raster_resolution,",
         _pieces,
         MOST_PIECES,
         "a lower max_speed, a shorter time_step or a coarser raster_resolution",
     ),
-    Product(
+    _Product(
         "the number of cells that bodies meet in a step, from robots, robot.radius and robot.max_speed,",
         _drive,
         MOST_DRIVE,
         "smaller, slower or fewer robots, or a coarser raster_resolution",
     ),
-    Product(
+    _Product(
         "the size of what is observed, robots * (map_cells^2 + scales * egocentric_cells^2 + 4 * pixels),",
         _observed,
         MOST_OBSERVED,
         "fewer map_cells, egocentric_cells or pixels",
     ),
-    Product(
+    _Product(
         "the number of steps of an episode, horizon_s / time_step,",
         lambda settings: (settings.horizon_s or 0.0) / settings.time_step,
         MOST_STEPS,
         "a shorter horizon_s, or None for none",
     ),
-    Product(
+    _Product(
         "the number of steps of a decision, decision_period_s / time_step,",
         lambda settings: settings.decision_period_s / settings.time_step,
         MOST_DECISION,

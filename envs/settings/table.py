@@ -11,7 +11,7 @@ from lidarium.mapping.geometry.bounds import rules_of
 
 
 @dataclass(frozen=True, slots=True)
-class Setting:
+class _Setting:
     """A setting.
 
     Attributes
@@ -35,11 +35,11 @@ class Setting:
     bounds: str = ""
 
 
-def settings_table(settings: Any = None, prefix: str = "") -> Iterator[Setting]:  # noqa: ANN401
+def settings_table(settings: Any = None, prefix: str = "") -> Iterator[_Setting]:  # noqa: ANN401
     """Yield every setting in the order of its declaration; those of a part follow under its name."""
     settings = ExplorationSettings() if settings is None else settings
     kind: Any = type(settings)
-    documented, rules = documented_attributes(kind), rules_of(kind)
+    documented, rules = _documented_attributes(kind), rules_of(kind)
     for each in fields(settings):
         value = getattr(settings, each.name)
         if is_dataclass(value):
@@ -51,10 +51,10 @@ def settings_table(settings: Any = None, prefix: str = "") -> Iterator[Setting]:
             kind, summary = documented[each.name]
             rule = rules[each.name]
             bounds = rule.bounds.interval if rule.kind in (int, float) else ""
-            yield Setting(f"{prefix}{each.name}", kind, value, summary, bounds)
+            yield _Setting(f"{prefix}{each.name}", kind, value, summary, bounds)
 
 
-def documented_attributes(kind: type) -> dict[str, tuple[str, str]]:
+def _documented_attributes(kind: type) -> dict[str, tuple[str, str]]:
     """Return what the docstrings of a class and its bases say of each attribute: its type, what it is."""
     found: dict[str, tuple[str, str]] = {}
     for each in reversed(kind.__mro__):

@@ -19,7 +19,7 @@ Map = tuple[NDArray[np.int8], tuple[float, float]]
 """Log-odds (rows, columns), and where cell (0, 0) begins [m]."""
 
 
-def map_around_start(pages: ArrayPool, floor: FloorTables, resolution: float) -> Map:
+def _map_around_start(pages: ArrayPool, floor: FloorTables, resolution: float) -> Map:
     """Return a map in the start's own frame that holds the whole floor.
 
     It does so however the floor is turned.
@@ -31,7 +31,7 @@ def map_around_start(pages: ArrayPool, floor: FloorTables, resolution: float) ->
     return pages.blank((2 * half, 2 * half), np.int8), (-half * resolution, -half * resolution)
 
 
-def map_with_margin(pages: ArrayPool, floor: FloorTables, rows: int, columns: int, resolution: float) -> Map:
+def _map_with_margin(pages: ArrayPool, floor: FloorTables, rows: int, columns: int, resolution: float) -> Map:
     """Return a map on the floor's lattice that reaches beyond the floor.
 
     It has ``rows`` x ``columns`` cells, for poses that drift.
@@ -170,11 +170,11 @@ class Beliefs:
         resolution = self.occupancy.resolution
         self.believed[row] = 0.0 if start is None else start
         if start is None:
-            self.log_odds[row], self.origins[row] = map_around_start(pages, floor, resolution)
+            self.log_odds[row], self.origins[row] = _map_around_start(pages, floor, resolution)
         elif self._is_true:
             self.log_odds[row], self.origins[row] = pages.blank(shape, np.int8), floor.laser.origin
         else:
-            self.log_odds[row], self.origins[row] = map_with_margin(pages, floor, *shape, resolution)
+            self.log_odds[row], self.origins[row] = _map_with_margin(pages, floor, *shape, resolution)
         height, width = self.log_odds[row].shape
         # At scale 1 a map is its own pooled map.
         self._pools[row] = [

@@ -82,7 +82,7 @@ def make_rules(simulation: Simulation, settings: ExplorationSettings) -> Rules:
 
 
 @kernel(forceinline=True)
-def is_near(x: float, y: float, goal_x: float, goal_y: float, radius: float) -> bool:
+def _is_near(x: float, y: float, goal_x: float, goal_y: float, radius: float) -> bool:
     """Whether a place is within a radius of the goal [m]; never of a goal that is nan."""
     return bool((x - goal_x) * (x - goal_x) + (y - goal_y) * (y - goal_y) <= radius * radius)
 
@@ -102,7 +102,7 @@ def ending_of(world: WorldArrays, row: int, episode: int, rules: Rules) -> int:
     if bounds[STOPS_ON_CONTACT] != 0.0 and world.contacts[row] != 0:
         return COLLISION
     goal = rules.goals[episode]
-    if is_near(world.poses[row, 0], world.poses[row, 1], goal[0], goal[1], bounds[GOAL_RADIUS]):
+    if _is_near(world.poses[row, 0], world.poses[row, 1], goal[0], goal[1], bounds[GOAL_RADIUS]):
         return REACHED
     if world.steps[episode] >= bounds[HORIZON_STEPS]:
         return HORIZON

@@ -75,7 +75,7 @@ def _of_quads(corners: NDArray[np.float64]) -> _Mesh:
 
 def body_mesh(radius: float, height: float) -> _Mesh:
     """Return a round body on the ground, its middle at the origin."""
-    around = circle(radius)[:-1]
+    around = _circle(radius)[:-1]
     low, high = (np.column_stack([around, np.full(SIDES, z)]) for z in (0.0, height))
     k = np.arange(SIDES)
     beside = (k + 1) % SIDES
@@ -95,8 +95,8 @@ def _nose_mesh(radius: float, height: float) -> _Mesh:
     return _Mesh(vertices, np.array([(0, 1, 2), (0, 2, 3)], np.uint32))
 
 
-def circle(radius: float) -> NDArray[np.float64]:
-    """Return points on a circle about the origin, (SIDES + 1, 2), the last of them the first."""
+def _circle(radius: float) -> NDArray[np.float64]:
+    """Return points on a _circle about the origin, (SIDES + 1, 2), the last of them the first."""
     angles = 2.0 * math.pi * np.arange(SIDES + 1) / SIDES
     return radius * np.column_stack([np.cos(angles), np.sin(angles)])
 
@@ -228,13 +228,13 @@ class RobotNodes:
         self._scan = scene.add_frame(f"/scans/{agent}/last", show_axes=False)
         self._hits = self._points(f"/scans/{agent}/last/hits", colour, 0.035)
         self._cloud = self._points(f"/clouds/{agent}", colour, 0.02)
-        outline = segments(circle(1.3 * robot.radius), BELIEVED_HEIGHT)
+        outline = segments(_circle(1.3 * robot.radius), BELIEVED_HEIGHT)
         ahead = segments(robot.radius * np.array([(1.0, 0.0), (1.9, 0.0)]), BELIEVED_HEIGHT)
         self._believed = self._lines(f"/believed/{agent}", np.concatenate([outline, ahead]), LINE)
         self._trail = self._lines(f"/trails/{agent}", _NOWHERE, LINE)
         self._plans = scene.add_frame(f"/plans/{agent}", show_axes=False)
         self._plan = self._lines(f"/plans/{agent}/path", _NOWHERE, 0.7 * LINE)
-        goal = np.concatenate([segments(circle(share * robot.radius), GOAL_HEIGHT) for share in (0.3, 0.9)])
+        goal = np.concatenate([segments(_circle(share * robot.radius), GOAL_HEIGHT) for share in (0.3, 0.9)])
         self._goal = self._lines(f"/plans/{agent}/goal", goal, LINE)
         self._boxes = scene.add_frame(f"/boxes/{agent}", show_axes=False)
         self._drawn_boxes = np.zeros((0, 2, 3))
@@ -303,7 +303,7 @@ class RobotNodes:
             np.zeros((0, 3), np.float32),
             colour,
             point_size=size,
-            point_shape="circle",
+            point_shape="_circle",
             point_shading="flat",
             precision="float32",
         )
@@ -349,7 +349,7 @@ class TeamScene:
             np.zeros((0, 3), np.float32),
             FRONTIER,
             point_size=0.6 * maps.cell_m,
-            point_shape="circle",
+            point_shape="_circle",
             point_shading="flat",
             precision="float32",
         )

@@ -16,7 +16,7 @@ _BESIDE = re.compile(r"\.(?P<name>.+)\.[0-9a-f]{8}")
 
 
 @contextmanager
-def errors_named(path: Path) -> Iterator[None]:
+def _errors_named(path: Path) -> Iterator[None]:
     """Give errors of the system that name no file the name of the one that is written.
 
     A full disk, for instance, is reported of an open file, whose name the system does not report.
@@ -39,7 +39,7 @@ def write_whole(path: Path, content: bytes, *, is_lasting: bool = True) -> None:
     # Made here rather than by tempfile, whose files are for their owner alone: the system applies the mask.
     handle = os.open(beside, os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), 0o666)
     try:
-        with errors_named(path), os.fdopen(handle, "wb") as file:
+        with _errors_named(path), os.fdopen(handle, "wb") as file:
             file.write(content)
             if is_lasting:
                 file.flush()
@@ -116,7 +116,7 @@ def whole_file(path: Path) -> Iterator[Path]:
     path.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(dir=path.parent, prefix=f".{path.name}.") as folder:
         beside = Path(folder) / path.name
-        with errors_named(path):
+        with _errors_named(path):
             yield beside
             _bring_to_disk(beside)
         beside.replace(path)

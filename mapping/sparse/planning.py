@@ -235,7 +235,7 @@ REASONS = ("", "start in collision", "goal in collision", "no path")
 
 
 @dataclass(frozen=True, eq=False)
-class Plan:
+class _Plan:
     """The answer to a request.
 
     Attributes
@@ -268,8 +268,8 @@ def plan(
     start: NDArray[np.float64],
     goal: NDArray[np.float64],
     shortens: bool = True,
-) -> Plan:
-    """Plan a path for the body of a graph.
+) -> _Plan:
+    """_Plan a path for the body of a graph.
 
     Parameters
     ----------
@@ -291,7 +291,7 @@ def plan(
         graph.body.numbers,
         shortens,
     )
-    return Plan(path, REASONS[reason], nodes)
+    return _Plan(path, REASONS[reason], nodes)
 
 
 def _terminal(graph: TopologicalGraph, name: str, point: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -400,7 +400,7 @@ SPACING_M = 0.05
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class PathMeasures:
+class _PathMeasures:
     """Measures of a path.
 
     Attributes
@@ -421,7 +421,7 @@ class PathMeasures:
     dispersion: float
 
 
-def measure_path(path: NDArray[np.float64], spacing: float | None = SPACING_M) -> PathMeasures:
+def measure_path(path: NDArray[np.float64], spacing: float | None = SPACING_M) -> _PathMeasures:
     """Measure a path.
 
     Parameters
@@ -437,7 +437,7 @@ def measure_path(path: NDArray[np.float64], spacing: float | None = SPACING_M) -
         raise ValueError(f"the path has shape {points.shape}; want (P, D) with at least one finite point")
     length = float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
     even = points if spacing is None else points_along(points, spacing)
-    return PathMeasures(
+    return _PathMeasures(
         length=length, points=len(points), turning=_turning_of(even), dispersion=_dispersion_of(even)
     )
 

@@ -100,7 +100,7 @@ class _Merge(Command):
         return factor
 
 
-def execute(command: _Merge) -> Answer:
+def _execute(command: _Merge) -> Answer:
     """Merge maps and write the results."""
     from lidarium.mapping.files.output import check_writable
     from lidarium.mapping.merging.settings import TOLERANCES, merge_settings

@@ -34,7 +34,7 @@ class _Plan(Command):
     """by how much paths beside obstacles cost more, as a share"""
 
 
-def execute(command: _Plan) -> Answer:
+def _execute(command: _Plan) -> Answer:
     """Plan a path."""
     import numpy as np
 

@@ -75,7 +75,7 @@ def _place_of(kernel: Any) -> str:  # noqa: ANN401
     return f"{module}:{name}"
 
 
-def main() -> None:
+def _main() -> None:
     """Write the list."""
     if sys.argv[1:] == [CHILD]:
         print(json.dumps(_compiled_in_reset()))
@@ -89,4 +89,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    _main()

@@ -161,7 +161,7 @@ def _differing_blocks(source: Array, target: Array, low: int, high: int, found: 
 
 
 @dataclass(frozen=True, slots=True)
-class Message:
+class _Message:
     """Something that is being sent: a pose, or blocks of a map if there are any.
 
     Attributes
@@ -292,7 +292,7 @@ class Exchange:
             self._beliefs.log_odds[self._first : self._first + self._settings.robots],
         )
         self._radio.start(seed)
-        self._in_transit: list[Message] = []
+        self._in_transit: list[_Message] = []
         self.heard, self.heard_at = np.zeros((robots, robots, 3)), np.full((robots, robots), NEVER, np.int64)
         self.heard_ended = np.zeros((robots, robots), np.bool_)
         self.copies = [
@@ -347,7 +347,7 @@ class Exchange:
         is_reached, is_lost = self._radio.reached()[receiver], self._radio.is_lost(is_of_station=True)
         return self._latency if is_reached and not is_lost else None
 
-    def _send(self, message: Message) -> None:
+    def _send(self, message: _Message) -> None:
         if not self._radio.is_lost(is_of_station=message.receiver == self._settings.robots):
             self._in_transit.append(message)
 
@@ -359,7 +359,7 @@ class Exchange:
             self.bytes_sent[sender] += POSE_BYTES
             for receiver in np.flatnonzero(self.links[sender]).tolist():
                 self._send(
-                    Message(
+                    _Message(
                         step + self._latency, receiver, sender, step, pose, has_ended, NO_BLOCKS, NO_CELLS
                     )
                 )
@@ -407,13 +407,13 @@ class Exchange:
         best = int(np.argmax(held_at))
         return best if held_at[best] > self.copied_at[receiver, source] else None
 
-    def _part_to_send(self, sender: int, receiver: int, source: int, step: int) -> Message:
+    def _part_to_send(self, sender: int, receiver: int, source: int, step: int) -> _Message:
         """Return what a sender holds of a map that the receiver does not."""
         held, copy = self.copies[sender][source], self._copy_of(receiver, source)
         true_at, status = int(self.copied_at[sender, source]), self.statuses[sender][source]
         arrives = step + self._latency
         blocks, cells = differing_blocks(held, copy)
-        return Message(arrives, receiver, source, true_at, None, False, blocks, cells, status)
+        return _Message(arrives, receiver, source, true_at, None, False, blocks, cells, status)
 
     def _copy_of(self, receiver: int, source: int) -> NDArray[np.int8]:
         """Return what a robot holds of another's map, blank at first."""
@@ -423,7 +423,7 @@ class Exchange:
             )
         return self.copies[receiver][source]
 
-    def _receive(self, message: Message) -> None:
+    def _receive(self, message: _Message) -> None:
         receiver, source = message.receiver, message.source
         if message.pose is not None:
             if message.step > self.heard_at[receiver, source]:

@@ -41,7 +41,7 @@ FAULTS = frozenset({"failed"})
 """Endings that are faults; a robot that ends for any other reason was stopped."""
 
 
-def state_after(reason: str) -> OperatingState:
+def _state_after(reason: str) -> OperatingState:
     """Return the state of a robot that has ended for a reason."""
     return OperatingState.FAILED if reason in FAULTS else OperatingState.STOPPED
 
@@ -237,7 +237,7 @@ class Operating:
         self._retreating[rows] = 0
         names = self.state_names.copy()
         for row, reason in reasons.items():
-            state = state_after(reason)
+            state = _state_after(reason)
             self.states[row] = state
             names[row] = state.value
             self._note(row, "state", state.value, reason)

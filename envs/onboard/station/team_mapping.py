@@ -27,7 +27,7 @@ Frames = dict[tuple[str, str], Transform]
 """By a robot and another: the transform of the other's map frame into its own."""
 
 
-class Joined(NamedTuple):
+class _Joined(NamedTuple):
     """How the frames of two robots lie.
 
     Attributes
@@ -47,7 +47,7 @@ class Joined(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class TeammateMap:
+class _TeammateMap:
     """What a robot has last got of another.
 
     Attributes
@@ -85,7 +85,7 @@ class TeamMapping:
 
     Attributes
     ----------
-    received : dict of (str, str) to TeammateMap
+    received : dict of (str, str) to _TeammateMap
         By a robot and another: what the one has last got of the other, while it knew how their frames lie.
     fused : dict of str to FusedMap
         Each robot's own map and all that it has got, in its own frame.
@@ -93,7 +93,7 @@ class TeamMapping:
 
     perception: Perception
     settings: MergeSettings = field(default_factory=MergeSettings)
-    received: dict[tuple[str, str], TeammateMap] = field(default_factory=dict)
+    received: dict[tuple[str, str], _TeammateMap] = field(default_factory=dict)
     fused: dict[str, FusedMap] = field(default_factory=dict)
     episode: int = 0
     confirms: bool = True
@@ -115,7 +115,7 @@ class TeamMapping:
 
     def exchange(
         self, clusters: list[list[str]], time_s: float, frames: Frames | None = None
-    ) -> dict[tuple[str, str], Joined]:
+    ) -> dict[tuple[str, str], _Joined]:
         """Let robots that can talk to each other exchange and merge their maps.
 
         Parameters
@@ -141,10 +141,10 @@ class TeamMapping:
         if frames is None:
             joined = self._merged(maps, places, pairs)
         else:
-            joined = {(a, b): Joined(frames[a, b], places[b]) for a, b in pairs}
+            joined = {(a, b): _Joined(frames[a, b], places[b]) for a, b in pairs}
         for (a, b), (a_from_b, *_) in joined.items():
-            self.received[a, b] = TeammateMap(maps[b], poses[b], a_from_b, time_s)
-            self.received[b, a] = TeammateMap(maps[a], poses[a], a_from_b.inverse(), time_s)
+            self.received[a, b] = _TeammateMap(maps[b], poses[b], a_from_b, time_s)
+            self.received[b, a] = _TeammateMap(maps[a], poses[a], a_from_b.inverse(), time_s)
         self.fused = {agent: self._fused(agent, maps[agent]) for agent in agents}
         return joined
 
@@ -153,7 +153,7 @@ class TeamMapping:
         maps: dict[str, GrowingMap],
         places: dict[str, tuple[float, float]],
         pairs: list[tuple[str, str]],
-    ) -> dict[tuple[str, str], Joined]:
+    ) -> dict[tuple[str, str], _Joined]:
         merged = self._merger.update(
             {agent: self._compared(agent, one) for agent, one in maps.items()}, frozenset(pairs)
         )
@@ -168,7 +168,7 @@ class TeamMapping:
                     if overlaps and result is not None
                     else places[b]
                 )
-                joined[a, b] = Joined(
+                joined[a, b] = _Joined(
                     transform, (float(centre[0]), float(centre[1])), merged.tree.has_edge(a, b)
                 )
         return joined

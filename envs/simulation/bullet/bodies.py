@@ -23,7 +23,7 @@ _STRAIGHT = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
-class Box:
+class _Box:
     """A box that stands upright.
 
     Attributes
@@ -45,13 +45,13 @@ class FloorShapes:
 
     Attributes
     ----------
-    boxes : list of Box
+    boxes : list of _Box
         Upright boxes.
     prisms : list of ((N, 2) float64, float, float)
         Convex outline, lower and upper end of each other piece [m].
     """
 
-    boxes: list[Box]
+    boxes: list[_Box]
     prisms: list[tuple[NDArray[np.float64], float, float]]
 
     @classmethod
@@ -100,17 +100,17 @@ class FloorShapes:
         return "\n".join(lines)
 
 
-def _outer_walls(floor: Floor) -> Iterator[Box]:
+def _outer_walls(floor: Floor) -> Iterator[_Box]:
     x_low, y_low, x_high, y_high = floor.bounds
     width, depth, height = x_high - x_low, y_high - y_low, floor.ceiling
     x, y, thick = 0.5 * (x_low + x_high), 0.5 * (y_low + y_high), OUTER_WALL
     for side in (x_low - 0.5 * thick, x_high + 0.5 * thick):
-        yield Box((side, y, 0.5 * height), (thick, depth + 2.0 * thick, height))
+        yield _Box((side, y, 0.5 * height), (thick, depth + 2.0 * thick, height))
     for side in (y_low - 0.5 * thick, y_high + 0.5 * thick):
-        yield Box((x, side, 0.5 * height), (width, thick, height))
+        yield _Box((x, side, 0.5 * height), (width, thick, height))
 
 
-def _box_of(solid: Solid, low: float, high: float) -> Box | None:
+def _box_of(solid: Solid, low: float, high: float) -> _Box | None:
     """Return the box that a solid is; None if it is none."""
     corners = solid.polygon
     if len(corners) != 4 or solid.holes:
@@ -123,15 +123,15 @@ def _box_of(solid: Solid, low: float, high: float) -> Box | None:
     if abs(float(first @ second)) > _STRAIGHT * max(length, depth):
         return None
     x, y = corners.mean(axis=0).tolist()
-    return Box((x, y, 0.5 * (low + high)), (length, depth, high - low), math.atan2(first[1], first[0]))
+    return _Box((x, y, 0.5 * (low + high)), (length, depth, high - low), math.atan2(first[1], first[0]))
 
 
-def _cell_boxes(cells: Raster, height: float) -> Iterator[Box]:
+def _cell_boxes(cells: Raster, height: float) -> Iterator[_Box]:
     """Yield boxes that cover the solid cells of a raster."""
     side, (x, y) = cells.resolution, cells.origin
     for row, column, end_row, end_column in rectangles_of(cells.solid != 0).tolist():
         centre = (x + 0.5 * side * (column + end_column), y + 0.5 * side * (row + end_row), 0.5 * height)
-        yield Box(centre, (side * (end_column - column), side * (end_row - row), height))
+        yield _Box(centre, (side * (end_column - column), side * (end_row - row), height))
 
 
 def _numbers(values: tuple[float, ...]) -> str:

@@ -14,16 +14,16 @@ MISSING = (
 )
 
 
-class MissingBulletError(ImportError, ValueError):
+class _MissingBulletError(ImportError, ValueError):
     """PyBullet is not installed, so that the backend cannot be chosen."""
 
 
-def load_bullet() -> Any:  # noqa: ANN401
+def _load_bullet() -> Any:  # noqa: ANN401
     """Return the module ``pybullet``."""
     try:
         return importlib.import_module("pybullet")
     except ImportError as error:
-        raise MissingBulletError(MISSING) from error
+        raise _MissingBulletError(MISSING) from error
 
 
 def has_display() -> bool:
@@ -43,12 +43,12 @@ class Client:
 
     Raises
     ------
-    MissingBulletError
+    _MissingBulletError
         If PyBullet is not installed.
     """
 
     def __init__(self, is_shown: bool = False) -> None:
-        self.bullet = load_bullet()
+        self.bullet = _load_bullet()
         self._number = self.bullet.connect(self.bullet.GUI if is_shown else self.bullet.DIRECT)
         if is_shown:
             self.call("configureDebugVisualizer", self.bullet.COV_ENABLE_GUI, 0)

@@ -85,7 +85,7 @@ def view_numbers(camera: DepthCamera) -> NDArray[np.float64]:
 
 
 @kernel(nrt=False)
-def rotate(roll: float, pitch: float, yaw: float, rotation: Array) -> None:
+def _rotate(roll: float, pitch: float, yaw: float, rotation: Array) -> None:
     """Write the rotation by roll, pitch and yaw about x, y and z, in this order, into (3, 3)."""
     cr, sr, cp, sp = math.cos(roll), math.sin(roll), math.cos(pitch), math.sin(pitch)
     cy, sy = math.cos(yaw), math.sin(yaw)
@@ -101,8 +101,8 @@ def place_camera(pose: Array, attitude: Array, mount: Array, axes: Array, eye: A
     ``axes`` is (3, 3) in the world, ``eye`` (3,) [m].
     """
     body, own = scratch_grid(3, 3, np.float64), scratch_grid(3, 3, np.float64)
-    rotate(attitude[1], attitude[2], pose[2], body)
-    rotate(0.0, mount[PITCH], mount[PAN], own)
+    _rotate(attitude[1], attitude[2], pose[2], body)
+    _rotate(0.0, mount[PITCH], mount[PAN], own)
     for k in range(3):
         eye[k] = body[k, 0] * mount[FORWARD] + body[k, 1] * mount[LEFT] + body[k, 2] * mount[UP]
         for axis in range(3):

@@ -40,7 +40,7 @@ class FaceTable(NamedTuple):
     tile_columns: int
 
 
-class BeamRows(NamedTuple):
+class _BeamRows(NamedTuple):
     """Rows of numbers, one for each beam, by their addresses.
 
     Attributes
@@ -61,7 +61,7 @@ class BeamRows(NamedTuple):
 
 @kernel(forceinline=True, nrt=False)
 def _draw_face(
-    first: int, last: int, rows: BeamRows, distance: float, run: float, low: float, high: float
+    first: int, last: int, rows: _BeamRows, distance: float, run: float, low: float, high: float
 ) -> None:
     """Lower the ranges of the beams that meet a face.
 
@@ -180,7 +180,7 @@ def cast_by_faces(table: FaceTable, window: tuple[int, int, int, int], beams: Be
         _find_spans(listed, count, direction, beams, spans)
         across = directions_at + (2 if along_rows else 3) * row_size
         along = directions_at + (1 if along_rows else 0) * row_size
-        rows = BeamRows(count_of_beams, across, along, ranges_at)
+        rows = _BeamRows(count_of_beams, across, along, ranges_at)
         for k in range(count):
             distance, low, high = listed[0, k], listed[1, k] - CORNER_OVERLAP, listed[2, k] + CORNER_OVERLAP
             _draw_face(spans[0, k], spans[1, k], rows, distance, run, low, high)

@@ -103,7 +103,7 @@ def invalidate_teammates(world: WorldArrays, row: int, first: int, robots: int, 
 
 
 @kernel(nrt=False)
-def update_map(
+def _update_map(
     world: WorldArrays,
     row: int,
     first: int,
@@ -174,7 +174,7 @@ def perceive_robot(world: WorldArrays, row: int, first: int, robots: int, scratc
     """
     scratch.windows[:] = np.uint64(0)
     beam_directions(world.believed[row, 2], world.unit_vectors, scratch.directions)
-    update_map(world, row, first, robots, scratch, (0, 0, 0, 0), False)
+    _update_map(world, row, first, robots, scratch, (0, 0, 0, 0), False)
 
 
 @kernel(inline="always")
@@ -195,4 +195,4 @@ def sense_and_perceive(
         scratch.windows[0] = np.uint64(0)
         if world.believed[row, 2] != world.poses[row, 2]:
             beam_directions(world.believed[row, 2], world.unit_vectors, scratch.directions)
-    update_map(world, row, first, robots, scratch, box, is_same)
+    _update_map(world, row, first, robots, scratch, box, is_same)

@@ -71,7 +71,7 @@ _LISTED = re.compile(r"^\s*-\s+(\S+\.(?:mcap|db3)(?:\.zstd)?)\s*$", re.MULTILINE
 """Files that a metadata.yaml lists."""
 
 
-class Storage(NamedTuple):
+class _Storage(NamedTuple):
     """One open file of a bag.
 
     Attributes
@@ -104,7 +104,7 @@ class _Budget:
 
 
 @contextmanager
-def open_storages(path: Path) -> Iterator[list[Storage]]:
+def open_storages(path: Path) -> Iterator[list[_Storage]]:
     """Open the storages of a bag: of a file, or of all files in a folder, in order of their names."""
     files = _storage_files(path)
     size = 0
@@ -150,7 +150,7 @@ def _storage_files(path: Path) -> list[Path]:
 
 
 def _within(
-    storage: Storage, budget: _Budget
+    storage: _Storage, budget: _Budget
 ) -> Callable[[Collection[str]], Iterator[tuple[int, str, bytes]]]:
     """Return the messages of a storage, unpacked and counted."""
 
@@ -198,7 +198,7 @@ def _unpacked_file(path: Path, folder: Path, budget: _Budget) -> Path:
 
 
 @contextmanager
-def _open_mcap(path: Path, budget: _Budget) -> Iterator[Storage]:
+def _open_mcap(path: Path, budget: _Budget) -> Iterator[_Storage]:
     with open_guarded(path) as file:
         if file.seek(0, os.SEEK_END) < _MCAP_BYTES:
             raise ValueError(f"{path} is not a whole bag, it is cut off; {WANTED}")
@@ -230,7 +230,7 @@ def _open_mcap(path: Path, budget: _Budget) -> Iterator[Storage]:
             for _, channel, message in reader.iter_messages(topics, log_time_order=False):
                 yield message.log_time, channel.topic, message.data
 
-        yield Storage(types, messages, encodings == {"ros1"})
+        yield _Storage(types, messages, encodings == {"ros1"})
 
 
 def _encoded_otherwise(path: Path, encodings: Collection[str]) -> str:
@@ -248,7 +248,7 @@ def _has_stated_size(chunk: Chunk) -> bool:
 
 
 @contextmanager
-def _open_sqlite(path: Path, budget: _Budget) -> Iterator[Storage]:
+def _open_sqlite(path: Path, budget: _Budget) -> Iterator[_Storage]:
     size = path.stat().st_size
     steps = iter(range((_SQL_STEPS + _SQL_STEPS_PER_BYTE * size) // 10_000))
     uri = f"file:{urllib.parse.quote(str(path.absolute()))}?mode=ro&immutable=1"
@@ -272,7 +272,7 @@ def _open_sqlite(path: Path, budget: _Budget) -> Iterator[Storage]:
                 if names.get(identifier) in topics:
                     yield int(time), names[identifier], bytes(memoryview(content))
 
-        yield Storage(types, messages)
+        yield _Storage(types, messages)
 
 
 class _Ros1Reader(Reader):
@@ -300,7 +300,7 @@ class _Ros1Reader(Reader):
 
 
 @contextmanager
-def _open_ros1(path: Path, budget: _Budget) -> Iterator[Storage]:
+def _open_ros1(path: Path, budget: _Budget) -> Iterator[_Storage]:
     with _Ros1Reader(path) as reader:
         compressions = {function: name for name, function in decompressors.items()}
         for pos, chunk in reader.chunks.items():
@@ -314,7 +314,7 @@ def _open_ros1(path: Path, budget: _Budget) -> Iterator[Storage]:
                 yield time, connection.topic, content
 
         types = {each.topic: normalized(each.msgtype) for each in reader.connections}
-        yield Storage(types, messages, is_ros1=True)
+        yield _Storage(types, messages, is_ros1=True)
 
 
 def _bounded(compression: str, budget: _Budget) -> Callable[[bytes], bytes]:

@@ -26,7 +26,7 @@ from lidarium.mapping.planning.search.swept_costs import SweptCosts
 
 
 @dataclass(frozen=True, slots=True)
-class Approaches:
+class _Approaches:
     """Nearest approach of a body to each of K clusters.
 
     Attributes
@@ -57,7 +57,7 @@ class Approaches:
 
 
 @dataclass(frozen=True, slots=True)
-class NearestFrontier:
+class _NearestFrontier:
     """The frontier that is cheapest to approach.
 
     Attributes
@@ -89,7 +89,7 @@ def approach(
     log_odds: NDArray[np.int8],
     reach: float,
     thin: NDArray[np.bool_] | None = None,
-) -> Approaches:
+) -> _Approaches:
     """Return the cheapest approach of a searched body to each cluster.
 
     It is the cheapest cell from which a frontier cell is in reach and sight, or the cheapest in reach if
@@ -129,7 +129,7 @@ def approach(
     for k in range(len(clusters)):
         unseen = "hidden" if reached[k] else "narrow" if thin is not None and thin[k] else "blocked"
         names.append("" if in_sight[k] else unseen)
-    return Approaches(places[:, :2].copy(), costs, places[:, 2:].copy(), in_sight, tuple(names))
+    return _Approaches(places[:, :2].copy(), costs, places[:, 2:].copy(), in_sight, tuple(names))
 
 
 def nearest_frontier(
@@ -142,7 +142,7 @@ def nearest_frontier(
     *,
     reach: float | None = None,
     blocked: Iterable[Disc] = (),
-) -> NearestFrontier | None:
+) -> _NearestFrontier | None:
     """Search outwards for a cell with a frontier cell in reach and sight; None if no frontier can be reached.
 
     Parameters
@@ -163,7 +163,7 @@ def nearest_frontier(
     seen_row, seen_column = _nearest_in_sight(
         log_odds, frontiers.flags, disc_spans(distance / space.resolution), row, column
     )
-    return NearestFrontier(
+    return _NearestFrontier(
         (row, column), (int(seen_row), int(seen_column)), found.cost((row, column)), found.path((row, column))
     )
 

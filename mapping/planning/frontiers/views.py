@@ -42,7 +42,7 @@ class ViewRules(NamedTuple):
     kept_share: float = 0.7
 
 
-class Views(NamedTuple):
+class _Views(NamedTuple):
     """A view of each of K frontiers.
 
     Attributes
@@ -82,7 +82,7 @@ def views_of(
     lengths: NDArray[np.int32],
     clusters: tuple[NDArray[np.int64], NDArray[np.int64]],
     rules: ViewRules,
-) -> Views:
+) -> _Views:
     """Return a view of each cluster of frontier cells.
 
     Parameters
@@ -102,7 +102,7 @@ def views_of(
     """
     frame = _frame_of(grid, resolution, rules)
     cells, gains, found = _view_all(log_odds, lengths, clusters[0], clusters[1], _rays(), frame)
-    return Views(cells, gains, found)
+    return _Views(cells, gains, found)
 
 
 def gain_at(
