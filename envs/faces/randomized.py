@@ -83,7 +83,7 @@ class Draws:
             "numbers of 1 or more, so that the largest team is known"
         )
 
-    def _draw(self, generator: np.random.Generator) -> dict[str, Any]:
+    def draw(self, generator: np.random.Generator) -> dict[str, Any]:
         """Return a value for each setting that is drawn, by name."""
         return {name: _draw(each, generator) for name, each in self._distributions.items()}
 

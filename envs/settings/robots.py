@@ -25,7 +25,7 @@ Friction = Annotated[float, within(0.0, 10.0)]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _Build:
+class Build:
     """Masses, wheels, casters and friction of a differential-drive robot.
 
     The body is a cylinder from ``clearance`` up to the robot's height, on two driven wheels and on casters in
@@ -94,7 +94,7 @@ class Robot:
         Ticks that the encoder of a wheel counts on a metre [1/m].
     length, width : float
         Outline of the body [m].
-    build : _Build
+    build : Build
         Masses, wheels, casters and friction; only worlds with forces know them.
     """
 
@@ -109,12 +109,12 @@ class Robot:
     ticks_per_metre: Annotated[float, above(0.0, 1e7)] = 11724.0
     length: Annotated[float, above(0.0, 20.0)] = 0.352
     width: Annotated[float, above(0.0, 20.0)] = 0.352
-    build: _Build = field(default_factory=_Build)
+    build: Build = field(default_factory=Build)
 
     def __post_init__(self) -> None:
         check_settings(self, "the robot")
-        if not isinstance(self.build, _Build):
-            raise ValueError(f"build of the robot is {shown(self.build)}; want _Build")
+        if not isinstance(self.build, Build):
+            raise ValueError(f"build of the robot is {shown(self.build)}; want Build")
         if self.build.clearance >= self.height:
             raise ValueError(
                 f"clearance of the build is {self.build.clearance} m; want less than the robot's height of "
@@ -177,7 +177,7 @@ ROBOTS.register(
         ticks_per_metre=500 / (2 * math.pi * 0.0975),
         length=0.455,
         width=0.381,
-        build=_Build(
+        build=Build(
             base_mass=8.2,
             wheel_mass=0.4,
             mass_height=0.12,
@@ -205,7 +205,7 @@ ROBOTS.register(
         ticks_per_metre=4000.0,
         length=0.6,
         width=0.6,
-        build=_Build(
+        build=Build(
             base_mass=38.0,
             wheel_mass=1.0,
             mass_height=0.35,
@@ -233,7 +233,7 @@ ROBOTS.register(
         ticks_per_metre=100000.0,
         length=0.02,
         width=0.02,
-        build=_Build(
+        build=Build(
             base_mass=0.2,
             wheel_mass=0.01,
             mass_height=0.004,
