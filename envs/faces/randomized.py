@@ -71,7 +71,7 @@ class Draws:
         Raises
         ------
         ValueError
-            If it cannot be known, or a _draw is no number of robots.
+            If it cannot be known, or a draw is no number of robots.
         """
         sizes = self._distributions.get(ROBOTS)
         if sizes is None:
@@ -130,7 +130,7 @@ class RandomizedTeam(TeamWrapper):
     Raises
     ------
     ValueError
-        If a name or a distribution is none, a _draw is no value of its setting, or draws change the spaces of
+        If a name or a distribution is none, a draw is no value of its setting, or draws change the spaces of
         observations or actions.
     """
 

@@ -169,7 +169,7 @@ MADE_BY = (
     "mapping/grids/scan_geometry.py",
     "mapping/geometry",
     "envs/simulation/kernels/arrays.py",
-    "envs/simulation/kernels/floor_tables.py",
+    "envs/simulation/kernels/floor_cache.py",
     "envs/simulation/kernels/contact.py",
     "envs/simulation/kernels/ray_tables.py",
     "mapping/files/output.py",

@@ -289,7 +289,7 @@ def imported(path):
         ),
         (
             floor_cache.MADE_BY,
-            ("envs/simulation/kernels/floor_tables.py", "envs/floors/catalogue/store.py"),
+            ("envs/simulation/kernels/floor_cache.py", "envs/floors/catalogue/store.py"),
         ),
     ],
 )
