@@ -143,6 +143,8 @@ class Engine:
         self._goals = np.full((self.rows, 2), np.nan)
         self.perception = Perception(self.simulation, settings, self._offsets)
         self._software = Software(self.perception, settings)
+        # Without localizers and radios of their own on board, a step is that of the simulation alone.
+        self._step = self._software.step if self._software.is_staged else self.simulation.step
         self.operating = Operating(self.perception, settings)
         self._meters = Meters(self.world, settings) if reports or settings.battery.is_limited else None
         self.perception.meters = self._meters
@@ -159,8 +161,11 @@ class Engine:
         named = Rows(self.simulation, settings, self.perception.poses)
         self._computed = ComputedObservations(named)
         self._extra = ExtraTerms(settings.reward.more, named)
+        self._computes = bool(self._computed.boxes)
+        self._has_extra = not self._extra.is_empty
+        self._is_battery_limited = settings.battery.is_limited
         self._rules = make_rules(self.simulation, settings)
-        self._rules_table: NDArray[np.int64] | None = None
+        self._tables: tuple[NDArray[np.int64], NDArray[np.int64]] | None = None
         self.live = self._rules.live
         self.acted = np.zeros(self.rows, np.bool_)
         self.reasons = np.zeros(self.rows, np.int8)
@@ -193,6 +198,7 @@ class Engine:
         self.observation_space = spaces.Dict({**known, **self.level.boxes})
         self.action_space = self.level.action_space
         self._boxes = {**self._computed.boxes, **self.level.boxes}
+        self._written = self._writer.kinds
         self._buffers = [self._new_buffers(), self._new_buffers()]
         self.observations: Arrays = self._buffers[0]
 
@@ -318,7 +324,8 @@ class Engine:
 
     def _finish(self, acted: NDArray[np.bool_], seen: NDArray[np.bool_], is_plain: bool) -> None:
         """Complete observations, rewards, endings and infos after the episodes have run."""
-        self._computed.write(self.observations, seen)
+        if self._computes:
+            self._computed.write(self.observations, seen)
         terms = self._take_terms(acted, is_plain)
         self.acted = acted
         self._note_endings(acted)
@@ -388,13 +395,14 @@ class Engine:
 
     def _run_stepwise(self, modes: NDArray[np.int8], after_step: AfterStep | None) -> None:
         """Run episodes as the kernel does, step by step; ``modes`` is used up."""
-        commands, level, robots, table = self._commands, self.level, self.robots, self.simulation.table
+        commands, level, robots = self._commands, self.level, self.robots
         if modes.tobytes() == self._all_step:
             self._tick(commands, None, after_step)
             return
+        table = self.simulation.table
         senses = modes == SENSES
         if senses.any():
-            self._software.step(commands, moves_bodies=False, runs=senses)
+            self._step(commands, moves_bodies=False, runs=senses)
             modes[senses] = WAITS
         self.operating.interrupting[:] = False
         decides = modes == DECIDES
@@ -416,12 +424,12 @@ class Engine:
         is_active = operating.is_active
         if is_active:
             operating.before_step(commands, runs)
-        self._software.step(commands, runs=runs)
+        self._step(commands, runs=runs)
         if is_active:
             operating.after_step(runs)
         if meters is not None and meters.is_active:
             meters.advance()
-            if self.settings.battery.is_limited:
+            if self._is_battery_limited:
                 self._rules.is_empty[:] = meters.is_empty
         if after_step is not None:
             after_step(commands)
@@ -432,11 +440,12 @@ class Engine:
         Rows that did not act have earned nothing; ``is_plain`` says that all did.
         """
         score = self.score
-        earned = {} if self._extra.is_empty else self._extra.earned()
+        rewards = score.rewards
+        earned = self._extra.earned() if self._has_extra else {}
         for amounts in earned.values():
-            score.rewards += amounts
+            rewards += amounts
         if not is_plain:
-            score.rewards[~acted] = 0.0
+            rewards[~acted] = 0.0
             score.reward_terms[~acted] = 0.0
             earned = {name: np.where(acted, amounts, 0.0) for name, amounts in earned.items()}
         return {**dict(zip(TERMS, score.reward_terms.T.copy(), strict=True)), **earned}
@@ -447,10 +456,11 @@ class Engine:
         What happens to them counts before reasons of their own. An empty battery takes the sensors and the radio of a
         robot as well.
         """
-        if self._rules_table is None:
-            self._rules_table = table_of(self._rules)
+        if self._tables is None:
+            self._tables = self.simulation.table, table_of(self._rules)
+        world, rules = self._tables
         self.reasons = reasons = np.zeros(self.rows, np.int8)
-        count = note_endings(self.simulation.table, self.robots, self._rules_table, reasons)
+        count = note_endings(world, self.robots, rules, reasons)
         stopping = self.operating.stopping
         if not count and not stopping:
             self.has_endings = False
@@ -501,7 +511,7 @@ class Engine:
             infos["_ended_because"] = self.reasons != 0
         infos["state"] = operating.state_names
         infos["_state"] = everyone
-        if self.settings.battery.is_limited:
+        if self._is_battery_limited:
             infos["energy_j"] = self.used_j
             infos["_energy_j"] = everyone
         if self._calibration is not None:
@@ -527,8 +537,10 @@ class Engine:
         }
 
     def _new_buffers(self) -> Arrays:
-        more = {name: np.zeros((self.rows, *(box.shape or ())), box.dtype) for name, box in self._boxes.items()}
-        return {**self._writer.buffers(), **more}
+        arrays: Arrays = {name: np.empty(shape, dtype) for name, (shape, dtype) in self._written.items()}
+        for name, box in self._boxes.items():
+            arrays[name] = np.zeros((self.rows, *(box.shape or ())), box.dtype)
+        return arrays
 
     def _turn_buffers(self, seen: NDArray[np.bool_] | None, is_same_step: bool) -> None:
         """Choose the arrays for the observations of this step; rows that are not seen repeat their last one.
@@ -566,4 +578,4 @@ class Engine:
 
     def __getstate__(self) -> dict[str, Any]:
         # A copy's arrays lie elsewhere.
-        return {**self.__dict__, "_rules_table": None}
+        return {**self.__dict__, "_tables": None}

@@ -104,6 +104,8 @@ class ObservationForm:
         Of one robot's observations in this form.
     has_mask_apart : bool
         Whether the mask is in infos.
+    is_plain : bool
+        Whether observations are as they are.
 
     Raises
     ------
@@ -131,7 +133,7 @@ class ObservationForm:
         self.space: spaces.Space[Any] = rest
         if mask is not None and self._is_beside:
             self.space = spaces.Dict({REST: rest, MASK: mask})
-        self._is_plain = not self._is_flat and place == "inside"
+        self.is_plain = not self._is_flat and place == "inside"
 
     def of(self, observation: Mapping[str, NDArray[Any]], rows: tuple[int, ...] = ()) -> Any:  # noqa: ANN401
         """Return an observation in this form.
@@ -143,7 +145,7 @@ class ObservationForm:
         rows : tuple of int
             ``(rows,)`` for many at once.
         """
-        if self._is_plain:
+        if self.is_plain:
             return observation
         rest: Any = (
             np.concatenate(

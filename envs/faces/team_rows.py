@@ -94,6 +94,7 @@ class TeamRows:
             self._messages = self._board.table()
         self._form = ObservationForm(space, self.conventions)
         self.space = self._form.space
+        self._is_plain = self._form.is_plain and not (self._keeps or floats or self._merged is not None)
         self.columns = self._form.columns
 
     def begin(
@@ -161,7 +162,7 @@ class TeamRows:
                 self.terminated = (self.terminated | masked) & is_over
             else:
                 self.truncated = self.truncated | masked & is_over
-        self.rewards = engine.rewards.copy()
+        self.rewards = engine.score.rewards.copy()
         self._infos = engine.infos
         share = self.conventions.team_reward
         if share and is_step:
@@ -198,6 +199,8 @@ class TeamRows:
     @property
     def observations(self) -> Any:  # noqa: ANN401
         """The observations of all rows."""
+        if self._is_plain:
+            return self.engine.observations
         arrays = self._with_more()
         if self._keeps and self._kept.any():
             arrays = {name: array.copy() for name, array in arrays.items()}

@@ -96,6 +96,11 @@ class ObservationWriter:
         self._everyone = np.ones(self.rows, np.bool_)
         self._threads = min(settings.threads, available_threads()) if self.rows >= ROWS_FOR_THREADS else 1
 
+    @property
+    def kinds(self) -> dict[str, tuple[tuple[int, ...], Any]]:
+        """Shape and dtype of the array of each key."""
+        return dict(zip(self.keys, self._kinds, strict=True))
+
     def buffers(self) -> dict[str, NDArray[Any]]:
         """Return new arrays for the observations, by key.
 
@@ -119,12 +124,13 @@ class ObservationWriter:
 
     def fill(self, out: Mapping[str, NDArray[Any]], active: NDArray[np.bool_] | None = None) -> None:
         """Write into arrays that ``buffers`` has made, without checks; see `write`."""
-        self._write([out[name] for name in self.keys], active)
+        arrays = [out[name] for name in self.keys]
+        self._write(arrays, active)
 
     def _write(self, arrays: list[NDArray[Any]], active: NDArray[np.bool_] | None) -> None:
         sources = self._table() if self._sources is None else self._sources
         chosen, observed = self._everyone if active is None else active, self._in_order(arrays + self._absent)
-        if use_threads(self._threads) > 1:
+        if self._threads > 1 and use_threads(self._threads) > 1:
             write_parallel(chosen, sources, observed)
         else:
             write_serial(chosen, sources, observed)

@@ -1,7 +1,7 @@
 """A step in kernels over episodes x robots: bodies move, lasers scan, masks fill, maps follow.
 
 Episodes do not touch each other, and within an episode only the motion and the sharing out need the robots in
-their order. So threads may take the robots of an episode, or whole episodes (``envs/batch/running.py``); all
+their order. So threads may take the robots of an episode, or whole episodes (``envs/engine/running.py``); all
 forms run the same functions and agree to the bit.
 """
 
