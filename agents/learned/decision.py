@@ -162,9 +162,7 @@ def scene_of(
     return Scene(options, resolution, crops, (places, directions), shared, situation, weights)
 
 
-def decision_of(
-    scene: Scene, robot: int, sequence: NDArray[np.int64], picks: Sequence[int | None]
-) -> Decision | None:
+def decision_of(scene: Scene, robot: int, sequence: NDArray[np.int64], picks: Sequence[int | None]) -> Decision | None:
     """Return the decision of a robot, None where its tour is empty.
 
     Parameters
@@ -197,9 +195,7 @@ def decision_of(
         "picked": float(len(picks)),
     }
     others = [
-        (other, _target_of(scene, k, picks), k < len(picks))
-        for k, other in enumerate(options.robots)
-        if k != robot
+        (other, _target_of(scene, k, picks), k < len(picks)) for k, other in enumerate(options.robots) if k != robot
     ]
     return Decision(
         table_of({**scene.shared, **own}, OPTION_FEATURES),

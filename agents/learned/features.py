@@ -194,9 +194,7 @@ def table_of(values: Mapping[str, NDArray[np.float64]], scales: Mapping[str, flo
     return np.clip(np.stack(columns, axis=-1), -MOST, MOST).astype(np.float32)
 
 
-def in_frame(
-    places: NDArray[np.float64], pose: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def in_frame(places: NDArray[np.float64], pose: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return places (n, 2) as seen from a pose: ahead and left, (n,) each [m]."""
     gap = places - pose[:2]
     cosine, sine = math.cos(wrapped(float(pose[2]))), math.sin(wrapped(float(pose[2])))

@@ -8,7 +8,7 @@ from lidarium.envs.onboard.teammate import Teammate
 from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.simulation.kernels.arrays import ENDED
 from lidarium.envs.simulation.simulation import Simulation
-from lidarium.mapping.localization.dead_reckoning.localizer import Localizer
+from lidarium.mapping.localization.localizer import Localizer
 
 
 class KnownPoses:

@@ -13,8 +13,8 @@ from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.simulation.depth.point_cloud import camera_pose
 from lidarium.mapping.geometry.rigid import Transform, composed, relative
 from lidarium.mapping.grids.growing_array import GrowingArray
-from lidarium.mapping.localization.dead_reckoning.localizer import KeyScans
-from lidarium.mapping.localization.matching.wall_direction import wall_direction, within_quarter
+from lidarium.mapping.localization.localizer import KeyScans
+from lidarium.mapping.localization.matching.wall_compass import wall_direction, within_quarter
 from lidarium.mapping.point_clouds.cameras import points_of_depth
 from lidarium.mapping.sparse.exploring.ground import GroundCamera, SeenGround, are_seen_through
 from lidarium.mapping.sparse.floor_plane import FloorPlane

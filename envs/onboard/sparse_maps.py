@@ -13,7 +13,7 @@ from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.simulation.kernels.arrays import ENDED
 from lidarium.envs.simulation.simulation import Simulation
 from lidarium.mapping.geometry.rigid import Transform
-from lidarium.mapping.localization.dead_reckoning.localizer import KeyScans
+from lidarium.mapping.localization.localizer import KeyScans
 from lidarium.mapping.sparse.exploring.ground import ground_map, joined_ground
 from lidarium.mapping.sparse.exploring.navigation import SparseNavigation, sparse_navigation
 

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from lidarium.mapping.geometry.bounds import Count, Distance, check_settings, share, shown, within
 from lidarium.mapping.geometry.rigid import Transform, fit
 from lidarium.mapping.kernels.compilation import Array, kernel
+from lidarium.mapping.merging.corners import Corners
 from lidarium.mapping.merging.correspondence import Matches
-from lidarium.mapping.merging.description.corners import Corners
-from lidarium.mapping.merging.description.described_map import DescribedMap
+from lidarium.mapping.merging.described_map import DescribedMap
 from lidarium.mapping.merging.wall_alignment import refine_on_walls
 
 INLIER_RULES = ("distance", "ratio")
@@ -71,9 +71,7 @@ class AlignmentSettings:
             raise ValueError(f"inlier_rule is {self.inlier_rule!r}; want one of {', '.join(INLIER_RULES)}")
         is_list = isinstance(self.refinements, tuple | list)
         if not is_list or not all(each in REFINEMENTS for each in self.refinements):
-            raise ValueError(
-                f"refinements are {shown(self.refinements)}; want some of {', '.join(REFINEMENTS)}"
-            )
+            raise ValueError(f"refinements are {shown(self.refinements)}; want some of {', '.join(REFINEMENTS)}")
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -13,8 +13,7 @@ from bag_forms import write_form
 from drawn_decisions import drawn_decision
 
 import lidarium
-from lidarium.agents.learned.network import shapes
-from lidarium.agents.learned.weights import save_weights
+from lidarium.agents.learned.network import save_weights, shapes
 from lidarium.envs.settings.making import make_settings
 from lidarium.evaluation.episodes.runner import run_episode
 from lidarium.evaluation.episodes.watching import WatchedExploration
@@ -29,8 +28,7 @@ from lidarium.mapping.files.spline_files import write_spline_map
 from lidarium.mapping.files.trajectories import write_tum
 from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.grids.scan_geometry import ScanGeometry
-from lidarium.mapping.splines.features import observe
-from lidarium.mapping.splines.scan_points import scan_points
+from lidarium.mapping.splines.features import observe, scan_points
 from lidarium.mapping.splines.spline_map import SplineMap
 from lidarium.training.teaching.samples import samples_of, write_samples
 from lidarium.training.teaching.teacher import Lesson

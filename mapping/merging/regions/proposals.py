@@ -12,9 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.mapping.merging.regions.doors import Doors
-from lidarium.mapping.merging.regions.graph import RegionGraph, turned
-from lidarium.mapping.merging.regions.settings import RegionSettings
+from lidarium.mapping.merging.regions.graph import Doors, RegionGraph, turned
+from lidarium.mapping.merging.regions.segmentation import RegionSettings
 
 QUARTER = math.pi / 2.0
 

@@ -5,8 +5,7 @@ import pytest
 
 from lidarium.agents.learned.decision import decision_of, scene_of, tours_in
 from lidarium.agents.learned.features import OPTION_FEATURES, SITUATION_FEATURES, TEAMMATE_FEATURES
-from lidarium.agents.tours.planning import Tourist, first_options, tour_options
-from lidarium.agents.tours.settings import TourSettings
+from lidarium.agents.tours.planning import Tourist, TourSettings, first_options, tour_options
 from lidarium.envs.onboard.navigation import NavigationMap
 from lidarium.mapping.planning.touring.tours import with_first
 

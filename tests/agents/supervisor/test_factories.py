@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from lidarium.agents import make_policy
-from lidarium.agents.learned.network import shapes
-from lidarium.agents.learned.weights import save_weights
+from lidarium.agents.learned.network import save_weights, shapes
 from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.settings.making import make_settings
 from lidarium.evaluation.episodes.runner import run_episode

@@ -11,7 +11,7 @@ from lidarium.envs.settings.making import make_settings
 from lidarium.envs.settings.realism import REALISM
 from lidarium.evaluation.episodes.runner import run_episode
 from lidarium.mapping.geometry.rigid import Transform
-from lidarium.mapping.localization.dead_reckoning.localizer import KeyScans
+from lidarium.mapping.localization.localizer import KeyScans
 from lidarium.mapping.localization.registry import LOCALIZERS
 
 

@@ -8,15 +8,14 @@ from drawn_maps import RESOLUTION, about_middle, apartment, blank, hall, kept, m
 
 from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.grids.occupancy import FREE, OCCUPIED, UNKNOWN
-from lidarium.mapping.merging.regions.directions import BINS, likely_rotations
-from lidarium.mapping.merging.regions.graph import find_regions
+from lidarium.mapping.merging.regions.graph import BINS, find_regions, likely_rotations
 from lidarium.mapping.merging.regions.proposals import (
     by_doors,
     by_growing_regions,
     by_regions,
     propose_motions,
 )
-from lidarium.mapping.merging.regions.settings import RegionSettings
+from lidarium.mapping.merging.regions.segmentation import RegionSettings
 
 SETTINGS = RegionSettings()
 
@@ -61,9 +60,7 @@ def test_a_room_that_was_seen_in_part_meets_at_its_ends():
 def test_regions_of_like_shapes_propose_the_scale():
     truth = about_middle(0.7, apartment(), (480, 480))
     larger = np.kron(apartment(), np.ones((3, 3), np.uint8))[::2, ::2]
-    found = by_growing_regions(
-        graph(larger), graph(moved(apartment(), truth, (480, 480))), SETTINGS, (0.5, 2.0)
-    )
+    found = by_growing_regions(graph(larger), graph(moved(apartment(), truth, (480, 480))), SETTINGS, (0.5, 2.0))
     is_scale = np.abs(found[:, 3] - 1.5) < 0.05
     # A point p of the small map lies at 1.5 R p + t in the large one.
     point = np.array((5.0, 4.0))
