@@ -177,7 +177,7 @@ def decision_of(scene: Scene, robot: int, sequence: NDArray[np.int64], picks: Se
         What the robots before it have picked.
     """
     options = scene.options
-    tours = tours_in(sequence, len(options.numbers))
+    tours = _tours_in(sequence, len(options.numbers))
     if not tours[robot] or not options.is_reached[robot, tours[robot][0]]:
         return None
     first = tours[robot][0]
@@ -207,7 +207,7 @@ def decision_of(scene: Scene, robot: int, sequence: NDArray[np.int64], picks: Se
     )
 
 
-def tours_in(sequence: NDArray[np.int64], count: int) -> list[list[int]]:
+def _tours_in(sequence: NDArray[np.int64], count: int) -> list[list[int]]:
     """Return each robot's tour of a sequence past ``count`` places.
 
     The sequence is that of ``team_tours``.

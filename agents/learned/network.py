@@ -38,7 +38,7 @@ EPSILON = 1e-5
 Weights = Mapping[str, NDArray[np.float32]]
 
 
-def shapes() -> dict[str, tuple[int, ...]]:
+def _shapes() -> dict[str, tuple[int, ...]]:
     """Return the shape of every array of weights, by name; the names are PyTorch's."""
     table: dict[str, tuple[int, ...]] = {}
 
@@ -73,7 +73,7 @@ class Network:
     Parameters
     ----------
     weights : mapping of str to float32
-        As ``shapes`` says.
+        As ``_shapes`` says.
     """
 
     weights: Weights
@@ -123,7 +123,7 @@ class Network:
         return np.asarray(scaled * self.weights[f"{name}.weight"] + self.weights[f"{name}.bias"])
 
 
-def check_weights(weights: Weights, name: str) -> None:
+def _check_weights(weights: Weights, name: str) -> None:
     """Check that weights are those of this network.
 
     Raises
@@ -131,7 +131,7 @@ def check_weights(weights: Weights, name: str) -> None:
     ValueError
         Where names, shapes or types are others, or a number is not finite; the message names the first.
     """
-    wanted = shapes()
+    wanted = _shapes()
     for key in sorted({*weights, *wanted}):
         if key not in weights or key not in wanted:
             what = "lacks" if key not in weights else "has"
@@ -168,10 +168,10 @@ def load_weights(path: str | Path = "") -> dict[str, NDArray[np.float32]]:
         raise ValueError(f"weights is {shown(path)}; want the name of a file")
     if not str(path):
         return dict(_shipped())
-    return weights_from(read_bytes(Path(path), MOST_BYTES), str(path))
+    return _weights_from(read_bytes(Path(path), MOST_BYTES), str(path))
 
 
-def weights_from(content: bytes, name: str) -> dict[str, NDArray[np.float32]]:
+def _weights_from(content: bytes, name: str) -> dict[str, NDArray[np.float32]]:
     """Return the weights of a file's content; ``name`` is what messages call it.
 
     Raises
@@ -183,7 +183,7 @@ def weights_from(content: bytes, name: str) -> dict[str, NDArray[np.float32]]:
         weights: dict[str, NDArray[np.float32]] = load(content)
     except (SafetensorError, ValueError, KeyError, TypeError) as error:
         raise ValueError(f"{name} is no file of weights, or is truncated: {error}") from error
-    check_weights(weights, name)
+    _check_weights(weights, name)
     return weights
 
 
@@ -197,7 +197,7 @@ def save_weights(path: Path, weights: Weights) -> str:
     OSError
         Where it cannot be written.
     """
-    check_weights(weights, "what was trained")
+    _check_weights(weights, "what was trained")
     content = save({name: np.ascontiguousarray(array) for name, array in weights.items()})
     path.parent.mkdir(parents=True, exist_ok=True)
     write_whole(path, content)
@@ -218,4 +218,4 @@ def _shipped() -> dict[str, NDArray[np.float32]]:
         ) from error
     if hashlib.sha256(content).hexdigest() != wanted:
         raise ValueError(f"{SHIPPED} is not what its card {CARD} names; install the package again")
-    return weights_from(content, SHIPPED)
+    return _weights_from(content, SHIPPED)

@@ -45,7 +45,7 @@ OBSTACLE_S, OBSTACLE_M = 30.0, 0.1
 
 
 @dataclass(slots=True)
-class Work:
+class _Work:
     """What a robot is at.
 
     Attributes
@@ -150,13 +150,13 @@ class SparseFrontier(Policy):
     def __init__(self, shares_map: bool = True, **settings: float) -> None:
         self.shares_map, self.settings = shares_map, ViewSettings(**settings)
         self._given_up: list[GivenUp] = []
-        self._work: dict[str, Work] = {}
+        self._work: dict[str, _Work] = {}
 
     def reset(self, team: Team, seed: int) -> None:
         """Begin an episode; nothing is drawn."""
         self.team = team
         self._given_up = []
-        self._work = {agent: Work() for agent in team.agents}
+        self._work = {agent: _Work() for agent in team.agents}
         self._sight = self.settings.sight_of(team.belief(team.agents[0]))
 
     def act(self, observations: Mapping[str, Observation]) -> dict[str, Action]:

@@ -64,7 +64,7 @@ def discs_around(points: NDArray[np.float64], radius: float) -> NDArray[np.float
     return np.column_stack([points, np.full(len(points), radius)])
 
 
-def are_within(points: NDArray[np.float64], discs: NDArray[np.float64]) -> NDArray[np.bool_]:
+def _are_within(points: NDArray[np.float64], discs: NDArray[np.float64]) -> NDArray[np.bool_]:
     """Return which points (N, 2) lie in one of discs (M, 3) [m], (N,) bool."""
     gaps = np.hypot(*(points[:, None] - discs[None, :, :2]).transpose(2, 0, 1))
     return np.asarray((gaps <= discs[:, 2]).any(axis=1))
@@ -72,7 +72,7 @@ def are_within(points: NDArray[np.float64], discs: NDArray[np.float64]) -> NDArr
 
 def apart_from(borders: list[NDArray[np.float64]], discs: NDArray[np.float64]) -> list[NDArray[np.float64]]:
     """Return borders (N, 2) without what lies in one of discs (M, 3) [m]."""
-    left = [border[~are_within(border, discs)] for border in borders]
+    left = [border[~_are_within(border, discs)] for border in borders]
     return [border for border in left if len(border)]
 
 

@@ -39,7 +39,7 @@ TEAMMATE_SAME = 1.0
 """What lies this near to what a teammate goes for is the teammate's [m]."""
 
 
-def first_on_tour(
+def _first_on_tour(
     memory: Memory,
     senses: Senses,
     limits: Limits,
@@ -275,7 +275,7 @@ class WayChooser:
             return []
         of_teammates = [target.focus for target in targets]
         for least in (settings.least_frontier, LAST_FRONTIER):
-            begun = first_on_tour(memory, senses, self._limits, least, self._source.intent, of_teammates)
+            begun = _first_on_tour(memory, senses, self._limits, least, self._source.intent, of_teammates)
             if begun is not None:
                 return _to_focus(node, *begun)
         return []

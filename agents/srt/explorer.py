@@ -33,7 +33,7 @@ NEW_NODE = 0.05
 """A robot nearer than this to its last node makes no new one [m]."""
 
 
-class TreeGrowth:
+class _TreeGrowth:
     """The nodes that one robot adds to the team's graph, and where it is in it.
 
     Parameters
@@ -178,7 +178,7 @@ class Explorer:
         self._settings, self._lidar, self._generator = settings, lidar, generator
         self._travel = Travel(settings, robot, lidar)
         body = robot.radius + settings.margin
-        self._growth = TreeGrowth(agent, tree, settings, lidar, body)
+        self._growth = _TreeGrowth(agent, tree, settings, lidar, body)
         self._tree, self._source = tree, CandidateSource(settings, body, generator)
         self._chooser = WayChooser(self._source, settings, self._travel.limits, generator)
         self._turns, self._progress = self._travel.turns, self._travel.progress

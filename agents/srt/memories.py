@@ -21,7 +21,7 @@ Legs = list[Place]
 
 
 @dataclass(frozen=True, slots=True)
-class Frontiers:
+class _Frontiers:
     """Frontiers that a robot can come to.
 
     Attributes
@@ -76,7 +76,7 @@ class Memory(Protocol):
         """
         ...
 
-    def frontiers(self, start: Place, least: float, most: int) -> Frontiers | None:
+    def frontiers(self, start: Place, least: float, most: int) -> _Frontiers | None:
         """Return the nearest frontiers of at least a length [m], so many at most.
 
         None where there is none.
@@ -157,7 +157,7 @@ class MapMemory:
         )
         return None if found is None else self._legs(start, [*self._centres(found[1])[1:-1], end])
 
-    def frontiers(self, start: Place, least: float, most: int) -> Frontiers | None:
+    def frontiers(self, start: Place, least: float, most: int) -> _Frontiers | None:
         """Return the cheapest frontiers to reach, and the paths between them.
 
         The paths join the places where the robot would stand.
@@ -184,7 +184,7 @@ class MapMemory:
         ways = [self._centres(found.path(stand)) for stand in stands]
         ahead = round(AHEAD / self._map.resolution)
         costs = near.costs[chosen]
-        return Frontiers(
+        return _Frontiers(
             focuses=np.array(self._centres(near.frontier_cells[chosen])),
             cells=[np.array(self._centres(clusters.of(int(k)))) for k in chosen],
             sizes=clusters.sizes[chosen],
@@ -289,7 +289,7 @@ class RegionMemory:
         """Return None: regions know no way but the tree's."""
         return None
 
-    def frontiers(self, start: Place, least: float, most: int) -> Frontiers | None:
+    def frontiers(self, start: Place, least: float, most: int) -> _Frontiers | None:
         """Return None: regions have openings alone."""
         return None
 

@@ -123,7 +123,7 @@ def free_way(scan: NDArray[np.float32], geometry: ScanGeometry, radius: float, h
     return max(float(reach.min(initial=geometry.range_max)), 0.0)
 
 
-def stopping_speed(distance: float, deceleration: float) -> float:
+def _stopping_speed(distance: float, deceleration: float) -> float:
     """Return the speed from which a robot stops within a distance [m/s]."""
     return math.sqrt(2.0 * deceleration * max(distance, 0.0))
 
@@ -161,11 +161,11 @@ def driven(
         return replace(drive, phase=Phase.DONE), 0.0, 0.0
     fastest = min(
         limits.speed,
-        stopping_speed(distance, limits.deceleration),
-        stopping_speed(free - GAP, limits.deceleration),
+        _stopping_speed(distance, limits.deceleration),
+        _stopping_speed(free - GAP, limits.deceleration),
     )
     if settings.drive == "controls":
-        speed, turn_rate = best_control(pose, drive.target, fastest, limits)
+        speed, turn_rate = _best_control(pose, drive.target, fastest, limits)
         return replace(drive, phase=Phase.ADVANCE if speed > 0.0 else Phase.TURN), speed, turn_rate
     # Past something near by a robot has to go straight: it would drift towards it while it turns the rest.
     ends = min(settings.turning_ends, STRAIGHT) if free < min(distance, NEAR) else settings.turning_ends
@@ -176,7 +176,7 @@ def driven(
     return replace(drive, phase=Phase.ADVANCE), fastest * math.cos(error), turn_rate
 
 
-def best_control(
+def _best_control(
     pose: NDArray[np.float64], target: NDArray[np.float64], fastest: float, limits: Limits
 ) -> tuple[float, float]:
     """Return the listed control whose predicted pose best suits a target.

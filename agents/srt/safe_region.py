@@ -87,7 +87,7 @@ def joined_views(first: NDArray[np.float64], second: NDArray[np.float64]) -> NDA
     return np.fmin(first, second)
 
 
-def region_of(angle: NDArray[np.float64]) -> NDArray[np.int64]:
+def _region_of(angle: NDArray[np.float64]) -> NDArray[np.int64]:
     """Return the laser region of an angle against the heading [rad].
 
     The regions are 0 right to 4 left, and 5 to 7 behind.
@@ -173,7 +173,7 @@ def safe_region(
         raise ValueError(f"shape of the safe region is {shape!r}; want one of {', '.join(SHAPES)}")
     seen = ~np.isnan(view)
     ranges = np.minimum(np.where(seen, view, 0.0), perception)
-    regions = region_of(np.asarray(ANGLES - heading, np.float64))
+    regions = _region_of(np.asarray(ANGLES - heading, np.float64))
     radial = _radial(np.where(seen, ranges, np.nan), body)
     if shape == "radial":
         radii = radial

@@ -31,7 +31,7 @@ SAME_PLACE = 0.5
 """Blocks nearer to each other than this are at one place [m]."""
 
 
-class Progress:
+class _Progress:
     """What a robot remembers of how it got on."""
 
     def __init__(self) -> None:
@@ -81,7 +81,7 @@ TURN_GAIN = 2.0
 """Turn rate by the error of the heading [1/s]."""
 
 
-class TurnPlan:
+class _TurnPlan:
     """The headings to which a robot still has to turn.
 
     Attributes
@@ -165,7 +165,7 @@ class Travel:
         self.legs: list[Choice] = []
         self.began_at: NDArray[np.float64] = np.zeros(2)
         self.is_aside = False
-        self.turns, self.progress = TurnPlan(), Progress()
+        self.turns, self.progress = _TurnPlan(), _Progress()
         self._drive: Drive | None = None
         self._backs_until = -math.inf
 

@@ -50,7 +50,7 @@ class _Errand:
     is_taken: bool = False
 
 
-class Errands:
+class _Errands:
     """The errands of a team's robots, by name.
 
     Parameters
@@ -144,7 +144,7 @@ def _is_frontier(belief: Belief, place: tuple[float, float] | None) -> bool:
     return bool((around == FRONTIER).any())
 
 
-class LedTeam:
+class _LedTeam:
     """A team as the policy under a supervisor sees it.
 
     Drives for the supervisor are hidden from the policy.
@@ -317,13 +317,13 @@ class Supervised(Policy):
             )
         self._supervisor = Supervisor(station, footprint_of(belief.radius))
         self._informs = not knows_starts
-        self._errands = Errands(team)
+        self._errands = _Errands(team)
         self._given_up: dict[str, NDArray[np.float64]] = {}
         self._informed: set[str] = set()
         self._decision_due, self._merge_due = settings.period_s, 0.0
         self._exploring: set[str] = set()
         self.tick_seconds, self.merge_seconds = [], []
-        self.policy.reset(LedTeam(team, self._exploring), seed)
+        self.policy.reset(_LedTeam(team, self._exploring), seed)
 
     def act(self, observations: Mapping[str, Observation]) -> dict[str, Action]:
         """Let the policy decide for all robots that the supervisor has not sent anywhere."""

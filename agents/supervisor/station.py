@@ -26,7 +26,7 @@ from lidarium.mapping.merging.pair import PairResult
 from lidarium.mapping.merging.settings import MergeSettings
 
 
-class ReceivedReports:
+class _ReceivedReports:
     """The reports of a team: the latest of each robot, and what earlier ones say.
 
     Parameters
@@ -151,7 +151,7 @@ class MergeStation:
         self._found: set[Pair] = set()
         self._joined: set[Pair] = set()
         self._middles: dict[Pair, tuple[float, float]] = {}
-        self._received = ReceivedReports(self.agents, resolution, settings)
+        self._received = _ReceivedReports(self.agents, resolution, settings)
         self.joins: list[Join] = []
         self.events: list[StationEvent] = []
         self.left_behind: list[tuple[str, NDArray[np.float64]]] = []

@@ -39,7 +39,7 @@ EXPLAINED_PAUSES = frozenset({"contact", "blocked"})
 
 
 @dataclass(slots=True)
-class Judged:
+class _Judged:
     """A case, what the tree said of it, and the goal that was chosen.
 
     Attributes
@@ -63,7 +63,7 @@ class Judged:
     target: Target | None = None
 
 
-class Judge:
+class _Judge:
     """Puts the robots of a station before the tree.
 
     Parameters
@@ -79,7 +79,7 @@ class Judge:
         self._tree = decision_tree(station.settings)
         self._full_j: dict[str, float] = {}
 
-    def judge_alone(self, agent: str) -> Judged:
+    def judge_alone(self, agent: str) -> _Judged:
         """Put a robot before the tree of which nothing but its last report is known."""
         return self._decide(Case(self._inputs(agent, 0.0)))
 
@@ -95,7 +95,7 @@ class Judge:
         workers: list[str],
         survey: Survey,
         taken: Mapping[str, int],
-    ) -> Judged:
+    ) -> _Judged:
         """Put a robot before the tree, and choose its goal where it is to get another.
 
         Parameters
@@ -201,9 +201,9 @@ class Judge:
         # Where the merged map knows no path, the one that it came is one.
         return report.energy_left_j < self._settings.battery_margin * metre * min(way, report.travelled_m)
 
-    def _decide(self, case: Case) -> Judged:
+    def _decide(self, case: Case) -> _Judged:
         leaf, answers = decide(self._tree, case)
-        return Judged(case, leaf, tuple(answers))
+        return _Judged(case, leaf, tuple(answers))
 
 
 def _worth(others: list[str], survey: Survey, taken: Mapping[str, int]) -> NDArray[np.float64]:
@@ -282,7 +282,7 @@ class Supervisor:
         self.decisions: list[Decision] = []
         self.standing_by: set[str] = set()
         self._silent: set[str] = set()
-        self._judge = Judge(station, self.standing_by)
+        self._judge = _Judge(station, self.standing_by)
 
     def decide(self, time_s: float, given_up: Mapping[str, NDArray[np.float64]]) -> list[Command]:
         """Decide about all robots.
@@ -339,7 +339,7 @@ class Supervisor:
             for agent, report in station.reports.items()
         }
         survey = Survey(fused, frames, reports, workers, all_given_up, self.footprint, self._settings)
-        judged: dict[str, Judged] = {}
+        judged: dict[str, _Judged] = {}
         taken: dict[str, int] = dict(survey.going)
         for agent in group:
             one = self._judge.judge(agent, group, workers, survey, taken)
@@ -354,7 +354,7 @@ class Supervisor:
             if (command := self._command(one, survey, time_s, tuple(group))) is not None
         ]
 
-    def _assign_all(self, judged: Mapping[str, Judged], workers: list[str], survey: Survey) -> None:
+    def _assign_all(self, judged: Mapping[str, _Judged], workers: list[str], survey: Survey) -> None:
         """Give goals to all robots of a group at once that are to explore."""
         exploring = [agent for agent in workers if judged[agent].leaf.rule in (0, 3, 4, 7, RESUMED.rule)]
         rows = [workers.index(agent) for agent in exploring]
@@ -384,7 +384,7 @@ class Supervisor:
             else:
                 one.leaf, one.goal = Leaf(6, OrderKind.GO_TO, "all robots got goals at once", OTHER), goal
 
-    def _command(self, one: Judged, survey: Survey, time_s: float, group: tuple[str, ...]) -> Command | None:
+    def _command(self, one: _Judged, survey: Survey, time_s: float, group: tuple[str, ...]) -> Command | None:
         """Return the order to a robot, and log the decision."""
         agent, leaf = one.case.robot.agent, one.leaf
         observes = None
@@ -407,7 +407,7 @@ class Supervisor:
             self.standing_by.discard(agent)
         return Command(agent, leaf.order, leaf.rule, leaf.why, one.target, observes, leaf.aim == HOME)
 
-    def _log(self, time_s: float, group: tuple[str, ...], one: Judged) -> None:
+    def _log(self, time_s: float, group: tuple[str, ...], one: _Judged) -> None:
         case, leaf, target = one.case, one.leaf, one.target
         pose = self.station.reports[case.robot.agent].pose
         self.decisions.append(

@@ -26,7 +26,7 @@ NONE = -1
 
 
 @dataclass(frozen=True, slots=True)
-class Goals:
+class _Goals:
     """The frontier clusters of a merged map as goals; K of them for R robots.
 
     Attributes
@@ -55,14 +55,14 @@ class Goals:
     observed: NDArray[np.int64]
 
 
-def find_goals(
+def _find_goals(
     navigation: NavigationMap,
     origin: tuple[float, float],
     cells: Sequence[Cell],
     footprint: Footprint,
     reach: float,
     range_m: float,
-) -> Goals:
+) -> _Goals:
     """Find the goals on a map, and what the way to each costs.
 
     Parameters
@@ -101,7 +101,7 @@ def find_goals(
         costs[row] = np.where(near.reachable, near.costs, math.inf)
         stands[row], observed[row] = near.cells, near.frontier_cells
     areas = _unknown_around(navigation.log_odds, clusters.representatives, range_m / 2.0, navigation.resolution)
-    return Goals(
+    return _Goals(
         clusters.cells,
         clusters.starts,
         clusters.representatives,
@@ -190,7 +190,7 @@ class Survey:
             self._map.frontiers.ignore_near((int(cell[0]), int(cell[1])), reach)
         self._poses = {agent: frames[agent] @ reports[agent].pose for agent in self.workers}
         cells = [self._cell_of(agent) for agent in self.workers]
-        self.goals = find_goals(self._map, self.origin, cells, footprint, reach, settings.sensor_range_m)
+        self.goals = _find_goals(self._map, self.origin, cells, footprint, reach, settings.sensor_range_m)
         targets = {agent: reports[agent].target for agent in self.workers}
         self.places = {
             agent: None if target is None else tuple(frames[agent].apply((target.x, target.y)).tolist())

@@ -248,11 +248,11 @@ def tour_options(
 
 def first_options(options: TourOptions) -> list[int | None]:
     """Return the option at which each robot's tour begins, None where there is none that it reaches."""
-    firsts = first_places(options.sequence, len(options.numbers))
+    firsts = _first_places(options.sequence, len(options.numbers))
     return [number if number is not None and options.is_reached[k, number] else None for k, number in enumerate(firsts)]
 
 
-def first_places(sequence: NDArray[np.int64], count: int) -> list[int | None]:
+def _first_places(sequence: NDArray[np.int64], count: int) -> list[int | None]:
     """Return the number of the first place of each robot's tour, None where it has none.
 
     Parameters

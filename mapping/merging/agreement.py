@@ -37,11 +37,11 @@ def disc_agreement(
         return 0.0
     is_inside = np.zeros(b.levels.shape, np.bool_)
     counts = np.zeros(2, np.int64)
-    _count_discs(a.levels, b.levels, a.resolution, pose_numbers(a_from_b), points, radius_cells, is_inside, counts)
+    _count_discs(a.levels, b.levels, a.resolution, _pose_numbers(a_from_b), points, radius_cells, is_inside, counts)
     return float(counts[0]) / float(counts[1]) if counts[1] else 0.0
 
 
-def pose_numbers(transform: Transform) -> tuple[float, float, float]:
+def _pose_numbers(transform: Transform) -> tuple[float, float, float]:
     """Return a transform as the numbers that kernels take: x, y [m], theta [rad]."""
     return transform.x, transform.y, transform.theta
 
@@ -104,7 +104,7 @@ def count_walls(
 
 
 @kernel
-def count_overlap(a: Array, b: Array, side: float, pose: tuple[float, float, float], found: Array) -> None:
+def _count_overlap(a: Array, b: Array, side: float, pose: tuple[float, float, float], found: Array) -> None:
     """Count the cells known in both maps, and find their centroid in b [m].
 
     Every so many-th cell of every so many-th row is examined.
@@ -309,7 +309,7 @@ def compare(a: DescribedMap, b: DescribedMap, a_from_b: Transform, settings: Val
     walls, facing = np.zeros((2, 3), np.int64), np.zeros((2, 3))
     for k, (field_of, walls_of, transform) in enumerate(((a, b, a_from_b), (b, a, b_from_a))):
         field = WallField(field_of.levels, field_of.distance, field_of.is_open, 1.0 / side, hit, miss)
-        count_walls(field, walls_of.walls, walls_of.normals, pose_numbers(transform), walls[k], facing[k])
+        count_walls(field, walls_of.walls, walls_of.normals, _pose_numbers(transform), walls[k], facing[k])
     return agreement_of(a, b, a_from_b, walls, facing)
 
 
@@ -334,7 +334,7 @@ def agreement_of(
         Sums of the squares of the normals of those that agree: xx, xy, yy.
     """
     side, area = a.resolution, np.zeros(3)
-    count_overlap(a.levels, b.levels, side, pose_numbers(a_from_b), area)
+    _count_overlap(a.levels, b.levels, side, _pose_numbers(a_from_b), area)
     both = float(area[0])
     hits, soft, hard = (float(count) for count in walls.sum(axis=0))
     met = hits + soft + hard
@@ -405,7 +405,7 @@ APART_M, LEAST_M = 0.12, 0.3
 """Gap between two walls that face one direction, and least length of a wall that agrees [m]."""
 
 
-def distinct_walls(a: DescribedMap, b: DescribedMap, a_from_b: Transform, hit_distance_m: float) -> int:
+def _distinct_walls(a: DescribedMap, b: DescribedMap, a_from_b: Transform, hit_distance_m: float) -> int:
     """Return the number of distinct walls of map b that agree with walls of map a.
 
     A wall is all that faces one direction at one distance.
@@ -504,7 +504,7 @@ class Confirmation:
         if self == Confirmation():
             return True
         overlap_m2, validation = agreement.overlap_m2, self.validation or ValidationSettings()
-        walls = distinct_walls(*maps, a_from_b, validation.hit_distance_m)
+        walls = _distinct_walls(*maps, a_from_b, validation.hit_distance_m)
         knows_more = known_m2 - overlap_m2 >= self.own_m2
         if not (knows_more or overlap_m2 >= PLENTY_M2 or walls >= MANY_WALLS):
             return False

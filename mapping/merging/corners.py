@@ -22,7 +22,7 @@ from lidarium.mapping.kernels.compilation import Array, kernel
 
 
 @lru_cache
-def orientation_table(rule: str = "table", neighbours: tuple[int, ...] = (4, 5, 6)) -> NDArray[np.uint8]:
+def _orientation_table(rule: str = "table", neighbours: tuple[int, ...] = (4, 5, 6)) -> NDArray[np.uint8]:
     """Return the opening angle of each of the 256 codes plus one, shape (256,).
 
     Angles are in units of ``STEP``; 0 where the code is no corner.
@@ -189,7 +189,7 @@ def detect_corners(levels: NDArray[np.uint8], resolution: float, settings: Corne
         if _is_three_level(padded.view(np.uint64))
         else cv2.LUT(padded, _levels_of_greys(settings.occupied_below, settings.free_above))
     )
-    table = orientation_table(settings.rule, settings.neighbours)
+    table = _orientation_table(settings.rule, settings.neighbours)
     found = np.empty((levels.size // 2 + 1, 3), np.int32)
     count = _find_corners(three.view(np.uint64), rows, columns, table, found)
     cells = found[:count, :2].astype(np.int64)

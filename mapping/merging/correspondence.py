@@ -20,7 +20,7 @@ LEAST_CLUSTER = 2
 """Corners beside its own that a cluster needs."""
 
 
-def common_distances(first: NDArray[np.float64], second: NDArray[np.float64], tolerance: float) -> NDArray[np.float64]:
+def _common_distances(first: NDArray[np.float64], second: NDArray[np.float64], tolerance: float) -> NDArray[np.float64]:
     """Return the share of common distances of each pair of corners, (n, m).
 
     The share of the first corner's distances that the second one has too.
@@ -29,7 +29,7 @@ def common_distances(first: NDArray[np.float64], second: NDArray[np.float64], to
     return np.asarray(votes / max(len(first) - 1, 1))
 
 
-def like_clusters(
+def _like_clusters(
     first: NDArray[np.float64], second: NDArray[np.float64], tolerance: float, radius_m: float
 ) -> NDArray[np.float64]:
     """Return the share of common distances of each pair of corners within a radius, (n, m).
@@ -45,7 +45,7 @@ def like_clusters(
     return np.where(smaller >= LEAST_CLUSTER, common / np.maximum(larger, 1), 0.0)
 
 
-def like_triangles(first: NDArray[np.float64], second: NDArray[np.float64], tolerance: float) -> NDArray[np.float64]:
+def _like_triangles(first: NDArray[np.float64], second: NDArray[np.float64], tolerance: float) -> NDArray[np.float64]:
     """Return the similarity of the triangles of each pair of corners, (n, m).
 
     Triangles are with the two nearest neighbours; 0 where they are not alike.
@@ -215,7 +215,7 @@ def match_corners(
     similarity: NDArray[np.floating]
     shift: NDArray[np.floating]
     if settings.method == "descriptors":
-        similarity, shift = compare_descriptors(first_descriptors, second_descriptors, settings)
+        similarity, shift = _compare_descriptors(first_descriptors, second_descriptors, settings)
     else:
         similarity, shift = _compared_places(first.points, second.points, settings), np.zeros_like(difference)
     # Of a corner seen at a in the first map and at b in the second, the second map is turned by a - b.
@@ -230,7 +230,7 @@ def match_corners(
     )
 
 
-def compare_descriptors(
+def _compare_descriptors(
     first: Descriptors, second: Descriptors, settings: CorrespondenceSettings
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Compare each descriptor of a map with each of another.
@@ -282,10 +282,10 @@ def _compared_places(
     """Return the similarity of corners (n, m) by where their neighbours are."""
     tolerance = settings.length_tolerance
     if settings.method == "distances":
-        return common_distances(first, second, tolerance)
+        return _common_distances(first, second, tolerance)
     if settings.method == "triplets":
-        return like_triangles(first, second, tolerance)
-    return like_clusters(first, second, tolerance, settings.cluster_radius_m)
+        return _like_triangles(first, second, tolerance)
+    return _like_clusters(first, second, tolerance, settings.cluster_radius_m)
 
 
 def _energy(first: NDArray[np.floating], second: NDArray[np.floating], measure: str) -> NDArray[np.floating]:

@@ -43,7 +43,7 @@ class GrowingMap(NamedTuple):
 
 
 @dataclass(slots=True)
-class DescribedMaps:
+class _DescribedMaps:
     """The maps as they were last taken in, by name.
 
     Attributes
@@ -96,7 +96,7 @@ def _is_same(before: GrowingMap | None, now: GrowingMap) -> bool:
 
 
 @dataclass(slots=True)
-class TriedPair:
+class _TriedPair:
     """What is known of a pair.
 
     Attributes
@@ -164,8 +164,8 @@ class IncrementalMerger:
     searches_per_update: int | None = None
     searched: int = 0
     verified: int = 0
-    _described: DescribedMaps = field(default_factory=DescribedMaps)
-    _pairs: dict[tuple[str, str], TriedPair] = field(default_factory=dict)
+    _described: _DescribedMaps = field(default_factory=_DescribedMaps)
+    _pairs: dict[tuple[str, str], _TriedPair] = field(default_factory=dict)
     _tree: FrameTree[str] | None = None
     _updates: int = 0
 
@@ -208,7 +208,7 @@ class IncrementalMerger:
         self.searched = self.verified = 0
         every = list(itertools.combinations(maps, 2))
         most = self.searches_per_update if may_search else 0
-        tried_now: dict[tuple[str, str], TriedPair] = {}
+        tried_now: dict[tuple[str, str], _TriedPair] = {}
         for pair in self._due([pair for pair in every if may_try is None or pair in may_try]):
             tried = self._tried(pair, self._pairs.get(pair), most is None or self.searched < most)
             if tried is not None:
@@ -266,7 +266,7 @@ class IncrementalMerger:
     def _known_of(self, pair: tuple[str, str]) -> float:
         return sum(self._described.known_m2[name] for name in pair)
 
-    def _kept(self, pair: tuple[str, str]) -> TriedPair | None:
+    def _kept(self, pair: tuple[str, str]) -> _TriedPair | None:
         """Return the known result of a pair that is not tried now.
 
         It refers to the corners that the maps have now.
@@ -285,7 +285,7 @@ class IncrementalMerger:
         agreement = replace(before.result.agreement, centre=(float(centre[0]), float(centre[1])))
         return replace(before, result=replace(before.result, a_from_b=a_from_b, agreement=agreement), corner=first)
 
-    def _tried(self, pair: tuple[str, str], before: TriedPair | None, may_search: bool) -> TriedPair | None:
+    def _tried(self, pair: tuple[str, str], before: _TriedPair | None, may_search: bool) -> _TriedPair | None:
         """Verify the transform of a pair.
 
         Search where there is none, or it is refused by now. None where that has to wait.
@@ -303,7 +303,7 @@ class IncrementalMerger:
             result = verify_pair(a, b, first.inverse() @ implied @ second, self.settings)
             if result.is_accepted and result.a_from_b is not None and self._convinces(pair, result):
                 self.verified += 1
-                return TriedPair(
+                return _TriedPair(
                     result, first @ result.a_from_b @ second.inverse(), known_m2, True, self._updates, first
                 )
             if self.searches_per_update is not None:
@@ -313,15 +313,15 @@ class IncrementalMerger:
         return self._searched(pair, before) if may_search else None
 
     def _verified(
-        self, pair: tuple[str, str], before: TriedPair, frames: Transform, may_search: bool
-    ) -> TriedPair | None:
+        self, pair: tuple[str, str], before: _TriedPair, frames: Transform, may_search: bool
+    ) -> _TriedPair | None:
         """Verify what was found; None where it is searched for once more."""
         a, b = (self._described.features[name] for name in pair)
         first, second = (placed(self._described.maps[name].origin) for name in pair)
         known_m2 = self._known_of(pair)
         result = verify_pair(a, b, first.inverse() @ frames @ second, self.settings)
         if not result.is_accepted or result.a_from_b is None:
-            return None if may_search else TriedPair(result, None, -math.inf, False, before.at, first)
+            return None if may_search else _TriedPair(result, None, -math.inf, False, before.at, first)
         is_due = not before.is_confirmed and self._may_be_better(pair, before, result, known_m2)
         if is_due and may_search:
             return None
@@ -329,15 +329,15 @@ class IncrementalMerger:
         refined = first @ result.a_from_b @ second.inverse()
         # A search that has to wait is due whether maps grow any more or not.
         at = before.at if is_due else self._updates
-        return TriedPair(result, refined, before.known_m2, before.is_confirmed, at, first)
+        return _TriedPair(result, refined, before.known_m2, before.is_confirmed, at, first)
 
-    def _may_be_better(self, pair: tuple[str, str], before: TriedPair, result: PairResult, known_m2: float) -> bool:
+    def _may_be_better(self, pair: tuple[str, str], before: _TriedPair, result: PairResult, known_m2: float) -> bool:
         """Whether a search may confirm what was found, or find what convinces where that does not."""
         if self._convinces(pair, result):
             return known_m2 >= before.known_m2 + (self.confirmation_growth_m2 or 0.0)
         return known_m2 >= before.known_m2 + self.search_growth_m2
 
-    def _searched(self, pair: tuple[str, str], before: TriedPair | None) -> TriedPair:
+    def _searched(self, pair: tuple[str, str], before: _TriedPair | None) -> _TriedPair:
         """Search for the transform of a pair."""
         a, b = (self._described.features[name] for name in pair)
         first, second = (placed(self._described.maps[name].origin) for name in pair)
@@ -346,10 +346,10 @@ class IncrementalMerger:
         is_found = result.is_accepted and result.a_from_b is not None
         frames = first @ result.a_from_b @ second.inverse() if is_found and result.a_from_b is not None else None
         is_confirmed = self._confirms(pair, before, frames, result)
-        return TriedPair(result, frames, self._known_of(pair), is_confirmed, self._updates, first)
+        return _TriedPair(result, frames, self._known_of(pair), is_confirmed, self._updates, first)
 
     def _confirms(
-        self, pair: tuple[str, str], before: TriedPair | None, frames: Transform | None, result: PairResult
+        self, pair: tuple[str, str], before: _TriedPair | None, frames: Transform | None, result: PairResult
     ) -> bool:
         """Whether what was searched for and found is believed from now on."""
         if self.confirmation_growth_m2 is None:

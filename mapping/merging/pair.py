@@ -44,7 +44,7 @@ SAME = 0.9
 SAMPLES = 2000
 
 
-def exact_motion(a: DescribedMap, b: DescribedMap, a_from_b: Transform) -> Transform | None:
+def _exact_motion(a: DescribedMap, b: DescribedMap, a_from_b: Transform) -> Transform | None:
     """Return the motion by whole cells and quarter turns near another one, if the maps share cells.
 
     Parameters
@@ -161,7 +161,7 @@ def explained(a: DescribedMap, b: DescribedMap, result: PairResult, settings: Me
     return replace(result, ranked=tuple(ranked), confidence=confidence_of(signs_of(a, b, ranked)) if ranked else 0.0)
 
 
-def or_bent(a: DescribedMap, b: DescribedMap, result: PairResult, settings: MergeSettings) -> PairResult:
+def _or_bent(a: DescribedMap, b: DescribedMap, result: PairResult, settings: MergeSettings) -> PairResult:
     """Return a refused result, or that of the maps bent where they agree then."""
     if result.is_accepted or settings.confidence > 1.0 or settings.bend.candidates == 0:
         return result
@@ -260,7 +260,7 @@ def merge_near(a: DescribedMap, b: DescribedMap, guess: Transform, settings: Mer
         found_by="guess",
         tried=tuple(one.candidate.a_from_b for one in judged),
     )
-    result = _exactly(a, b, or_bent(a, b, result, settings), settings)
+    result = _exactly(a, b, _or_bent(a, b, result, settings), settings)
     return replace(result, time_ms=1e3 * (time.process_time() - began))
 
 
@@ -268,7 +268,7 @@ def _exactly(a: DescribedMap, b: DescribedMap, result: PairResult, settings: Mer
     """Return an accepted result with the exact motion where the maps share their cells."""
     if not result.is_accepted or result.a_from_b is None:
         return result
-    motion = exact_motion(a, b, result.a_from_b)
+    motion = _exact_motion(a, b, result.a_from_b)
     if motion is None:
         return result
     agreement = compare(a, b, motion, settings.validation)
@@ -309,7 +309,7 @@ def verify_pair(
         found_by="verification",
         tried=(a_from_b,),
     )
-    return replace(or_bent(a, b, result, settings), time_ms=1e3 * (time.process_time() - began))
+    return replace(_or_bent(a, b, result, settings), time_ms=1e3 * (time.process_time() - began))
 
 
 def is_contradicted(a: DescribedMap, b: DescribedMap, a_from_b: Transform, settings: MergeSettings) -> bool:
@@ -354,7 +354,7 @@ def _merge_by_walls(a: DescribedMap, b: DescribedMap, matches: Matches, settings
         joined=joined,
         tried=tuple(one.candidate.a_from_b for one in judged),
     )
-    return or_bent(a, b, result, settings)
+    return _or_bent(a, b, result, settings)
 
 
 class _Search(NamedTuple):

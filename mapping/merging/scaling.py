@@ -101,7 +101,7 @@ class ScaleSettings:
         return np.asarray(self.least * np.exp(self.step * np.arange(count)))
 
 
-class Placement(NamedTuple):
+class _Placement(NamedTuple):
     """How the second map may lie on the first.
 
     Attributes
@@ -119,7 +119,7 @@ class Placement(NamedTuple):
     value_m: float
 
 
-def wall_axis(described: DescribedMap) -> float:
+def _wall_axis(described: DescribedMap) -> float:
     """Return the direction of a map's walls, from 0 to a quarter turn [rad].
 
     It is that across which walls fall into the fewest bins of a histogram: the sum of the squared counts,
@@ -140,7 +140,7 @@ def _sharpness(walls: NDArray[np.float64], angle: float, bin_m: float) -> float:
     return float(sum((np.bincount(bins[:, axis]).astype(np.float64) ** 2).sum() for axis in (0, 1)))
 
 
-def placements(a: DescribedMap, b: DescribedMap, settings: ScaleSettings) -> list[Placement]:
+def _placements(a: DescribedMap, b: DescribedMap, settings: ScaleSettings) -> list[_Placement]:
     """Return the placements of map b for which most speaks, the best first.
 
     They are ranked by the walls that agree, between what these measure in the one map and in the other: in
@@ -155,19 +155,19 @@ def placements(a: DescribedMap, b: DescribedMap, settings: ScaleSettings) -> lis
     """
     slants = np.arange(-settings.slants, settings.slants + 1) * settings.slant
     quarters = np.arange(4) * (math.pi / 2.0)
-    rotations = (wall_axis(a) - wall_axis(b) + quarters[:, None] + slants).ravel()
+    rotations = (_wall_axis(a) - _wall_axis(b) + quarters[:, None] + slants).ravel()
     found = []
     for scale in settings.scales.tolist():
         grown = replace(b, resolution=b.resolution * scale, walls=b.walls * scale)
         transforms, values = best_translations(a, grown, rotations, settings.correlation, settings.apart_m)
         found += [
-            Placement(scale, Transform(*transform), value)
+            _Placement(scale, Transform(*transform), value)
             for transform, value in zip(transforms.tolist(), values.tolist(), strict=True)
         ]
     return sorted(found, key=lambda one: -one.value_m / math.sqrt(one.scale))[: settings.candidates]
 
 
-def grown_levels(levels: NDArray[np.uint8], resolution: float, wanted: float) -> NDArray[np.uint8]:
+def _grown_levels(levels: NDArray[np.uint8], resolution: float, wanted: float) -> NDArray[np.uint8]:
     """Return a three-level map in cells of another side, from the same corner.
 
     Parameters
@@ -187,9 +187,9 @@ _SAMPLES = 400
 """Number of wall cells by which placements are ranked."""
 
 
-def region_placements(
+def _region_placements(
     a: DescribedMap, b: DescribedMap, settings: RegionSettings, scaling: ScaleSettings
-) -> list[Placement]:
+) -> list[_Placement]:
     """Return the placements of map b under which regions meet, those for which most speaks first.
 
     Parameters
@@ -210,10 +210,10 @@ def region_placements(
     places = found[:, :2] + turned(middle, found[:, 2])
     order = np.argsort(-values, kind="stable")
     apart = (scaling.apart_m, scaling.slant)
-    kept: list[Placement] = []
+    kept: list[_Placement] = []
     for k in distinct(np.column_stack([places, found[:, 2]]), order, np.zeros(2), settings.candidates, apart):
         x, y, theta, scale = found[k].tolist()
-        kept.append(Placement(scale, Transform(x, y, theta), float(values[k]) * a.resolution))
+        kept.append(_Placement(scale, Transform(x, y, theta), float(values[k]) * a.resolution))
     return kept
 
 
@@ -227,7 +227,7 @@ SETTLED = 0.003
 """A scale that would change by less is refined no more."""
 
 
-class Grown(NamedTuple):
+class _Grown(NamedTuple):
     """A hypothesis at a scale.
 
     Attributes
@@ -294,8 +294,8 @@ def merge_scaled(
     side = max(scaling.cell_m, *(resolution for _, resolution in drawn.values()))
     (first, a_grid), (second, b_grid) = drawn.items()
     began = time.process_time()
-    a, b = (describe_map(grown_levels(*grid, side), side) for grid in (a_grid, b_grid))
-    if structure(a) < structure(b):
+    a, b = (describe_map(_grown_levels(*grid, side), side) for grid in (a_grid, b_grid))
+    if _structure(a) < _structure(b):
         ranked = _ranked(b, a_grid, settings, scaling)
         confidence = _confidence(b, ranked)
         best = _turned_round(a, ranked[0], b_grid, settings) if ranked else None
@@ -310,7 +310,7 @@ def merge_scaled(
     return ScaledMerge(merged, 1.0 if best is None else best.scale)
 
 
-def structure(described: DescribedMap) -> float:
+def _structure(described: DescribedMap) -> float:
     """Return how much structure a map has, whatever its scale.
 
     It is the squared length of its walls over its area. The map with less is laid on that with more: a
@@ -321,12 +321,12 @@ def structure(described: DescribedMap) -> float:
 
 
 def _turned_round(
-    a: DescribedMap, found: Grown, grid: tuple[NDArray[np.uint8], float], settings: MergeSettings
-) -> Grown | None:
+    a: DescribedMap, found: _Grown, grid: tuple[NDArray[np.uint8], float], settings: MergeSettings
+) -> _Grown | None:
     """Return the hypothesis of the second map on the first, from its inverse."""
     back = found.hypothesis.bend.a_from_b.inverse()
     start = Transform(back.x / found.scale, back.y / found.scale, back.theta)
-    return _refined(a, grid, Placement(1.0 / found.scale, start, 0.0), settings, 1)
+    return _refined(a, grid, _Placement(1.0 / found.scale, start, 0.0), settings, 1)
 
 
 def _checked(name: str, grid: ArrayLike, resolution: float, settings: MergeSettings) -> NDArray[np.uint8]:
@@ -340,26 +340,26 @@ def _checked(name: str, grid: ArrayLike, resolution: float, settings: MergeSetti
 
 def _ranked(
     a: DescribedMap, grid: tuple[NDArray[np.uint8], float], settings: MergeSettings, scaling: ScaleSettings
-) -> list[Grown]:
+) -> list[_Grown]:
     """Return hypotheses of how a map lies at some scale, the best first.
 
     All scales are tried where regions are not asked, or propose nothing that is believed.
     """
-    b = describe_map(grown_levels(*grid, a.resolution), a.resolution)
+    b = describe_map(_grown_levels(*grid, a.resolution), a.resolution)
     if len(a.walls) == 0 or len(b.walls) == 0:
         return []
-    found: list[Grown] = []
+    found: list[_Grown] = []
     if settings.structure != "corners":
-        starts = region_placements(a, b, settings.regions, scaling)
+        starts = _region_placements(a, b, settings.regions, scaling)
         found = _by_evidence([_refined(a, grid, one, settings, scaling.rounds) for one in starts])
         is_enough = _confidence(a, found) >= scaling.confidence
         if found and (is_enough or settings.structure == "regions"):
             return found
-    starts = placements(a, b, scaling)
+    starts = _placements(a, b, scaling)
     return _by_evidence([*found, *(_refined(a, grid, one, settings, scaling.rounds) for one in starts)])
 
 
-def _by_evidence(found: Iterable[Grown | None]) -> list[Grown]:
+def _by_evidence(found: Iterable[_Grown | None]) -> list[_Grown]:
     """Return the hypotheses that there are, the best first."""
     return sorted((one for one in found if one is not None), key=lambda one: (-one.own_evidence_m, one.scale))
 
@@ -367,29 +367,29 @@ def _by_evidence(found: Iterable[Grown | None]) -> list[Grown]:
 def _refined(
     a: DescribedMap,
     grid: tuple[NDArray[np.uint8], float],
-    start: Placement,
+    start: _Placement,
     settings: MergeSettings,
     rounds: int,
-) -> Grown | None:
+) -> _Grown | None:
     """Return the hypothesis near a placement, scale refined; None without walls."""
     scale, a_from_b = start.scale, start.a_from_b
     while True:
         rounds -= 1
-        levels = grown_levels(grid[0], grid[1] * scale, a.resolution)
+        levels = _grown_levels(grid[0], grid[1] * scale, a.resolution)
         b = describe_map(levels, a.resolution)
         if len(b.walls) == 0:
             return None
         bend = estimate_bend(a, b, a_from_b, settings.bend)
         growth = min(max(bend.scale, 1.0 / MOST_GROWTH), MOST_GROWTH)
         if rounds == 0 or abs(growth - 1.0) < SETTLED or not bend.is_held:
-            return Grown(scale, b, Hypothesis(bend, compare_bent(a, b, bend)))
+            return _Grown(scale, b, Hypothesis(bend, compare_bent(a, b, bend)))
         # The map grows about the middle of its walls.
         middle = b.walls.mean(axis=0)
         x, y = bend.a_from_b.apply(middle) - Transform(0.0, 0.0, bend.a_from_b.theta).apply(middle * growth)
         scale, a_from_b = scale * growth, Transform(float(x), float(y), bend.a_from_b.theta)
 
 
-def _is_rival(best: Grown, other: Grown) -> bool:
+def _is_rival(best: _Grown, other: _Grown) -> bool:
     """Whether a hypothesis is of another place, or of another scale."""
     if abs(math.log(best.scale / other.scale)) > SAME_SCALE:
         return True
@@ -400,7 +400,7 @@ def _is_rival(best: Grown, other: Grown) -> bool:
     return distance > RIVAL_M or abs(wrapped(first.theta - second.theta)) > RIVAL_ANGLE
 
 
-def _confidence(a: DescribedMap, ranked: list[Grown]) -> float:
+def _confidence(a: DescribedMap, ranked: list[_Grown]) -> float:
     """Return how sure it is that the best hypothesis is right, 0 where there is none."""
     if not ranked:
         return 0.0
@@ -410,7 +410,7 @@ def _confidence(a: DescribedMap, ranked: list[Grown]) -> float:
     return confidence_of(signs_of(a, best.described, [best.hypothesis])._replace(rival_share=rival_share))
 
 
-def _result(best: Grown | None, confidence: float, scaling: ScaleSettings) -> PairResult:
+def _result(best: _Grown | None, confidence: float, scaling: ScaleSettings) -> PairResult:
     """Return what comes of the best hypothesis."""
     if best is None:
         return PairResult(False, NO_WALLS)

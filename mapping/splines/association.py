@@ -73,7 +73,7 @@ def overlap_of(seen: Spline, known: Spline, settings: AssociationSettings | None
     """
     settings = settings or AssociationSettings()
     seen_at, known_at = seen.sample_parameters(SAMPLE_SPACING), known.sample_parameters(SAMPLE_SPACING)
-    found = find_overlap(seen.evaluate(seen_at), known.evaluate(known_at))
+    found = _find_overlap(seen.evaluate(seen_at), known.evaluate(known_at))
     seen_from, seen_to, known_from, known_to, length, distance, turn, cases = found
     if length < settings.least_overlap or distance > settings.mean_distance or turn > settings.mean_turn:
         return None
@@ -104,7 +104,7 @@ def _are_near(seen: Array, known: Array, distance: float) -> bool:
 
 
 @kernel
-def closest_place(way: Array, x: float, y: float) -> tuple[float, float]:
+def _closest_place(way: Array, x: float, y: float) -> tuple[float, float]:
     """Return the nearest place on a polyline (n, 2) to a point, and its distance.
 
     The place is counted in points of the polyline, n >= 2; the distance is in metres [m].
@@ -132,19 +132,19 @@ def mark_along(points: Array, way: Array, distance: float, is_along: Array) -> N
     """
     last = points.shape[0] - 1
     for k in range(points.shape[0]):
-        place, gap = closest_place(way, points[k, 0], points[k, 1])
+        place, gap = _closest_place(way, points[k, 0], points[k, 1])
         if gap <= distance:
             x, y = (
                 points[min(k + 1, last), 0] - points[max(k - 1, 0), 0],
                 points[min(k + 1, last), 1] - points[max(k - 1, 0), 1],
             )
-            direction = direction_of(way, place)
+            direction = _direction_of(way, place)
             if x * math.cos(direction) + y * math.sin(direction) >= 0.0:
                 is_along[k] = True
 
 
 @kernel
-def point_of(way: Array, place: float) -> tuple[float, float]:
+def _point_of(way: Array, place: float) -> tuple[float, float]:
     """Return the point at a place of a way."""
     k = min(max(int(place), 0), way.shape[0] - 2)
     share = place - k
@@ -152,14 +152,14 @@ def point_of(way: Array, place: float) -> tuple[float, float]:
 
 
 @kernel
-def direction_of(way: Array, place: float) -> float:
+def _direction_of(way: Array, place: float) -> float:
     """Return the direction of a way at a place [rad]."""
     k = min(max(int(place), 0), way.shape[0] - 2)
     return math.atan2(way[k + 1, 1] - way[k, 1], way[k + 1, 0] - way[k, 0])
 
 
 @kernel
-def find_overlap(seen: Array, known: Array) -> tuple[float, float, float, float, float, float, float, int]:
+def _find_overlap(seen: Array, known: Array) -> tuple[float, float, float, float, float, float, float, int]:
     """Find the common part of two ways of points (n, 2), (m, 2).
 
     Returns
@@ -173,11 +173,11 @@ def find_overlap(seen: Array, known: Array) -> tuple[float, float, float, float,
     cases = 0
     for side in range(2):
         a = 0 if side == 0 else seen.shape[0] - 1
-        b, _ = closest_place(known, seen[a, 0], seen[a, 1])
+        b, _ = _closest_place(known, seen[a, 0], seen[a, 1])
         is_end = b <= 0.0 or b >= known.shape[0] - 1.0
         if is_end:
-            x, y = point_of(known, b)
-            ends[side], _ = closest_place(seen, x, y)
+            x, y = _point_of(known, b)
+            ends[side], _ = _closest_place(seen, x, y)
             cases += 1 << side
         else:
             ends[side] = float(a)
@@ -191,9 +191,9 @@ def find_overlap(seen: Array, known: Array) -> tuple[float, float, float, float,
             continue
         dx, dy = seen[k + 1, 0] - seen[k, 0], seen[k + 1, 1] - seen[k, 1]
         step = (high - low) * math.sqrt(dx * dx + dy * dy)
-        x, y = point_of(seen, (low + high) / 2.0)
-        place, gap = closest_place(known, x, y)
-        angle = math.atan2(dy, dx) - direction_of(known, place)
+        x, y = _point_of(seen, (low + high) / 2.0)
+        place, gap = _closest_place(known, x, y)
+        angle = math.atan2(dy, dx) - _direction_of(known, place)
         length += step
         distance += step * gap
         turn += step * abs(math.atan2(math.sin(angle), math.cos(angle)))
@@ -237,7 +237,7 @@ class Places:
 
 def common_places(seen: Way, known: Way, settings: AssociationSettings) -> Places | None:
     """Return where two ways run together, None where they are not of one wall."""
-    seen_from, seen_to, known_from, known_to, length, distance, turn, _ = find_overlap(seen.points, known.points)
+    seen_from, seen_to, known_from, known_to, length, distance, turn, _ = _find_overlap(seen.points, known.points)
     if length < settings.least_overlap or distance > settings.mean_distance or turn > settings.mean_turn:
         return None
     return Places(seen_from, seen_to, known_from, known_to, length)
@@ -322,7 +322,7 @@ def _join(
     tail = known_to >= last_known and _length_between(seen, seen_to, last_seen) >= least_extension
     count = 0
     if head:
-        x, y = point_of(seen, seen_from)
+        x, y = _point_of(seen, seen_from)
         offset_x, offset_y = _shift(
             known[0, 0], known[0, 1], known_weights[0], x, y, _weight_at(seen_weights, seen_from)
         )
@@ -334,10 +334,10 @@ def _join(
     for k in range(known.shape[0]):
         points[count, 0], points[count, 1], weights[count] = known[k, 0], known[k, 1], known_weights[k]
         if known_from <= k <= known_to:
-            place, _ = closest_place(seen, known[k, 0], known[k, 1])
+            place, _ = _closest_place(seen, known[k, 0], known[k, 1])
             # What lies beside an end of the seen way is not what it saw.
             if 0.0 < place < last_seen or k in (known_from, known_to):
-                x, y = point_of(seen, place)
+                x, y = _point_of(seen, place)
                 weight = _weight_at(seen_weights, place)
                 if known_from > 0.0:
                     weight *= _ramp(_length_between(known, known_from, float(k)), blend)
@@ -349,7 +349,7 @@ def _join(
                 weights[count] = min(known_weights[k] + weight, most_weight)
         count += 1
     if tail:
-        x, y = point_of(seen, seen_to)
+        x, y = _point_of(seen, seen_to)
         end = known.shape[0] - 1
         offset_x, offset_y = _shift(
             known[end, 0], known[end, 1], known_weights[end], x, y, _weight_at(seen_weights, seen_to)

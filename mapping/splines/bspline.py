@@ -19,7 +19,7 @@ ORDER = 4
 """Degree 3, and one."""
 
 
-def basis_matrix(knots: ArrayLike, parameters: ArrayLike) -> NDArray[np.float64]:
+def _basis_matrix(knots: ArrayLike, parameters: ArrayLike) -> NDArray[np.float64]:
     """Return the values of all basis functions, shape (parameters, n).
 
     Each row sums to one within the domain.
@@ -141,7 +141,7 @@ GAUSS_PLACES, GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(5)
 
 
 @kernel
-def is_sound(knots: Array, control_points: Array) -> bool:
+def _is_sound(knots: Array, control_points: Array) -> bool:
     """Return whether all numbers are finite and the knots are valid.
 
     Knots must not decrease, and must span something.
@@ -158,7 +158,7 @@ def is_sound(knots: Array, control_points: Array) -> bool:
 
 
 @kernel
-def evaluate_curve(knots: Array, control_points: Array, parameters: Array, order: int, points: Array) -> None:
+def _evaluate_curve(knots: Array, control_points: Array, parameters: Array, order: int, points: Array) -> None:
     """Write a derivative of a curve at some parameters, (parameters, 2)."""
     values = np.empty(ORDER)
     for k in range(parameters.shape[0]):
@@ -183,7 +183,7 @@ def curve_length(knots: Array, control_points: Array) -> float:
 
 
 @kernel
-def closest_point(knots: Array, control_points: Array, points: Array, parameters: Array, distances: Array) -> None:
+def _closest_point(knots: Array, control_points: Array, points: Array, parameters: Array, distances: Array) -> None:
     """Find nearest points by Newton's method in each piece that may hold one.
 
     The control points' differences bound the length of each piece.
@@ -283,7 +283,7 @@ class _Ray(NamedTuple):
 
 
 @kernel
-def ray_crossing(knots: Array, control_points: Array, x: float, y: float, cosine: float, sine: float) -> float:
+def _ray_crossing(knots: Array, control_points: Array, x: float, y: float, cosine: float, sine: float) -> float:
     """Find where a ray meets the curve, skipping spans it cannot meet.
 
     Their control polygon lies on one side of its line, or behind it: a curve lies in its polygon's hull.
@@ -367,7 +367,7 @@ class Spline:
             raise ValueError(
                 f"knots have shape {knots.shape}; want {len(control_points) + ORDER}, {ORDER} more than control points"
             )
-        if not is_sound(knots, control_points):
+        if not _is_sound(knots, control_points):
             raise ValueError("knots decrease or span nothing, or knots or control points are not finite")
         object.__setattr__(self, "knots", knots)
         object.__setattr__(self, "control_points", control_points)
@@ -428,7 +428,7 @@ class Spline:
         """
         places = np.ascontiguousarray(np.reshape(np.asarray(points, np.float64), (-1, 2)))
         parameters, distances = np.empty(len(places)), np.empty(len(places))
-        closest_point(self.knots, self.control_points, places, parameters, distances)
+        _closest_point(self.knots, self.control_points, places, parameters, distances)
         return parameters, distances
 
     def ray(self, origin: ArrayLike, direction: float) -> float:
@@ -437,10 +437,10 @@ class Spline:
         From a point (2,) along a direction [rad]; inf where it does not.
         """
         x, y = (float(value) for value in np.asarray(origin, np.float64))
-        return float(ray_crossing(self.knots, self.control_points, x, y, math.cos(direction), math.sin(direction)))
+        return float(_ray_crossing(self.knots, self.control_points, x, y, math.cos(direction), math.sin(direction)))
 
     def _values(self, parameters: ArrayLike, order: int) -> NDArray[np.float64]:
         wanted = np.atleast_1d(np.asarray(parameters, np.float64))
         values = np.empty((len(wanted), 2))
-        evaluate_curve(self.knots, self.control_points, wanted, order, values)
+        _evaluate_curve(self.knots, self.control_points, wanted, order, values)
         return values

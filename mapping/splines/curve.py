@@ -88,7 +88,7 @@ def make_curve(spline: Spline, weights: NDArray[np.float64], count: int, last_se
         )
     parameters = spline.sample_parameters(spacing)
     points = spline.evaluate(parameters)
-    way = Way(points, np.interp(parameters, control_parameters(spline.knots), weights))
+    way = Way(points, np.interp(parameters, _control_parameters(spline.knots), weights))
     line = np.empty(4)
     is_line = _find_line(points, line)
     return Curve(
@@ -117,7 +117,7 @@ def fit_curve(way: Way, count: int, last_seen: int, fit: FitSettings, settings: 
     weights[[0, -1]] = _END_WEIGHT * weights.max()
     spline = fit_bspline(way.points, fitting, 0.01 / np.sqrt(weights)).spline
     lengths = lengths_along(way.points)
-    shares = control_parameters(spline.knots) / spline.domain[1]
+    shares = _control_parameters(spline.knots) / spline.domain[1]
     weights = np.interp(shares * lengths[-1], lengths, way.weights)
     return make_curve(spline, weights, count, last_seen, settings.sample_spacing)
 
@@ -133,7 +133,7 @@ def curves_in(curves: list[Curve], box: Box) -> list[int]:
     ]
 
 
-def control_parameters(knots: NDArray[np.float64]) -> NDArray[np.float64]:
+def _control_parameters(knots: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the parameter at which each control point acts most, (n,) [m].
 
     The mean of its three inner knots (Greville).
@@ -282,7 +282,7 @@ def _is_straight(points: Array, first: int, last: int) -> bool:
 
 
 @kernel(forceinline=True)
-def piece_distance(pieces: Array, piece: int, x: float, y: float) -> float:
+def _piece_distance(pieces: Array, piece: int, x: float, y: float) -> float:
     """Return the distance of a point from a straight piece [m]."""
     dx, dy = x - pieces[piece, 0], y - pieces[piece, 1]
     along = abs(dx * pieces[piece, 2] + dy * pieces[piece, 3]) - pieces[piece, 4]
@@ -293,7 +293,7 @@ def piece_distance(pieces: Array, piece: int, x: float, y: float) -> float:
 
 
 @kernel(forceinline=True)
-def piece_at(nearest: Array, frame: Array, x: float, y: float) -> int:
+def _piece_at(nearest: Array, frame: Array, x: float, y: float) -> int:
     """Return the nearest piece of a place, -1 where there is none."""
     column, row = int((x - frame[0]) * (1.0 / CELL)), int((y - frame[1]) * (1.0 / CELL))
     if x < frame[0] or y < frame[1] or row >= nearest.shape[0] or column >= nearest.shape[1]:
@@ -304,8 +304,8 @@ def piece_at(nearest: Array, frame: Array, x: float, y: float) -> int:
 @kernel
 def _look_up(points: Array, pieces: Array, nearest: Array, frame: Array, found: Array, gaps: Array) -> None:
     for k in range(points.shape[0]):
-        piece = piece_at(nearest, frame, points[k, 0], points[k, 1])
-        gap = piece_distance(pieces, piece, points[k, 0], points[k, 1]) if piece >= 0 else math.inf
+        piece = _piece_at(nearest, frame, points[k, 0], points[k, 1])
+        gap = _piece_distance(pieces, piece, points[k, 0], points[k, 1]) if piece >= 0 else math.inf
         found[k], gaps[k] = (piece, gap) if gap <= frame[2] else (-1, math.inf)
 
 
@@ -325,7 +325,7 @@ def _stamp(pieces: Array, frame: Array, nearest: Array, gaps: Array) -> None:
         for row in range(first_row, last_row + 1):
             for column in range(first_column, last_column + 1):
                 middle_x, middle_y = frame[0] + (column + 0.5) * CELL, frame[1] + (row + 0.5) * CELL
-                gap = piece_distance(pieces, k, middle_x, middle_y)
+                gap = _piece_distance(pieces, k, middle_x, middle_y)
                 if gap <= reach and gap < gaps[row, column]:
                     gaps[row, column] = gap
                     nearest[row, column] = k

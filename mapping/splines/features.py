@@ -23,7 +23,7 @@ from lidarium.mapping.splines.settings import BREAKPOINT_TESTS, PointSettings, S
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ScanPoints:
+class _ScanPoints:
     """Where the beams of a scan ended, in the frame of the robot at the last beam.
 
     Attributes
@@ -56,7 +56,7 @@ def scan_points(
     settings: PointSettings | None = None,
     motion: Transform | None = None,
     motion_s: float = 0.0,
-) -> ScanPoints:
+) -> _ScanPoints:
     """Turn a scan into points.
 
     Parameters
@@ -93,7 +93,7 @@ def scan_points(
         back = motion.inverse()
         _undo_motion(points, shares, back.x, back.y, back.theta)
     sigmas = np.maximum(settings.noise_floor, settings.noise_share * hits)
-    return ScanPoints(points, beams.astype(np.int64), hits, sigmas, scan, geometry)
+    return _ScanPoints(points, beams.astype(np.int64), hits, sigmas, scan, geometry)
 
 
 @kernel
@@ -109,7 +109,7 @@ def _undo_motion(points: Array, shares: Array, x: float, y: float, theta: float)
         points[k, 1] = sine * px + cosine * py + shares[k] * y
 
 
-def clusters(points: ScanPoints, settings: SegmentationSettings | None = None) -> NDArray[np.int64]:
+def clusters(points: _ScanPoints, settings: SegmentationSettings | None = None) -> NDArray[np.int64]:
     """Cut the points of a scan where the surface ends.
 
     A beam without a return, or an invalid one, always breaks. Dietmayer's test is printed with a difference
@@ -252,12 +252,12 @@ class Observation:
         Corners, peaks and lines.
     """
 
-    points: ScanPoints
+    points: _ScanPoints
     pieces: tuple[tuple[int, int], ...]
     features: Features
 
 
-def observe(points: ScanPoints, settings: SplineSettings | None = None) -> Observation:
+def observe(points: _ScanPoints, settings: SplineSettings | None = None) -> Observation:
     """Cut a scan into smooth pieces and find its features."""
     settings = settings or SplineSettings()
     pieces: list[tuple[int, int]] = []
@@ -329,7 +329,7 @@ def _are_lines(cut: Cut, sigmas: NDArray[np.float64], settings: SplineSettings) 
     return np.asarray(is_long & (cut.lines[:, 4] < np.maximum(limits.split_distance / 2.0, 1.25 * noise)))
 
 
-def _is_peak(points: ScanPoints, end: int, step: int) -> bool:
+def _is_peak(points: _ScanPoints, end: int, step: int) -> bool:
     """Return whether a cluster ends at a point because its surface does.
 
     Points are followed in steps of 1 or -1.

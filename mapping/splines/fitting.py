@@ -13,7 +13,7 @@ from lidarium.mapping.splines.settings import FitSettings
 
 
 @kernel
-def factorize(band: Array) -> bool:
+def _factorize(band: Array) -> bool:
     """Replace a banded matrix by its Cholesky factor, band for band.
 
     Return False where it is not positive definite.
@@ -34,7 +34,7 @@ def factorize(band: Array) -> bool:
 
 
 @kernel
-def solve(factor: Array, right: Array) -> None:
+def _solve(factor: Array, right: Array) -> None:
     """Solve for all columns of the right side, in place."""
     count = factor.shape[0]
     for column in range(right.shape[1]):
@@ -55,7 +55,7 @@ STEP_SIGMAS = 4.0
 MOST_BIAS = 3.5
 
 
-class Samples(NamedTuple):
+class _Samples(NamedTuple):
     """Points that a curve is fitted to, in order.
 
     Attributes
@@ -73,7 +73,7 @@ class Samples(NamedTuple):
     parameters: Array
 
 
-class Closeness(NamedTuple):
+class _Closeness(NamedTuple):
     """How closely a curve has to follow its points.
 
     Attributes
@@ -91,7 +91,7 @@ class Closeness(NamedTuple):
     window: int
 
 
-class ControlRule(NamedTuple):
+class _ControlRule(NamedTuple):
     """How many control points a curve may have, and how stiff it is.
 
     Attributes
@@ -111,7 +111,7 @@ class ControlRule(NamedTuple):
 
 
 @kernel
-def chord_lengths(points: Array, noise: Array, parameters: Array) -> float:
+def _chord_lengths(points: Array, noise: Array, parameters: Array) -> float:
     """Write how far along the way each point lies; return the length of the way [m].
 
     Noise makes a way through the points longer, the more the denser they are. It is therefore measured from
@@ -142,7 +142,7 @@ def chord_lengths(points: Array, noise: Array, parameters: Array) -> float:
 
 
 @kernel
-def average_knots(parameters: Array, count: int, knots: Array) -> None:
+def _average_knots(parameters: Array, count: int, knots: Array) -> None:
     """Knots by averaging, after Piegl and Tiller, equations 9.68 and 9.69."""
     total = parameters.shape[0]
     knots[:ORDER], knots[count:] = parameters[0], parameters[total - 1]
@@ -154,8 +154,8 @@ def average_knots(parameters: Array, count: int, knots: Array) -> None:
 
 
 @kernel
-def fit_curve(
-    samples: Samples, length: float, closeness: Closeness, rule: ControlRule
+def _fit_curve(
+    samples: _Samples, length: float, closeness: _Closeness, rule: _ControlRule
 ) -> tuple[Array, Array, Array, float]:
     """Fit with more and more control points until the curve follows.
 
@@ -172,7 +172,7 @@ def fit_curve(
     is_straight = is_sparse
     while True:
         knots = np.empty(count + ORDER)
-        average_knots(parameters, count, knots)
+        _average_knots(parameters, count, knots)
         normal, control_points = np.zeros((count, ORDER)), np.zeros((count, 2))
         _accumulate(samples, knots, stiffness, normal, control_points)
         if is_straight:
@@ -184,8 +184,8 @@ def fit_curve(
         factor = normal.copy()
         # With the stiffness there always is a solution; without, more control points than the points
         # determine have none.
-        if factorize(factor):
-            solve(factor, control_points)
+        if _factorize(factor):
+            _solve(factor, control_points)
             rms, bias = _misfit(samples, knots, control_points, closeness)
             if (rms <= wanted and bias <= MOST_BIAS) or count >= most:
                 return control_points, knots, normal, rms
@@ -226,7 +226,7 @@ def _fit_straight(points: Array, sigmas: Array) -> Array:
 
 
 @kernel
-def _accumulate(samples: Samples, knots: Array, stiffness: float, normal: Array, right: Array) -> None:
+def _accumulate(samples: _Samples, knots: Array, stiffness: float, normal: Array, right: Array) -> None:
     """Sum up the normal matrix's lower band (n, 4) and the right side (n, 2).
 
     Row i holds columns i .. i - 3.
@@ -257,7 +257,7 @@ def _accumulate(samples: Samples, knots: Array, stiffness: float, normal: Array,
 
 
 @kernel
-def _misfit(samples: Samples, knots: Array, control_points: Array, closeness: Closeness) -> tuple[float, float]:
+def _misfit(samples: _Samples, knots: Array, control_points: Array, closeness: _Closeness) -> tuple[float, float]:
     """Return how far points lie beside the curve at their parameters.
 
     Along it, parameters are but estimates.
@@ -327,12 +327,12 @@ class Fit:
         count = len(self.normal)
         inverse = np.empty((count, count))
         factor = self.normal.copy()
-        if not factorize(factor):
+        if not _factorize(factor):
             raise ValueError("the points do not determine the control points")
         for k in range(count):
             column = np.zeros((count, 1))
             column[k] = 1.0
-            solve(factor, column)
+            _solve(factor, column)
             inverse[:, k] = column[:, 0]
         return inverse
 
@@ -371,7 +371,7 @@ def fit_bspline(points: ArrayLike, settings: FitSettings | None = None, sigmas: 
         raise ValueError(f"sigmas have shape {deviations.shape} or are not positive; want ({len(places)},)")
     parameters = np.empty(len(places))
     noise = settings.explained * deviations if sigmas is not None else np.zeros(len(places))
-    length = float(chord_lengths(places, noise, parameters))
+    length = float(_chord_lengths(places, noise, parameters))
     if not _SHORTEST < length < math.inf:
         raise ValueError("points are all the same, or not finite; want points along a curve")
     is_noisy = sigmas is not None and settings.explained > 0.0
@@ -382,11 +382,11 @@ def fit_bspline(points: ArrayLike, settings: FitSettings | None = None, sigmas: 
     )
     window = max(len(places) // _WINDOWS, _LEAST_WINDOW) if is_noisy else 1
     scales = np.hypot(deviations, _FINE * settings.rms) if is_noisy else np.full(len(places), settings.rms)
-    control_points, knots, normal, rms = fit_curve(
-        Samples(places, deviations, parameters),
+    control_points, knots, normal, rms = _fit_curve(
+        _Samples(places, deviations, parameters),
         length,
-        Closeness(wanted, scales, window),
-        ControlRule(settings.spacing, settings.finest_spacing, settings.is_sparse, settings.stiffness),
+        _Closeness(wanted, scales, window),
+        _ControlRule(settings.spacing, settings.finest_spacing, settings.is_sparse, settings.stiffness),
     )
     # The way through the points is longer than the curve; another scale of the parameter leaves the curve as
     # it is.
@@ -394,11 +394,11 @@ def fit_bspline(points: ArrayLike, settings: FitSettings | None = None, sigmas: 
     return Fit(Spline(knots * (curve / length) if curve > _SHORTEST else knots, control_points), float(rms), normal)
 
 
-def averaged_knots(parameters: ArrayLike, count: int) -> NDArray[np.float64]:
+def _averaged_knots(parameters: ArrayLike, count: int) -> NDArray[np.float64]:
     """Return knots (count + 4,) for so many control points.
 
     Every span has its share of the parameters (m,).
     """
     knots = np.empty(count + ORDER)
-    average_knots(np.ascontiguousarray(parameters, np.float64), count, knots)
+    _average_knots(np.ascontiguousarray(parameters, np.float64), count, knots)
     return knots

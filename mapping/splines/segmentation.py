@@ -20,7 +20,7 @@ from lidarium.mapping.splines.settings import CORNER_RULES, SegmentationSettings
 
 
 @kernel
-def fit_line(points: Array, first: int, last: int) -> tuple[float, float, float, float, float]:
+def _fit_line(points: Array, first: int, last: int) -> tuple[float, float, float, float, float]:
     """Fit a line to points first .. last by total least squares.
 
     Returns middle x, y, direction along the points [rad], half length, rms [m].
@@ -74,7 +74,7 @@ def _farthest(points: Array, sigmas: Array, first: int, last: int, limit: float,
 
 
 @kernel
-def split_runs(points: Array, sigmas: Array, limit: float, noise_sigmas: float, ends: Array) -> int:
+def _split_runs(points: Array, sigmas: Array, limit: float, noise_sigmas: float, ends: Array) -> int:
     """Write the ends of the leaves, first and last point included.
 
     Return the number of leaves.
@@ -97,7 +97,7 @@ def split_runs(points: Array, sigmas: Array, limit: float, noise_sigmas: float, 
 
 
 @kernel
-def merge_runs(
+def _merge_runs(
     points: Array, sigmas: Array, limit: float, noise_sigmas: float, collinear: float, ends: Array, count: int
 ) -> int:
     """Join neighbouring leaves until no two fit one line; return their number.
@@ -109,9 +109,9 @@ def merge_runs(
         is_changed = False
         k = 1
         while k < count:
-            before, after = fit_line(points, ends[k - 1], ends[k]), fit_line(points, ends[k], ends[k + 1])
+            before, after = _fit_line(points, ends[k - 1], ends[k]), _fit_line(points, ends[k], ends[k + 1])
             turn = abs(np.arctan2(np.sin(after[2] - before[2]), np.cos(after[2] - before[2])))
-            joined = fit_line(points, ends[k - 1], ends[k + 1])
+            joined = _fit_line(points, ends[k - 1], ends[k + 1])
             cosine, sine = np.cos(joined[2]), np.sin(joined[2])
             is_straight = turn <= collinear
             for i in range(ends[k - 1], ends[k + 1] + 1):
@@ -259,7 +259,7 @@ def _is_round(points: Array, first: int, low: int, high: int, last: int, reach: 
     before, after = max(_reach(points, low, -1, reach), first), min(_reach(points, high, 1, reach), last)
     if low - before + 1 < least or after - high + 1 < least:
         return False
-    farther = fit_line(points, high, after)[2] - fit_line(points, before, low)[2]
+    farther = _fit_line(points, high, after)[2] - _fit_line(points, before, low)[2]
     ratio = math.atan2(math.sin(farther), math.cos(farther)) / math.atan2(math.sin(turn), math.cos(turn))
     return ratio > _ROUND_RATIO
 
@@ -291,10 +291,10 @@ def _cut(
     Return the number of leaves.
     """
     limit, noise_sigmas, collinear, corner_angle, corner_reach, least, by = rule
-    count = split_runs(points, sigmas, limit, noise_sigmas, ends)
-    count = merge_runs(points, sigmas, limit, noise_sigmas, collinear, ends, count)
+    count = _split_runs(points, sigmas, limit, noise_sigmas, ends)
+    count = _merge_runs(points, sigmas, limit, noise_sigmas, collinear, ends, count)
     for k in range(count):
-        lines[k] = fit_line(points, ends[k], ends[k + 1])
+        lines[k] = _fit_line(points, ends[k], ends[k + 1])
     last_cut = 0
     for k in range(1, count):
         at = ends[k]
@@ -304,7 +304,7 @@ def _cut(
         low, high = max(_reach(points, at, -1, reach), last_cut), _reach(points, at, 1, reach)
         if at - low + 1 < least or high - at + 1 < least:
             continue
-        before, after = fit_line(points, low, at), fit_line(points, at, high)
+        before, after = _fit_line(points, low, at), _fit_line(points, at, high)
         turn = after[2] - before[2]
         if by == 1:
             is_sharp = abs(np.tan(after[2]) - np.tan(before[2])) > np.tan(corner_angle)

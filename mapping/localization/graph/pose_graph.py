@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from lidarium.mapping.kernels.compilation import Array, kernel
 
 
-class Elimination(NamedTuple):
+class _Elimination(NamedTuple):
     """Where the blocks of a factor are, column by column in the order of elimination.
 
     Attributes
@@ -47,7 +47,7 @@ class Elimination(NamedTuple):
     row_columns: NDArray[np.int64]
 
 
-def elimination(count: int, a: NDArray[np.int64], b: NDArray[np.int64]) -> Elimination:
+def _elimination(count: int, a: NDArray[np.int64], b: NDArray[np.int64]) -> _Elimination:
     """Return the factor's blocks where poses are joined by pairs.
 
     The order of elimination fills few of them.
@@ -74,11 +74,11 @@ def elimination(count: int, a: NDArray[np.int64], b: NDArray[np.int64]) -> Elimi
     columns = np.repeat(poses, np.diff(starts))
     by_row = np.lexsort((columns, rows))
     row_starts = np.searchsorted(rows[by_row], np.arange(count + 1))
-    return Elimination(factors.perm_c.astype(np.int64), starts, rows, row_starts, by_row, columns[by_row])
+    return _Elimination(factors.perm_c.astype(np.int64), starts, rows, row_starts, by_row, columns[by_row])
 
 
 @kernel
-def factorise(places: Elimination, blocks: Array) -> bool:
+def _factorise(places: _Elimination, blocks: Array) -> bool:
     """Replace the lower triangle of a matrix by that of its factor L.
 
     The matrix is L L^T.
@@ -116,7 +116,7 @@ def factorise(places: Elimination, blocks: Array) -> bool:
 
 
 @kernel
-def solve(places: Elimination, factor: Array, right: Array) -> Array:
+def _solve(places: _Elimination, factor: Array, right: Array) -> Array:
     """Return the solution (poses, 3) of a factorised matrix for a right side.
 
     The right side is (poses, 3), both float64 and in the poses' order.
@@ -240,7 +240,7 @@ def optimised(
         return poses.copy(), np.zeros((3, 3))
     # The first pose stays where it is: the unknowns are those of all others.
     is_free = (edges.a > 0) & (edges.b > 0)
-    places = elimination(len(poses) - 1, edges.a[is_free] - 1, edges.b[is_free] - 1)
+    places = _elimination(len(poses) - 1, edges.a[is_free] - 1, edges.b[is_free] - 1)
     factor = np.empty((len(places.rows), 3, 3))
     best = poses.copy()
     pull = _squares(best, edges)[len(edges.a) - newest :]
@@ -294,7 +294,7 @@ def _cost(poses: Array, edges: Edges, robust_scale: float) -> float:
 
 @kernel
 def _settled(
-    poses: Array, edges: Edges, robust_scale: float, iterations: int, places: Elimination, factor: Array
+    poses: Array, edges: Edges, robust_scale: float, iterations: int, places: _Elimination, factor: Array
 ) -> Array:
     """Return the poses of least cost near given ones.
 
@@ -309,8 +309,8 @@ def _settled(
             for i in range(3):
                 factor[places.starts[j], i, i] *= 1.0 + damping
         trial, trial_cost = best.copy(), np.inf
-        if factorise(places, factor):
-            trial[1:] -= solve(places, factor, gradient)
+        if _factorise(places, factor):
+            trial[1:] -= _solve(places, factor, gradient)
             trial_cost = _cost(trial, edges, robust_scale)
         if trial_cost <= cost:
             gain = cost - trial_cost
@@ -324,7 +324,7 @@ def _settled(
 
 
 @kernel
-def _normal_equations(poses: Array, edges: Edges, robust_scale: float, places: Elimination, hessian: Array) -> Array:
+def _normal_equations(poses: Array, edges: Edges, robust_scale: float, places: _Elimination, hessian: Array) -> Array:
     """Return the gradient (poses - 1, 3) and write the Hessian's lower triangle.
 
     The gradient is float64, for all poses but the first. The Hessian is written in blocks.
@@ -371,11 +371,11 @@ def _write_jacobians(a: Array, b: Array, jacobians: Array) -> None:
     before[0, 2], before[1, 2] = cosine * y - sine * x, -cosine * x - sine * y
 
 
-def _last_covariance(places: Elimination, factor: NDArray[np.float64]) -> NDArray[np.float64]:
+def _last_covariance(places: _Elimination, factor: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the covariance of the last pose, of the factor of the last Hessian."""
     covariance = np.empty((3, 3))
     for k in range(3):
         right = np.zeros((len(places.turn), 3))
         right[-1, k] = 1.0
-        covariance[:, k] = solve(places, factor, right)[-1]
+        covariance[:, k] = _solve(places, factor, right)[-1]
     return np.asarray(0.5 * (covariance + covariance.T))

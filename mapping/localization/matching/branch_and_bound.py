@@ -39,14 +39,14 @@ COLUMN, ROW, TURN, SUM = range(4)
 """Places in what is found."""
 
 
-class CoarseLevels(NamedTuple):
+class _CoarseLevels(NamedTuple):
     """Coarse maps, see ``Pyramid``."""
 
     maxima: NDArray[np.uint8]
     shapes: NDArray[np.int64]
 
 
-class Window(NamedTuple):
+class _Window(NamedTuple):
     """Placements among which a search chooses.
 
     Attributes
@@ -91,10 +91,10 @@ def _is_avoided(avoided: Array, column: int, row: int, heading: float) -> bool:
 
 
 @kernel
-def find_placements(
-    coarse: CoarseLevels,
+def _find_placements(
+    coarse: _CoarseLevels,
     points: Array,
-    window: Window,
+    window: _Window,
     least: float,
     evaluations: int,
     avoided: Array,
@@ -140,7 +140,7 @@ def find_placements(
 
 
 @kernel
-def _top_level(coarse: CoarseLevels, width: int) -> int:
+def _top_level(coarse: _CoarseLevels, width: int) -> int:
     """Return the level at which a search begins."""
     top = 0
     while top < coarse.shapes.shape[0] - 1 and (1 << top) < width:
@@ -149,7 +149,7 @@ def _top_level(coarse: CoarseLevels, width: int) -> int:
 
 
 @kernel
-def _cells_of(points: Array, window: Window) -> Array:
+def _cells_of(points: Array, window: _Window) -> Array:
     """Return the cells of points in the first placement of each heading.
 
     Points are in cells; the result is (headings, n, 2) int32.
@@ -165,7 +165,7 @@ def _cells_of(points: Array, window: Window) -> Array:
 
 
 @kernel
-def _bounds_of_blocks(coarse: CoarseLevels, cells: Array, top: int, blocks: int) -> Array:
+def _bounds_of_blocks(coarse: _CoarseLevels, cells: Array, top: int, blocks: int) -> Array:
     """Return the bounds of all blocks of the top level.
 
     Heading by heading, row by row.
@@ -190,7 +190,7 @@ def _push(stack: Array, depth: int, block: tuple[int, int, int, int, int]) -> No
 
 @kernel
 def _divide(
-    coarse: CoarseLevels, cells: Array, block: tuple[int, int, int], width: int, best: float, children: Array
+    coarse: _CoarseLevels, cells: Array, block: tuple[int, int, int], width: int, best: float, children: Array
 ) -> tuple[int, int]:
     """Fill ``children`` with the parts of a block that can beat the best.
 
@@ -242,7 +242,7 @@ class Pyramid:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Placement:
+class _Placement:
     """What a search found.
 
     Attributes
@@ -284,7 +284,7 @@ def place(
     least_score: float,
     evaluations: int,
     apart: tuple[NDArray[np.float64], float, float] | None = None,
-) -> tuple[Placement | None, bool]:
+) -> tuple[_Placement | None, bool]:
     """Find the best placement of points within a window.
 
     Parameters
@@ -329,9 +329,9 @@ def place(
             angle,
         )
     found = np.full(4, -1.0)
-    least, window = float(FULL_LEVEL) * least_score * len(points), Window(headings, corner, 2 * steps + 1)
-    is_over = find_placements(
-        CoarseLevels(coarse.maxima, coarse.shapes), points / side, window, least, evaluations, avoided, found
+    least, window = float(FULL_LEVEL) * least_score * len(points), _Window(headings, corner, 2 * steps + 1)
+    is_over = _find_placements(
+        _CoarseLevels(coarse.maxima, coarse.shapes), points / side, window, least, evaluations, avoided, found
     )
     if found[3] < 0.0:
         return None, is_over
@@ -342,4 +342,4 @@ def place(
             headings[int(found[2])],
         ]
     )
-    return Placement(pose, float(found[3]) / (float(FULL_LEVEL) * len(points))), is_over
+    return _Placement(pose, float(found[3]) / (float(FULL_LEVEL) * len(points))), is_over

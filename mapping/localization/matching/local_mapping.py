@@ -18,7 +18,7 @@ from lidarium.mapping.localization.matching.submaps import AgreementGrid, Submap
 from lidarium.mapping.localization.settings import SlamSettings
 
 
-class LocalMatcher:
+class _LocalMatcher:
     """Lays scans on a local map, and knows how well they have agreed of late.
 
     Parameters
@@ -104,7 +104,7 @@ class LocalMatcher:
             far = far if is_alike else None
         good = [match for match in (near, far) if match is not None and self._is_good(match)]
         found = good[0] if good else None
-        if len(good) == 2 and outweighs(good[1], good[0], settings.better_by):
+        if len(good) == 2 and _outweighs(good[1], good[0], settings.better_by):
             found = good[1]
         if self._uses_odometry and not is_sparse and not self._explains(found):
             found = self._beyond_odometry(submap, points, predicted) or found
@@ -240,7 +240,7 @@ class LocalMatcher:
         return match if self._is_good(match) and not self._is_new_ground(match, len(points)) else None
 
 
-def outweighs(far: Match, near: Match, better_by: float) -> bool:
+def _outweighs(far: Match, near: Match, better_by: float) -> bool:
     """Return whether a match outweighs odometry, which then has to be wrong.
 
     The match against odometry must be better than one with it by enough.
@@ -321,7 +321,7 @@ class LocalMapper:
         self._matching, self._submaps = settings.matching, settings.submaps
         self._geometry = geometry
         self._active: list[_Active] = []
-        self._matcher = LocalMatcher(settings, geometry)
+        self._matcher = _LocalMatcher(settings, geometry)
 
     @property
     def node(self) -> int:
@@ -345,17 +345,17 @@ class LocalMapper:
 
     @property
     def contradiction(self) -> float:
-        """How much the last scan contradicted the local map, see ``LocalMatcher``."""
+        """How much the last scan contradicted the local map, see ``_LocalMatcher``."""
         return self._matcher.contradiction
 
     @property
     def recoveries(self) -> int:
-        """How many scans were found elsewhere than odometry said, see ``LocalMatcher``."""
+        """How many scans were found elsewhere than odometry said, see ``_LocalMatcher``."""
         return self._matcher.recoveries
 
     @property
     def explains(self) -> bool:
-        """Whether the last match explains enough of its scan, see ``LocalMatcher``."""
+        """Whether the last match explains enough of its scan, see ``_LocalMatcher``."""
         return self._matcher.explains
 
     def match(
@@ -366,7 +366,7 @@ class LocalMapper:
         uncertainty: NDArray[np.float64],
         failed: int,
     ) -> Match | None:
-        """Return where a scan lies on the older local map, see ``LocalMatcher.match``."""
+        """Return where a scan lies on the older local map, see ``_LocalMatcher.match``."""
         return self._matcher.match(self._active[0].submap, points, predicted, moved, uncertainty, failed)
 
     def judge(self, points: NDArray[np.float64], pose: NDArray[np.float64]) -> None:

@@ -51,7 +51,7 @@ def _spline_slopes(t: float) -> tuple[float, float, float, float]:
 
 
 @kernel(forceinline=True, nrt=False)
-def agreement(levels: Array, x: float, y: float) -> tuple[float, float, float]:
+def _agreement(levels: Array, x: float, y: float) -> tuple[float, float, float]:
     """Return the smoothed agreement at x, y [cells] and its slopes [1/cell] (kernel).
 
     Zero where the map ends.
@@ -76,14 +76,14 @@ def agreement(levels: Array, x: float, y: float) -> tuple[float, float, float]:
 
 
 @kernel(forceinline=True, nrt=False)
-def is_unseen(levels: Array, x: float, y: float) -> bool:
+def _is_unseen(levels: Array, x: float, y: float) -> bool:
     """Whether the map has not observed the cell at x, y [cells] (kernel)."""
     column, row = int(math.floor(x)), int(math.floor(y))
     return not (0 <= column < levels.shape[1] and 0 <= row < levels.shape[0]) or levels[row, column] == UNSEEN
 
 
 @kernel(nrt=False)
-def extremes_around(levels: Array, column: int, row: int) -> tuple[int, int]:
+def _extremes_around(levels: Array, column: int, row: int) -> tuple[int, int]:
     """Return the lowest and the highest level within three cells (kernel).
 
     What lies outside of the map is not observed.
@@ -121,7 +121,7 @@ def _is_one_surface(points: Array, k: int) -> bool:
 
 
 @kernel
-def find_normals(points: Array, reach: float, normals: Array) -> None:
+def _find_normals(points: Array, reach: float, normals: Array) -> None:
     """Fill ``normals`` (n, 2) with unit normals of the surfaces (kernel).
 
     The surface at each point is that of the point and its neighbours; zero for a point alone.
@@ -202,7 +202,7 @@ PROBES = 4
 """Places around a pose at which curvature is measured, half a cell to each side."""
 
 
-class Objective(NamedTuple):
+class _Objective(NamedTuple):
     """What the cost of a pose is made of.
 
     Attributes
@@ -305,15 +305,15 @@ def refine(
     if count == 0:
         return Match(pose, 0.0, 0.0, 0.0, np.zeros((3, 3)), information)
     normals = np.zeros((count, 2))
-    find_normals(points, surface_m, normals)
-    objective = Objective(grid, points, normals, prior, information, weight / count, unseen)
+    _find_normals(points, surface_m, normals)
+    objective = _Objective(grid, points, normals, prior, information, weight / count, unseen)
     _refine(objective, pose, hessian, judgement)
     score, overlap, contradiction = judgement.tolist()
     return Match(pose, score, overlap, contradiction, hessian, information)
 
 
 @kernel
-def _refine(objective: Objective, pose: Array, hessian: Array, judgement: Array) -> None:
+def _refine(objective: _Objective, pose: Array, hessian: Array, judgement: Array) -> None:
     """Move a pose to where the cost is least.
 
     Tell the Hessian and what ``_judge`` says.
@@ -324,7 +324,7 @@ def _refine(objective: Objective, pose: Array, hessian: Array, judgement: Array)
 
 
 @kernel
-def _descend(objective: Objective, pose: Array, hessian: Array) -> None:
+def _descend(objective: _Objective, pose: Array, hessian: Array) -> None:
     """Move a pose to where the cost is least (Levenberg and Marquardt)."""
     prior, information, weight = objective.prior, objective.information, objective.weight
     gradient, trial_gradient, trial_hessian = np.empty(3), np.empty(3), np.empty((3, 3))
@@ -355,7 +355,7 @@ def _descend(objective: Objective, pose: Array, hessian: Array) -> None:
 
 
 @kernel
-def _curve_around(objective: Objective, pose: Array, hessian: Array) -> None:
+def _curve_around(objective: _Objective, pose: Array, hessian: Array) -> None:
     """Fill the weighed Hessian from half a cell around a pose.
 
     On the crest of a wall slopes vanish: how steep it is, is seen half a cell away.
@@ -371,7 +371,7 @@ def _curve_around(objective: Objective, pose: Array, hessian: Array) -> None:
 
 
 @kernel(nrt=False)
-def _normal_equations(objective: Objective, pose: Array, hessian: Array, gradient: Array) -> float:
+def _normal_equations(objective: _Objective, pose: Array, hessian: Array, gradient: Array) -> float:
     """Fill the normal equations of the points' disagreement at a pose.
 
     Return the sum of its squares.
@@ -384,8 +384,8 @@ def _normal_equations(objective: Objective, pose: Array, hessian: Array, gradien
     for k in range(points.shape[0]):
         x, y = cosine * points[k, 0] - sine * points[k, 1], sine * points[k, 0] + cosine * points[k, 1]
         u, v = (x + pose[0]) / side - first_column, (y + pose[1]) / side - first_row
-        value, slope_x, slope_y = agreement(levels, u, v)
-        if value == 0.0 and is_unseen(levels, u, v):
+        value, slope_x, slope_y = _agreement(levels, u, v)
+        if value == 0.0 and _is_unseen(levels, u, v):
             cost += unseen
             continue
         rest = 1.0 - value / FULL_AGREEMENT
@@ -423,12 +423,12 @@ def _judge(grid: AgreementGrid, points: Array, pose: Array, judgement: Array) ->
     for k in range(points.shape[0]):
         x = (cosine * points[k, 0] - sine * points[k, 1] + pose[0]) / side - first_column
         y = (sine * points[k, 0] + cosine * points[k, 1] + pose[1]) / side - first_row
-        value, _, _ = agreement(levels, x, y)
+        value, _, _ = _agreement(levels, x, y)
         agreeing += min(value / FULL_AGREEMENT, 1.0)
         if value > 0.0:
             known += 1
         else:
-            lowest, highest = extremes_around(levels, int(math.floor(x)), int(math.floor(y)))
+            lowest, highest = _extremes_around(levels, int(math.floor(x)), int(math.floor(y)))
             known += highest > UNSEEN
             contradicting += lowest == FREE_LEVEL and highest == FREE_LEVEL
     judgement[0], judgement[1], judgement[2] = (

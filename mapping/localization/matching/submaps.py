@@ -29,7 +29,7 @@ Ends farther apart [cells] are not joined.
 """
 
 
-class Cells(NamedTuple):
+class _Cells(NamedTuple):
     """What a local map holds of its cells.
 
     Attributes
@@ -53,8 +53,8 @@ class Cells(NamedTuple):
 
 
 @kernel
-def insert_scan(
-    cells: Cells,
+def _insert_scan(
+    cells: _Cells,
     place: tuple[float, float, float],
     ranges: Array,
     geometry: tuple[float, float, float, float, float, float],
@@ -296,7 +296,7 @@ class Submap:
         # only.
         self._half = -(-half // 64) * 64
         side = 2 * self._half
-        self._cells = Cells(
+        self._cells = _Cells(
             np.zeros((side, side), np.float32),
             np.zeros((side, side), np.float32),
             np.zeros((side, side), np.uint16),
@@ -340,7 +340,7 @@ class Submap:
         if not (reach + _MARGIN <= min(x, y) and max(x, y) <= side - reach - _MARGIN):
             return False
         numbers = (geometry.angle_increment, reach, scale, float(geometry.is_full_circle), *self._behind)
-        insert_scan(self._cells, (x, y, float(pose[2])), ranges, numbers, geometry.unit_vectors)
+        _insert_scan(self._cells, (x, y, float(pose[2])), ranges, numbers, geometry.unit_vectors)
         self.scans += 1
         return True
 

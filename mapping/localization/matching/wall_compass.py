@@ -179,7 +179,7 @@ def _fine_order(points: Array, direction: float, cell: float, reach: float, coun
 
 
 @dataclass(frozen=True, slots=True)
-class Bearing:
+class _Bearing:
     """Where walls run, as seen from a node of the graph.
 
     Attributes
@@ -219,7 +219,7 @@ class WallCompass:
 
     def __init__(self, settings: CompassSettings) -> None:
         self._settings = settings
-        self.bearings: list[Bearing] = []
+        self.bearings: list[_Bearing] = []
         # Points of scans since the last node, in its frame [m].
         self._points: list[NDArray[np.float64]] = []
         # Where walls run, and the variances of the last node's heading, of that direction, and of both
@@ -253,7 +253,7 @@ class WallCompass:
         if information == 0.0:
             return False
         noise = 1.0 / information + self._settings.deviation_angle**2
-        self.bearings.append(Bearing(node, direction, 1.0 / noise))
+        self.bearings.append(_Bearing(node, direction, 1.0 / noise))
         # Headings have drifted since as far as each is uncertain; the local map's own node has not.
         self._walls, self._walls_variance, self._covariance = heading + direction, noise, 0.0
         return True
@@ -312,7 +312,7 @@ class WallCompass:
         if information == 0.0:
             return 0.0
         noise = 1.0 / information + settings.deviation_angle**2
-        bearing = Bearing(node, seen - since, 1.0 / noise)
+        bearing = _Bearing(node, seen - since, 1.0 / noise)
         rest = self.rest(bearing, heading)
         of_heading, of_walls = (
             self._heading_variance - self._covariance,
@@ -350,7 +350,7 @@ class WallCompass:
             )
         return edges
 
-    def rest(self, bearing: Bearing, heading: float) -> float:
+    def rest(self, bearing: _Bearing, heading: float) -> float:
         """Return the turn of a heading that would align its walls with the building's.
 
         The heading is that of the bearing's node; the turn is in radians [rad].

@@ -39,7 +39,7 @@ _HIT_SHARE = 0.95
 _ENTRIES_PER_METRE, _FARTHEST = 2000.0, 0.5
 
 
-def ray_likelihoods(sigma: float) -> NDArray[np.float64]:
+def _ray_likelihoods(sigma: float) -> NDArray[np.float64]:
     """Return log-likelihood and likelihood of a ray, shape (entries, 2).
 
     By the distance of the ray's end from a curve.
@@ -50,7 +50,7 @@ def ray_likelihoods(sigma: float) -> NDArray[np.float64]:
     return np.stack([np.log(likelihoods), likelihoods], axis=1)
 
 
-class MatchedFeatures(NamedTuple):
+class _MatchedFeatures(NamedTuple):
     """Features as seen and in the map, and their deviations; see ``Matches``."""
 
     seen: Array
@@ -59,10 +59,10 @@ class MatchedFeatures(NamedTuple):
 
 
 @kernel
-def weigh_features(
+def _weigh_features(
     particles: Array,
-    matched_points: MatchedFeatures,
-    matched_lines: MatchedFeatures,
+    matched_points: _MatchedFeatures,
+    matched_lines: _MatchedFeatures,
     angle_sigma: float,
     logarithms: Array,
 ) -> None:
@@ -87,7 +87,7 @@ def weigh_features(
 
 
 @kernel
-def weigh_rays(
+def _weigh_rays(
     particles: Array,
     rays: Array,
     pieces: Array,
@@ -206,7 +206,7 @@ class SplineFilter(SplineTracker):
             (settings.particles, 2)
         )
         self.resamplings, self._lost_steps, self._box = 0, 0, 0.0
-        self._ray_table = ray_likelihoods(self.tracking.curve_sigma)
+        self._ray_table = _ray_likelihoods(self.tracking.curve_sigma)
         # Where odometry alone leads each particle from its last place, and the covariance of that motion.
         self._expected, self._motion_covariance = self.particles.copy(), np.diag(_LEAST_MOTION**2)
 
@@ -247,20 +247,20 @@ class SplineFilter(SplineTracker):
     def _correct(self, matches: Matches, observation: Observation) -> NDArray[np.float64]:
         tracking = self.tracking
         logarithms, fits = np.zeros(len(self.particles)), np.zeros(len(self.particles))
-        weigh_features(
+        _weigh_features(
             self.particles,
-            MatchedFeatures(
+            _MatchedFeatures(
                 matches.points,
                 matches.known_points,
                 np.maximum(matches.point_sigmas, tracking.feature_sigma),
             ),
-            MatchedFeatures(
+            _MatchedFeatures(
                 matches.lines, matches.known_lines, np.maximum(matches.line_sigmas, tracking.feature_sigma)
             ),
             tracking.line_angle_sigma,
             logarithms,
         )
-        weigh_rays(
+        _weigh_rays(
             self.particles,
             matches.rays,
             matches.pieces,

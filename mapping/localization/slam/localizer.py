@@ -33,7 +33,7 @@ LITTLE = "little explained: hardly any of the scans agrees with the map, and no 
 
 
 @dataclass(frozen=True, slots=True)
-class Doubt:
+class _Doubt:
     """A stretch that is doubtful.
 
     Attributes
@@ -52,11 +52,11 @@ class Doubt:
     reason: str
 
 
-class Doubts:
+class _Doubts:
     """Doubtful stretches so far, in the order of time."""
 
     def __init__(self) -> None:
-        self.stretches: list[Doubt] = []
+        self.stretches: list[_Doubt] = []
         self._sure_s: float | None = None
         self._is_open = False
 
@@ -70,12 +70,12 @@ class Doubts:
             self.stretches[-1] = replace(last, end_s=time_s, scans=last.scans + 1)
         else:
             start_s = time_s if self._sure_s is None else self._sure_s
-            self.stretches.append(Doubt(start_s, time_s, 1, reason))
+            self.stretches.append(_Doubt(start_s, time_s, 1, reason))
         self._is_open = True
 
 
 @dataclass(slots=True)
-class SlamCounts:
+class _SlamCounts:
     """What a localizer has done so far."""
 
     scans: int = 0
@@ -114,7 +114,7 @@ class Slam:
     def reset(self, pose: NDArray[np.float64], seed: int) -> None:
         """Begin again at x, y, theta (3,) [m, rad]; nothing is drawn."""
         self._path = MappedPath(self._settings, self._geometry, pose)
-        self.counts, self.doubts = SlamCounts(), Doubts()
+        self.counts, self.doubts = _SlamCounts(), _Doubts()
         self._has_begun = False
         self._motion = OdometryMotion(self._settings)
         self._failed, self._time_s = 0, 0.0

@@ -21,7 +21,7 @@ from lidarium.mapping.localization.odometry import compounded
 from lidarium.mapping.localization.settings import SlamSettings
 
 
-class LoopClosing:
+class _LoopClosing:
     """Finds closures, and keeps them until their time has come.
 
     Parameters
@@ -76,7 +76,7 @@ class LoopClosing:
         return acting
 
 
-class ScanHistory:
+class _ScanHistory:
     """Matched scans, each with the node before it and its pose in that node's frame.
 
     Parameters
@@ -125,7 +125,7 @@ class ScanHistory:
         self._mapped = 0
 
 
-class ScanSampling:
+class _ScanSampling:
     """Samples the points of scans, in the robot's frame.
 
     Parameters
@@ -154,7 +154,7 @@ class ScanSampling:
         return self.points(ranges, self._settings.compass.spacing_m, self._geometry.beams)
 
 
-class WallSurvey:
+class _WallSurvey:
     """Surveys where walls run, and compares later scans with them.
 
     Parameters
@@ -170,7 +170,7 @@ class WallSurvey:
         Directions of walls; None where they are not used.
     """
 
-    def __init__(self, settings: SlamSettings, sampling: ScanSampling) -> None:
+    def __init__(self, settings: SlamSettings, sampling: _ScanSampling) -> None:
         self.compass = WallCompass(settings.compass) if settings.uses_walls else None
         self._sampling, self._after_m = sampling, settings.graph.start_path_m
         self._due_m = self._after_m
@@ -186,7 +186,7 @@ class WallSurvey:
         if self.compass is not None and self.compass.is_surveyed:
             self.compass.observe(Transform(*pose).apply(self._sampling.all_points(ranges)))
 
-    def survey(self, length_m: float, node: int, history: ScanHistory, nodes: NDArray[np.float64]) -> None:
+    def survey(self, length_m: float, node: int, history: _ScanHistory, nodes: NDArray[np.float64]) -> None:
         """Survey where walls run in the local map of a node, if it is time to.
 
         Where none do, survey again after as much of the path.
@@ -234,12 +234,12 @@ class MappedPath:
     """
 
     def __init__(self, settings: SlamSettings, geometry: ScanGeometry, pose: NDArray[np.float64]) -> None:
-        self._settings, self.sampling = settings, ScanSampling(settings, geometry)
+        self._settings, self.sampling = settings, _ScanSampling(settings, geometry)
         self.mapper = LocalMapper(settings, geometry)
-        self._loops = LoopClosing(settings)
-        self._walls = WallSurvey(settings, self.sampling)
+        self._loops = _LoopClosing(settings)
+        self._walls = _WallSurvey(settings, self.sampling)
         self._graph = NodeGraph(settings.graph, self._walls.compass, pose)
-        self._history = ScanHistory(geometry, settings.submaps.resolution)
+        self._history = _ScanHistory(geometry, settings.submaps.resolution)
         # The first scan's points and pose, until the map shows how well they match.
         self._first: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
         self.local, self.matched, self.at_node = np.zeros(3), np.zeros(3), np.zeros(3)

@@ -122,11 +122,11 @@ def deform(
         corner = Transform(*known.origin)
         deformation = _held(under, one, (corner, transform), settings)
         found.append(deformation)
-        laid.append(Laid(one.levels, transform) if deformation is None else bent_map(one, deformation.bend, corner))
+        laid.append(Laid(one.levels, transform) if deformation is None else _bent_map(one, deformation.bend, corner))
     return Deformed(_fused(laid, resolution), found, laid)
 
 
-def bent_map(one: DescribedMap, bend: Bend, corner: Transform) -> Laid:
+def _bent_map(one: DescribedMap, bend: Bend, corner: Transform) -> Laid:
     """Return a bent map in cells along the axes of the map onto which it is bent.
 
     Parameters

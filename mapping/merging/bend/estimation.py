@@ -26,7 +26,7 @@ from lidarium.mapping.merging.wall_alignment import gap_to_wall, wall_sample
 
 
 @kernel
-def find_gaps(
+def _find_gaps(
     levels: Array,
     distance: Array,
     side: float,
@@ -54,7 +54,7 @@ def find_gaps(
 
 
 @kernel
-def add_walls(
+def _add_walls(
     nodes: Array,
     weights: Array,
     normals: Array,
@@ -88,7 +88,7 @@ def add_walls(
 
 
 @kernel
-def add_springs(columns: int, strength: float, band: Array) -> None:
+def _add_springs(columns: int, strength: float, band: Array) -> None:
     """Add springs between the neighbouring nodes of a grid of so many columns to a band."""
     count = band.shape[1] // 2
     for node in range(count):
@@ -143,7 +143,7 @@ class OffsetField:
         return np.asarray(found)
 
 
-def bilinear(
+def _bilinear(
     points: NDArray[np.float64], corner: tuple[float, float], spacing: float, shape: tuple[int, ...]
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """Return the four nodes around each point and their weights, both (n, 4)."""
@@ -278,7 +278,7 @@ def estimate_bend(a: DescribedMap, b: DescribedMap, a_from_b: Transform, setting
     spacing = max(settings.spacing_m, float((high - low).max()) / max(settings.most_nodes - 1, 1))
     columns, rows = (int(count) for count in np.ceil((high - low) / spacing - 1e-9).astype(np.int64) + 1)
     corner = (float(low[0]), float(low[1]))
-    nodes, weights = bilinear(walls, corner, spacing, (rows, columns))
+    nodes, weights = _bilinear(walls, corner, spacing, (rows, columns))
     offsets = np.zeros((rows * columns, 2))
     start = a_from_b.apply(walls)
     gaps, found = np.zeros(len(walls)), np.zeros(len(walls), np.bool_)
@@ -287,12 +287,12 @@ def estimate_bend(a: DescribedMap, b: DescribedMap, a_from_b: Transform, setting
         reach = settings.reach_m * (settings.last_reach_m / settings.reach_m) ** share
         reach = max(reach, 2.0 * a.resolution)
         places = start + (weights[..., None] * offsets[nodes]).sum(axis=1)
-        find_gaps(a.levels, a.distance, a.resolution, places, normals, reach, gaps, found)
+        _find_gaps(a.levels, a.distance, a.resolution, places, normals, reach, gaps, found)
         if found.sum() < 3:
             break
         offsets = _solved(nodes, weights, normals, offsets, (gaps, found, reach), (columns, settings.stiffness))
     places = start + (weights[..., None] * offsets[nodes]).sum(axis=1)
-    find_gaps(a.levels, a.distance, a.resolution, places, normals, settings.last_reach_m, gaps, found)
+    _find_gaps(a.levels, a.distance, a.resolution, places, normals, settings.last_reach_m, gaps, found)
     field = OffsetField(corner, spacing, offsets.reshape(rows, columns, 2))
     wall_m = b.resolution * len(b.walls) / max(len(sample), 1)
     return _described(a_from_b, field, (walls, normals, gaps), found, wall_m)
@@ -319,10 +319,10 @@ def _solved(
     # Large gaps count less: they may lead to another wall.
     trust = np.where(found, 1.0 / (1.0 + (2.0 * gaps / reach) ** 2), 0.0)
     band, right = np.zeros((2 * columns + 4, 2 * count)), np.zeros(2 * count)
-    add_walls(nodes, weights, normals, offsets, gaps, trust, band, right)
+    _add_walls(nodes, weights, normals, offsets, gaps, trust, band, right)
     # The springs are as strong as the walls of a node.
     strength = trust.sum() / count
-    add_springs(columns, stiffness * strength, band)
+    _add_springs(columns, stiffness * strength, band)
     band[0] += ANCHOR * strength
     return np.asarray(scipy.linalg.solveh_banded(band, right, lower=True).reshape(count, 2))
 

@@ -28,7 +28,7 @@ SPREADS = 2.5
 """So many standard deviations of the gaps that a bend leaves, walls agree."""
 
 
-def tolerance(bend: Bend, resolution: float) -> tuple[float, float]:
+def _tolerance(bend: Bend, resolution: float) -> tuple[float, float]:
     """Return at which distance walls agree, and beyond which they contradict [m].
 
     Both follow from the spread of the gaps that the bend has left.
@@ -52,7 +52,7 @@ def compare_bent(a: DescribedMap, b: DescribedMap, bend: Bend) -> Agreement:
     Agreement
         What agrees and what does not, within the tolerance of the bend.
     """
-    hit, miss = tolerance(bend, a.resolution)
+    hit, miss = _tolerance(bend, a.resolution)
     walls, facing = np.zeros((2, 3), np.int64), np.zeros((2, 3))
     turn = Transform(0.0, 0.0, bend.a_from_b.theta)
     laid = (
@@ -134,7 +134,7 @@ def _bent(a: DescribedMap, b: DescribedMap, a_from_b: Transform, settings: BendS
     return Hypothesis(bend, compare_bent(a, b, bend))
 
 
-def is_other(one: Hypothesis, other: Hypothesis) -> bool:
+def _is_other(one: Hypothesis, other: Hypothesis) -> bool:
     """Whether two hypotheses are of different places."""
     distance, angle = one.bend.a_from_b.difference(other.bend.a_from_b, one.agreement.centre)
     return distance > RIVAL_M or angle > RIVAL_ANGLE
@@ -146,7 +146,7 @@ def agrees_bent(a: DescribedMap, b: DescribedMap, a_from_b: Transform, settings:
     return bent.agreement.wall_m == 0.0 or bent.evidence_m > 0.0
 
 
-class Signs(NamedTuple):
+class _Signs(NamedTuple):
     """What distinguishes maps of one place from strangers.
 
     Attributes
@@ -182,12 +182,12 @@ class Signs(NamedTuple):
     spread_m: float
 
 
-def signs_of(a: DescribedMap, b: DescribedMap, ranked: list[Hypothesis]) -> Signs:
+def signs_of(a: DescribedMap, b: DescribedMap, ranked: list[Hypothesis]) -> _Signs:
     """Return what distinguishes the best of ranked hypotheses from a chance."""
     best = ranked[0]
     evidence = max(best.evidence_m, 0.0)
-    rival = next((one.evidence_m for one in ranked[1:] if is_other(best, one)), 0.0)
-    return Signs(
+    rival = next((one.evidence_m for one in ranked[1:] if _is_other(best, one)), 0.0)
+    return _Signs(
         evidence,
         evidence / max(best.agreement.agreeing_m, 1e-9),
         best.agreement.overlap_m2,
@@ -200,7 +200,7 @@ def signs_of(a: DescribedMap, b: DescribedMap, ranked: list[Hypothesis]) -> Sign
     )
 
 
-def confidence_of(signs: Signs) -> float:
+def confidence_of(signs: _Signs) -> float:
     """Return how sure it is that two maps are of one place, from 0 to 1.
 
     It is 0 where an overlap is no larger than rooms that are alike, where another place explains the maps

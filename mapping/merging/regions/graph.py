@@ -33,14 +33,14 @@ _SMOOTH_CELLS, _SMOOTH_BINS = 2.0, 2.0
 """Standard deviations with which free space and histograms are smoothed [cells, bins]."""
 
 
-class Slopes(NamedTuple):
+class _Slopes(NamedTuple):
     """Slopes of free space at the cells beside walls: directions (n,) [rad] and regions (n,) int32."""
 
     directions: NDArray[np.float64]
     regions: NDArray[np.int32]
 
 
-def wall_slopes(levels: NDArray[np.uint8], free: NDArray[np.uint8], labels: NDArray[np.int32]) -> Slopes:
+def _wall_slopes(levels: NDArray[np.uint8], free: NDArray[np.uint8], labels: NDArray[np.int32]) -> _Slopes:
     """Return across which directions walls run, at each cell of a region beside one.
 
     Parameters
@@ -52,10 +52,10 @@ def wall_slopes(levels: NDArray[np.uint8], free: NDArray[np.uint8], labels: NDAr
     is_wall = cv2.dilate((levels == OCCUPIED).astype(np.uint8), np.ones((3, 3), np.uint8))
     rows, columns = np.nonzero((is_wall > 0) & (labels != NONE))
     x, y = (cv2.Scharr(smooth, cv2.CV_32F, *order)[rows, columns] for order in ((1, 0), (0, 1)))
-    return Slopes(np.arctan2(y, x).astype(np.float64), labels[rows, columns])
+    return _Slopes(np.arctan2(y, x).astype(np.float64), labels[rows, columns])
 
 
-def region_axes(slopes: Slopes, count: int) -> NDArray[np.float64]:
+def _region_axes(slopes: _Slopes, count: int) -> NDArray[np.float64]:
     """Return the direction of each region's walls from 0 to a quarter turn, of all where it has none."""
     # Fourfold angles are alike for all four directions of a rectangle's walls.
     around = np.exp(4j * slopes.directions)
@@ -64,7 +64,7 @@ def region_axes(slopes: Slopes, count: int) -> NDArray[np.float64]:
     return np.asarray((np.angle(sums) / 4.0) % QUARTER)
 
 
-def direction_histogram(slopes: Slopes) -> NDArray[np.float64]:
+def _direction_histogram(slopes: _Slopes) -> NDArray[np.float64]:
     """Return how many walls run in each direction of a quarter turn, smoothed, shape (`BINS`,)."""
     bins = (slopes.directions % QUARTER / QUARTER * BINS).astype(np.int64) % BINS
     distance = np.minimum(np.arange(BINS), BINS - np.arange(BINS))
@@ -127,7 +127,7 @@ class Doors(NamedTuple):
     widths: NDArray[np.float64]
 
 
-def find_doors(met: Meetings, side: float) -> Doors:
+def _find_doors(met: Meetings, side: float) -> Doors:
     """Return the doors of a map, those between the first regions first.
 
     Parameters
@@ -273,14 +273,14 @@ def find_regions(levels: NDArray[np.uint8], resolution: float, settings: RegionS
     clearance = clearance_of(free)
     labels = split_regions(clearance, resolution, settings)
     count = int(labels.max(initial=NONE)) + 1
-    slopes = wall_slopes(known, free, labels)
-    axes = region_axes(slopes, count)
+    slopes = _wall_slopes(known, free, labels)
+    axes = _region_axes(slopes, count)
     low, high = _boxes(labels, resolution, origin, axes)
-    doors = find_doors(find_meetings(labels, clearance), resolution)
+    doors = _find_doors(find_meetings(labels, clearance), resolution)
     doors = doors._replace(places=doors.places + origin, normals=_snapped(doors, axes))
     areas = np.bincount(labels[labels != NONE], minlength=count).astype(np.float64) * resolution**2
     return RegionGraph(
-        labels, resolution, tuple(origin.tolist()), areas, axes, low, high, doors, direction_histogram(slopes)
+        labels, resolution, tuple(origin.tolist()), areas, axes, low, high, doors, _direction_histogram(slopes)
     )
 
 

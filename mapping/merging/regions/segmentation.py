@@ -181,7 +181,7 @@ def _meets(labels: Array, row: int, column: int, down: int, right: int) -> bool:
 _LEVELS_A_CELL = 8
 
 
-class SplitRule(NamedTuple):
+class _SplitRule(NamedTuple):
     """Where basins stay apart; lengths in cells.
 
     Half the width of the widest door, its share of the narrower region, radius of a region at least.
@@ -233,7 +233,7 @@ def split_regions(clearance: NDArray[np.float32], side: float, settings: RegionS
     settings : RegionSettings
         Where regions are split.
     """
-    rule = SplitRule(0.5 * settings.widest_door_m / side, settings.door_share, settings.least_radius_m / side)
+    rule = _SplitRule(0.5 * settings.widest_door_m / side, settings.door_share, settings.least_radius_m / side)
     labels = np.full(clearance.shape, NONE, np.int32)
     order = np.empty(np.count_nonzero(clearance), np.int64)
     _sort(clearance, np.zeros(int(clearance.max() * _LEVELS_A_CELL) + 2, np.int64), order)
@@ -265,7 +265,7 @@ def _sort(clearance: Array, ends: Array, order: Array) -> None:
 
 
 @kernel
-def _flood(clearance: Array, order: Array, rule: SplitRule, basins: tuple[Array, Array, Array], labels: Array) -> int:
+def _flood(clearance: Array, order: Array, rule: _SplitRule, basins: tuple[Array, Array, Array], labels: Array) -> int:
     """Label the cells by basins, with parent, peak and area of each; returns how many there are.
 
     Each cell joins the basin from which the slope to it is steepest. Where it touches several, those merge
@@ -310,7 +310,7 @@ def _root(parent: Array, basin: int) -> int:
 
 
 @kernel(forceinline=True)
-def _met(parent: Array, peak: Array, one: int, other: int, height: float, rule: SplitRule) -> int:
+def _met(parent: Array, peak: Array, one: int, other: int, height: float, rule: _SplitRule) -> int:
     """Merge two basins that meet, unless a door keeps them apart; returns that of the first one."""
     if one == other or _is_door(height, min(peak[one], peak[other]), rule):
         return one
@@ -320,7 +320,7 @@ def _met(parent: Array, peak: Array, one: int, other: int, height: float, rule: 
 
 
 @kernel(forceinline=True)
-def _is_door(height: float, peak: float, rule: SplitRule) -> bool:
+def _is_door(height: float, peak: float, rule: _SplitRule) -> bool:
     """Whether a passage keeps two basins apart, by its clearance and the peak of the narrower one."""
     return bool(height <= rule.half_door and peak >= rule.least_radius and height <= rule.door_share * peak)
 

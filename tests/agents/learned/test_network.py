@@ -12,12 +12,12 @@ import pytest
 from drawn_decisions import drawn_decision
 
 from lidarium.agents.learned import network
-from lidarium.agents.learned.network import CARD, SHIPPED, Network, check_weights, load_weights, save_weights, shapes
+from lidarium.agents.learned.network import CARD, SHIPPED, Network, _check_weights, _shapes, load_weights, save_weights
 
 
 def weights(scale=0.1, seed=0):
     generator = np.random.default_rng(seed)
-    return {name: (scale * generator.normal(size=shape)).astype(np.float32) for name, shape in shapes().items()}
+    return {name: (scale * generator.normal(size=shape)).astype(np.float32) for name, shape in _shapes().items()}
 
 
 def classic_weights():
@@ -61,7 +61,7 @@ def test_preferences_do_not_depend_on_the_order_of_options():
 
 
 def test_it_has_at_most_300000_parameters():
-    assert sum(int(np.prod(shape)) for shape in shapes().values()) <= 300_000
+    assert sum(int(np.prod(shape)) for shape in _shapes().values()) <= 300_000
 
 
 @pytest.mark.parametrize(
@@ -78,12 +78,12 @@ def test_weights_of_another_network_are_refused(change, message):
     arrays = weights()
     change(arrays)
     with pytest.raises(ValueError, match=message):
-        check_weights(arrays, "a file")
+        _check_weights(arrays, "a file")
 
 
 def drawn():
     generator = np.random.default_rng(0)
-    return {name: generator.normal(size=shape).astype(np.float32) for name, shape in shapes().items()}
+    return {name: generator.normal(size=shape).astype(np.float32) for name, shape in _shapes().items()}
 
 
 def test_what_was_saved_is_loaded(tmp_path):
@@ -203,5 +203,5 @@ def test_the_package_ships_weights_that_are_what_their_card_names():
     card = json.loads((folder / CARD).read_text(encoding="utf-8"))
     assert hashlib.sha256(content).hexdigest() == card["sha256"]
     assert len(content) <= 5_000_000
-    assert load_weights().keys() == shapes().keys()
+    assert load_weights().keys() == _shapes().keys()
     assert {"training", "validation", "hours", "versions"} <= card.keys()

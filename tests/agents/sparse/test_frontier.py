@@ -9,7 +9,7 @@ import pytest
 import lidarium
 from lidarium.agents import PerRobot
 from lidarium.agents.policy import settings_for
-from lidarium.agents.sparse.frontier import BLOCKED_S, CLAIMED_M, OBSTACLE_S, PATIENCE_S, STUCK_S, SparseFrontier, Work
+from lidarium.agents.sparse.frontier import BLOCKED_S, CLAIMED_M, OBSTACLE_S, PATIENCE_S, STUCK_S, SparseFrontier, _Work
 from lidarium.envs.floors.floor import Floor, Solid
 from lidarium.envs.floors.free_space import reachable_free_space
 from lidarium.envs.onboard.radio.messages import DriveState
@@ -331,7 +331,7 @@ VIEW = View(np.array([4.0, 2.0]), 0.0, 3.0, np.array([[5.0, 2.0], [5.0, 3.0]]))
 
 
 def begun():
-    work = Work()
+    work = _Work()
     work.begin(VIEW, 10.0, HERE)
     return work
 

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from lidarium.agents.sparse.views import FACING, ViewSettings, apart_from, are_within, discs_around
+from lidarium.agents.sparse.views import FACING, ViewSettings, _are_within, apart_from, discs_around
 
 BORDER = np.array([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [3.0, 0.0]])
 
@@ -28,8 +28,8 @@ def sight(half_angle=0.5, nearest_m=0.6, farthest_m=3.0):
 
 def test_points_lie_within_discs_up_to_their_borders():
     discs = np.array([[1.0, 0.0, 1.0], [9.0, 9.0, 0.1]])
-    assert are_within(BORDER, discs).tolist() == [True, True, True, False]
-    assert not are_within(BORDER, np.empty((0, 3))).any()
+    assert _are_within(BORDER, discs).tolist() == [True, True, True, False]
+    assert not _are_within(BORDER, np.empty((0, 3))).any()
     np.testing.assert_array_equal(discs_around(BORDER[:1], 0.3), [[0.0, 0.0, 0.3]])
 
 

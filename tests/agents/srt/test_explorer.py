@@ -8,7 +8,7 @@ import pytest
 from driven_rooms import box, cast
 from srt_halls import RADIUS, hall
 
-from lidarium.agents.srt.explorer import NEW_NODE, Explorer, TreeGrowth
+from lidarium.agents.srt.explorer import NEW_NODE, Explorer, _TreeGrowth
 from lidarium.agents.srt.memories import RegionMemory
 from lidarium.agents.srt.senses import Senses
 from lidarium.agents.srt.settings import SrtSettings, make_srt_settings
@@ -155,7 +155,7 @@ def at(x, y, ranges=2.0):
 
 
 def planted(tree=None, agent="robot_0", **settings):
-    growth = TreeGrowth(agent, tree or Tree(), SrtSettings(**settings), TREE_GROWTH_LIDAR, RADIUS)
+    growth = _TreeGrowth(agent, tree or Tree(), SrtSettings(**settings), TREE_GROWTH_LIDAR, RADIUS)
     growth.plant(at(4.0, 3.0), MEMORY)
     return growth
 
@@ -188,7 +188,7 @@ def test_a_robot_that_comes_to_a_node_joins_it_with_the_last_one():
 
 
 def test_another_scan_at_a_place_shows_what_the_first_did_not():
-    growth = TreeGrowth("robot_0", Tree(), SrtSettings(), TREE_GROWTH_LIDAR, RADIUS)
+    growth = _TreeGrowth("robot_0", Tree(), SrtSettings(), TREE_GROWTH_LIDAR, RADIUS)
     blind = at(4.0, 3.0)
     blind.scan[TREE_GROWTH_LIDAR.beams // 4 : 3 * TREE_GROWTH_LIDAR.beams // 4] = np.nan  # nothing is known ahead
     growth.plant(blind, MEMORY)

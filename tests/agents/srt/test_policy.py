@@ -171,7 +171,7 @@ def test_the_same_seed_gives_the_same_run():
 )
 def test_only_explorers_that_choose_the_least_cost_plan_tours(chosen, monkeypatch):
     planned = []
-    monkeypatch.setattr("lidarium.agents.srt.choice.first_on_tour", lambda *_: planned.append(1))
+    monkeypatch.setattr("lidarium.agents.srt.choice._first_on_tour", lambda *_: planned.append(1))
     env = lidarium.parallel_env("apartment", robots=1, robot="pioneer", horizon_s=30.0)
     run_episode(SensorBasedRandomTree(**chosen), env, 0)
     assert bool(planned) == (not chosen)

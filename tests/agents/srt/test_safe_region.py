@@ -13,9 +13,9 @@ from lidarium.agents.srt.safe_region import (
     DIRECTIONS,
     STEP,
     UNIT,
+    _region_of,
     joined_views,
     openings_of,
-    region_of,
     safe_region,
     view_of,
 )
@@ -27,7 +27,7 @@ URG = ScanGeometry()
 
 def test_the_five_laser_regions_go_from_right_to_left():
     degrees = np.array([-120, -73, -72, -25, -24, 0, 23, 24, 71, 72, 119, 121, 179])
-    assert region_of(np.radians(degrees)).tolist() == [0, 0, 1, 1, 2, 2, 2, 3, 3, 4, 4, 5, 6]
+    assert _region_of(np.radians(degrees)).tolist() == [0, 0, 1, 1, 2, 2, 2, 3, 3, 4, 4, 5, 6]
 
 
 @settings(max_examples=20)
@@ -66,8 +66,8 @@ def test_a_region_with_a_near_return_is_not_safe_to_turn_in():
     view = box_view()
     view[0] = 0.25
     radii = safe_region(HERE, view, 0.0, "radial", BODY, PERCEPTION, turn_room=0.1).radii
-    assert (radii[region_of(ANGLES) == 2] == 0.0).all()
-    assert (radii[region_of(ANGLES) == 4] > 0.0).all()
+    assert (radii[_region_of(ANGLES) == 2] == 0.0).all()
+    assert (radii[_region_of(ANGLES) == 4] > 0.0).all()
 
 
 def test_a_scan_becomes_ranges_along_the_axes_of_the_map():

@@ -10,7 +10,7 @@ from srt_halls import hall, senses_at
 
 from lidarium.agents.srt.senses import Senses
 from lidarium.agents.srt.settings import SrtSettings
-from lidarium.agents.srt.travel import BACKING_S, MOST_TURNS, Progress, Travel, TurnPlan
+from lidarium.agents.srt.travel import BACKING_S, MOST_TURNS, Travel, _Progress, _TurnPlan
 from lidarium.envs.settings.lidar import Lidar
 from lidarium.envs.settings.robots import Robot
 
@@ -93,7 +93,7 @@ def test_blocks_at_one_place_are_counted_in_a_row():
     def there(x, time_s):
         return Senses(time_s, np.array([x, 0.0, 0.0]), np.empty(0, np.float32), False, None, [])
 
-    progress = Progress()
+    progress = _Progress()
     assert [progress.note_block(there(x, 0.0)) for x in (1.0, 1.3, 1.1, 3.0, 3.2, 1.0)] == [1, 2, 3, 1, 2, 1]
     progress.stand(there(1.0, 10.0))
     assert not progress.is_stuck(there(1.01, 12.9))
@@ -120,7 +120,7 @@ def headings_of(plan):
 @pytest.mark.parametrize("degrees", [60.0, 90.0, 120.0, 240.0, 270.0])
 @pytest.mark.parametrize("heading", [0.0, 2.5])
 def test_after_all_turns_the_whole_circle_was_seen(degrees, heading):
-    plan = TurnPlan()
+    plan = _TurnPlan()
     plan.plan_circle(facing(heading), lidar(degrees))
     headings = [heading, *headings_of(plan)]
     assert len(headings) == math.ceil(360.0 / degrees)
@@ -135,13 +135,13 @@ def test_after_all_turns_the_whole_circle_was_seen(degrees, heading):
     ids=["full", "narrow", "beam"],
 )
 def test_a_laser_that_sees_all_or_hardly_anything_does_not_turn(laser):
-    plan = TurnPlan()
+    plan = _TurnPlan()
     plan.plan_circle(facing(0.0), laser)
     assert plan.is_over
 
 
 def test_a_robot_turns_to_a_frontier_the_short_distance():
-    plan = TurnPlan()
+    plan = _TurnPlan()
     focus = np.array([-1.0, 2.0])
     plan.plan_frontier(focus, facing(3.0, 1.0, 2.0))
     assert plan.focus is focus

@@ -11,7 +11,7 @@ from lidarium.agents import Policy
 from lidarium.agents.policy import Stop
 from lidarium.agents.random_walk import RandomWalk
 from lidarium.agents.supervisor.factories import supervised
-from lidarium.agents.supervisor.policy import LOST_S, PATIENCE_S, Errands, LedTeam, Supervised
+from lidarium.agents.supervisor.policy import LOST_S, PATIENCE_S, Supervised, _Errands, _LedTeam
 from lidarium.agents.supervisor.settings import SupervisorSettings
 from lidarium.agents.supervisor.supervisor import Command
 from lidarium.envs.onboard.navigation import NavigationMap
@@ -219,7 +219,7 @@ class Robots:
 def sent(**changes):
     """A robot that has been sent to a frontier, and has taken the order."""
     team = Robots()
-    errands = Errands(team)
+    errands = _Errands(team)
     values = {"agent": "a", "kind": OrderKind.GO_TO, "rule": 3, "why": "because"}
     errands.begin(Command(**{**values, "target": Target(1.9, 2.0), "observes": (2.0, 2.0), **changes}))
     order = errands.action("a")
@@ -240,7 +240,7 @@ def test_a_robot_gets_its_order_once_and_is_away():
 
 
 def test_a_command_without_a_target_is_no_errand():
-    errands = Errands(Robots())
+    errands = _Errands(Robots())
     errands.begin(Command("a", OrderKind.PAUSE, 1, "wait"))
     assert len(errands) == 0
 
@@ -248,7 +248,7 @@ def test_a_command_without_a_target_is_no_errand():
 @pytest.mark.parametrize(("after_s", "is_left"), [(LOST_S, 1), (LOST_S + 0.1, 0)])
 def test_an_order_that_was_not_taken_is_lost_after_a_while(after_s, is_left):
     team = Robots()
-    errands = Errands(team)
+    errands = _Errands(team)
     errands.begin(Command("a", OrderKind.GO_TO, 3, "because", Target(1.9, 2.0)))
     errands.action("a")
     # Until it has taken the order its policy drives it.
@@ -317,7 +317,7 @@ def led(exploring):
         drive_state=lambda agent: DriveState.BLOCKED,
         **{name: answered(name) for name in names},
     )
-    return LedTeam(team, exploring), asked
+    return _LedTeam(team, exploring), asked
 
 
 def test_drives_for_the_supervisor_are_hidden():

@@ -9,7 +9,7 @@ from drawn_maps import about_middle, apartment, blank, kept, moved, noisy, room
 from reported_halls import RADIUS, RESOLUTION, hall, report
 
 from lidarium.agents.supervisor.settings import SupervisorSettings
-from lidarium.agents.supervisor.station import MergeStation, ReceivedReports
+from lidarium.agents.supervisor.station import MergeStation, _ReceivedReports
 from lidarium.envs.onboard.radio.messages import OperatingState
 from lidarium.envs.onboard.station.trails import without_bodies, without_own_trail
 from lidarium.mapping.merging.incremental import GrowingMap
@@ -129,7 +129,7 @@ WAY = SETTINGS.enclosed_way_m
 
 
 def received(*reports):
-    found = ReceivedReports(["a", "b"], RESOLUTION, SETTINGS)
+    found = _ReceivedReports(["a", "b"], RESOLUTION, SETTINGS)
     for each in reports:
         found.add("a", each)
     return found

@@ -7,7 +7,7 @@ import pytest
 from reported_halls import RADIUS, RESOLUTION, hall, report
 
 from lidarium.agents.supervisor.settings import SupervisorSettings
-from lidarium.agents.supervisor.survey import NONE, Survey, _unknown_around, find_goals
+from lidarium.agents.supervisor.survey import NONE, Survey, _find_goals, _unknown_around
 from lidarium.envs.onboard.driving.path_planner import footprint_of
 from lidarium.envs.onboard.navigation import NavigationMap
 from lidarium.mapping.geometry.rigid import Transform
@@ -128,7 +128,7 @@ def parted_hall(with_wall=False):
 
 
 def goals_of(navigation, *cells):
-    return find_goals(navigation, (0.0, 0.0), cells, FOOTPRINT, 0.5, 3.0)
+    return _find_goals(navigation, (0.0, 0.0), cells, FOOTPRINT, 0.5, 3.0)
 
 
 def test_each_open_side_is_a_goal_with_its_length_and_the_nearer_one_costs_less():

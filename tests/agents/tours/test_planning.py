@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from lidarium.agents.tours.planning import Tourist, TourSettings, first_options, first_places, leg_to, tour_options
+from lidarium.agents.tours.planning import Tourist, TourSettings, _first_places, first_options, leg_to, tour_options
 from lidarium.envs.onboard.navigation import NavigationMap
 
 RESOLUTION = 0.05
@@ -100,9 +100,9 @@ def test_robots_without_a_frontier_stay():
 
 
 def test_first_places_are_those_behind_each_separator():
-    assert first_places(np.array([2, 0, 4, 1, 3]), 4) == [2, 1]
-    assert first_places(np.array([3, 1, 0, 4, 2]), 3) == [None, 1, 2]
-    assert first_places(np.array([0, 1]), 0) == [None, None, None]
+    assert _first_places(np.array([2, 0, 4, 1, 3]), 4) == [2, 1]
+    assert _first_places(np.array([3, 1, 0, 4, 2]), 3) == [None, 1, 2]
+    assert _first_places(np.array([0, 1]), 0) == [None, None, None]
 
 
 def test_nothing_counts_that_lies_beyond_the_laser():

@@ -16,11 +16,11 @@ from lidarium.mapping.merging.agreement import (
     Confirmation,
     ValidationSettings,
     WallField,
+    _count_overlap,
+    _distinct_walls,
     compare,
-    count_overlap,
     count_walls,
     disc_agreement,
-    distinct_walls,
     why_refused,
 )
 from lidarium.mapping.merging.described_map import describe_map
@@ -121,7 +121,7 @@ def test_the_overlap_is_that_of_a_plain_count_of_every_third_cell(pose):
     generator = np.random.default_rng(4)
     a, b = (generator.choice(np.array([0, 127, 255], np.uint8), (30, 40)) for _ in range(2))
     found = np.zeros(3)
-    count_overlap(a, b, 0.1, pose, found)
+    _count_overlap(a, b, 0.1, pose, found)
     both = []
     for row in range(1, 30, STRIDE):
         for column in range(1, 40, STRIDE):
@@ -163,7 +163,7 @@ def test_many_walls_convince_though_maps_know_nothing_else_and_excuse_a_body():
     one = describe_map(apartment(), RESOLUTION)
     found = Agreement(20.0, (4.0, 4.0), 40.0, 41.0, 12.0, 0.0, 1.0)
     rule = Confirmation(validation=ValidationSettings(most_contradiction_m=0.3), own_m2=6.0, wall_m=3.5)
-    walls = distinct_walls(one, one, Transform(), HIT_M)
+    walls = _distinct_walls(one, one, Transform(), HIT_M)
     assert walls > MANY_WALLS
     assert rule.convinces((one, one), 20.0, Transform(), found)
     body = replace(found, contradicting_m=0.3 + 0.09 * (walls - MANY_WALLS))
@@ -191,20 +191,20 @@ def test_walls_are_counted_once_however_long_they_are():
         levels[18 : 22 + length, 18:102] = 0
         levels[20 : 20 + length, 20:100] = 255
         one = describe_map(levels, RESOLUTION)
-        assert distinct_walls(one, one, Transform(), HIT_M) == 4
+        assert _distinct_walls(one, one, Transform(), HIT_M) == 4
 
 
 def test_furniture_adds_walls_and_what_lies_elsewhere_none():
     one = describe_map(apartment(), RESOLUTION)
-    assert distinct_walls(one, one, Transform(), HIT_M) >= 20
-    assert distinct_walls(one, one, Transform(100.0, 0.0), HIT_M) == 0
+    assert _distinct_walls(one, one, Transform(), HIT_M) >= 20
+    assert _distinct_walls(one, one, Transform(100.0, 0.0), HIT_M) == 0
 
 
 def test_the_number_of_walls_does_not_depend_on_the_frame():
     truth = about_middle(0.5 * np.pi, apartment())
     one, turned = describe_map(apartment(), RESOLUTION), describe_map(moved(apartment(), truth), RESOLUTION)
     counts = (
-        distinct_walls(turned, one, truth, HIT_M),
-        distinct_walls(one, one, Transform(), HIT_M),
+        _distinct_walls(turned, one, truth, HIT_M),
+        _distinct_walls(one, one, Transform(), HIT_M),
     )
     assert abs(counts[0] - counts[1]) <= 2

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lidarium.mapping.geometry.rigid import Transform, wrapped
-from lidarium.mapping.merging.alignment import AlignmentSettings, find_inliers, propose, sweep_rotation
+from lidarium.mapping.merging.alignment import AlignmentSettings, _propose, _sweep_rotation, find_inliers
 from lidarium.mapping.merging.corners import Corners, detect_corners
 from lidarium.mapping.merging.correspondence import METHODS, CorrespondenceSettings, Matches, match_corners
 from lidarium.mapping.merging.described_map import describe_map
@@ -49,13 +49,13 @@ def paired(first, second):
 @given(POSES)
 def test_every_exact_match_proposes_the_true_transform(pose):
     first, second = seen_from(*scattered(8), pose)
-    for x, y, theta in propose(first, second, paired(first, second)).tolist():
+    for x, y, theta in _propose(first, second, paired(first, second)).tolist():
         assert close(Transform(x, y, theta), pose, 1e-7, 1e-7)
 
 
 def test_the_transform_maps_b_into_a():
     first, second = seen_from(*scattered(6), Transform(1.0, -2.0, math.radians(30.0)))
-    np.testing.assert_allclose(propose(first, second, paired(first, second))[0], (1.0, -2.0, math.radians(30.0)))
+    np.testing.assert_allclose(_propose(first, second, paired(first, second))[0], (1.0, -2.0, math.radians(30.0)))
 
 
 def test_the_true_transform_wins_among_sixty_percent_wrong_matches():
@@ -94,7 +94,7 @@ def test_the_ratio_rule_is_loose_far_from_the_corner_and_tight_near_it():
 def test_the_sweep_repairs_a_rotation_within_seven_degrees():
     points, _ = scattered(9)
     pose = Transform(1.0, 2.0, 0.5)
-    swept = sweep_rotation(pose.apply(points), points, Transform(1.0, 2.0, 0.5 + math.radians(5.0)))
+    swept = _sweep_rotation(pose.apply(points), points, Transform(1.0, 2.0, 0.5 + math.radians(5.0)))
     assert close(swept, pose, 0.05, math.radians(0.26))
 
 

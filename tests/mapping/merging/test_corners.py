@@ -5,7 +5,7 @@ import pytest
 from drawn_maps import RESOLUTION, apartment, blank, room
 
 from lidarium.mapping.files.map_files import FREE, OCCUPIED, UNKNOWN
-from lidarium.mapping.merging.corners import STEP, CornerSettings, detect_corners, orientation_table
+from lidarium.mapping.merging.corners import STEP, CornerSettings, _orientation_table, detect_corners
 
 ALL = CornerSettings(separation_m=0.0, limit=0)
 
@@ -58,7 +58,7 @@ def test_every_corner_is_found_wherever_the_words_of_eight_cells_begin():
 def test_the_detector_agrees_with_a_slow_one():
     generator = np.random.default_rng(3)
     levels = generator.choice(np.array([OCCUPIED, UNKNOWN, FREE], np.uint8), (50, 45), p=[0.5, 0.1, 0.4])
-    table = orientation_table()
+    table = _orientation_table()
     around = ((0, 1), (1, 1), (1, 0), (1, -1), (0, -1), (-1, -1), (-1, 0), (-1, 1))
     expected = set()
     for row in range(1, 49):
@@ -147,11 +147,11 @@ def mirrored_code(code):
 
 
 def test_the_table_holds_the_sixteen_corners():
-    assert angles_of(orientation_table()) == TABLE
+    assert angles_of(_orientation_table()) == TABLE
 
 
 def test_the_table_looks_alike_in_all_directions():
-    angles = angles_of(orientation_table("table", (4, 5, 6, 7)))
+    angles = angles_of(_orientation_table("table", (4, 5, 6, 7)))
     for code, angle in angles.items():
         assert angles[turned_code(code)] == (angle + 90.0) % 360.0
         assert angles[mirrored_code(code)] == -angle % 360.0
@@ -159,10 +159,10 @@ def test_the_table_looks_alike_in_all_directions():
 
 @pytest.mark.parametrize(("rule", "counts"), [("table", (4, 4, 8, 8)), ("literal", (4, 12, 16, 8))])
 def test_each_number_of_neighbours_can_be_had_alone(rule, counts):
-    assert tuple(np.count_nonzero(orientation_table(rule, (r,))) for r in (4, 5, 6, 7)) == counts
-    assert np.count_nonzero(orientation_table(rule, (5, 6))) == counts[1] + counts[2]
+    assert tuple(np.count_nonzero(_orientation_table(rule, (r,))) for r in (4, 5, 6, 7)) == counts
+    assert np.count_nonzero(_orientation_table(rule, (5, 6))) == counts[1] + counts[2]
 
 
 def test_the_literal_rule_favours_one_diagonal():
-    codes = set(angles_of(orientation_table("literal", (5,))))
+    codes = set(angles_of(_orientation_table("literal", (5,))))
     assert {turned_code(code) for code in codes} != codes

@@ -9,10 +9,10 @@ from drawn_maps import RESOLUTION, about_middle, apartment, moved
 from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.merging.correspondence import (
     CorrespondenceSettings,
-    common_distances,
-    compare_descriptors,
-    like_clusters,
-    like_triangles,
+    _common_distances,
+    _compare_descriptors,
+    _like_clusters,
+    _like_triangles,
     match_corners,
 )
 from lidarium.mapping.merging.described_map import describe_map
@@ -36,7 +36,7 @@ def plain(first, second, shift):
 def test_equal_descriptors_are_alike_by_every_measure(maps, measure):
     one = maps[0].descriptors
     settings = CorrespondenceSettings(measure=measure, is_known_only=False)
-    similarity, shift = compare_descriptors(one, one, settings)
+    similarity, shift = _compare_descriptors(one, one, settings)
     np.testing.assert_allclose(np.diag(similarity), 1.0, atol=1e-4)
     np.testing.assert_allclose(np.diag(shift), 0.0, atol=1e-6)
 
@@ -46,7 +46,7 @@ def test_the_difference_is_that_of_its_definition():
     values = generator.normal(size=(2, 3, 16)).astype(np.float32)
     one = Descriptors(values, np.ones_like(values))
     settings = CorrespondenceSettings(measure="difference", is_known_only=False, shift_window=math.pi)
-    similarity, shift = compare_descriptors(one, one, settings)
+    similarity, shift = _compare_descriptors(one, one, settings)
     columns = round(float(shift[0, 1]) / (2.0 * math.pi / 16))
     assert similarity[0, 1] == pytest.approx(plain(values[0], values[1], columns), abs=1e-4)
     assert similarity[0, 1] <= 1.0
@@ -55,8 +55,8 @@ def test_the_difference_is_that_of_its_definition():
 def test_a_louder_copy_correlates_and_differs():
     values = np.random.default_rng(2).normal(size=(1, 3, 16)).astype(np.float32)
     one, loud = (Descriptors(factor * values, np.ones_like(values)) for factor in (1.0, 3.0))
-    alike, _ = compare_descriptors(one, loud, CorrespondenceSettings())
-    differs, _ = compare_descriptors(one, loud, CorrespondenceSettings(measure="difference"))
+    alike, _ = _compare_descriptors(one, loud, CorrespondenceSettings())
+    differs, _ = _compare_descriptors(one, loud, CorrespondenceSettings(measure="difference"))
     assert alike[0, 0] == pytest.approx(1.0, abs=1e-4)
     assert differs[0, 0] == pytest.approx(0.6, abs=1e-4)
 
@@ -75,7 +75,7 @@ def test_what_is_as_similar_from_behind_is_no_match():
     values = np.tile(column, (1, 3, 1)).astype(np.float32)
     one = Descriptors(values, np.ones_like(values))
     for excludes, expected in ((False, 1.0), (True, -1.0)):
-        similarity, _ = compare_descriptors(one, one, CorrespondenceSettings(excludes_opposite=excludes))
+        similarity, _ = _compare_descriptors(one, one, CorrespondenceSettings(excludes_opposite=excludes))
         assert similarity[0, 0] == pytest.approx(expected, abs=1e-4)
 
 
@@ -86,9 +86,9 @@ def test_an_unknown_measure_is_refused():
 
 MOTION = Transform(3.0, -7.0, 2.1)
 COMPARED = (
-    lambda a, b: common_distances(a, b, 0.01),
-    lambda a, b: like_triangles(a, b, 0.01),
-    lambda a, b: like_clusters(a, b, 0.01, 4.0),
+    lambda a, b: _common_distances(a, b, 0.01),
+    lambda a, b: _like_triangles(a, b, 0.01),
+    lambda a, b: _like_clusters(a, b, 0.01, 4.0),
 )
 
 
@@ -132,12 +132,12 @@ def plain_clusters(first, second, tolerance, radius):
 def test_clusters_are_compared_by_the_distances_within_a_radius(seed):
     first, second = scattered(12, seed), scattered(15, seed + 10)
     second[:6] = MOTION.apply(first[:6])
-    found = like_clusters(first, second, 0.08, 3.0)
+    found = _like_clusters(first, second, 0.08, 3.0)
     np.testing.assert_allclose(found, plain_clusters(first, second, 0.08, 3.0))
 
 
 def test_corners_beyond_the_radius_do_not_count():
     points = scattered(10)
     far = points + np.array([100.0, 0.0])
-    similarity = like_clusters(points, np.concatenate([points, far]), 0.01, 4.0)
+    similarity = _like_clusters(points, np.concatenate([points, far]), 0.01, 4.0)
     assert np.allclose(similarity[:, :10], similarity[:, 10:])

@@ -6,7 +6,7 @@ from drawn_maps import RESOLUTION, apartment, blank, room
 
 from lidarium.mapping.files.map_files import UNKNOWN
 from lidarium.mapping.merging.corners import Corners, CornerSettings, detect_corners
-from lidarium.mapping.merging.correspondence import CorrespondenceSettings, compare_descriptors
+from lidarium.mapping.merging.correspondence import CorrespondenceSettings, _compare_descriptors
 from lidarium.mapping.merging.descriptors import VARIANTS, DescriptorSettings, describe_corners
 
 
@@ -76,7 +76,7 @@ def test_all_shifts_are_compared_as_a_slow_loop_would(is_known_only):
     settings = CorrespondenceSettings(is_known_only=is_known_only, shift_window=math.pi, least_known=0.0)
     first = describe_corners(levels, RESOLUTION, corners)
     second = describe_corners(levels, RESOLUTION, looking_along(corners, 0.3))
-    similarity, shift = compare_descriptors(first, second, settings)
+    similarity, shift = _compare_descriptors(first, second, settings)
     columns = first.values.shape[2]
     for i in range(len(corners)):
         for j in range(len(corners)):

@@ -8,7 +8,7 @@ from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.merging import pair
 from lidarium.mapping.merging.agreement import Confirmation, ValidationSettings
 from lidarium.mapping.merging.frame_tree import Edge, FrameTree
-from lidarium.mapping.merging.incremental import DescribedMaps, GrowingMap, IncrementalMerger
+from lidarium.mapping.merging.incremental import GrowingMap, IncrementalMerger, _DescribedMaps
 from lidarium.mapping.merging.pair import described, is_contradicted, verify_pair
 from lidarium.mapping.merging.settings import MergeSettings, merge_settings
 
@@ -256,7 +256,7 @@ SETTINGS = MergeSettings()
 
 
 def taken_in(maps, number, into=None):
-    into = into or DescribedMaps()
+    into = into or _DescribedMaps()
     into.update(maps, RESOLUTION, SETTINGS, number)
     return into
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from lidarium.mapping.files.map_files import FREE, OCCUPIED, UNKNOWN
 from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.merging.described_map import describe_map
-from lidarium.mapping.merging.pair import PairResult, described, exact_motion, explained, merge_pair, or_bent
+from lidarium.mapping.merging.pair import PairResult, _exact_motion, _or_bent, described, explained, merge_pair
 from lidarium.mapping.merging.settings import TOLERANCES, MergeSettings, merge_settings
 
 
@@ -241,7 +241,7 @@ def test_a_turned_copy_is_laid_on_its_cells_exactly(quarters):
         corner[0] * RESOLUTION, corner[1] * RESOLUTION, math.remainder(quarters * math.pi / 2.0, math.tau)
     )
     start = Transform(truth.x + 0.12, truth.y - 0.08, truth.theta + math.radians(0.5))
-    found = exact_motion(describe_map(turned, RESOLUTION), describe_map(levels, RESOLUTION), start)
+    found = _exact_motion(describe_map(turned, RESOLUTION), describe_map(levels, RESOLUTION), start)
     assert found is not None
     assert (found.x, found.y) == pytest.approx((truth.x, truth.y), abs=1e-12)
     assert math.cos(found.theta - truth.theta) == pytest.approx(1.0, abs=1e-12)
@@ -249,29 +249,29 @@ def test_a_turned_copy_is_laid_on_its_cells_exactly(quarters):
 
 def test_a_rotation_that_is_no_quarter_turn_has_no_exact_motion():
     one = describe_map(apartment(), RESOLUTION)
-    assert exact_motion(one, one, Transform(theta=math.radians(3.0))) is None
+    assert _exact_motion(one, one, Transform(theta=math.radians(3.0))) is None
 
 
 def test_maps_that_do_not_share_their_cells_have_no_exact_motion():
     truth = about_middle(0.02, apartment())
     other = describe_map(moved(apartment(), truth), RESOLUTION)
-    assert exact_motion(other, describe_map(apartment(), RESOLUTION), truth) is None
+    assert _exact_motion(other, describe_map(apartment(), RESOLUTION), truth) is None
     one = describe_map(apartment(), RESOLUTION)
-    assert exact_motion(one, one, Transform(2.0, 0.0, 0.0)) is None
+    assert _exact_motion(one, one, Transform(2.0, 0.0, 0.0)) is None
 
 
 def test_maps_that_know_nothing_in_common_have_no_exact_motion():
     one = describe_map(apartment(), RESOLUTION)
-    assert exact_motion(one, one, Transform(100.0, 0.0, 0.0)) is None
-    assert exact_motion(one, describe_map(blank(), RESOLUTION), Transform()) is None
-    assert exact_motion(describe_map(blank(), RESOLUTION), one, Transform()) is None
+    assert _exact_motion(one, one, Transform(100.0, 0.0, 0.0)) is None
+    assert _exact_motion(one, describe_map(blank(), RESOLUTION), Transform()) is None
+    assert _exact_motion(describe_map(blank(), RESOLUTION), one, Transform()) is None
 
 
 def test_walls_that_only_one_map_knows_do_not_count():
     part = apartment()
     part[:, 110:] = 127
     a, b = describe_map(part, RESOLUTION), describe_map(apartment(), RESOLUTION)
-    assert exact_motion(a, b, Transform(0.05, 0.0, 0.0)) == Transform()
+    assert _exact_motion(a, b, Transform(0.05, 0.0, 0.0)) == Transform()
 
 
 SETTINGS = MergeSettings()
@@ -304,7 +304,7 @@ def test_maps_without_walls_are_explained_by_nothing(maps):
 
 
 def test_a_refused_pair_is_accepted_where_it_agrees_bent(maps):
-    found = or_bent(*maps, replace(REFUSED, inliers=7), SETTINGS)
+    found = _or_bent(*maps, replace(REFUSED, inliers=7), SETTINGS)
     assert (found.is_accepted, found.reason, found.found_by) == (True, "accepted", "bend")
     assert found.inliers == 0
     assert found.a_from_b == found.ranked[0].bend.a_from_b
@@ -313,14 +313,14 @@ def test_a_refused_pair_is_accepted_where_it_agrees_bent(maps):
 
 
 def test_what_is_not_believed_stays_refused(maps):
-    assert or_bent(*maps, replace(REFUSED, is_accepted=True), SETTINGS).found_by == "corners"
+    assert _or_bent(*maps, replace(REFUSED, is_accepted=True), SETTINGS).found_by == "corners"
     for changed in (
         replace(SETTINGS, confidence=2.0),
         replace(SETTINGS, bend=replace(SETTINGS.bend, candidates=0)),
     ):
-        assert or_bent(*maps, REFUSED, changed) is REFUSED
+        assert _or_bent(*maps, REFUSED, changed) is REFUSED
     other = describe_map(apartment(), RESOLUTION)
-    unsure = or_bent(maps[0], other, replace(REFUSED, a_from_b=Transform(1.0, 2.0, 0.7), tried=()), SETTINGS)
+    unsure = _or_bent(maps[0], other, replace(REFUSED, a_from_b=Transform(1.0, 2.0, 0.7), tried=()), SETTINGS)
     assert not unsure.is_accepted
     assert unsure.reason == "contradiction"
     assert unsure.confidence < SETTINGS.confidence

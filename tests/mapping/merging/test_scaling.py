@@ -12,11 +12,11 @@ from lidarium.mapping.merging.described_map import describe_map
 from lidarium.mapping.merging.regions.segmentation import RegionSettings
 from lidarium.mapping.merging.scaling import (
     ScaleSettings,
-    grown_levels,
+    _grown_levels,
+    _placements,
+    _region_placements,
+    _wall_axis,
     merge_scaled,
-    placements,
-    region_placements,
-    wall_axis,
 )
 
 SIZE = (700, 700)
@@ -24,7 +24,7 @@ SIZE = (700, 700)
 
 def drawn_at(levels, scale, there):
     """Return a map drawn smaller or larger than it is, in a frame of its own; it lies there once grown."""
-    return grown_levels(moved(levels, there, SIZE), RESOLUTION / scale, RESOLUTION)
+    return _grown_levels(moved(levels, there, SIZE), RESOLUTION / scale, RESOLUTION)
 
 
 @pytest.mark.parametrize("scale", [0.7, 1.0, 1.6])
@@ -83,9 +83,9 @@ REGIONS, SCALING = RegionSettings(), ScaleSettings()
 def placed(theta=-0.4, scale=1.3, regions=REGIONS, scaling=SCALING):
     """Placements of a plan of the apartment that is turned and drawn too small, and where it truly lies."""
     there = about_middle(theta, apartment(), (400, 400))
-    plan = grown_levels(moved(apartment(), there, (400, 400)), RESOLUTION / scale, RESOLUTION)
+    plan = _grown_levels(moved(apartment(), there, (400, 400)), RESOLUTION / scale, RESOLUTION)
     maps = (describe_map(levels, RESOLUTION) for levels in (apartment(), plan))
-    return region_placements(*maps, regions, scaling), there.inverse()
+    return _region_placements(*maps, regions, scaling), there.inverse()
 
 
 @pytest.mark.parametrize(("theta", "scale"), [(-0.4, 1.3), (2.0, 0.8)])
@@ -125,7 +125,7 @@ def test_maps_without_like_regions_lie_nowhere():
     corridor = room(blank(), 40, 20, 14, 170)
     hall = room(blank(), 10, 10, 130, 130)
     a, b = (describe_map(levels, RESOLUTION) for levels in (corridor, hall))
-    assert region_placements(a, b, REGIONS, SCALING) == []
+    assert _region_placements(a, b, REGIONS, SCALING) == []
 
 
 QUICK = ScaleSettings(slants=0, candidates=8)
@@ -135,14 +135,14 @@ def test_the_axis_of_walls_is_that_of_the_turned_map():
     for theta in (0.0, 0.3, -0.6):
         turned = moved(apartment(), about_middle(theta, apartment()))
         described = describe_map(turned, RESOLUTION)
-        assert math.remainder(wall_axis(described) - theta, math.pi / 2.0) == pytest.approx(0.0, abs=0.03)
+        assert math.remainder(_wall_axis(described) - theta, math.pi / 2.0) == pytest.approx(0.0, abs=0.03)
 
 
 def test_placements_hold_the_true_one_first():
     floor, scale = apartment(), 1.3
     there = about_middle(-0.4, floor, (400, 400))
-    plan = grown_levels(moved(floor, there, (400, 400)), RESOLUTION / scale, RESOLUTION)
-    best = placements(describe_map(floor, RESOLUTION), describe_map(plan, RESOLUTION), QUICK)[0]
+    plan = _grown_levels(moved(floor, there, (400, 400)), RESOLUTION / scale, RESOLUTION)
+    best = _placements(describe_map(floor, RESOLUTION), describe_map(plan, RESOLUTION), QUICK)[0]
     assert best.scale == pytest.approx(scale, rel=0.04)
     distance, angle = best.a_from_b.difference(there.inverse(), (10.0, 10.0))
     assert distance < 0.6
@@ -151,7 +151,7 @@ def test_placements_hold_the_true_one_first():
 
 @pytest.mark.parametrize("scale", [0.4, 1.0, 2.5])
 def test_walls_stay_where_they_are_when_cells_change(scale):
-    levels = grown_levels(apartment(), RESOLUTION * scale, RESOLUTION)
+    levels = _grown_levels(apartment(), RESOLUTION * scale, RESOLUTION)
     rows, columns = np.nonzero(apartment() == OCCUPIED)
     x, y = (columns + 0.5) * scale, (rows + 0.5) * scale
     inside = (y < levels.shape[0]) & (x < levels.shape[1])

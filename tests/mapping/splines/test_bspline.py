@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.interpolate import BSpline
 
-from lidarium.mapping.splines.bspline import ORDER, Spline, basis_matrix
+from lidarium.mapping.splines.bspline import ORDER, Spline, _basis_matrix
 
 
 def straight(length=2.0, count=5):
@@ -78,7 +78,7 @@ def test_curve_and_derivatives_are_those_of_scipy(spline, shares):
 @given(splines(), SHARES)
 def test_basis_sums_to_one_and_is_local(spline, shares):
     at = np.append(within(spline, shares), spline.knots[3:-3])
-    matrix = basis_matrix(spline.knots, at)
+    matrix = _basis_matrix(spline.knots, at)
     np.testing.assert_allclose(matrix.sum(axis=1), 1.0, atol=1e-13)
     assert (matrix >= -1e-15).all()
     assert (np.count_nonzero(matrix, axis=1) <= ORDER).all()

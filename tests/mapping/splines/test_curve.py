@@ -8,7 +8,7 @@ from curved_room import taken
 
 from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.splines.association import Way
-from lidarium.mapping.splines.curve import CurveLookup, box_of, control_parameters, curves_in, fit_curve, make_curve
+from lidarium.mapping.splines.curve import CurveLookup, _control_parameters, box_of, curves_in, fit_curve, make_curve
 from lidarium.mapping.splines.settings import FitSettings, MapSettings
 
 
@@ -59,7 +59,7 @@ def test_a_curve_moves_with_its_frame():
 
 def test_control_points_act_at_the_means_of_their_inner_knots():
     knots = np.array([0.0, 0.0, 0.0, 0.0, 1.0, 3.0, 3.0, 3.0, 3.0])
-    np.testing.assert_allclose(control_parameters(knots), (0.0, 1.0 / 3.0, 4.0 / 3.0, 7.0 / 3.0, 3.0))
+    np.testing.assert_allclose(_control_parameters(knots), (0.0, 1.0 / 3.0, 4.0 / 3.0, 7.0 / 3.0, 3.0))
 
 
 def test_a_curve_wants_a_weight_for_each_control_point():

@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.interpolate import make_lsq_spline
 
-from lidarium.mapping.splines.bspline import basis_matrix
-from lidarium.mapping.splines.fitting import averaged_knots, factorize, fit_bspline, solve
+from lidarium.mapping.splines.bspline import _basis_matrix
+from lidarium.mapping.splines.fitting import _averaged_knots, _factorize, _solve, fit_bspline
 from lidarium.mapping.splines.settings import FitSettings
 
 
@@ -72,19 +72,19 @@ def test_solutions_are_those_of_the_dense_system(count):
     matrix, band = banded(count, count)
     right = np.random.default_rng(1).normal(size=(count, 2))
     expected = np.linalg.solve(matrix, right)
-    assert factorize(band)
-    solve(band, right)
+    assert _factorize(band)
+    _solve(band, right)
     np.testing.assert_allclose(right, expected, rtol=1e-8, atol=1e-10)
 
 
 def test_a_matrix_that_is_not_positive_definite_has_no_factor():
     _, band = banded(6)
     band[4, 0] = -1.0
-    assert not factorize(band)
+    assert not _factorize(band)
     singular = np.zeros((4, 4))
     singular[:, 0] = 1.0
     singular[1:, 1] = 1.0
-    assert not factorize(singular)
+    assert not _factorize(singular)
 
 
 def test_a_straight_wall_has_four_control_points_on_a_line():
@@ -120,6 +120,6 @@ def test_the_fit_is_that_of_scipy_where_nothing_stiffens_it(points, seed):
 
 def test_every_span_has_points():
     parameters = np.sort(np.random.default_rng(3).uniform(0.0, 3.0, 30))
-    knots = averaged_knots(parameters, 12)
-    matrix = basis_matrix(knots, parameters)
+    knots = _averaged_knots(parameters, 12)
+    matrix = _basis_matrix(knots, parameters)
     assert np.linalg.matrix_rank(matrix) == 12

@@ -8,7 +8,7 @@ import pytest
 from scanned_walls import points_of
 
 from lidarium.mapping.splines.features import clusters
-from lidarium.mapping.splines.segmentation import fit_line, merge_runs, split_merge, split_runs
+from lidarium.mapping.splines.segmentation import _fit_line, _merge_runs, _split_runs, split_merge
 from lidarium.mapping.splines.settings import SegmentationSettings
 
 
@@ -62,22 +62,22 @@ def polyline(*corners, step=0.05):
 def test_a_line_runs_as_its_points_do_and_noise_is_its_rms(angle):
     along = np.array([math.cos(angle), math.sin(angle)])
     points = np.array([1.0, 2.0]) + np.linspace(-1.0, 1.0, 41)[:, None] * along
-    x, y, theta, half, rms = fit_line(points, 0, 40)
+    x, y, theta, half, rms = _fit_line(points, 0, 40)
     assert (x, y, half, rms) == pytest.approx((1.0, 2.0, 1.0, 0.0), abs=1e-9)
     assert abs(math.remainder(theta - angle, math.tau)) < 1e-9
     aside = 0.02 * np.where(np.arange(41) % 2, 1.0, -1.0)[:, None] * np.array([-along[1], along[0]])
-    assert fit_line(points + aside, 0, 40)[4] == pytest.approx(0.02, rel=0.05)
+    assert _fit_line(points + aside, 0, 40)[4] == pytest.approx(0.02, rel=0.05)
 
 
 def test_only_the_points_of_the_run_count():
     points = polyline((0.0, 0.0), (2.0, 0.0), (2.0, 2.0))
-    assert fit_line(points, 0, 40)[:4] == pytest.approx((1.0, 0.0, 0.0, 1.0))
-    assert fit_line(points, 40, 80)[:4] == pytest.approx((2.0, 1.0, math.pi / 2.0, 1.0))
+    assert _fit_line(points, 0, 40)[:4] == pytest.approx((1.0, 0.0, 0.0, 1.0))
+    assert _fit_line(points, 40, 80)[:4] == pytest.approx((2.0, 1.0, math.pi / 2.0, 1.0))
 
 
 def split(points, limit=0.05, sigma=0.0):
     ends = np.empty(len(points) + 1, np.int64)
-    count = split_runs(points, np.full(len(points), sigma), limit, 3.0, ends)
+    count = _split_runs(points, np.full(len(points), sigma), limit, 3.0, ends)
     return ends[: count + 1].tolist()
 
 
@@ -95,7 +95,7 @@ def test_bends_within_the_noise_are_not_split():
 def test_neighbours_of_one_line_are_merged_and_others_are_not():
     points = polyline((0.0, 0.0), (2.0, 0.0), (2.0, 2.0))
     ends = np.array([0, 15, 40, 80, 0, 0], np.int64)
-    count = merge_runs(points, np.zeros(len(points)), 0.05, 3.0, math.radians(10.0), ends, 3)
+    count = _merge_runs(points, np.zeros(len(points)), 0.05, 3.0, math.radians(10.0), ends, 3)
     assert ends[: count + 1].tolist() == [0, 40, 80]
     same = ends.copy()
-    assert merge_runs(points, np.zeros(len(points)), 0.05, 3.0, math.radians(10.0), same, 2) == 2
+    assert _merge_runs(points, np.zeros(len(points)), 0.05, 3.0, math.radians(10.0), same, 2) == 2

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lidarium.mapping.geometry.rigid import composed, relative
-from lidarium.mapping.localization.graph.pose_graph import Edges, elimination, factorise, optimised, residuals, solve
+from lidarium.mapping.localization.graph.pose_graph import Edges, _elimination, _factorise, _solve, optimised, residuals
 
 SIDE = 10
 
@@ -145,17 +145,17 @@ def blocks_of(matrix, places):
 def test_the_factor_solves_what_the_dense_matrix_solves(graph):
     count, pairs, seed = graph
     matrix = matrix_of(count, pairs, seed)
-    places = elimination(count, pairs[:, 0], pairs[:, 1])
+    places = _elimination(count, pairs[:, 0], pairs[:, 1])
     factor = blocks_of(matrix, places)
-    assert factorise(places, factor)
+    assert _factorise(places, factor)
     right = np.random.default_rng(seed).normal(size=(count, 3))
-    assert np.allclose(solve(places, factor, right), np.linalg.solve(matrix, right.ravel()).reshape(-1, 3), atol=1e-9)
+    assert np.allclose(_solve(places, factor, right), np.linalg.solve(matrix, right.ravel()).reshape(-1, 3), atol=1e-9)
 
 
 @given(graphs())
 def test_blocks_are_where_poses_are_joined_and_where_elimination_joins_them(graph):
     count, pairs, _ = graph
-    places = elimination(count, pairs[:, 0], pairs[:, 1])
+    places = _elimination(count, pairs[:, 0], pairs[:, 1])
     assert sorted(places.turn) == list(range(count))
     joined = np.eye(count, dtype=bool)
     joined[places.turn[pairs].T[0], places.turn[pairs].T[1]] = True
@@ -172,12 +172,12 @@ def test_blocks_are_where_poses_are_joined_and_where_elimination_joins_them(grap
 
 
 def test_a_chain_fills_nothing():
-    places = elimination(50, np.arange(49), np.arange(1, 50))
+    places = _elimination(50, np.arange(49), np.arange(1, 50))
     assert len(places.rows) == 50 + 49
 
 
 def test_a_matrix_that_is_not_positive_definite_has_no_factor():
     pairs = np.array([[0, 1]])
-    places = elimination(2, pairs[:, 0], pairs[:, 1])
-    assert not factorise(places, blocks_of(np.eye(6) - 2.0 * np.eye(6)[:, ::-1], places))
-    assert not factorise(places, blocks_of(np.full((6, 6), np.nan), places))
+    places = _elimination(2, pairs[:, 0], pairs[:, 1])
+    assert not _factorise(places, blocks_of(np.eye(6) - 2.0 * np.eye(6)[:, ::-1], places))
+    assert not _factorise(places, blocks_of(np.full((6, 6), np.nan), places))

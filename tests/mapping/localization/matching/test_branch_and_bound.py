@@ -11,9 +11,9 @@ from mapped_room import ORIGIN, odd_room_submap, points_of
 
 from lidarium.mapping.geometry.rigid import composed
 from lidarium.mapping.localization.matching.branch_and_bound import (
-    CoarseLevels,
-    Window,
-    find_placements,
+    _CoarseLevels,
+    _find_placements,
+    _Window,
     place,
     pyramid,
 )
@@ -105,13 +105,13 @@ def case(seed, width=21):
     levels = (generator.random((37, 45)) ** 4 * 255).astype(np.uint8)
     points = generator.uniform(-14.0, 14.0, (40, 2))
     corner = generator.uniform(5.0, 15.0, 2)
-    return levels, points, Window(HEADINGS, corner, width)
+    return levels, points, _Window(HEADINGS, corner, width)
 
 
 def searched(levels, points, window, least=0.0, evaluations=10**6, avoided=(0.0, 0.0, 0.0, 0.0, 0.0)):
     coarse, found = pyramid(AgreementGrid(levels, 0, 0, 0.05)), np.full(4, -1.0)
-    is_over = find_placements(
-        CoarseLevels(coarse.maxima, coarse.shapes),
+    is_over = _find_placements(
+        _CoarseLevels(coarse.maxima, coarse.shapes),
         points,
         window,
         float(least),

@@ -8,7 +8,7 @@ from driven_rooms import GEOMETRY, cast, odd_room
 from mapped_room import ORIGIN, odd_room_submap, points_of
 
 from lidarium.mapping.geometry.rigid import composed
-from lidarium.mapping.localization.matching.local_mapping import LocalMapper, LocalMatcher, outweighs, way
+from lidarium.mapping.localization.matching.local_mapping import LocalMapper, _LocalMatcher, _outweighs, way
 from lidarium.mapping.localization.matching.scan_matching import Match
 from lidarium.mapping.localization.settings import MatchingSettings, SlamSettings, SubmapSettings
 
@@ -98,14 +98,14 @@ def match_of(score, overlap):
 
 @pytest.mark.parametrize(("score", "is_believed"), [(0.45, False), (0.55, True), (0.8, True)])
 def test_odometry_is_given_up_only_for_a_match_that_is_clearly_better(score, is_believed):
-    assert outweighs(match_of(score, 1.0), match_of(0.4, 1.0), BETTER_BY) == is_believed
+    assert _outweighs(match_of(score, 1.0), match_of(0.4, 1.0), BETTER_BY) == is_believed
 
 
 def test_part_of_a_scan_that_agrees_better_does_not_outweigh_all_of_it():
     # As it was at the corner of a hall, where the part lay on the other side of a wall of 0.2 m.
     near, far = match_of(0.43, 0.92), match_of(0.56, 0.64)
-    assert not outweighs(far, near, BETTER_BY)
-    assert outweighs(match_of(0.56, 0.92), near, BETTER_BY)
+    assert not _outweighs(far, near, BETTER_BY)
+    assert _outweighs(match_of(0.56, 0.92), near, BETTER_BY)
 
 
 SURE = np.diag([1e-4, 1e-4, 1e-4])
@@ -118,7 +118,7 @@ def submap():
 
 
 def matcher():
-    made = LocalMatcher(SlamSettings(matching=MATCHING), GEOMETRY)
+    made = _LocalMatcher(SlamSettings(matching=MATCHING), GEOMETRY)
     made.usual_score = 0.7
     return made
 

@@ -13,10 +13,10 @@ from scipy.interpolate import BSpline
 from lidarium.mapping.geometry.rigid import composed
 from lidarium.mapping.localization.matching.branch_and_bound import place, pyramid
 from lidarium.mapping.localization.matching.scan_matching import (
-    agreement,
-    extremes_around,
-    find_normals,
-    is_unseen,
+    _agreement,
+    _extremes_around,
+    _find_normals,
+    _is_unseen,
     refine,
 )
 from lidarium.mapping.localization.matching.scan_search import search
@@ -138,7 +138,7 @@ def plain(levels, x, y):
 @pytest.mark.parametrize("place", [(5.0, 6.0), (4.27, 7.81), (8.5, 5.5), (9.99, 3.01)])
 def test_the_value_is_that_of_a_plain_spline_and_slopes_are_its_differences(place):
     x, y = place
-    value, slope_x, slope_y = agreement(LEVELS, x, y)
+    value, slope_x, slope_y = _agreement(LEVELS, x, y)
     assert value == pytest.approx(plain(LEVELS, x, y), abs=1e-12)
     step = 1e-5
     assert slope_x == pytest.approx((plain(LEVELS, x + step, y) - plain(LEVELS, x - step, y)) / (2 * step), abs=1e-6)
@@ -147,36 +147,36 @@ def test_the_value_is_that_of_a_plain_spline_and_slopes_are_its_differences(plac
 
 def test_full_agreement_is_one_and_flat_and_what_is_free_or_unseen_is_nothing():
     for level, expected in ((FULL_LEVEL, 1.0), (FREE_LEVEL, 0.0), (UNSEEN, 0.0)):
-        found = agreement(np.full((10, 10), level, np.uint8), 4.3, 5.8)
+        found = _agreement(np.full((10, 10), level, np.uint8), 4.3, 5.8)
         assert found == pytest.approx((expected, 0.0, 0.0), abs=1e-12)
 
 
 def test_agreement_ends_where_the_map_does():
     full = np.full((10, 14), FULL_LEVEL, np.uint8)
     for x, y in ((1.4, 5.0), (5.0, 1.4), (12.5, 5.0), (5.0, 8.5), (-3.0, 5.0)):
-        assert agreement(full, x, y) == (0.0, 0.0, 0.0)
-    assert agreement(full, 12.4, 8.4)[0] == pytest.approx(1.0)
+        assert _agreement(full, x, y) == (0.0, 0.0, 0.0)
+    assert _agreement(full, 12.4, 8.4)[0] == pytest.approx(1.0)
 
 
 def test_cells_outside_of_the_map_are_unseen():
     levels = np.full((4, 6), FREE_LEVEL, np.uint8)
     levels[2, 3] = UNSEEN
-    assert is_unseen(levels, 3.9, 2.0)
-    assert not is_unseen(levels, 4.0, 2.0)
+    assert _is_unseen(levels, 3.9, 2.0)
+    assert not _is_unseen(levels, 4.0, 2.0)
     for x, y in ((-0.1, 1.0), (6.0, 1.0), (1.0, -0.1), (1.0, 4.0)):
-        assert is_unseen(levels, x, y)
+        assert _is_unseen(levels, x, y)
 
 
 def test_extremes_are_those_of_the_square_of_seven_cells():
     padded = np.pad(LEVELS, 3, constant_values=UNSEEN)
     for row, column in ((0, 0), (5, 7), (11, 14), (3, 3)):
         window = padded[row : row + 7, column : column + 7]
-        assert extremes_around(LEVELS, column, row) == (window.min(), window.max())
+        assert _extremes_around(LEVELS, column, row) == (window.min(), window.max())
 
 
 def normals_of(points, reach=0.3):
     normals = np.zeros((len(points), 2))
-    find_normals(np.ascontiguousarray(points, np.float64), reach, normals)
+    _find_normals(np.ascontiguousarray(points, np.float64), reach, normals)
     return normals
 
 

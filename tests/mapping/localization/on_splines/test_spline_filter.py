@@ -11,12 +11,12 @@ from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.grids.scan_geometry import ScanGeometry
 from lidarium.mapping.localization.localizer import Sensing
 from lidarium.mapping.localization.on_splines.spline_filter import (
-    MatchedFeatures,
     SplineFilter,
     SplineFilterSettings,
-    ray_likelihoods,
-    weigh_features,
-    weigh_rays,
+    _MatchedFeatures,
+    _ray_likelihoods,
+    _weigh_features,
+    _weigh_rays,
 )
 
 
@@ -100,10 +100,10 @@ def drawn(rng, count=7):
 
 def test_features_weigh_by_their_distances_and_turns(rng):
     particles = drawn(rng)
-    points = MatchedFeatures(rng.normal(size=(4, 2)), rng.normal(size=(4, 2)), rng.uniform(0.1, 0.5, 4))
-    lines = MatchedFeatures(drawn(rng, 3), drawn(rng, 3), rng.uniform(0.1, 0.5, 3))
+    points = _MatchedFeatures(rng.normal(size=(4, 2)), rng.normal(size=(4, 2)), rng.uniform(0.1, 0.5, 4))
+    lines = _MatchedFeatures(drawn(rng, 3), drawn(rng, 3), rng.uniform(0.1, 0.5, 3))
     found, expected = np.zeros(len(particles)), np.zeros(len(particles))
-    weigh_features(particles, points, lines, 0.2, found)
+    _weigh_features(particles, points, lines, 0.2, found)
     for i, particle in enumerate(particles.tolist()):
         pose = Transform(*particle)
         for seen, known, sigma in zip(*points, strict=True):
@@ -121,7 +121,7 @@ def test_rays_weigh_by_the_distances_of_their_ends_from_pieces(rng):
     along = rng.uniform(0.0, math.pi, 5)
     pieces = np.column_stack([rng.uniform(-1, 1, (5, 2)), np.cos(along), np.sin(along), np.ones(5)])
     logarithms, fits = np.zeros(len(particles)), np.zeros(len(particles))
-    weigh_rays(particles, rays, pieces, ray_likelihoods(SIGMA), 0.5, logarithms, fits)
+    _weigh_rays(particles, rays, pieces, _ray_likelihoods(SIGMA), 0.5, logarithms, fits)
     for i, particle in enumerate(particles.tolist()):
         ends = Transform(*particle).apply(rays) - pieces[:, :2]
         gaps = np.abs(ends[:, 1] * pieces[:, 2] - ends[:, 0] * pieces[:, 3])
@@ -131,7 +131,7 @@ def test_rays_weigh_by_the_distances_of_their_ends_from_pieces(rng):
 
 
 def test_a_ray_that_ends_on_its_curve_fits_and_one_that_ends_far_off_hardly_does():
-    table = ray_likelihoods(SIGMA)
+    table = _ray_likelihoods(SIGMA)
     assert table[0, 1] == pytest.approx(1.0, abs=1e-3)
     assert table[-1, 1] == pytest.approx(0.05)
     assert (np.diff(table, axis=0) <= 0.0).all()

@@ -10,7 +10,7 @@ from driven_rooms import GEOMETRY, RING_ROUND, TWINS_VISITED, cast, driven, odd_
 from lidarium.mapping.geometry.rigid import composed, relative
 from lidarium.mapping.localization.localizer import Sensing
 from lidarium.mapping.localization.settings import ClosureSettings, GraphSettings, MatchingSettings, SlamSettings
-from lidarium.mapping.localization.slam.localizer import ELSEWHERE, NO_MATCH, ODOMETRY_ALONE, Doubt, Doubts, Slam
+from lidarium.mapping.localization.slam.localizer import ELSEWHERE, NO_MATCH, ODOMETRY_ALONE, Slam, _Doubt, _Doubts
 
 EAGER = SlamSettings(graph=GraphSettings(waiting=5))
 """Corrects the past also where closures contradict it by little."""
@@ -284,14 +284,14 @@ def test_a_turn_that_odometry_does_not_know_is_found():
 
 
 def test_stretches_begin_at_the_last_sure_scan_and_grow():
-    doubts = Doubts()
+    doubts = _Doubts()
     for time_s, reason in [(0.0, None), (1.0, NO_MATCH), (2.0, NO_MATCH), (3.0, None), (4.0, ODOMETRY_ALONE)]:
         doubts.note(time_s, reason)
     doubts.note(5.0, NO_MATCH)
     assert doubts.stretches == [
-        Doubt(0.0, 2.0, 2, NO_MATCH),
-        Doubt(3.0, 4.0, 1, ODOMETRY_ALONE),
-        Doubt(3.0, 5.0, 1, NO_MATCH),
+        _Doubt(0.0, 2.0, 2, NO_MATCH),
+        _Doubt(3.0, 4.0, 1, ODOMETRY_ALONE),
+        _Doubt(3.0, 5.0, 1, NO_MATCH),
     ]
 
 

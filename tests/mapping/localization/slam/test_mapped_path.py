@@ -15,11 +15,11 @@ from lidarium.mapping.localization.matching.local_mapping import Finished, way
 from lidarium.mapping.localization.matching.scan_points import scan_points
 from lidarium.mapping.localization.settings import ClosureSettings, SlamSettings, SubmapSettings
 from lidarium.mapping.localization.slam.mapped_path import (
-    LoopClosing,
     MappedPath,
-    ScanHistory,
-    ScanSampling,
-    WallSurvey,
+    _LoopClosing,
+    _ScanHistory,
+    _ScanSampling,
+    _WallSurvey,
 )
 
 SETTINGS = SlamSettings(submaps=SubmapSettings(resolution=0.05, path_m=3.0, least_scans=6))
@@ -135,7 +135,7 @@ TRUE, BELIEVED = np.array([0.1, 0.05, 0.02]), np.array([0.2, -0.05, 0.05])
 
 def back_again(settings=LOOP_CLOSING_SETTINGS):
     """Loops that know the room from long ago, the nodes of a robot that comes back, and what it sees."""
-    loops = LoopClosing(settings)
+    loops = _LoopClosing(settings)
     loops.remember([Finished(odd_room_submap().finished(), np.array([0]), np.zeros((1, 3)))], 0.0)
     graph = NodeGraph(settings.graph, None, np.zeros(3))
     graph.add(BELIEVED, np.diag([0.3**2, 0.3**2, math.radians(5.0) ** 2]))
@@ -199,10 +199,10 @@ def box_scan(heading=0.0, half=2.0):
 
 
 def with_history(*headings):
-    history = ScanHistory(LASER, 0.05)
+    history = _ScanHistory(LASER, 0.05)
     for time_s, heading in enumerate(headings):
         history.append(0, np.array([0.0, 0.0, heading]), box_scan(heading), float(time_s))
-    return WallSurvey(WALL_SURVEY_SETTINGS, ScanSampling(WALL_SURVEY_SETTINGS, LASER)), history
+    return _WallSurvey(WALL_SURVEY_SETTINGS, _ScanSampling(WALL_SURVEY_SETTINGS, LASER)), history
 
 
 def test_walls_are_surveyed_once_the_path_is_long_enough():
@@ -235,7 +235,7 @@ def test_a_new_beginning_puts_the_survey_off():
 
 def test_where_walls_are_not_used_nothing_is_surveyed():
     settings = SlamSettings(uses_walls=False)
-    survey, (_, history) = WallSurvey(settings, ScanSampling(settings, LASER)), with_history(0.0)
+    survey, (_, history) = _WallSurvey(settings, _ScanSampling(settings, LASER)), with_history(0.0)
     survey.observe(box_scan(), np.zeros(3))
     survey.restart(1.0)
     survey.survey(1e3, 0, history, NODE)
@@ -247,7 +247,7 @@ PLACES = ((0, (1.0, 1.5, 0.2)), (1, (0.5, 0.3, 1.0)), (1, (1.0, 0.2, -0.4)))
 
 
 def filled():
-    history = ScanHistory(GEOMETRY, 0.05)
+    history = _ScanHistory(GEOMETRY, 0.05)
     for k, (node, place) in enumerate(PLACES):
         pose = np.array(place)
         history.append(node, pose, cast(odd_room(), composed(NODES[node], pose)), 0.5 * k)
@@ -271,7 +271,7 @@ def test_scans_since_a_node_are_those_taken_at_it_or_after():
 
 
 def test_the_map_grows_by_new_scans_and_is_the_same_as_of_all_at_once():
-    gradual = ScanHistory(GEOMETRY, 0.05)
+    gradual = _ScanHistory(GEOMETRY, 0.05)
     for k, (node, place) in enumerate(PLACES):
         pose = np.array(place)
         gradual.append(node, pose, cast(odd_room(), composed(NODES[node], pose)), 0.5 * k)
@@ -296,7 +296,7 @@ def test_samples_lie_where_beams_end():
     angles = laser.angle_first + laser.angle_increment * np.arange(laser.beams)
     half = 2.0 / np.maximum(np.abs(np.cos(angles)), np.abs(np.sin(angles)))
     ranges = half.astype(np.float32)
-    points = ScanSampling(settings, laser).all_points(ranges)
+    points = _ScanSampling(settings, laser).all_points(ranges)
     assert np.abs(points).max(axis=1) == pytest.approx(2.0, abs=1e-3)
-    few = ScanSampling(settings, laser).points(ranges, 0.5, 10)
+    few = _ScanSampling(settings, laser).points(ranges, 0.5, 10)
     assert 0 < len(few) <= 10

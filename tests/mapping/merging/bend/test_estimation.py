@@ -10,14 +10,14 @@ from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.merging.bend.estimation import (
     BendSettings,
     OffsetField,
+    _add_springs,
+    _add_walls,
+    _bilinear,
+    _find_gaps,
     _solved,
-    add_springs,
-    add_walls,
-    bilinear,
     estimate_bend,
-    find_gaps,
 )
-from lidarium.mapping.merging.bend.hypotheses import compare_bent, tolerance
+from lidarium.mapping.merging.bend.hypotheses import _tolerance, compare_bent
 from lidarium.mapping.merging.described_map import describe_map
 from lidarium.mapping.merging.pair import described, merge_pair
 from lidarium.mapping.merging.settings import MergeSettings
@@ -28,7 +28,7 @@ def test_offsets_solve_the_plain_normal_equations():
     columns, rows, stiffness = 5, 4, 0.3
     count = columns * rows
     points = generator.random((60, 2)) * (columns - 1, rows - 1)
-    nodes, weights = bilinear(points, (0.0, 0.0), 1.0, (rows, columns))
+    nodes, weights = _bilinear(points, (0.0, 0.0), 1.0, (rows, columns))
     normals, gaps = generator.normal(size=(60, 2)), 0.1 * generator.normal(size=60)
     found = generator.random(60) < 0.8
     solved = _solved(nodes, weights, normals, np.zeros((count, 2)), (gaps, found, 0.5), (columns, stiffness))
@@ -95,7 +95,7 @@ def test_maps_without_bend_keep_their_motion_and_a_sharp_tolerance():
     distance, angle = bend.a_from_b.difference(truth, (5.0, 4.0))
     assert distance < 0.03
     assert angle < math.radians(0.3)
-    assert tolerance(bend, RESOLUTION)[0] < 0.1
+    assert _tolerance(bend, RESOLUTION)[0] < 0.1
     agreement = compare_bent(a, b, bend)
     assert agreement.hit_rate > 0.95
     assert agreement.contradicting_m < 0.2
@@ -128,7 +128,7 @@ def test_gaps_are_signed_along_the_normal_and_none_is_found_out_of_reach():
     rows = np.array([27.5, 29.5, 32.5, 60.5])
     places = np.stack([np.full(4, 60.5), rows], axis=1) * RESOLUTION
     gaps, found = np.empty(4), np.empty(4, np.bool_)
-    find_gaps(
+    _find_gaps(
         described.levels,
         described.distance,
         RESOLUTION,
@@ -151,7 +151,7 @@ def test_walls_add_the_squares_of_what_they_want():
     offsets, gaps = generator.normal(size=(nodes_in_all, 2)), generator.normal(size=count)
     trust = np.where(generator.random(count) < 0.3, 0.0, generator.random(count))
     band, right = np.zeros((2 * columns + 4, 2 * nodes_in_all)), np.zeros(2 * nodes_in_all)
-    add_walls(nodes, weights, normals, offsets, gaps, trust, band, right)
+    _add_walls(nodes, weights, normals, offsets, gaps, trust, band, right)
     rows = np.zeros((count, 2 * nodes_in_all))
     for i in range(count):
         for j in range(4):
@@ -163,7 +163,7 @@ def test_walls_add_the_squares_of_what_they_want():
 @pytest.mark.parametrize(("rows", "columns"), [(3, 4), (1, 5), (5, 1), (1, 1)])
 def test_springs_join_neighbours_in_rows_and_columns_alone(rows, columns):
     band = np.zeros((2 * columns + 4, 2 * rows * columns))
-    add_springs(columns, 0.5, band)
+    _add_springs(columns, 0.5, band)
     expected = np.zeros((2 * rows * columns,) * 2)
     for one in range(rows * columns):
         for other in range(one):
@@ -183,7 +183,7 @@ def field(seed=0):
 def test_offsets_are_bilinear_between_nodes_and_those_of_the_rim_beyond():
     one = field()
     points = np.random.default_rng(1).uniform(-4.0, 10.0, (200, 2))
-    nodes, weights = bilinear(points, one.corner, one.spacing_m, one.offsets.shape[:2])
+    nodes, weights = _bilinear(points, one.corner, one.spacing_m, one.offsets.shape[:2])
     plain = (weights[..., None] * one.offsets.reshape(-1, 2)[nodes]).sum(axis=1)
     np.testing.assert_allclose(one.at(points), plain, atol=1e-12)
     np.testing.assert_allclose(weights.sum(axis=1), 1.0)
@@ -194,7 +194,7 @@ def test_offsets_are_bilinear_between_nodes_and_those_of_the_rim_beyond():
 def test_grids_of_one_row_or_column_have_offsets_too(shape):
     one = OffsetField((0.0, 0.0), 1.0, np.random.default_rng(2).normal(size=(*shape, 2)))
     points = np.random.default_rng(3).uniform(-1.0, 5.0, (50, 2))
-    nodes, weights = bilinear(points, one.corner, 1.0, shape)
+    nodes, weights = _bilinear(points, one.corner, 1.0, shape)
     plain = (weights[..., None] * one.offsets.reshape(-1, 2)[nodes]).sum(axis=1)
     np.testing.assert_allclose(one.at(points), plain, atol=1e-12)
 

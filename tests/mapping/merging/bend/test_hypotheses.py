@@ -16,18 +16,18 @@ from lidarium.mapping.merging.bend.hypotheses import (
     MOST_RIVAL_SHARE,
     MOST_STRAIN,
     SHARP_M,
-    Signs,
+    _Signs,
+    _tolerance,
     compare_bent,
     confidence_of,
     ranked_hypotheses,
     signs_of,
-    tolerance,
 )
 from lidarium.mapping.merging.described_map import describe_map
 from lidarium.mapping.merging.pair import described, merge_pair
 from lidarium.mapping.merging.settings import MergeSettings
 
-PLAIN = Signs(30.0, 0.85, 80.0, 15.0, 0.2, 80.0, 3.0, 0.01, 0.05)
+PLAIN = _Signs(30.0, 0.85, 80.0, 15.0, 0.2, 80.0, 3.0, 0.01, 0.05)
 
 
 def test_the_best_hypothesis_leads_and_others_are_told():
@@ -60,7 +60,7 @@ def test_each_sign_speaks_for_or_against_a_place(sign, worse):
 
 
 def test_small_overlaps_and_near_rivals_are_never_believed():
-    sure = Signs(500.0, 0.99, 900.0, 200.0, 0.0, 500.0, 0.0, 0.0, 0.01)
+    sure = _Signs(500.0, 0.99, 900.0, 200.0, 0.0, 500.0, 0.0, 0.0, 0.01)
     assert confidence_of(sure) > 0.999
     assert confidence_of(sure._replace(overlap_m2=0.99 * LEAST_OVERLAP_M2)) == 0.0
     assert confidence_of(sure._replace(rival_share=MOST_RIVAL_SHARE + 0.01)) == 0.0
@@ -69,7 +69,7 @@ def test_small_overlaps_and_near_rivals_are_never_believed():
 
 
 def test_sharp_maps_of_a_few_rooms_may_differ_by_furniture_alone():
-    rooms = Signs(40.0, 0.95, 40.0, 15.0, 0.2, 60.0, 2.0, 0.005, 0.02)
+    rooms = _Signs(40.0, 0.95, 40.0, 15.0, 0.2, 60.0, 2.0, 0.005, 0.02)
     assert confidence_of(rooms) > 0.95
     assert confidence_of(rooms._replace(quality=0.85)) == 0.0
     assert confidence_of(rooms._replace(quality=0.85, spread_m=0.05)) > 0.9
@@ -96,11 +96,11 @@ def bend_of(offsets, pose=(0.0, 0.0, 0.0)):
 
 def test_the_tolerance_grows_with_the_spread_between_two_limits():
     straight = bend_of(np.zeros((2, 2, 2)))
-    found = [tolerance(replace(straight, spread_m=spread), 0.025)[0] for spread in (0.0, 0.04, 1.0)]
+    found = [_tolerance(replace(straight, spread_m=spread), 0.025)[0] for spread in (0.0, 0.04, 1.0)]
     assert found == pytest.approx([SHARP_M, 0.1, BLUNT_M])
-    assert tolerance(straight, 0.2)[0] == pytest.approx(0.3)
+    assert _tolerance(straight, 0.2)[0] == pytest.approx(0.3)
     for resolution in (0.025, 0.1, 0.4):
-        hit, miss = tolerance(straight, resolution)
+        hit, miss = _tolerance(straight, resolution)
         assert hit < miss
 
 

@@ -13,14 +13,14 @@ from lidarium.mapping.merging.described_map import resampled
 from lidarium.mapping.merging.regions.graph import (
     BINS,
     QUARTER,
-    Slopes,
+    _direction_histogram,
+    _find_doors,
     _joined,
-    direction_histogram,
-    find_doors,
+    _region_axes,
+    _Slopes,
+    _wall_slopes,
     find_regions,
     likely_rotations,
-    region_axes,
-    wall_slopes,
 )
 from lidarium.mapping.merging.regions.segmentation import NONE, RegionSettings, find_meetings
 
@@ -146,12 +146,12 @@ def test_settings_that_make_no_sense_are_named():
 
 def slopes_of(levels):
     free = (levels == FREE).astype(np.uint8)
-    return wall_slopes(levels, free, np.where(free > 0, 0, NONE).astype(np.int32))
+    return _wall_slopes(levels, free, np.where(free > 0, 0, NONE).astype(np.int32))
 
 
 def histogram_at(*degrees):
     directions = np.radians(np.repeat(degrees, 50))
-    return direction_histogram(Slopes(directions, np.zeros(len(directions), np.int32)))
+    return _direction_histogram(_Slopes(directions, np.zeros(len(directions), np.int32)))
 
 
 def test_slopes_point_away_from_the_walls_of_a_room():
@@ -166,14 +166,14 @@ def test_slopes_point_away_from_the_walls_of_a_room():
 @pytest.mark.parametrize("theta", [0.0, 0.3, 1.2])
 def test_the_axis_of_a_region_is_that_of_its_walls(theta):
     turned = moved(apartment(), about_middle(theta, apartment()))
-    (axis,) = region_axes(slopes_of(turned), 1)
+    (axis,) = _region_axes(slopes_of(turned), 1)
     assert 0.0 <= axis < QUARTER
     assert math.remainder(axis - theta, QUARTER) == pytest.approx(0.0, abs=0.02)
 
 
 def test_a_region_without_walls_has_the_axis_of_all():
     directions = np.radians([20.0, 110.0, 200.0, 50.0])
-    axes = region_axes(Slopes(directions, np.array([0, 0, 0, 2], np.int32)), 3)
+    axes = _region_axes(_Slopes(directions, np.array([0, 0, 0, 2], np.int32)), 3)
     assert np.degrees(axes[[0, 2]]) == pytest.approx([20.0, 50.0])
     everyone = np.exp(4j * directions).sum()
     assert axes[1] == pytest.approx(np.angle(everyone) / 4.0 % QUARTER)
@@ -230,7 +230,7 @@ def two_rooms(*gaps):
 
 
 def doors_of(labels, clearance):
-    return find_doors(find_meetings(labels, clearance), SIDE)
+    return _find_doors(find_meetings(labels, clearance), SIDE)
 
 
 def test_a_door_has_its_middle_width_and_the_direction_through_it():

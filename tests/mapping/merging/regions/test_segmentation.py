@@ -12,7 +12,7 @@ from lidarium.mapping.merging.regions import segmentation
 from lidarium.mapping.merging.regions.segmentation import (
     NONE,
     RegionSettings,
-    SplitRule,
+    _SplitRule,
     clearance_of,
     find_meetings,
     free_space,
@@ -78,7 +78,7 @@ def test_basins_are_those_of_the_plain_watershed(seed):
     # Distances without ties, so that the order of a cell's neighbours does not matter.
     clearance = np.where(clearance > 0, clearance + np.random.default_rng(seed).random(clearance.shape) / 9, 0)
     clearance = clearance.astype(np.float32)
-    rule = SplitRule(3.0, 0.75, 1.5)
+    rule = _SplitRule(3.0, 0.75, 1.5)
     order = np.argsort(-clearance.ravel(), kind="stable")[: np.count_nonzero(clearance)]
     labels = np.full(clearance.shape, NONE, np.int32)
     parent, peak, areas = (np.zeros(len(order), kind) for kind in (np.int32, np.float32, np.int64))
