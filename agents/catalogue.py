@@ -16,7 +16,7 @@ POLICIES: Registry[Callable[..., Policy]] = Registry("policy")
 A module is imported when it is first needed.
 """
 
-_FRONTIER = "lidarium.agents.frontier_policies"
+_FRONTIER = "lidarium.agents.frontier.policies"
 POLICIES.register(
     "random_walk",
     "lidarium.agents.random_walk:RandomWalk",
@@ -54,7 +54,7 @@ POLICIES.register(
 )
 POLICIES.register(
     "sparse_frontier",
-    "lidarium.agents.sparse_frontier:SparseFrontier",
+    "lidarium.agents.sparse.frontier:SparseFrontier",
     "robots see all ground with depth cameras, and plan on sparse maps of boxes",
 )
 POLICIES.register(

@@ -161,8 +161,7 @@ def check_observed(policy: Policy, name: str, observe: Sequence[str]) -> None:
     if missing:
         camera = ", with a depth camera: camera='xtion_tilted'" if "depth" in missing else ""
         raise ValueError(
-            f"{name} needs {', '.join(missing)}, which the robots do not observe; add to settings.observe"
-            f"{camera}"
+            f"{name} needs {', '.join(missing)}, which the robots do not observe; add to settings.observe{camera}"
         )
 
 
@@ -242,8 +241,7 @@ class _Alone:
     def belief(self, agent: str) -> Belief:
         if agent != self._agent:
             raise ValueError(
-                f"{self._agent} asked for the belief of {agent}; a decentralised policy sees its own robot "
-                "only"
+                f"{self._agent} asked for the belief of {agent}; a decentralised policy sees its own robot only"
             )
         return self._team.belief(agent)
 
@@ -257,16 +255,10 @@ class _Alone:
         return self._team.last_order(agent)
 
     def report(self, agent: str) -> Report | None:
-        raise ValueError(
-            f"{self._agent} asked for the report of {agent}; a decentralised policy has no station"
-        )
+        raise ValueError(f"{self._agent} asked for the report of {agent}; a decentralised policy has no station")
 
     def send_map(self, agent: str, others: FusedMap | None) -> bool:
-        raise ValueError(
-            f"{self._agent} would send {agent} what others know; a decentralised policy has no station"
-        )
+        raise ValueError(f"{self._agent} would send {agent} what others know; a decentralised policy has no station")
 
     def forget_walls(self, agent: str, trail: NDArray[np.float64]) -> bool:
-        raise ValueError(
-            f"{self._agent} would send {agent} where others drove; a decentralised policy has no station"
-        )
+        raise ValueError(f"{self._agent} would send {agent} where others drove; a decentralised policy has no station")

@@ -38,9 +38,7 @@ class RandomWalk(Policy):
         self._team = team
         self._generators = {
             agent: np.random.default_rng(child)
-            for agent, child in zip(
-                team.agents, np.random.SeedSequence(seed).spawn(len(team.agents)), strict=True
-            )
+            for agent, child in zip(team.agents, np.random.SeedSequence(seed).spawn(len(team.agents)), strict=True)
         }
         self._headings = dict.fromkeys(team.agents)
 

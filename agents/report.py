@@ -7,7 +7,7 @@ from typing import Any, Protocol
 from lidarium.envs.onboard.radio.messages import OrderKind
 from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.merging.fusion import FusedMap
-from lidarium.mapping.merging.pair_result import PairResult
+from lidarium.mapping.merging.pair import PairResult
 
 
 @dataclass(frozen=True, slots=True)

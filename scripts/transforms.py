@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from lidarium.mapping.geometry.rigid import Transform
-    from lidarium.mapping.merging.pair_result import PairResult
+    from lidarium.mapping.merging.pair import PairResult
 
 MOST_ALTERNATIVES = 5
 """Most hypotheses of a pair that are written."""

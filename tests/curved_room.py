@@ -7,8 +7,7 @@ from polygon_scans import ring, scan
 
 from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.grids.scan_geometry import ScanGeometry
-from lidarium.mapping.splines.features import observe
-from lidarium.mapping.splines.scan_points import scan_points
+from lidarium.mapping.splines.features import observe, scan_points
 from lidarium.mapping.splines.spline_map import SplineMap
 
 LASER = ScanGeometry()

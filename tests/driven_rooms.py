@@ -8,7 +8,7 @@ import numpy as np
 
 from lidarium.mapping.geometry.rigid import composed, relative
 from lidarium.mapping.grids.scan_geometry import ScanGeometry
-from lidarium.mapping.localization.dead_reckoning.localizer import Sensing
+from lidarium.mapping.localization.localizer import Sensing
 
 GEOMETRY = ScanGeometry(beams=241, field_of_view=math.radians(240.0), range_min=0.02, range_max=5.6)
 

@@ -2,8 +2,8 @@
 
 from reported_halls import RADIUS, RESOLUTION
 
-from lidarium.agents.supervisor.knowledge.station import MergeStation
 from lidarium.agents.supervisor.settings import SupervisorSettings
+from lidarium.agents.supervisor.station import MergeStation
 from lidarium.agents.supervisor.supervisor import Supervisor
 from lidarium.envs.onboard.driving.path_planner import footprint_of
 

@@ -5,8 +5,8 @@ from driven_rooms import GEOMETRY, cast, odd_room
 
 from lidarium.mapping.geometry.rigid import composed
 from lidarium.mapping.localization.matching.scan_points import scan_points
-from lidarium.mapping.localization.matching.settings.matching import SubmapSettings
 from lidarium.mapping.localization.matching.submaps import Submap
+from lidarium.mapping.localization.settings import SubmapSettings
 
 ORIGIN = np.array([2.5, 1.5, 0.3])
 """The local map's frame in the room."""

@@ -7,7 +7,7 @@ import numpy as np
 from lidarium.envs.onboard.radio.messages import DriveState, OperatingState, Target
 from lidarium.envs.onboard.station.reports import Report
 from lidarium.mapping.geometry.rigid import Transform
-from lidarium.mapping.merging.growing_maps import GrowingMap
+from lidarium.mapping.merging.incremental import GrowingMap
 
 RESOLUTION, RADIUS = 0.05, 0.18
 

@@ -4,7 +4,7 @@ import numpy as np
 from polygon_scans import scan
 
 from lidarium.mapping.grids.scan_geometry import ScanGeometry
-from lidarium.mapping.splines.scan_points import scan_points
+from lidarium.mapping.splines.features import scan_points
 
 LASER = ScanGeometry()
 

@@ -2,13 +2,7 @@
 
 import numpy as np
 
-from lidarium.agents.srt.frontier_arcs import openings_of
-from lidarium.agents.srt.safe_region import (
-    ANGLES,
-    UNIT,
-    safe_region,
-    seen_region,
-)
+from lidarium.agents.srt.safe_region import ANGLES, UNIT, openings_of, safe_region, seen_region
 from lidarium.agents.srt.tree import Node
 
 BODY, PERCEPTION = 0.2, 4.0

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from lidarium.agents.srt.memories.map_memory import MapMemory
-from lidarium.agents.srt.motion.drive import Limits
+from lidarium.agents.srt.memories import MapMemory
+from lidarium.agents.srt.motion import Limits
 from lidarium.agents.srt.senses import Senses
 from lidarium.envs.onboard.navigation import NavigationMap
 

@@ -6,7 +6,7 @@ import numpy as np
 from polygon_scans import ring, scan
 
 from lidarium.mapping.grids.scan_geometry import ScanGeometry
-from lidarium.mapping.localization.dead_reckoning.localizer import Sensing
+from lidarium.mapping.localization.localizer import Sensing
 
 LASER = ScanGeometry()
 WORLD_2 = np.vstack(

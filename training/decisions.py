@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from lidarium.agents.learned.decision import CROP_SIDE, Decision
 from lidarium.agents.learned.features import OPTION_FEATURES, SITUATION_FEATURES, TEAMMATE_FEATURES
-from lidarium.agents.tours.settings import TourSettings
+from lidarium.agents.tours.planning import TourSettings
 
 MOST_OPTIONS, MOST_TEAMMATES = TourSettings().most, 8
 """So many options and teammates of a decision are kept; there are no more of the first."""

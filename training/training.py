@@ -16,7 +16,7 @@ import numpy as np
 import torch
 
 import lidarium
-from lidarium.agents.learned.weights import load_weights, save_weights
+from lidarium.agents.learned.network import load_weights, save_weights
 from lidarium.mapping.files.guarded_reading import read_text, reading
 from lidarium.mapping.files.output import clear_unfinished, only_writer, remove_unfinished, write_json
 from lidarium.mapping.geometry.bounds import shown

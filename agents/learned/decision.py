@@ -162,9 +162,7 @@ def scene_of(
     return Scene(options, resolution, crops, (places, directions), shared, situation, weights)
 
 
-def decision_of(
-    scene: Scene, robot: int, sequence: NDArray[np.int64], picks: Sequence[int | None]
-) -> Decision | None:
+def decision_of(scene: Scene, robot: int, sequence: NDArray[np.int64], picks: Sequence[int | None]) -> Decision | None:
     """Return the decision of a robot, None where its tour is empty.
 
     Parameters
@@ -179,7 +177,7 @@ def decision_of(
         What the robots before it have picked.
     """
     options = scene.options
-    tours = tours_in(sequence, len(options.numbers))
+    tours = _tours_in(sequence, len(options.numbers))
     if not tours[robot] or not options.is_reached[robot, tours[robot][0]]:
         return None
     first = tours[robot][0]
@@ -197,9 +195,7 @@ def decision_of(
         "picked": float(len(picks)),
     }
     others = [
-        (other, _target_of(scene, k, picks), k < len(picks))
-        for k, other in enumerate(options.robots)
-        if k != robot
+        (other, _target_of(scene, k, picks), k < len(picks)) for k, other in enumerate(options.robots) if k != robot
     ]
     return Decision(
         table_of({**scene.shared, **own}, OPTION_FEATURES),
@@ -211,7 +207,7 @@ def decision_of(
     )
 
 
-def tours_in(sequence: NDArray[np.int64], count: int) -> list[list[int]]:
+def _tours_in(sequence: NDArray[np.int64], count: int) -> list[list[int]]:
     """Return each robot's tour of a sequence past ``count`` places.
 
     The sequence is that of ``team_tours``.

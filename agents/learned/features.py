@@ -104,7 +104,7 @@ def option_features(
     gap = places - pose[:2]
     straight = np.hypot(gap[:, 0], gap[:, 1])
     bearing = np.arctan2(gap[:, 1], gap[:, 0])
-    ahead, left = in_frame(places, pose)
+    ahead, left = _in_frame(places, pose)
     others = np.delete(options.lengths, robot, axis=0)
     apart = options.between + np.where(np.eye(len(places)) > 0, NO_PATH, 0.0)
     place = np.zeros(len(places))
@@ -171,8 +171,8 @@ def teammate_features(
     poses = np.array([robot.pose for robot, _, _ in robots]).reshape(-1, 3)
     has_target = np.array([target is not None for _, target, _ in robots], np.float64)
     targets = np.array([pose[:2] if target is None else target for _, target, _ in robots]).reshape(-1, 2)
-    ahead, left = in_frame(poses[:, :2], pose)
-    target_ahead, target_left = in_frame(targets, pose)
+    ahead, left = _in_frame(poses[:, :2], pose)
+    target_ahead, target_left = _in_frame(targets, pose)
     return {
         "ahead": ahead,
         "left": left,
@@ -194,7 +194,7 @@ def table_of(values: Mapping[str, NDArray[np.float64]], scales: Mapping[str, flo
     return np.clip(np.stack(columns, axis=-1), -MOST, MOST).astype(np.float32)
 
 
-def in_frame(
+def _in_frame(
     places: NDArray[np.float64], pose: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return places (n, 2) as seen from a pose: ahead and left, (n,) each [m]."""

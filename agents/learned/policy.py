@@ -9,8 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from lidarium.agents.learned.decision import Chooser, Decision, Scene, choose_classic, decision_of, scene_of
-from lidarium.agents.learned.network import Network
-from lidarium.agents.learned.weights import load_weights
+from lidarium.agents.learned.network import Network, load_weights
 from lidarium.agents.policy import Team
 from lidarium.agents.tours.planning import TourOptions
 from lidarium.agents.tours.policy import TourFrontier

@@ -12,9 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.agents.intent import Intent
-from lidarium.agents.srt.frontier_arcs import Opening, least_opening
-from lidarium.agents.srt.memories.memory import Memory
-from lidarium.agents.srt.safe_region import DIRECTIONS, UNIT
+from lidarium.agents.srt.memories import Memory
+from lidarium.agents.srt.safe_region import DIRECTIONS, UNIT, Opening, least_opening
 from lidarium.agents.srt.senses import Senses
 from lidarium.agents.srt.settings import SrtSettings
 from lidarium.agents.srt.tree import Node
@@ -145,9 +144,7 @@ class CandidateSource:
                 middle = int(points[len(points) // 2])
                 inwards = opening.points[middle] - opening.beyond[middle]
                 places = [opening.points[middle] + steps * inwards for steps in STANDS]
-                candidates += [
-                    Candidate(node.number, place, opening, opening.points[middle]) for place in places
-                ]
+                candidates += [Candidate(node.number, place, opening, opening.points[middle]) for place in places]
         return [candidate for candidate in candidates if not self._was_tried(candidate)]
 
     def is_open(self, candidate: Candidate, node: Node, memory: Memory) -> bool:
@@ -180,9 +177,7 @@ class CandidateSource:
             is_done[unseen] = [self._attempts[patch] >= ATTEMPTS for patch in _patches(points[unseen])]
         return is_done
 
-    def _through(
-        self, node: Node, opening: Opening, points: NDArray[np.int64], others: list[Node]
-    ) -> Candidate | None:
+    def _through(self, node: Node, opening: Opening, points: NDArray[np.int64], others: list[Node]) -> Candidate | None:
         """Return the first valid candidate of an opening.
 
         Candidates are tried from its middle or its longest ray outwards.
@@ -193,10 +188,7 @@ class CandidateSource:
         for index in self._order(node, opening, points):
             candidate = self._at(node, opening, index, share)
             if self.is_valid(candidate, node, others):
-                if (
-                    not opening.is_gap
-                    or math.dist(candidate.place, node.place) >= NEARLY * opening.reaches[index]
-                ):
+                if not opening.is_gap or math.dist(candidate.place, node.place) >= NEARLY * opening.reaches[index]:
                     return candidate
                 if best is None or math.dist(candidate.place, node.place) > math.dist(best.place, node.place):
                     best = candidate
@@ -210,14 +202,10 @@ class CandidateSource:
             order = np.argsort(-node.safe.radii[opening.directions[points]], kind="stable")
         else:
             order = np.argsort(np.abs(points - np.median(points)), kind="stable")
-        chosen = np.unique(
-            np.linspace(0, len(order) - 1, min(self._settings.tries, len(order))).astype(np.int64)
-        )
+        chosen = np.unique(np.linspace(0, len(order) - 1, min(self._settings.tries, len(order))).astype(np.int64))
         return [int(points[index]) for index in order[chosen]]
 
-    def _drawn(
-        self, node: Node, found: list[tuple[Opening, NDArray[np.int64]]], others: list[Node]
-    ) -> list[Candidate]:
+    def _drawn(self, node: Node, found: list[tuple[Opening, NDArray[np.int64]]], others: list[Node]) -> list[Candidate]:
         """Draw an opening by its width and a point of it, until one is valid."""
         widths = np.array([opening.width for opening, _ in found]) + 1e-9
         rivals = others if self._settings.memory == "regions" else []
@@ -267,8 +255,7 @@ class CandidateSource:
 
     def _was_tried(self, candidate: Candidate) -> bool:
         return any(
-            math.dist(place, candidate.place) < TRIED_NEAR
-            and math.dist(focus, candidate.focus) < 2.0 * TRIED_NEAR
+            math.dist(place, candidate.place) < TRIED_NEAR and math.dist(focus, candidate.focus) < 2.0 * TRIED_NEAR
             for place, focus in self._tried
         )
 

@@ -10,14 +10,93 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from lidarium.agents.intent import KEPT_NEAR, Intent
 from lidarium.agents.srt.candidates import Candidate, CandidateSource
-from lidarium.agents.srt.frontier_tour import MOST, TEAMMATE_SAME, first_on_tour
-from lidarium.agents.srt.memories.memory import Memory
-from lidarium.agents.srt.motion.drive import Limits
+from lidarium.agents.srt.memories import Legs, Memory, Place
+from lidarium.agents.srt.motion import Limits
 from lidarium.agents.srt.senses import Senses
 from lidarium.agents.srt.settings import SrtSettings
 from lidarium.agents.srt.tree import Node, Tree, way_to
 from lidarium.mapping.geometry.rigid import wrapped
+from lidarium.mapping.planning.touring.tours import shortest_tour
+
+MOST = 14
+"""Tours go past so many frontiers at most, the nearest ones."""
+
+WAY_OF_SIZE = 1.0
+"""Extra distance that a metre of frontier length is worth [m].
+
+A robot drives so much farther to begin with a long frontier, as more is to be seen behind it.
+"""
+
+TEAMMATE_SPREAD = 5.0
+"""Distance from a teammate's target within which frontiers cost more [m].
+
+The added cost is by how much nearer they are.
+"""
+
+TEAMMATE_SAME = 1.0
+"""What lies this near to what a teammate goes for is the teammate's [m]."""
+
+
+def _first_on_tour(
+    memory: Memory,
+    senses: Senses,
+    limits: Limits,
+    least: float,
+    intent: Intent,
+    of_teammates: Sequence[Place],
+) -> tuple[Legs, Place] | None:
+    """Return the path to the tour's first frontier, and what to observe there.
+
+    The tour is the shortest one.
+
+    A robot turns on the spot before it sets out, so the turn counts, too, as the way that it could have
+    driven in the time.
+
+    Parameters
+    ----------
+    memory : Memory
+        What the robot remembers.
+    senses, limits : Senses, Limits
+        Where it is, and how fast it drives and turns.
+    least : float
+        Frontiers shorter than this are left out [m].
+    intent : Intent
+        What it went for last.
+    of_mates : sequence of (2,) float64
+        What teammates go for [m].
+
+    Returns
+    -------
+    tuple or None
+        The ends of the legs, and a place on the frontier; None where there is none in reach that is no
+        teammate's.
+    """
+    frontiers = memory.frontiers(senses.pose[:2], least, MOST)
+    if frontiers is None:
+        return None
+    to_teammates = np.array(
+        [[math.dist(focus, teammate) for teammate in of_teammates] for focus in frontiers.focuses]
+    ).min(axis=1, initial=math.inf)
+    is_left = to_teammates >= TEAMMATE_SAME
+    if not is_left.any():
+        return None
+    gap = frontiers.ahead - senses.pose[:2]
+    turns = np.abs([wrapped(float(angle)) for angle in np.arctan2(gap[:, 1], gap[:, 0]) - float(senses.pose[2])])
+    first = frontiers.costs + turns * limits.speed / limits.turn_rate + np.maximum(TEAMMATE_SPREAD - to_teammates, 0.0)
+    first -= WAY_OF_SIZE * frontiers.sizes
+    if intent.latest is not None:
+        first -= intent.kept * _are_near(frontiers.cells, intent.latest)
+    left = np.flatnonzero(is_left)
+    tour = shortest_tour(first[left], frontiers.between(left))
+    begin = int(left[tour[0]])
+    return frontiers.legs(begin), frontiers.focuses[begin]
+
+
+def _are_near(cells: Sequence[NDArray[np.float64]], latest: Place) -> NDArray[np.bool_]:
+    return np.array([float(np.hypot(*(each - latest).T).min()) < KEPT_NEAR for each in cells])
+
 
 LAST_FRONTIER = 0.3
 """Least length of map frontiers visited when nothing else is left [m]."""
@@ -101,9 +180,7 @@ class WayChooser:
             Those of teammates in contact.
         """
         settings = self._settings
-        lengths, before = (
-            tree.ways(node.number, known) if settings.backtrack == "open" else ({node.number: 0.0}, {})
-        )
+        lengths, before = tree.ways(node.number, known) if settings.backtrack == "open" else ({node.number: 0.0}, {})
         reached = [tree.nodes[number] for number in lengths]
         if straight := self._to_goal(tree, reached, lengths, before, memory, senses):
             return straight
@@ -115,9 +192,7 @@ class WayChooser:
         if is_drawn:
             best = self._drawn(reached, lengths, memory, others, targets)
         else:
-            found = [
-                candidate for each in reached for candidate in self._source.of_node(each, memory, others)
-            ]
+            found = [candidate for each in reached for candidate in self._source.of_node(each, memory, others)]
             best = self._cheapest(_left_by(targets, found), tree, lengths, before, senses)
         if best is not None:
             return [*_legs(tree, way_to(best.node, before)), Choice(best.place, None, best)]
@@ -200,14 +275,12 @@ class WayChooser:
             return []
         of_teammates = [target.focus for target in targets]
         for least in (settings.least_frontier, LAST_FRONTIER):
-            begun = first_on_tour(memory, senses, self._limits, least, self._source.intent, of_teammates)
+            begun = _first_on_tour(memory, senses, self._limits, least, self._source.intent, of_teammates)
             if begun is not None:
                 return _to_focus(node, *begun)
         return []
 
-    def _across(
-        self, nodes: list[Node], memory: Memory, senses: Senses, targets: Sequence[Candidate]
-    ) -> list[Choice]:
+    def _across(self, nodes: list[Node], memory: Memory, senses: Senses, targets: Sequence[Candidate]) -> list[Choice]:
         """Return the path across the map to the nearest indirect opening.
 
         No straight path from the opening's node leads to it.
@@ -222,9 +295,7 @@ class WayChooser:
                 ]
         return []
 
-    def _weighed(
-        self, length: float, first: NDArray[np.float64], last: NDArray[np.float64], senses: Senses
-    ) -> float:
+    def _weighed(self, length: float, first: NDArray[np.float64], last: NDArray[np.float64], senses: Senses) -> float:
         """Return the cost of a path [m].
 
         It counts its length, the turn towards its first place, and how far from the goal it ends.
@@ -232,9 +303,7 @@ class WayChooser:
         gap = first - senses.pose[:2]
         turn = abs(wrapped(math.atan2(gap[1], gap[0]) - float(senses.pose[2])))
         length += turn * self._limits.speed / self._limits.turn_rate
-        return self._settings.way_weight * length + (
-            0.0 if senses.goal is None else math.dist(last, senses.goal)
-        )
+        return self._settings.way_weight * length + (0.0 if senses.goal is None else math.dist(last, senses.goal))
 
     def _to_frontier(
         self, node: Node, memory: Memory, least: float, senses: Senses, targets: Sequence[Candidate]
@@ -259,9 +328,7 @@ class WayChooser:
         return [] if best is None else _to_focus(node, found.legs(best), found.focuses[best])
 
 
-def home_way(
-    tree: Tree, start: int, root: int, known: set[int], senses: Senses, memory: Memory
-) -> list[Choice]:
+def home_way(tree: Tree, start: int, root: int, known: set[int], senses: Senses, memory: Memory) -> list[Choice]:
     """Return the legs of the shortest path to the first node.
 
     The path follows the tree or else crosses the map; there are no legs where there is no path.

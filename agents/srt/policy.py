@@ -55,28 +55,20 @@ class SensorBasedRandomTree(Policy):
         for agent, child in zip(team.agents, children, strict=True):
             belief = team.belief(agent)
             generator = np.random.default_rng(child)
-            self._explorers[agent] = Explorer(
-                agent, self.tree, self.settings, belief.robot, belief.lidar, generator
-            )
+            self._explorers[agent] = Explorer(agent, self.tree, self.settings, belief.robot, belief.lidar, generator)
 
     def act(self, observations: Mapping[str, Observation]) -> dict[str, Action]:
         """Drive every robot for a step."""
         actions: dict[str, Action] = {}
         for agent, observation in observations.items():
             explorer, belief = self._explorers[agent], self._team.belief(agent)
-            in_contact = [
-                self._explorers[teammate] for teammate in self._contacts(agent) if teammate in observations
-            ]
+            in_contact = [self._explorers[teammate] for teammate in self._contacts(agent) if teammate in observations]
             for teammate in in_contact:
                 teammate.known.update(explorer.known)
                 explorer.known.update(teammate.known)
             targets = [teammate.target for teammate in in_contact if teammate.target is not None]
-            memory = memory_of(
-                belief, [self.tree.nodes[number] for number in sorted(explorer.known)], self.settings
-            )
-            speed, turn_rate = explorer.step(
-                senses_of(self._team.time_s, observation, belief), memory, targets
-            )
+            memory = memory_of(belief, [self.tree.nodes[number] for number in sorted(explorer.known)], self.settings)
+            speed, turn_rate = explorer.step(senses_of(self._team.time_s, observation, belief), memory, targets)
             actions[agent] = _shares(speed / belief.robot.max_speed, turn_rate / belief.robot.max_turn_rate)
         explorers = [self._explorers[agent] for agent in observations]
         if all(explorer.is_home for explorer in explorers):

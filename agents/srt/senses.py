@@ -10,9 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.agents.srt.memories.map_memory import MapMemory
-from lidarium.agents.srt.memories.memory import Memory
-from lidarium.agents.srt.memories.region_memory import RegionMemory
+from lidarium.agents.srt.memories import MapMemory, Memory, RegionMemory
 from lidarium.agents.srt.settings import SrtSettings
 from lidarium.agents.srt.tree import Node
 from lidarium.envs.faces.parallel import Observation
@@ -65,9 +63,7 @@ def senses_of(time_s: float, observation: Observation, belief: Belief) -> Senses
     origin = np.array(belief.map_origin)
     pose = np.asarray(belief.pose, np.float64)
     teammates = [
-        teammate.pose[:2] - origin
-        for teammate in belief.teammates.values()
-        if teammate.age_s <= CONTACT_AGE_S
+        teammate.pose[:2] - origin for teammate in belief.teammates.values() if teammate.age_s <= CONTACT_AGE_S
     ]
     return Senses(
         time_s,

@@ -136,9 +136,7 @@ class SrtSettings:
         check_settings(self, "the tree")
         for name, words in CHOICES.items():
             if getattr(self, name) not in words:
-                raise ValueError(
-                    f"{name} of the tree is {getattr(self, name)!r}; want one of {', '.join(words)}"
-                )
+                raise ValueError(f"{name} of the tree is {getattr(self, name)!r}; want one of {', '.join(words)}")
         if not self.turning_ends < self.turning_starts:
             raise ValueError(
                 f"turning_starts is {self.turning_starts} rad; want more than turning_ends "

@@ -7,15 +7,120 @@ from numpy.typing import NDArray
 
 from lidarium.agents.srt.candidates import Candidate
 from lidarium.agents.srt.choice import Choice
-from lidarium.agents.srt.memories.memory import Memory
-from lidarium.agents.srt.motion.blocks import place_aside
-from lidarium.agents.srt.motion.drive import Drive, Phase, driven, free_way, limits_of
-from lidarium.agents.srt.motion.progress import Progress
-from lidarium.agents.srt.motion.turn_plan import TURN_GAIN, TurnPlan
+from lidarium.agents.srt.memories import Memory
+from lidarium.agents.srt.motion import Drive, Phase, driven, free_way, limits_of, place_aside
 from lidarium.agents.srt.senses import Senses
 from lidarium.agents.srt.settings import SrtSettings
 from lidarium.envs.settings.lidar import Lidar
 from lidarium.envs.settings.robots import Robot
+from lidarium.mapping.geometry.rigid import wrapped
+
+PATIENCE_S = 3.0
+"""Time without motion after which a driving robot is blocked [s].
+
+The robot has neither moved nor turned for this long.
+"""
+
+MOVED, TURNED = 0.05, 0.1
+"""What counts as having moved [m] and turned [rad]."""
+
+BLIND_S = 10.0
+"""A robot whose laser measures nothing for this long gives up [s]."""
+
+SAME_PLACE = 0.5
+"""Blocks nearer to each other than this are at one place [m]."""
+
+
+class _Progress:
+    """What a robot remembers of how it got on."""
+
+    def __init__(self) -> None:
+        self._since, self._at = 0.0, np.zeros(3)
+        self._blocked_at, self._blocks = np.full(2, math.inf), 0
+        self._blind_since = -math.inf
+
+    def stand(self, senses: Senses) -> None:
+        """Count from now on: the robot is not expected to have moved before."""
+        self._since, self._at = senses.time_s, senses.pose
+
+    def is_stuck(self, senses: Senses) -> bool:
+        """Whether the robot has not got on for a while."""
+        gap = senses.pose - self._at
+        if math.hypot(gap[0], gap[1]) > MOVED or abs(wrapped(float(gap[2]))) > TURNED:
+            self.stand(senses)
+        return senses.time_s - self._since > PATIENCE_S
+
+    def note_block(self, senses: Senses) -> int:
+        """Note that the robot is blocked where it is.
+
+        Returns how often in a row it was blocked there, 1 the first time.
+        """
+        self._blocks = self._blocks + 1 if senses.distance_to(self._blocked_at) < SAME_PLACE else 1
+        self._blocked_at = senses.pose[:2]
+        return self._blocks
+
+    def waits_for_sight(self, senses: Senses, lidar: Lidar) -> bool:
+        """Whether the laser measures nothing; until it does, the robot stands."""
+        if not senses.is_blind(lidar):
+            self._blind_since = -math.inf
+            return False
+        if self._blind_since < 0.0:
+            self._blind_since = senses.time_s
+        self.stand(senses)
+        return True
+
+    def is_blind(self, senses: Senses) -> bool:
+        """Whether a robot that waits for sight has waited too long."""
+        return senses.time_s - self._blind_since >= BLIND_S
+
+
+MOST_TURNS = 8
+"""A laser that would need more turns than this does not turn around."""
+
+TURN_GAIN = 2.0
+"""Turn rate by the error of the heading [1/s]."""
+
+
+class _TurnPlan:
+    """The headings to which a robot still has to turn.
+
+    Attributes
+    ----------
+    focus : (2,) float64 or None
+        The frontier that the robot turns to, or turned to last [m].
+    """
+
+    def __init__(self) -> None:
+        self._headings: list[float] = []
+        self.focus: NDArray[np.float64] | None = None
+
+    @property
+    def is_over(self) -> bool:
+        """Whether no turn is left."""
+        return not self._headings
+
+    def plan_circle(self, senses: Senses, lidar: Lidar) -> None:
+        """Plan the turns after which the robot has seen the whole circle."""
+        field = lidar.field_of_view
+        turns = math.ceil(2.0 * math.pi / field - 1e-9) - 1
+        if lidar.beams == 1 or turns > MOST_TURNS:
+            return
+        heading = float(senses.pose[2])
+        self._headings = [wrapped(heading + (2.0 * math.pi - field) * (turn + 1) / turns) for turn in range(turns)]
+
+    def plan_frontier(self, focus: NDArray[np.float64], senses: Senses) -> None:
+        """Plan the turn to a frontier that is not seen through from where the robot came for it."""
+        gap = focus - senses.pose[:2]
+        self._headings, self.focus = [math.atan2(gap[1], gap[0])], focus
+
+    def error(self, senses: Senses) -> float:
+        """Return by how much the robot has to turn to its next heading [rad]."""
+        return wrapped(self._headings[0] - float(senses.pose[2]))
+
+    def end_turn(self) -> None:
+        """Note that the robot has turned to the next heading."""
+        self._headings.pop(0)
+
 
 BACKING_S, BACKING_SPEED = 1.5, 0.12
 """How long and how fast a blocked robot backs out [s, m/s]."""
@@ -60,7 +165,7 @@ class Travel:
         self.legs: list[Choice] = []
         self.began_at: NDArray[np.float64] = np.zeros(2)
         self.is_aside = False
-        self.turns, self.progress = TurnPlan(), Progress()
+        self.turns, self.progress = _TurnPlan(), _Progress()
         self._drive: Drive | None = None
         self._backs_until = -math.inf
 
@@ -115,9 +220,7 @@ class Travel:
         assert self._drive is not None
         free = free_way(senses.scan, self._lidar, self.limits.radius)
         arrived = EXACTLY if self.legs[0].is_goal else self._settings.arrived
-        self._drive, speed, turn_rate = driven(
-            self._drive, senses.pose, free, self.limits, self._settings, arrived
-        )
+        self._drive, speed, turn_rate = driven(self._drive, senses.pose, free, self.limits, self._settings, arrived)
         return None if self._drive.phase is Phase.DONE else (speed, turn_rate)
 
     def end_leg(self) -> None:

@@ -14,8 +14,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.agents.srt.frontier_arcs import Opening
-from lidarium.agents.srt.safe_region import SafeRegion
+from lidarium.agents.srt.safe_region import Opening, SafeRegion
 
 
 @dataclass(eq=False, slots=True)

@@ -25,9 +25,7 @@ def best_goal(costs: NDArray[np.float64], utility: NDArray[np.float64], cost_wei
         Utility that a metre of way costs [1/m].
     """
     # Where there is no weight, a way that does not exist still counts.
-    values = np.where(
-        np.isfinite(costs), utility - cost_weight * np.where(np.isfinite(costs), costs, 0.0), -np.inf
-    )
+    values = np.where(np.isfinite(costs), utility - cost_weight * np.where(np.isfinite(costs), costs, 0.0), -np.inf)
     return int(np.argmax(values)) if len(values) and np.isfinite(values.max()) else NOBODY
 
 

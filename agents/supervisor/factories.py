@@ -3,7 +3,7 @@
 from typing import Any
 
 from lidarium.agents.catalogue import make_policy
-from lidarium.agents.frontier_policies import NearestFrontier
+from lidarium.agents.frontier.policies import NearestFrontier
 from lidarium.agents.policy import PerRobot
 from lidarium.agents.supervisor.policy import Supervised
 

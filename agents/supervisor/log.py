@@ -103,9 +103,8 @@ class StationEvent:
 def _inputs(inputs: RobotInputs) -> dict[str, Any]:
     values = asdict(inputs)
     finite = {
-        name: value if not isinstance(value, float) or math.isfinite(value) else None
-        for name, value in values.items()
+        name: value if not isinstance(value, float) or math.isfinite(value) else None for name, value in values.items()
     }
-    return {
-        name: round(value, 4) if isinstance(value, float) else value for name, value in finite.items()
-    } | {"state": inputs.state.value}
+    return {name: round(value, 4) if isinstance(value, float) else value for name, value in finite.items()} | {
+        "state": inputs.state.value
+    }

@@ -6,7 +6,8 @@ A supervisor directs any policy that goes to goals.
 import math
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Set as AbstractSet
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -14,15 +15,181 @@ from numpy.typing import NDArray
 
 from lidarium.agents.policy import Action, Policy, Stop, Team
 from lidarium.agents.report import GivenOrder, GivenUp, Join, LogEntry, PolicyReport, Supervision, TeamMaps
-from lidarium.agents.supervisor.errands import Errands
-from lidarium.agents.supervisor.knowledge.station import MergeStation
-from lidarium.agents.supervisor.led_team import LedTeam
 from lidarium.agents.supervisor.log import Decision, StationEvent
 from lidarium.agents.supervisor.settings import SupervisorSettings
+from lidarium.agents.supervisor.station import MergeStation
 from lidarium.agents.supervisor.supervisor import Command, Supervisor
 from lidarium.envs.faces.parallel import Observation
+from lidarium.envs.onboard.belief import Belief
 from lidarium.envs.onboard.driving.path_planner import footprint_of
-from lidarium.envs.onboard.radio.messages import Order, OrderKind
+from lidarium.envs.onboard.radio.messages import DriveState, OperatingState, Order, OrderKind
+from lidarium.envs.onboard.station.reports import Report
+from lidarium.mapping.merging.fusion import FusedMap
+from lidarium.mapping.planning.frontiers.frontier_map import FRONTIER
+from lidarium.mapping.planning.grid_planning import cells_of
+
+PATIENCE_S = 20.0
+"""Time without motion after which a sent robot explores by itself again [s]."""
+
+MOVED_M = 0.15
+"""What counts as having moved [m]."""
+
+LOST_S = 2.0
+"""An order that a robot has not taken after this long has not reached it [s]."""
+
+
+@dataclass(slots=True)
+class _Errand:
+    """Where a robot is sent by an order, and where it was when it last had moved."""
+
+    command: Command
+    order: Order
+    since_s: float
+    place: tuple[float, float]
+    is_new: bool = True
+    is_taken: bool = False
+
+
+class _Errands:
+    """The errands of a team's robots, by name.
+
+    Parameters
+    ----------
+    team : Team
+        The robots.
+    """
+
+    def __init__(self, team: Team) -> None:
+        self._team = team
+        self._errands: dict[str, _Errand] = {}
+
+    def __len__(self) -> int:
+        return len(self._errands)
+
+    def begin(self, command: Command) -> None:
+        """Send a robot to the target of a command, unless both that and its errand lead home."""
+        if command.target is None:
+            return
+        agent, under_way = command.agent, self._errands.get(command.agent)
+        if under_way is not None and under_way.command.is_home and command.is_home:
+            return
+        x, y, _ = self._team.belief(agent).pose.tolist()
+        order = Order(OrderKind.GO_TO, command.target, f"rule {command.rule}: {command.why}")
+        self._errands[agent] = _Errand(command, order, self._team.time_s, (x, y))
+
+    def cancel(self, agent: str) -> None:
+        """Forget a robot's errand, if it has one."""
+        self._errands.pop(agent, None)
+
+    def review(self, agent: str) -> None:
+        """End an errand that is done, or that cannot be."""
+        errand = self._errands.get(agent)
+        if errand is None or errand.is_new:
+            return
+        if not errand.is_taken:
+            errand.is_taken = self._team.last_order(agent) is errand.order
+            if not errand.is_taken:
+                if self._team.time_s - errand.since_s > LOST_S:
+                    del self._errands[agent]
+                return
+        belief, state = self._team.belief(agent), self._team.drive_state(agent)
+        if errand.command.is_home:
+            return
+        x, y, _ = belief.pose.tolist()
+        if state is DriveState.GIVING_WAY or math.dist((x, y), errand.place) > MOVED_M:
+            errand.since_s, errand.place = self._team.time_s, (x, y)
+        is_stuck = self._team.time_s - errand.since_s > PATIENCE_S
+        if (
+            state in (DriveState.ARRIVED, DriveState.NO_PATH)
+            or is_stuck
+            or not _is_frontier(belief, errand.command.observes)
+        ):
+            del self._errands[agent]
+
+    def is_away(self, agent: str) -> bool:
+        """Whether a robot is on an errand or gets the order now.
+
+        Until it has taken the order the policy drives it.
+        """
+        errand = self._errands.get(agent)
+        return errand is not None and (errand.is_new or errand.is_taken)
+
+    def action(self, agent: str) -> Action:
+        """Return the action of a robot on an errand.
+
+        It is its order at first, to end where it came home, else nothing.
+        """
+        errand, state = self._errands[agent], self._team.drive_state(agent)
+        if errand.is_new:
+            errand.is_new = False
+            return errand.order
+        if errand.command.is_home and state in (DriveState.ARRIVED, DriveState.NO_PATH):
+            return Stop("returned" if state is DriveState.ARRIVED else "unreachable")
+        return None
+
+
+def _is_frontier(belief: Belief, place: tuple[float, float] | None) -> bool:
+    """Whether there still is a frontier at a place of a robot's map frame [m].
+
+    The tolerance is that by which frames may differ.
+    """
+    if place is None:
+        return True
+    navigation = belief.map if belief.shared_map is None else belief.shared_map
+    row, column = cells_of(np.asarray(place), belief.map_origin, navigation.resolution).tolist()
+    reach = round(0.3 / navigation.resolution)
+    around = navigation.frontiers.flags[
+        max(row - reach, 0) : max(row + reach + 1, 0), max(column - reach, 0) : max(column + reach + 1, 0)
+    ]
+    return bool((around == FRONTIER).any())
+
+
+class _LedTeam:
+    """A team as the policy under a supervisor sees it.
+
+    Drives for the supervisor are hidden from the policy.
+    """
+
+    def __init__(self, team: Team, exploring: AbstractSet[str]) -> None:
+        self._team, self._exploring = team, exploring
+
+    @property
+    def agents(self) -> list[str]:
+        """Live agents."""
+        return self._team.agents
+
+    @property
+    def time_s(self) -> float:
+        """Simulated time [s]."""
+        return self._team.time_s
+
+    def belief(self, agent: str) -> Belief:
+        """Return what an agent's onboard software knows."""
+        return self._team.belief(agent)
+
+    def drive_state(self, agent: str) -> DriveState:
+        """Return the state of its driving; idle where it drives for the supervisor."""
+        return self._team.drive_state(agent) if agent in self._exploring else DriveState.IDLE
+
+    def operating_state(self, agent: str) -> OperatingState:
+        """Return whether it takes part in the work."""
+        return self._team.operating_state(agent)
+
+    def report(self, agent: str) -> Report | None:
+        """Return what last reached the station."""
+        return self._team.report(agent)
+
+    def last_order(self, agent: str) -> Order | None:
+        """Return the last order that it took."""
+        return self._team.last_order(agent)
+
+    def send_map(self, agent: str, others: FusedMap | None) -> bool:
+        """Send it what others know."""
+        return self._team.send_map(agent, others)
+
+    def forget_walls(self, agent: str, trail: NDArray[np.float64]) -> bool:
+        """Let it forget walls where another robot drove."""
+        return self._team.forget_walls(agent, trail)
 
 
 class Supervised(Policy):
@@ -62,13 +229,11 @@ class Supervised(Policy):
     def __init__(self, policy: Policy, settings: SupervisorSettings | None = None, **options: Any) -> None:  # noqa: ANN401
         if policy.level not in ("waypoint", "frontier"):
             raise ValueError(
-                f"a policy of level {policy.level!r} goes to no goals; want one of level 'waypoint' or "
-                "'frontier'"
+                f"a policy of level {policy.level!r} goes to no goals; want one of level 'waypoint' or 'frontier'"
             )
         if settings is not None and options:
             raise ValueError(
-                f"settings of the supervisor are given twice, also as {', '.join(options)}; want one or the "
-                "other"
+                f"settings of the supervisor are given twice, also as {', '.join(options)}; want one or the other"
             )
         self.policy, self.settings = policy, settings or SupervisorSettings(**options)
         self.level, self.observes = policy.level, policy.observes
@@ -152,13 +317,13 @@ class Supervised(Policy):
             )
         self._supervisor = Supervisor(station, footprint_of(belief.radius))
         self._informs = not knows_starts
-        self._errands = Errands(team)
+        self._errands = _Errands(team)
         self._given_up: dict[str, NDArray[np.float64]] = {}
         self._informed: set[str] = set()
         self._decision_due, self._merge_due = settings.period_s, 0.0
         self._exploring: set[str] = set()
         self.tick_seconds, self.merge_seconds = [], []
-        self.policy.reset(LedTeam(team, self._exploring), seed)
+        self.policy.reset(_LedTeam(team, self._exploring), seed)
 
     def act(self, observations: Mapping[str, Observation]) -> dict[str, Action]:
         """Let the policy decide for all robots that the supervisor has not sent anywhere."""
@@ -174,9 +339,7 @@ class Supervised(Policy):
         actions: dict[str, Action] = self.policy.act(free) if free else {}
         self._exploring.clear()
         self._exploring.update(free)
-        is_work_left = (
-            any(not isinstance(action, Stop) for action in actions.values()) or len(self._errands) > 0
-        )
+        is_work_left = any(not isinstance(action, Stop) for action in actions.values()) or len(self._errands) > 0
         for agent in observations:
             if agent in stops:
                 actions[agent] = stops[agent]
@@ -185,9 +348,7 @@ class Supervised(Policy):
                 if (action := self._errands.action(agent)) is not None:
                     actions[agent] = action
             elif agent in standing:
-                actions[agent] = (
-                    self._rest(agent, observations[agent]) if is_work_left else Stop("no_frontier")
-                )
+                actions[agent] = self._rest(agent, observations[agent]) if is_work_left else Stop("no_frontier")
             elif is_work_left and isinstance(actions[agent], Stop):
                 # It may have to move aside, or get work when the others find more.
                 actions[agent] = self._rest(agent, observations[agent])
@@ -248,9 +409,7 @@ class Supervised(Policy):
         """
         station = self._supervisor.station
         station.left_behind = [
-            (agent, trail)
-            for agent, trail in station.left_behind
-            if not self._team.forget_walls(agent, trail)
+            (agent, trail) for agent, trail in station.left_behind if not self._team.forget_walls(agent, trail)
         ]
         for group in station.groups():
             for agent in group:

@@ -112,8 +112,7 @@ class SupervisorSettings:
         check_settings(self, "the supervisor")
         if self.assignment not in get_args(Assignment):
             raise ValueError(
-                f"assignment of the supervisor is {self.assignment!r}; want one of "
-                f"{', '.join(get_args(Assignment))}"
+                f"assignment of the supervisor is {self.assignment!r}; want one of {', '.join(get_args(Assignment))}"
             )
         if self.pauses_idle and self.is_stop_final:
             raise ValueError(

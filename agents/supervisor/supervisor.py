@@ -5,26 +5,221 @@ What the station knows becomes a case, the tree decides it, and orders to go get
 
 import math
 from collections.abc import Mapping
+from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.agents.supervisor.assignment import NOBODY, assign_by_cost, assign_by_utility
-from lidarium.agents.supervisor.judging import Judge, Judged
-from lidarium.agents.supervisor.knowledge.station import MergeStation
-from lidarium.agents.supervisor.knowledge.survey import Survey
+from lidarium.agents.supervisor.assignment import NOBODY, assign_by_cost, assign_by_utility, best_goal
 from lidarium.agents.supervisor.log import Decision, StationEvent
+from lidarium.agents.supervisor.station import MergeStation
+from lidarium.agents.supervisor.survey import Survey
 from lidarium.agents.supervisor.tree import (
     HOME,
     LEFT,
     OTHER,
     RESUMED,
+    RICH,
+    Case,
     Leaf,
+    RobotInputs,
+    decide,
+    decision_tree,
     idle_leaf,
 )
 from lidarium.envs.onboard.radio.messages import OperatingState, OrderKind, Target
 from lidarium.mapping.planning.footprint import Footprint
+
+LEAST_WAY_M = 1.0
+"""What a metre costs a battery is estimated after a path of this length [m]."""
+
+EXPLAINED_PAUSES = frozenset({"contact", "blocked"})
+"""Causes of pauses that a robot has seen or felt, and backs out of."""
+
+
+@dataclass(slots=True)
+class _Judged:
+    """A case, what the tree said of it, and the goal that was chosen.
+
+    Attributes
+    ----------
+    case : Case
+        What is known of the robot.
+    leaf : Leaf
+        Where the tree has led.
+    answers : tuple of (str, bool)
+        The questions on the way there, with their answers.
+    goal : int
+        The goal that the robot is to get, `NOBODY` for none.
+    target : Target or None
+        Where it is sent, in its map frame.
+    """
+
+    case: Case
+    leaf: Leaf
+    answers: tuple[tuple[str, bool], ...]
+    goal: int = NOBODY
+    target: Target | None = None
+
+
+class _Judge:
+    """Puts the robots of a station before the tree.
+
+    Parameters
+    ----------
+    station : MergeStation
+        What is known.
+    standing_by : set of str
+        Robots that have no goal of their own while others of their group work; the supervisor's own set.
+    """
+
+    def __init__(self, station: MergeStation, standing_by: AbstractSet[str]) -> None:
+        self._station, self._standing_by, self._settings = station, standing_by, station.settings
+        self._tree = decision_tree(station.settings)
+        self._full_j: dict[str, float] = {}
+
+    def judge_alone(self, agent: str) -> _Judged:
+        """Put a robot before the tree of which nothing but its last report is known."""
+        return self._decide(Case(self._inputs(agent, 0.0)))
+
+    def is_held(self, agent: str) -> bool:
+        """Whether a robot stands by, paused by an order."""
+        report = self._station.reports[agent]
+        return agent in self._standing_by and report.pause_cause == "order"
+
+    def judge(
+        self,
+        agent: str,
+        group: list[str],
+        workers: list[str],
+        survey: Survey,
+        taken: Mapping[str, int],
+    ) -> _Judged:
+        """Put a robot before the tree, and choose its goal where it is to get another.
+
+        Parameters
+        ----------
+        agent : str
+            The robot.
+        group, workers : list of str
+            The robots that are joined with it, itself included, and those of them that can get goals.
+        survey : Survey
+            Their merged map.
+        taken : mapping of str to int
+            The goals that robots have by now, `NOBODY` for none.
+        """
+        inputs = self._inputs(agent, survey.known_area_m2)
+        if agent not in workers:
+            is_explained = self._station.reports[agent].pause_cause in EXPLAINED_PAUSES
+            return self._decide(Case(inputs, is_pause_explained=is_explained))
+        row, rival = workers.index(agent), self._rival(agent, workers, survey)
+        if agent in self._standing_by and rival is not None:
+            # It has no path of its own; what counts is its way to the goal of the other.
+            goal = survey.going[rival.agent]
+            remaining_m = float(survey.goals.costs[row, goal]) if goal != NOBODY else math.inf
+            inputs = replace(inputs, remaining_m=remaining_m)
+        others = [teammate for teammate in workers if teammate != agent]
+        worth = _worth(others, survey, taken)
+        if survey.going[agent] != NOBODY and rival is not None:
+            worth[survey.going[agent]] = -np.inf
+        costs, weight = survey.goals.costs[row], self._settings.cost_weight
+        other = best_goal(costs, worth, weight)
+        areas = survey.goals.areas
+        richer = best_goal(
+            costs,
+            np.where(np.isfinite(worth), areas / max(float(areas.max(initial=0.0)), 1e-9), -np.inf),
+            weight,
+        )
+        going = survey.going[agent]
+        case = Case(
+            robot=inputs,
+            rival=rival,
+            opponent=self._opponent(agent, others, survey)
+            if rival is None and self._settings.avoids_rendezvous
+            else None,
+            has_frontier=survey.has_frontier(),
+            has_other_goal=other != NOBODY,
+            has_richer_goal=richer not in (NOBODY, going) and (going == NOBODY or areas[richer] > areas[going]),
+            is_behind=self._is_behind(agent, group),
+            is_enclosed=self._station.is_enclosed(agent),
+            is_battery_low=self._settings.battery_margin > 0.0 and self._is_battery_low(agent, survey),
+            is_held=self.is_held(agent),
+        )
+        one = self._decide(case)
+        one.goal = {OTHER: other, RICH: richer}.get(one.leaf.aim, NOBODY)
+        return one
+
+    def _inputs(self, agent: str, area_m2: float) -> RobotInputs:
+        report = self._station.reports[agent]
+        share = self._station.known_m2(agent) / area_m2 if area_m2 > 0.0 else 0.0
+        return RobotInputs(agent, report.path_left_m, report.state, min(share, 1.0), report.travelled_m)
+
+    def _rival(self, agent: str, workers: list[str], survey: Survey) -> RobotInputs | None:
+        """Return the nearest other robot with the same goal.
+
+        To a robot that stands by, the nearest one that has any goal.
+        """
+        is_waiting = agent in self._standing_by
+        teammates = [
+            self._inputs(teammate, survey.known_area_m2)
+            for teammate in workers
+            if teammate != agent
+            and teammate not in self._standing_by
+            and (
+                survey.places[teammate] is not None
+                if is_waiting
+                else survey.is_same_goal(agent, teammate, self._settings.same_goal_m)
+            )
+        ]
+        return min(teammates, key=lambda teammate: (teammate.remaining_m, teammate.agent), default=None)
+
+    def _opponent(self, agent: str, others: list[str], survey: Survey) -> RobotInputs | None:
+        """Return the nearest robot that an agent is about to meet."""
+        teammates = [
+            self._inputs(teammate, survey.known_area_m2) for teammate in others if survey.are_meeting(agent, teammate)
+        ]
+        return min(teammates, key=lambda teammate: (teammate.remaining_m, teammate.agent), default=None)
+
+    def _is_behind(self, agent: str, group: list[str]) -> bool:
+        known = [self._station.known_m2(teammate) for teammate in group if teammate != agent]
+        return bool(known) and self._station.known_m2(agent) < self._settings.unbalanced_share * float(np.mean(known))
+
+    def _is_battery_low(self, agent: str, survey: Survey) -> bool:
+        """Whether the battery left would soon not bring a robot home.
+
+        The estimate uses what metres have cost the robot until now.
+        """
+        report = self._station.reports[agent]
+        if report.energy_left_j is None:
+            return False
+        full = self._full_j.setdefault(agent, report.energy_left_j)
+        if report.travelled_m < LEAST_WAY_M:
+            return False
+        metre = (full - report.energy_left_j) / report.travelled_m
+        way = survey.way_home_m(agent, report.start)
+        # Where the merged map knows no path, the one that it came is one.
+        return report.energy_left_j < self._settings.battery_margin * metre * min(way, report.travelled_m)
+
+    def _decide(self, case: Case) -> _Judged:
+        leaf, answers = decide(self._tree, case)
+        return _Judged(case, leaf, tuple(answers))
+
+
+def _worth(others: list[str], survey: Survey, taken: Mapping[str, int]) -> NDArray[np.float64]:
+    """Return what each goal is worth to a robot, (K,).
+
+    It is less where others see the goal, and -inf where it is taken or none.
+    """
+    worth = np.where(survey.is_goal(), 1.0, -np.inf)
+    for teammate in others:
+        place = survey.places[teammate]
+        if place is not None:
+            worth = worth - survey.seen_at(place)
+        if taken[teammate] != NOBODY:
+            worth[taken[teammate]] = -np.inf
+    return worth
+
 
 STICKINESS_M = 1.0
 """Distance by which a robot's present goal counts as nearer [m].
@@ -87,7 +282,7 @@ class Supervisor:
         self.decisions: list[Decision] = []
         self.standing_by: set[str] = set()
         self._silent: set[str] = set()
-        self._judge = Judge(station, self.standing_by)
+        self._judge = _Judge(station, self.standing_by)
 
     def decide(self, time_s: float, given_up: Mapping[str, NDArray[np.float64]]) -> list[Command]:
         """Decide about all robots.
@@ -130,19 +325,13 @@ class Supervisor:
         station = self.station
         held = {agent for agent in group if self._judge.is_held(agent)}
         workers = [
-            agent
-            for agent in group
-            if agent in held or station.reports[agent].state is OperatingState.OPERATING
+            agent for agent in group if agent in held or station.reports[agent].state is OperatingState.OPERATING
         ]
         fused = station.fused(group, group[0])
         frames = {agent: frame for agent in group if (frame := station.lookup(group[0], agent)) is not None}
         if fused is None:
             return []
-        places = [
-            frames[agent].apply(given_up[agent])
-            for agent in group
-            if agent in given_up and len(given_up[agent])
-        ]
+        places = [frames[agent].apply(given_up[agent]) for agent in group if agent in given_up and len(given_up[agent])]
         all_given_up = np.concatenate(places) if places else np.zeros((0, 2))
         # Who is paused keeps its target, but goes nowhere.
         reports = {
@@ -150,7 +339,7 @@ class Supervisor:
             for agent, report in station.reports.items()
         }
         survey = Survey(fused, frames, reports, workers, all_given_up, self.footprint, self._settings)
-        judged: dict[str, Judged] = {}
+        judged: dict[str, _Judged] = {}
         taken: dict[str, int] = dict(survey.going)
         for agent in group:
             one = self._judge.judge(agent, group, workers, survey, taken)
@@ -165,7 +354,7 @@ class Supervisor:
             if (command := self._command(one, survey, time_s, tuple(group))) is not None
         ]
 
-    def _assign_all(self, judged: Mapping[str, Judged], workers: list[str], survey: Survey) -> None:
+    def _assign_all(self, judged: Mapping[str, _Judged], workers: list[str], survey: Survey) -> None:
         """Give goals to all robots of a group at once that are to explore."""
         exploring = [agent for agent in workers if judged[agent].leaf.rule in (0, 3, 4, 7, RESUMED.rule)]
         rows = [workers.index(agent) for agent in exploring]
@@ -181,9 +370,7 @@ class Supervisor:
         if self._settings.assignment == "hungarian":
             goals = assign_by_cost(costs)
         else:
-            goals = assign_by_utility(
-                costs, survey.seen(), is_goal.astype(np.float64), self._settings.cost_weight
-            )
+            goals = assign_by_utility(costs, survey.seen(), is_goal.astype(np.float64), self._settings.cost_weight)
         for agent, goal in zip(exploring, goals.tolist(), strict=True):
             one = judged[agent]
             if one.case.is_held:
@@ -197,7 +384,7 @@ class Supervisor:
             else:
                 one.leaf, one.goal = Leaf(6, OrderKind.GO_TO, "all robots got goals at once", OTHER), goal
 
-    def _command(self, one: Judged, survey: Survey, time_s: float, group: tuple[str, ...]) -> Command | None:
+    def _command(self, one: _Judged, survey: Survey, time_s: float, group: tuple[str, ...]) -> Command | None:
         """Return the order to a robot, and log the decision."""
         agent, leaf = one.case.robot.agent, one.leaf
         observes = None
@@ -220,7 +407,7 @@ class Supervisor:
             self.standing_by.discard(agent)
         return Command(agent, leaf.order, leaf.rule, leaf.why, one.target, observes, leaf.aim == HOME)
 
-    def _log(self, time_s: float, group: tuple[str, ...], one: Judged) -> None:
+    def _log(self, time_s: float, group: tuple[str, ...], one: _Judged) -> None:
         case, leaf, target = one.case, one.leaf, one.target
         pose = self.station.reports[case.robot.agent].pose
         self.decisions.append(

@@ -97,7 +97,7 @@ class Case:
 
 
 @dataclass(frozen=True, slots=True)
-class Question:
+class _Question:
     """A question that a case answers with yes or no."""
 
     name: str
@@ -122,7 +122,7 @@ class Leaf:
 class Node:
     """A question and what follows from either answer."""
 
-    question: Question
+    question: _Question
     yes: "Node | Leaf"
     no: "Node | Leaf"
 
@@ -135,33 +135,23 @@ def _keeps_before(robot: RobotInputs, other: RobotInputs | None) -> bool:
     return other is None or (robot.remaining_m, robot.agent) <= (other.remaining_m, other.agent)
 
 
-FAILED = Question("failed", "has it failed?", lambda case: case.robot.state is OperatingState.FAILED)
-OPERATING = Question(
-    "operating", "does it operate?", lambda case: case.robot.state is OperatingState.OPERATING
-)
-EXPLAINED = Question(
+FAILED = _Question("failed", "has it failed?", lambda case: case.robot.state is OperatingState.FAILED)
+OPERATING = _Question("operating", "does it operate?", lambda case: case.robot.state is OperatingState.OPERATING)
+EXPLAINED = _Question(
     "explained",
     "has it paused for something that it touched or that blocks it?",
     lambda case: case.is_pause_explained,
 )
-HELD = Question("held", "has the supervisor paused it?", lambda case: case.is_held)
-FRONTIER = Question(
-    "frontier", "does the merged map have a frontier left in reach?", lambda case: case.has_frontier
-)
-SAME_GOAL = Question(
-    "same_goal", "has another robot of its group the same goal?", lambda case: case.rival is not None
-)
-NEARER = Question("nearer", "is it nearer to the goal?", lambda case: _keeps_before(case.robot, case.rival))
-OTHER_GOAL = Question(
-    "other_goal", "does the merged map offer another goal?", lambda case: case.has_other_goal
-)
-BEHIND = Question("behind", "does it know much less of the map than its group?", lambda case: case.is_behind)
-RICHER = Question("richer", "is there a way with more to map?", lambda case: case.has_richer_goal)
-ENCLOSED = Question("enclosed", "has it driven far and mapped little?", lambda case: case.is_enclosed)
-LOW_BATTERY = Question(
-    "low_battery", "is its battery just enough to get home?", lambda case: case.is_battery_low
-)
-MEETING = Question(
+HELD = _Question("held", "has the supervisor paused it?", lambda case: case.is_held)
+FRONTIER = _Question("frontier", "does the merged map have a frontier left in reach?", lambda case: case.has_frontier)
+SAME_GOAL = _Question("same_goal", "has another robot of its group the same goal?", lambda case: case.rival is not None)
+NEARER = _Question("nearer", "is it nearer to the goal?", lambda case: _keeps_before(case.robot, case.rival))
+OTHER_GOAL = _Question("other_goal", "does the merged map offer another goal?", lambda case: case.has_other_goal)
+BEHIND = _Question("behind", "does it know much less of the map than its group?", lambda case: case.is_behind)
+RICHER = _Question("richer", "is there a way with more to map?", lambda case: case.has_richer_goal)
+ENCLOSED = _Question("enclosed", "has it driven far and mapped little?", lambda case: case.is_enclosed)
+LOW_BATTERY = _Question("low_battery", "is its battery just enough to get home?", lambda case: case.is_battery_low)
+MEETING = _Question(
     "meeting",
     "would it meet a nearer robot, and has another goal on offer?",
     lambda case: case.has_other_goal and not _keeps_before(case.robot, case.opponent),
@@ -196,9 +186,7 @@ def decision_tree(settings: SupervisorSettings) -> Node:
         goes_on,
     )
     if settings.avoids_rendezvous:
-        balance = Node(
-            MEETING, Leaf(7, OrderKind.GO_TO, "it would meet a robot that is nearer", OTHER), balance
-        )
+        balance = Node(MEETING, Leaf(7, OrderKind.GO_TO, "it would meet a robot that is nearer", OTHER), balance)
     rivals = Node(
         NEARER,
         Leaf(3, None, "it is the nearer one and keeps the goal"),
@@ -213,14 +201,10 @@ def decision_tree(settings: SupervisorSettings) -> Node:
         done = Leaf(8, OrderKind.GO_TO, "no frontier is left, it drives home", HOME)
     work = Node(FRONTIER, Node(SAME_GOAL, rivals, balance), done)
     if settings.battery_margin > 0.0:
-        work = Node(
-            LOW_BATTERY, Leaf(9, OrderKind.GO_TO, "its battery is just enough to get home", HOME), work
-        )
+        work = Node(LOW_BATTERY, Leaf(9, OrderKind.GO_TO, "its battery is just enough to get home", HOME), work)
     idle: Node | Leaf = LEFT
     if settings.resumes_paused:
-        idle = Node(
-            EXPLAINED, Leaf(10, OrderKind.RESUME, "it backs out of what stopped it and goes on"), idle
-        )
+        idle = Node(EXPLAINED, Leaf(10, OrderKind.RESUME, "it backs out of what stopped it and goes on"), idle)
     if settings.pauses_idle:
         waits = Node(OTHER_GOAL, RESUMED, LEFT)
         over = replace(done, order=OrderKind.RESUME) if settings.returns_home else done
@@ -269,12 +253,9 @@ def tree_text(tree: Node | Leaf, indent: str = "") -> str:
     if isinstance(tree, Leaf):
         return indent + words_of(tree)
     branches = [
-        (answer, tree_text(branch, indent + "    ").lstrip())
-        for answer, branch in (("yes", tree.yes), ("no", tree.no))
+        (answer, tree_text(branch, indent + "    ").lstrip()) for answer, branch in (("yes", tree.yes), ("no", tree.no))
     ]
-    return "\n".join(
-        [indent + tree.question.words, *(f"{indent}  {answer}: {text}" for answer, text in branches)]
-    )
+    return "\n".join([indent + tree.question.words, *(f"{indent}  {answer}: {text}" for answer, text in branches)])
 
 
 def tree_data(tree: Node | Leaf) -> dict[str, object]:

@@ -3,12 +3,13 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.agents.tours.settings import TourSettings
 from lidarium.envs.onboard.navigation import NavigationMap
+from lidarium.mapping.geometry.bounds import above, check_settings, share, within
 from lidarium.mapping.planning.frontiers.frontier_map import Clusters
 from lidarium.mapping.planning.frontiers.views import ViewRules, gain_at, views_of
 from lidarium.mapping.planning.grid_planning import Cell
@@ -21,7 +22,66 @@ from lidarium.mapping.planning.touring.coarse_distances import (
     distances_from,
     place_in,
 )
-from lidarium.mapping.planning.touring.tours import team_tours
+from lidarium.mapping.planning.touring.tours import TourWeights, team_tours
+
+Length = Annotated[float, within(0.0, 1000.0)]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TourSettings:
+    """How tours past frontiers are planned.
+
+    Attributes
+    ----------
+    minimum_size : float
+        Shorter frontiers are visited only when no others are left [m].
+    least_gain : float
+        So are those that show less than this [m2].
+    most : int
+        Tours pass so many frontiers at most: each robot in turn takes its nearest.
+    kept_share : float
+        A robot goes on to a frontier until less than this share of what it would show is left.
+    kept : float
+        What a robot drives to is left only for tours that are shorter by this [m].
+    turn_length : float
+        Length of path that a radian of turning costs at the start [m/rad].
+    total, waiting : float
+        Weight of the sum of all tours against the longest one, and of how long a square metre waits to be
+        seen [1, 1/m2].
+    around, spacing : float
+        Views lie within the first of their frontiers, and the second apart [m].
+    reach, depth : float
+        Unknown space counts up to the first from a view, and up to the second behind what is known [m].
+    view_share : float
+        The view with the shortest path is taken among those that show this share of the best.
+    """
+
+    minimum_size: Length = 0.3
+    least_gain: Annotated[float, within(0.0, 1e6)] = 0.4
+    most: Annotated[int, within(1, 200)] = 30
+    kept_share: Annotated[float, share()] = 0.15
+    kept: Length = 1.0
+    turn_length: Length = 0.25
+    total: Annotated[float, within(0.0, 1e3)] = 0.1
+    waiting: Annotated[float, within(0.0, 1e3)] = 0.05
+    around: Annotated[float, above(0.0, 10.0)] = 1.0
+    spacing: Annotated[float, above(0.0, 10.0)] = 0.3
+    reach: Annotated[float, above(0.0, 30.0)] = 3.0
+    depth: Annotated[float, above(0.0, 30.0)] = 1.5
+    view_share: Annotated[float, share()] = 0.7
+
+    def __post_init__(self) -> None:
+        check_settings(self, "tours")
+
+    def rules(self, range_max: float) -> ViewRules:
+        """Return how views are measured by a laser that sees so far [m]."""
+        return ViewRules(self.around, self.spacing, min(self.reach, range_max), self.depth, self.view_share)
+
+    @property
+    def weights(self) -> TourWeights:
+        """What the tours of a team are weighed by."""
+        return TourWeights(1.0, self.total, self.waiting)
+
 
 AHEAD = 0.5
 """The direction in which a path begins is that of a place about so far along it [m]."""
@@ -176,31 +236,23 @@ def tour_options(
     among, fields = distances_among(grid, places, starts)
     between = _metres(among, grid)
     turns = np.stack(
-        [
-            _turns(robot.pose, start, fields, grid, resolution)
-            for robot, start in zip(robots, starts, strict=True)
-        ]
+        [_turns(robot.pose, start, fields, grid, resolution) for robot, start in zip(robots, starts, strict=True)]
     )
     is_kept = np.stack([_are_kept(robot, clusters, chosen, resolution) for robot in robots])
     kept = np.array([[robot.kept] for robot in robots])
     first = paths + settings.turn_length * turns - kept * is_kept
     gains = views.gains[chosen]
     sequence = team_tours(first, between, gains, settings.weights)
-    return TourOptions(
-        robots, clusters, grid, places, chosen, gains, paths, turns, is_kept, first, between, sequence
-    )
+    return TourOptions(robots, clusters, grid, places, chosen, gains, paths, turns, is_kept, first, between, sequence)
 
 
 def first_options(options: TourOptions) -> list[int | None]:
     """Return the option at which each robot's tour begins, None where there is none that it reaches."""
-    firsts = first_places(options.sequence, len(options.numbers))
-    return [
-        number if number is not None and options.is_reached[k, number] else None
-        for k, number in enumerate(firsts)
-    ]
+    firsts = _first_places(options.sequence, len(options.numbers))
+    return [number if number is not None and options.is_reached[k, number] else None for k, number in enumerate(firsts)]
 
 
-def first_places(sequence: NDArray[np.int64], count: int) -> list[int | None]:
+def _first_places(sequence: NDArray[np.int64], count: int) -> list[int | None]:
     """Return the number of the first place of each robot's tour, None where it has none.
 
     Parameters
@@ -223,9 +275,7 @@ def _cell_at(pose: NDArray[np.float64], resolution: float) -> Cell:
     return math.floor(pose[1] / resolution), math.floor(pose[0] / resolution)
 
 
-def _nearest(
-    lengths: NDArray[np.int32], gains: NDArray[np.float64], settings: TourSettings
-) -> NDArray[np.int64]:
+def _nearest(lengths: NDArray[np.int32], gains: NDArray[np.float64], settings: TourSettings) -> NDArray[np.int64]:
     """Return the numbers of the frontiers to visit, the nearest to any robot first.
 
     Each robot in turn takes its nearest: a team that is spread out has something to visit everywhere.
@@ -267,9 +317,7 @@ def _turns(
     return np.where(np.hypot(x, y) > grid.side, turns, 0.0)
 
 
-def _are_kept(
-    robot: Tourist, clusters: Clusters, chosen: NDArray[np.int64], resolution: float
-) -> NDArray[np.bool_]:
+def _are_kept(robot: Tourist, clusters: Clusters, chosen: NDArray[np.int64], resolution: float) -> NDArray[np.bool_]:
     """Return which of the chosen frontiers are what a robot drives to already."""
     if robot.kept_cell is None:
         return np.zeros(len(chosen), np.bool_)

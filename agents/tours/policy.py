@@ -21,12 +21,11 @@ from dataclasses import fields
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.agents.frontier import FrontierExplorer
-from lidarium.agents.frontier_reach import Choice
+from lidarium.agents.frontier.frontier import FrontierExplorer
+from lidarium.agents.frontier.reach import Choice
 from lidarium.agents.intent import Intent
 from lidarium.agents.policy import Team
-from lidarium.agents.tours.planning import Leg, Tourist, TourOptions, first_options, leg_to, tour_options
-from lidarium.agents.tours.settings import TourSettings
+from lidarium.agents.tours.planning import Leg, Tourist, TourOptions, TourSettings, first_options, leg_to, tour_options
 from lidarium.envs.onboard.belief import Belief
 from lidarium.envs.onboard.navigation import NavigationMap
 from lidarium.mapping.geometry.rigid import wrapped
@@ -122,9 +121,7 @@ class TourFrontier(FrontierExplorer):
         least = max(math.ceil(self.settings.minimum_size / navigation.resolution - 1e-9), 1)
         clusters = self._without_vain(navigation, least)
         robots = [self._tourist(agent, agent) for agent in agents] + self._others(agents)
-        options = tour_options(
-            navigation, clusters, robots, self.footprint.radius, self.settings, self._rules
-        )
+        options = tour_options(navigation, clusters, robots, self.footprint.radius, self.settings, self._rules)
         if options is not None:
             self._sent_by |= dict.fromkeys(agents, TOURS)
             wanted = self.pick(agents, options)

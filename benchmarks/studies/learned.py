@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 import lidarium
+from lidarium.agents.learned.network import CARD
 from lidarium.agents.learned.policy import CORRECTED
-from lidarium.agents.learned.weights import CARD
 from lidarium.agents.tours.policy import NEAREST
 from lidarium.agents.tours.policy import TOURS as BY_TOURS
 from lidarium.benchmarks.studies.shared.study import (

@@ -24,7 +24,7 @@ from lidarium.evaluation.metrics.poses import absolute_error, best_transform
 from lidarium.evaluation.truth.beliefs import team_log_odds
 from lidarium.evaluation.truth.true_map import truth_of
 from lidarium.mapping.geometry.rigid import Transform
-from lidarium.mapping.localization.dead_reckoning.localizer import KeyScans, Localizer, Sensing
+from lidarium.mapping.localization.localizer import KeyScans, Localizer, Sensing
 
 TEAM = 5
 """Robots of the team whose speed is measured."""

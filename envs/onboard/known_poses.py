@@ -9,7 +9,7 @@ from lidarium.envs.onboard.radio.exchange import NEVER, Exchange
 from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.simulation.kernels.arrays import ENDED
 from lidarium.envs.simulation.simulation import Simulation
-from lidarium.mapping.localization.dead_reckoning.localizer import Localizer
+from lidarium.mapping.localization.localizer import Localizer
 
 
 @dataclass(frozen=True, slots=True)

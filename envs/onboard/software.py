@@ -14,7 +14,7 @@ from lidarium.envs.onboard.radio.exchange import CONTACT_S, NEVER
 from lidarium.envs.settings.exploration import KERNEL_LOCALIZATIONS, ExplorationSettings
 from lidarium.envs.simulation.kernels.arrays import ENDED
 from lidarium.envs.simulation.kernels.stepping import ranges_without_teammates
-from lidarium.mapping.localization.dead_reckoning.localizer import Sensing
+from lidarium.mapping.localization.localizer import Sensing
 from lidarium.mapping.localization.registry import make_localizer
 
 LOCALIZER_STREAM = 0x6C6F6361

@@ -15,8 +15,8 @@ from lidarium.envs.simulation.kernels.arrays import ENDED
 from lidarium.envs.simulation.simulation import Simulation
 from lidarium.mapping.geometry.rigid import Transform, composed, relative
 from lidarium.mapping.grids.growing_array import GrowingArray
-from lidarium.mapping.localization.dead_reckoning.localizer import KeyScans
-from lidarium.mapping.localization.matching.wall_direction import wall_direction, within_quarter
+from lidarium.mapping.localization.localizer import KeyScans
+from lidarium.mapping.localization.matching.wall_compass import wall_direction, within_quarter
 from lidarium.mapping.point_clouds.cameras import points_of_depth
 from lidarium.mapping.sparse.exploring.ground import (
     GroundCamera,

@@ -25,7 +25,7 @@ from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.grids.occupancy import FREE, OCCUPIED, UNKNOWN
 from lidarium.mapping.merging.bend.deforming import Deformed, Laid
 from lidarium.mapping.merging.fusion import FusedMap, fuse
-from lidarium.mapping.merging.joining.merged_maps import Merged
+from lidarium.mapping.merging.joining import Merged
 
 MOST_PANELS = 6
 """Most panels of a picture."""

@@ -17,7 +17,7 @@ from lidarium.mapping.files.output import whole_file
 from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.grids.occupancy import OCCUPIED
 from lidarium.mapping.merging.regions.graph import RegionGraph
-from lidarium.mapping.merging.regions.meetings import NONE
+from lidarium.mapping.merging.regions.segmentation import NONE
 
 INK, DOOR = "#1f2937", "#e11d48"
 DPI = 130

@@ -17,11 +17,10 @@ from numpy.typing import NDArray
 from lidarium.mapping.files.guarded_reading import check_file, read_arrays, read_text, reading
 from lidarium.mapping.files.output import write_whole
 from lidarium.mapping.geometry.bounds import Rule, shown, within
+from lidarium.mapping.splines.bspline import ORDER, Spline
 from lidarium.mapping.splines.curve import make_curve
-from lidarium.mapping.splines.curves.basis import ORDER
-from lidarium.mapping.splines.curves.bspline import Spline
-from lidarium.mapping.splines.curves.settings import SplineSettings
 from lidarium.mapping.splines.landmarks import Landmarks
+from lidarium.mapping.splines.settings import SplineSettings
 from lidarium.mapping.splines.spline_map import SplineMap
 
 VERSION = 1

@@ -3,7 +3,7 @@
 from typing import Any, Protocol
 
 from lidarium.mapping.grids.scan_geometry import ScanGeometry
-from lidarium.mapping.localization.dead_reckoning.localizer import Localizer
+from lidarium.mapping.localization.localizer import Localizer
 from lidarium.registry import Registry
 
 
@@ -27,9 +27,7 @@ LOCALIZERS: Registry[LocalizerClass] = Registry("localizer")
 """The localizers by name; the module of each is imported when it is first made."""
 
 _PACKAGE = "lidarium.mapping.localization"
-LOCALIZERS.register(
-    "odometry", f"{_PACKAGE}.dead_reckoning.odometry:Odometry", "dead reckoning from the start by the wheels"
-)
+LOCALIZERS.register("odometry", f"{_PACKAGE}.odometry:Odometry", "dead reckoning from the start by the wheels")
 LOCALIZERS.register(
     "slam",
     f"{_PACKAGE}.slam.localizer:Slam",

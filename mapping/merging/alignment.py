@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from lidarium.mapping.geometry.bounds import Count, Distance, check_settings, share, shown, within
 from lidarium.mapping.geometry.rigid import Transform, fit
 from lidarium.mapping.kernels.compilation import Array, kernel
+from lidarium.mapping.merging.corners import Corners
 from lidarium.mapping.merging.correspondence import Matches
-from lidarium.mapping.merging.description.corners import Corners
-from lidarium.mapping.merging.description.described_map import DescribedMap
+from lidarium.mapping.merging.described_map import DescribedMap
 from lidarium.mapping.merging.wall_alignment import refine_on_walls
 
 INLIER_RULES = ("distance", "ratio")
@@ -71,9 +71,7 @@ class AlignmentSettings:
             raise ValueError(f"inlier_rule is {self.inlier_rule!r}; want one of {', '.join(INLIER_RULES)}")
         is_list = isinstance(self.refinements, tuple | list)
         if not is_list or not all(each in REFINEMENTS for each in self.refinements):
-            raise ValueError(
-                f"refinements are {shown(self.refinements)}; want some of {', '.join(REFINEMENTS)}"
-            )
+            raise ValueError(f"refinements are {shown(self.refinements)}; want some of {', '.join(REFINEMENTS)}")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -92,7 +90,7 @@ class Candidate:
     inliers: NDArray[np.int64]
 
 
-def propose(first: Corners, second: Corners, matches: Matches) -> NDArray[np.float64]:
+def _propose(first: Corners, second: Corners, matches: Matches) -> NDArray[np.float64]:
     """Return the transform that each match proposes, shape (n, 3).
 
     x, y [m], theta [rad].
@@ -127,7 +125,7 @@ def find_inliers(
     is_inlier : (n, n) bool
         Row: proposal, column: match that agrees with it; each corner takes part in at most one.
     """
-    proposals = propose(first, second, matches)
+    proposals = _propose(first, second, matches)
     is_inlier = np.zeros((len(matches), len(matches)), np.bool_)
     tangent = math.tan(settings.angle_uncertainty)
     pairs = _Pairs(first.points[matches.first], second.points[matches.second], matches.first, matches.second)
@@ -250,13 +248,13 @@ def refine(
         if step == "walls":
             transform = refine_on_walls(a, b, transform, settings.refinement_reach_m, settings.wall_samples)
         elif step == "sweep" and len(p) > 0:
-            transform = sweep_rotation(p, q, transform)
+            transform = _sweep_rotation(p, q, transform)
         elif step == "least_squares" and len(p) > 1:
             transform = fit(q, p)
     return Candidate(transform, candidate.inliers)
 
 
-def sweep_rotation(p: NDArray[np.float64], q: NDArray[np.float64], a_from_b: Transform) -> Transform:
+def _sweep_rotation(p: NDArray[np.float64], q: NDArray[np.float64], a_from_b: Transform) -> Transform:
     """Return the transform with the rotation that best aligns the inliers.
 
     Of 29 rotations within 7 degrees, the one that brings q of map b nearest to p of map a.

@@ -7,11 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.mapping.geometry.rigid import Transform, halfway
-from lidarium.mapping.merging.agreement.validation import Agreement, compare, is_rival, why_refused
+from lidarium.mapping.merging.agreement import Agreement, compare, is_rival, why_refused
 from lidarium.mapping.merging.alignment import Candidate, distinct, find_inliers
 from lidarium.mapping.merging.correlation import best_translations
 from lidarium.mapping.merging.correspondence import Matches
-from lidarium.mapping.merging.description.described_map import DescribedMap
+from lidarium.mapping.merging.described_map import DescribedMap
 from lidarium.mapping.merging.regions.proposals import propose_motions
 from lidarium.mapping.merging.settings import MergeSettings
 from lidarium.mapping.merging.wall_alignment import rank_by_walls, refine_on_walls
@@ -56,9 +56,7 @@ def corner_candidates(
     alignment = settings.alignment
     if min(len(a.corners), len(b.corners)) < alignment.least_inliers:
         return [], f"too few corners: {len(a.corners)} and {len(b.corners)}, want {alignment.least_inliers}"
-    wanted = max(
-        alignment.least_inliers, math.ceil(alignment.inlier_share * min(len(a.corners), len(b.corners)))
-    )
+    wanted = max(alignment.least_inliers, math.ceil(alignment.inlier_share * min(len(a.corners), len(b.corners))))
     proposals, is_inlier = find_inliers(a.corners, b.corners, matches, a.resolution, alignment)
     counts = is_inlier.sum(axis=1)
     most = int(counts.max(initial=0))
@@ -103,11 +101,7 @@ def correlated(
     if guess is not None:
         middle = _middle(b)
         order = np.array(
-            [
-                k
-                for k in order.tolist()
-                if Transform(*transforms[k].tolist()).difference(guess, middle)[0] <= NEAR_M
-            ],
+            [k for k in order.tolist() if Transform(*transforms[k].tolist()).difference(guess, middle)[0] <= NEAR_M],
             np.int64,
         )
     chosen = distinct(
@@ -198,9 +192,7 @@ def polished(a: DescribedMap, b: DescribedMap, judged: Judged, settings: MergeSe
     )
     forth = refine_on_walls(a, b, start, reach, samples)
     back = refine_on_walls(b, a, start.inverse(), reach, samples).inverse()
-    return judge(
-        a, b, Candidate(halfway(forth, back, judged.agreement.centre), judged.candidate.inliers), settings
-    )
+    return judge(a, b, Candidate(halfway(forth, back, judged.agreement.centre), judged.candidate.inliers), settings)
 
 
 def most_evident(judged: list[Judged]) -> Judged | None:

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from lidarium.mapping.geometry.bounds import FromZero, Length, check_settings, within
 from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.grids.occupancy import FREE
-from lidarium.mapping.merging.description.described_map import DescribedMap
+from lidarium.mapping.merging.described_map import DescribedMap
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

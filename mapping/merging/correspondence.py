@@ -13,13 +13,88 @@ from numpy.typing import NDArray
 
 from lidarium.mapping.geometry.bounds import Count, Length, check_settings, share, within
 from lidarium.mapping.geometry.rigid import wrapped
-from lidarium.mapping.merging.description.corner_neighbours import (
-    common_distances,
-    like_clusters,
-    like_triangles,
-)
-from lidarium.mapping.merging.description.corners import Corners
-from lidarium.mapping.merging.description.descriptors import Descriptors
+from lidarium.mapping.merging.corners import Corners
+from lidarium.mapping.merging.descriptors import Descriptors
+
+LEAST_CLUSTER = 2
+"""Corners beside its own that a cluster needs."""
+
+
+def _common_distances(first: NDArray[np.float64], second: NDArray[np.float64], tolerance: float) -> NDArray[np.float64]:
+    """Return the share of common distances of each pair of corners, (n, m).
+
+    The share of the first corner's distances that the second one has too.
+    """
+    votes = _common(_distances(first), _distances(second), tolerance)
+    return np.asarray(votes / max(len(first) - 1, 1))
+
+
+def _like_clusters(
+    first: NDArray[np.float64], second: NDArray[np.float64], tolerance: float, radius_m: float
+) -> NDArray[np.float64]:
+    """Return the share of common distances of each pair of corners within a radius, (n, m).
+
+    The share is that of the larger cluster; 0 where either has fewer than ``LEAST_CLUSTER`` corners beside
+    its own.
+    """
+    left, right = (_within(_distances(points), radius_m) for points in (first, second))
+    common = np.minimum(_common(left, right, tolerance), _common(right, left, tolerance).T)
+    sizes = [np.count_nonzero(distances > 0.0, axis=1) for distances in (left, right)]
+    larger = np.maximum(sizes[0][:, None], sizes[1][None])
+    smaller = np.minimum(sizes[0][:, None], sizes[1][None])
+    return np.where(smaller >= LEAST_CLUSTER, common / np.maximum(larger, 1), 0.0)
+
+
+def _like_triangles(first: NDArray[np.float64], second: NDArray[np.float64], tolerance: float) -> NDArray[np.float64]:
+    """Return the similarity of the triangles of each pair of corners, (n, m).
+
+    Triangles are with the two nearest neighbours; 0 where they are not alike.
+    """
+    if len(first) < 3 or len(second) < 3:
+        return np.zeros((len(first), len(second)))
+    left, right = _triangles(first), _triangles(second)
+    longer = np.maximum(left[:, None], right[None])
+    difference = (np.abs(left[:, None] - right[None]) / np.maximum(longer, 1e-9)).max(axis=2)
+    return np.where(difference <= tolerance, 1.0 - difference, 0.0)
+
+
+def _common(left: NDArray[np.float64], right: NDArray[np.float64], tolerance: float) -> NDArray[np.float64]:
+    """Count the distances of each row (n, n) that each row of others (m, m) has too, (n, m); 0 is none."""
+    votes = np.zeros((len(left), len(right)))
+    for j, row in enumerate(right):
+        lengths = np.sort(row[row > 0.0])
+        if len(lengths) == 0:
+            continue
+        # A length has a like one if the first not shorter than its lower bound is not longer than its upper
+        # bound.
+        place = np.minimum(np.searchsorted(lengths, left * (1.0 - tolerance)), len(lengths) - 1)
+        votes[:, j] = (
+            (lengths[place] >= left * (1.0 - tolerance)) & (lengths[place] * (1.0 - tolerance) <= left) & (left > 0.0)
+        ).sum(axis=1)
+    return votes
+
+
+def _within(distances: NDArray[np.float64], radius_m: float) -> NDArray[np.float64]:
+    return np.where(distances <= radius_m, distances, 0.0)
+
+
+def _triangles(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the sides of each corner's triangle of neighbours, (n, 3) [m].
+
+    Distances to the nearest and second neighbour, and between the two.
+    """
+    distances = _distances(points)
+    order = np.argsort(distances + np.diag(np.full(len(points), np.inf)), axis=1, kind="stable")[:, :2]
+    rows = np.arange(len(points))
+    return np.stack(
+        [distances[rows, order[:, 0]], distances[rows, order[:, 1]], distances[order[:, 0], order[:, 1]]],
+        axis=1,
+    )
+
+
+def _distances(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.asarray(np.linalg.norm(points[:, None] - points[None], axis=2))
+
 
 METHODS = ("descriptors", "distances", "triplets", "radius")
 MEASURES = ("correlation", "difference")
@@ -81,9 +156,7 @@ class CorrespondenceSettings:
         if self.method not in METHODS:
             raise ValueError(f"method of correspondence is {self.method!r}; want one of {', '.join(METHODS)}")
         if self.measure not in MEASURES:
-            raise ValueError(
-                f"measure of correspondence is {self.measure!r}; want one of {', '.join(MEASURES)}"
-            )
+            raise ValueError(f"measure of correspondence is {self.measure!r}; want one of {', '.join(MEASURES)}")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -142,7 +215,7 @@ def match_corners(
     similarity: NDArray[np.floating]
     shift: NDArray[np.floating]
     if settings.method == "descriptors":
-        similarity, shift = compare_descriptors(first_descriptors, second_descriptors, settings)
+        similarity, shift = _compare_descriptors(first_descriptors, second_descriptors, settings)
     else:
         similarity, shift = _compared_places(first.points, second.points, settings), np.zeros_like(difference)
     # Of a corner seen at a in the first map and at b in the second, the second map is turned by a - b.
@@ -157,7 +230,7 @@ def match_corners(
     )
 
 
-def compare_descriptors(
+def _compare_descriptors(
     first: Descriptors, second: Descriptors, settings: CorrespondenceSettings
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Compare each descriptor of a map with each of another.
@@ -209,10 +282,10 @@ def _compared_places(
     """Return the similarity of corners (n, m) by where their neighbours are."""
     tolerance = settings.length_tolerance
     if settings.method == "distances":
-        return common_distances(first, second, tolerance)
+        return _common_distances(first, second, tolerance)
     if settings.method == "triplets":
-        return like_triangles(first, second, tolerance)
-    return like_clusters(first, second, tolerance, settings.cluster_radius_m)
+        return _like_triangles(first, second, tolerance)
+    return _like_clusters(first, second, tolerance, settings.cluster_radius_m)
 
 
 def _energy(first: NDArray[np.floating], second: NDArray[np.floating], measure: str) -> NDArray[np.floating]:
@@ -227,9 +300,7 @@ def _energy(first: NDArray[np.floating], second: NDArray[np.floating], measure: 
 
 def _standardised(values: NDArray[np.float32]) -> NDArray[np.float32]:
     centred = values - values.mean(axis=(1, 2), keepdims=True)
-    return np.asarray(
-        centred / np.maximum(np.sqrt((centred**2).sum(axis=(1, 2), keepdims=True)), 1e-9), np.float32
-    )
+    return np.asarray(centred / np.maximum(np.sqrt((centred**2).sum(axis=(1, 2), keepdims=True)), 1e-9), np.float32)
 
 
 def _correlation(first: NDArray[np.float32], second: NDArray[np.float32]) -> NDArray[np.float32]:

@@ -215,9 +215,7 @@ class FrameTree(Generic[Name]):
             # Equal weights keep the order in which edges came.
             usable.sort(key=lambda edge: -edge.weight)
             left_over = self._grow(usable)
-            worst = max(
-                ((self._misses(edge), edge) for edge in left_over), key=lambda one: one[0], default=None
-            )
+            worst = max(((self._misses(edge), edge) for edge in left_over), key=lambda one: one[0], default=None)
             if worst is not None and worst[0] > 1.0:
                 # The forest has the most weight, so the edge outside of it is the weakest of its cycle.
                 self._dropped.append(worst[1])
@@ -235,11 +233,7 @@ class FrameTree(Generic[Name]):
         """
         for a, b in combinations(self._names, 2):
             way = self._way(a, b)
-            if (
-                len(way) > 1
-                and frozenset((a, b)) not in self._edges
-                and contradicts(a, b, self._reached_from(a)[b])
-            ):
+            if len(way) > 1 and frozenset((a, b)) not in self._edges and contradicts(a, b, self._reached_from(a)[b]):
                 return min(way, key=lambda edge: edge.weight)
         return None
 
@@ -281,9 +275,7 @@ class FrameTree(Generic[Name]):
         through = self._reached_from(edge.a)[edge.b]
         distance, angle = through.difference(edge.a_from_b, edge.centre)
         slack_m = edge.slack_m + sum(one.slack_m for one in self._way(edge.a, edge.b))
-        return max(
-            distance / (self.cycle_distance_m + slack_m), angle / (self.cycle_angle + slack_m / BEND_LENGTH_M)
-        )
+        return max(distance / (self.cycle_distance_m + slack_m), angle / (self.cycle_angle + slack_m / BEND_LENGTH_M))
 
     def _settle_roots(self) -> None:
         """Keep the roots that there were, the oldest one where groups have become one.

@@ -49,9 +49,7 @@ class FusedMap:
     resolution: float
 
 
-def fuse(
-    maps: Sequence[NDArray[np.uint8]], common_from_map: Sequence[Transform], resolution: float
-) -> FusedMap:
+def fuse(maps: Sequence[NDArray[np.uint8]], common_from_map: Sequence[Transform], resolution: float) -> FusedMap:
     """Fuse maps of one resolution.
 
     Parameters
@@ -75,15 +73,13 @@ def fuse(
     """
     if not 0 < len(maps) <= MOST_MAPS or len(maps) != len(common_from_map):
         raise ValueError(
-            f"{len(maps)} maps with {len(common_from_map)} transforms are to be fused; want 1 to {MOST_MAPS} "
-            "of each"
+            f"{len(maps)} maps with {len(common_from_map)} transforms are to be fused; want 1 to {MOST_MAPS} of each"
         )
     low, high = _bounds(maps, common_from_map, resolution)
     columns, rows = (high - low).tolist()
     if rows * columns > MAX_CELLS:
         raise ValueError(
-            f"the fused map would have {rows} x {columns} cells, more than {MAX_CELLS}; use a coarser "
-            "resolution"
+            f"the fused map would have {rows} x {columns} cells, more than {MAX_CELLS}; use a coarser resolution"
         )
     origin = (float(low[0] * resolution), float(low[1] * resolution))
     log_odds, sources = np.zeros((rows, columns), np.float32), np.zeros((rows, columns), np.uint64)
@@ -115,9 +111,7 @@ def _bounds(
     if not corners:
         raise ValueError("none of the maps knows anything; want at least one known cell")
     points = np.concatenate(corners) / resolution
-    return np.floor(points.min(axis=0) + 1e-6).astype(np.int64), np.ceil(points.max(axis=0) - 1e-6).astype(
-        np.int64
-    )
+    return np.floor(points.min(axis=0) + 1e-6).astype(np.int64), np.ceil(points.max(axis=0) - 1e-6).astype(np.int64)
 
 
 def overlay(log_odds: NDArray[np.int8], fused: FusedMap, origin: tuple[float, float]) -> None:
@@ -140,9 +134,7 @@ def overlay(log_odds: NDArray[np.int8], fused: FusedMap, origin: tuple[float, fl
         round(OCCUPIED_LOG_ODDS / LOG_ODDS_UNIT),
         round(FREE_LOG_ODDS / LOG_ODDS_UNIT),
     )
-    left, low = (
-        round((place - own) / fused.resolution) for place, own in zip(fused.origin, origin, strict=True)
-    )
+    left, low = (round((place - own) / fused.resolution) for place, own in zip(fused.origin, origin, strict=True))
     rows, columns = fused.levels.shape
     inside = log_odds[max(low, 0) : max(low + rows, 0), max(left, 0) : max(left + columns, 0)]
     first_row, first_column = max(-low, 0), max(-left, 0)

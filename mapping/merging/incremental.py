@@ -12,15 +12,117 @@ import itertools
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 from lidarium.mapping.geometry.rigid import Transform
-from lidarium.mapping.merging.agreement.confirmation import Confirmation
+from lidarium.mapping.grids.occupancy import UNKNOWN
+from lidarium.mapping.merging import joining as joined_tree
+from lidarium.mapping.merging.agreement import Confirmation
+from lidarium.mapping.merging.described_map import DescribedMap
 from lidarium.mapping.merging.frame_tree import FrameTree
-from lidarium.mapping.merging.growing_maps import DescribedMaps, GrowingMap, TriedPair
-from lidarium.mapping.merging.joining.joined_tree import joined_tree
-from lidarium.mapping.merging.joining.merged_maps import Merged, placed
-from lidarium.mapping.merging.pair import PairResult, merge_pair, verify_pair
+from lidarium.mapping.merging.joining import Merged, placed
+from lidarium.mapping.merging.pair import PairResult, described, merge_pair, verify_pair
 from lidarium.mapping.merging.settings import MergeSettings
+
+
+class GrowingMap(NamedTuple):
+    """A robot's map as it is now.
+
+    Attributes
+    ----------
+    levels : (rows, columns) uint8
+        Occupancy, dark is occupied; row 0 at the lowest y.
+    origin : (x, y)
+        Lower left corner of cell (0, 0) in the robot's map frame [m].
+    """
+
+    levels: NDArray[np.uint8]
+    origin: tuple[float, float] = (0.0, 0.0)
+
+
+@dataclass(slots=True)
+class _DescribedMaps:
+    """The maps as they were last taken in, by name.
+
+    Attributes
+    ----------
+    maps : dict of str to GrowingMap
+        The maps themselves.
+    features : dict of str to DescribedMap
+        What they are described by.
+    known_m2 : dict of str to float
+        How much each knows [m2].
+    changed_at : dict of str to int
+        The number of the update in which each has changed last.
+    """
+
+    maps: dict[str, GrowingMap] = field(default_factory=dict)
+    features: dict[str, DescribedMap] = field(default_factory=dict)
+    known_m2: dict[str, float] = field(default_factory=dict)
+    changed_at: dict[str, int] = field(default_factory=dict)
+
+    def update(self, maps: Mapping[str, GrowingMap], resolution: float, settings: MergeSettings, number: int) -> None:
+        """Take in all maps, and describe those that are new or have changed.
+
+        Parameters
+        ----------
+        maps : mapping of str to GrowingMap
+            As they are now; one that is missing is forgotten.
+        resolution : float
+            Side of a cell of all maps [m].
+        settings : MergeSettings
+            How they are described.
+        number : int
+            Of the update.
+
+        Raises
+        ------
+        ValueError
+            Where one is no map; what was known is kept then.
+        """
+        changed = {name for name, one in maps.items() if not _is_same(self.maps.get(name), one)}
+        fresh = {name: described(maps[name].levels, resolution, settings) for name in maps if name in changed}
+        self.features = {name: fresh.get(name) or self.features[name] for name in maps}
+        for name in changed:
+            self.known_m2[name] = float(np.count_nonzero(self.features[name].levels != UNKNOWN)) * resolution**2
+            self.changed_at[name] = number
+        self.maps = dict(maps)
+
+
+def _is_same(before: GrowingMap | None, now: GrowingMap) -> bool:
+    return before is not None and before.origin == now.origin and np.array_equal(before.levels, now.levels)
+
+
+@dataclass(slots=True)
+class _TriedPair:
+    """What is known of a pair.
+
+    Attributes
+    ----------
+    result : PairResult
+        What came of the last try.
+    frames : Transform or None
+        The robots' transform, if it is verified.
+    known_m2 : float
+        What the maps knew when it was searched for [m2].
+    is_confirmed : bool
+        Whether it has been found as often as is wanted.
+    at : int
+        The number of the update that tried it last.
+    corner : Transform
+        Where the lower left corner of the first map was in its frame then.
+    """
+
+    result: PairResult
+    frames: Transform | None
+    known_m2: float
+    is_confirmed: bool = False
+    at: int = 0
+    corner: Transform = field(default_factory=Transform)
+
 
 CONFIRMED_M, CONFIRMED_ANGLE = 0.1, math.radians(1.0)
 """By how much two findings of one transform may differ [m, rad]."""
@@ -63,8 +165,8 @@ class IncrementalMerger:
     searches_per_update: int | None = None
     searched: int = 0
     verified: int = 0
-    _described: DescribedMaps = field(default_factory=DescribedMaps)
-    _pairs: dict[tuple[str, str], TriedPair] = field(default_factory=dict)
+    _described: _DescribedMaps = field(default_factory=_DescribedMaps)
+    _pairs: dict[tuple[str, str], _TriedPair] = field(default_factory=dict)
     _tree: FrameTree[str] | None = None
     _updates: int = 0
 
@@ -107,14 +209,12 @@ class IncrementalMerger:
         self.searched = self.verified = 0
         every = list(itertools.combinations(maps, 2))
         most = self.searches_per_update if may_search else 0
-        tried_now: dict[tuple[str, str], TriedPair] = {}
+        tried_now: dict[tuple[str, str], _TriedPair] = {}
         for pair in self._due([pair for pair in every if may_try is None or pair in may_try]):
             tried = self._tried(pair, self._pairs.get(pair), most is None or self.searched < most)
             if tried is not None:
                 tried_now[pair] = tried
-        pairs = {
-            pair: tried for pair in every if (tried := tried_now.get(pair) or self._kept(pair)) is not None
-        }
+        pairs = {pair: tried for pair in every if (tried := tried_now.get(pair) or self._kept(pair)) is not None}
         self._pairs = pairs
         results = {pair: tried.result for pair, tried in pairs.items()}
         believed = {pair: tried.result for pair, tried in pairs.items() if tried.is_confirmed}
@@ -167,7 +267,7 @@ class IncrementalMerger:
     def _known_of(self, pair: tuple[str, str]) -> float:
         return sum(self._described.known_m2[name] for name in pair)
 
-    def _kept(self, pair: tuple[str, str]) -> TriedPair | None:
+    def _kept(self, pair: tuple[str, str]) -> _TriedPair | None:
         """Return the known result of a pair that is not tried now.
 
         It refers to the corners that the maps have now.
@@ -181,16 +281,12 @@ class IncrementalMerger:
             return before
         # The middle of the overlap stays where it is on map a.
         centre = a_from_b.inverse().apply(
-            (first.inverse() @ before.corner).apply(
-                before.result.a_from_b.apply(before.result.agreement.centre)
-            )
+            (first.inverse() @ before.corner).apply(before.result.a_from_b.apply(before.result.agreement.centre))
         )
         agreement = replace(before.result.agreement, centre=(float(centre[0]), float(centre[1])))
-        return replace(
-            before, result=replace(before.result, a_from_b=a_from_b, agreement=agreement), corner=first
-        )
+        return replace(before, result=replace(before.result, a_from_b=a_from_b, agreement=agreement), corner=first)
 
-    def _tried(self, pair: tuple[str, str], before: TriedPair | None, may_search: bool) -> TriedPair | None:
+    def _tried(self, pair: tuple[str, str], before: _TriedPair | None, may_search: bool) -> _TriedPair | None:
         """Verify the transform of a pair.
 
         Search where there is none, or it is refused by now. None where that has to wait.
@@ -208,7 +304,7 @@ class IncrementalMerger:
             result = verify_pair(a, b, first.inverse() @ implied @ second, self.settings)
             if result.is_accepted and result.a_from_b is not None and self._convinces(pair, result):
                 self.verified += 1
-                return TriedPair(
+                return _TriedPair(
                     result, first @ result.a_from_b @ second.inverse(), known_m2, True, self._updates, first
                 )
             if self.searches_per_update is not None:
@@ -218,15 +314,15 @@ class IncrementalMerger:
         return self._searched(pair, before) if may_search else None
 
     def _verified(
-        self, pair: tuple[str, str], before: TriedPair, frames: Transform, may_search: bool
-    ) -> TriedPair | None:
+        self, pair: tuple[str, str], before: _TriedPair, frames: Transform, may_search: bool
+    ) -> _TriedPair | None:
         """Verify what was found; None where it is searched for once more."""
         a, b = (self._described.features[name] for name in pair)
         first, second = (placed(self._described.maps[name].origin) for name in pair)
         known_m2 = self._known_of(pair)
         result = verify_pair(a, b, first.inverse() @ frames @ second, self.settings)
         if not result.is_accepted or result.a_from_b is None:
-            return None if may_search else TriedPair(result, None, -math.inf, False, before.at, first)
+            return None if may_search else _TriedPair(result, None, -math.inf, False, before.at, first)
         is_due = not before.is_confirmed and self._may_be_better(pair, before, result, known_m2)
         if is_due and may_search:
             return None
@@ -234,31 +330,27 @@ class IncrementalMerger:
         refined = first @ result.a_from_b @ second.inverse()
         # A search that has to wait is due whether maps grow any more or not.
         at = before.at if is_due else self._updates
-        return TriedPair(result, refined, before.known_m2, before.is_confirmed, at, first)
+        return _TriedPair(result, refined, before.known_m2, before.is_confirmed, at, first)
 
-    def _may_be_better(
-        self, pair: tuple[str, str], before: TriedPair, result: PairResult, known_m2: float
-    ) -> bool:
+    def _may_be_better(self, pair: tuple[str, str], before: _TriedPair, result: PairResult, known_m2: float) -> bool:
         """Whether a search may confirm what was found, or find what convinces where that does not."""
         if self._convinces(pair, result):
             return known_m2 >= before.known_m2 + (self.confirmation_growth_m2 or 0.0)
         return known_m2 >= before.known_m2 + self.search_growth_m2
 
-    def _searched(self, pair: tuple[str, str], before: TriedPair | None) -> TriedPair:
+    def _searched(self, pair: tuple[str, str], before: _TriedPair | None) -> _TriedPair:
         """Search for the transform of a pair."""
         a, b = (self._described.features[name] for name in pair)
         first, second = (placed(self._described.maps[name].origin) for name in pair)
         self.searched += 1
         result = merge_pair(a, b, self.settings)
         is_found = result.is_accepted and result.a_from_b is not None
-        frames = (
-            first @ result.a_from_b @ second.inverse() if is_found and result.a_from_b is not None else None
-        )
+        frames = first @ result.a_from_b @ second.inverse() if is_found and result.a_from_b is not None else None
         is_confirmed = self._confirms(pair, before, frames, result)
-        return TriedPair(result, frames, self._known_of(pair), is_confirmed, self._updates, first)
+        return _TriedPair(result, frames, self._known_of(pair), is_confirmed, self._updates, first)
 
     def _confirms(
-        self, pair: tuple[str, str], before: TriedPair | None, frames: Transform | None, result: PairResult
+        self, pair: tuple[str, str], before: _TriedPair | None, frames: Transform | None, result: PairResult
     ) -> bool:
         """Whether what was searched for and found is believed from now on."""
         if self.confirmation_growth_m2 is None:

@@ -12,22 +12,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.grids.occupancy import UNKNOWN
-from lidarium.mapping.merging.description.described_map import (
-    DescribedMap,
-    check_resolution,
-    three_levels_of,
-)
-from lidarium.mapping.merging.description.resampling import resampled
+from lidarium.mapping.merging import joining as joined_tree
+from lidarium.mapping.merging.described_map import DescribedMap, check_resolution, resampled, three_levels_of
 from lidarium.mapping.merging.frame_tree import FrameTree
-from lidarium.mapping.merging.joining.joined_tree import joined_tree, pair_edge
-from lidarium.mapping.merging.joining.merged_maps import Merged
-from lidarium.mapping.merging.pair import (
-    described,
-    merge_near,
-    merge_pair,
-    verify_pair,
-)
-from lidarium.mapping.merging.pair_result import PairResult, explained
+from lidarium.mapping.merging.joining import Merged, pair_edge
+from lidarium.mapping.merging.pair import PairResult, described, explained, merge_near, merge_pair, verify_pair
 from lidarium.mapping.merging.settings import TOLERANCES, MergeSettings
 
 
@@ -95,9 +84,7 @@ def merge_maps(
         _check_guess(features[a], features[b], question.guess)
         pairs = {(a, b): merge_near(features[a], features[b], question.guess, settings)}
     if question.is_explained:
-        pairs = {
-            (a, b): explained(features[a], features[b], result, settings) for (a, b), result in pairs.items()
-        }
+        pairs = {(a, b): explained(features[a], features[b], result, settings) for (a, b), result in pairs.items()}
     if question.is_forced:
         pairs = {pair: _forced(result) for pair, result in pairs.items()}
     return Merged(levels, resolution, pairs, joined_tree(features, pairs, settings))
@@ -124,9 +111,7 @@ def _forced(result: PairResult) -> PairResult:
     return replace(result, is_accepted=True, reason=f"forced against: {result.reason}")
 
 
-def _all_pairs(
-    features: Mapping[str, DescribedMap], settings: MergeSettings
-) -> dict[tuple[str, str], PairResult]:
+def _all_pairs(features: Mapping[str, DescribedMap], settings: MergeSettings) -> dict[tuple[str, str], PairResult]:
     """Return what comes of each two maps, in their order."""
     every = list(itertools.combinations(features, 2))
     # What corners join spares the search of all rotations and translations, where there is one.

@@ -2,17 +2,17 @@
 
 import math
 import time
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lidarium.mapping.geometry.rigid import Transform
-from lidarium.mapping.merging.agreement.counts import disc_agreement
-from lidarium.mapping.merging.agreement.exact import exact_motion
-from lidarium.mapping.merging.agreement.validation import compare, has_contradiction
+from lidarium.mapping.grids.occupancy import OCCUPIED, UNKNOWN
+from lidarium.mapping.merging.agreement import Agreement, compare, disc_agreement, has_contradiction
 from lidarium.mapping.merging.alignment import Candidate, refine
+from lidarium.mapping.merging.bend.hypotheses import Hypothesis, confidence_of, ranked_hypotheses, signs_of
 from lidarium.mapping.merging.candidates import (
     NO_INLIERS,
     Judged,
@@ -27,15 +27,160 @@ from lidarium.mapping.merging.candidates import (
     region_candidates,
 )
 from lidarium.mapping.merging.correspondence import NO_MATCHES, Matches, match_corners
-from lidarium.mapping.merging.description.described_map import DescribedMap, describe_map
-from lidarium.mapping.merging.pair_result import NO_POINTS as NO_POINTS
-from lidarium.mapping.merging.pair_result import PairResult as PairResult
-from lidarium.mapping.merging.pair_result import explained as explained
-from lidarium.mapping.merging.pair_result import or_bent
-from lidarium.mapping.merging.regions.directions import likely_rotations
-from lidarium.mapping.merging.regions.graph import find_regions
+from lidarium.mapping.merging.described_map import DescribedMap, describe_map
+from lidarium.mapping.merging.regions.graph import find_regions, likely_rotations
 from lidarium.mapping.merging.settings import MergeSettings
-from lidarium.mapping.merging.wall_alignment import refine_on_walls
+from lidarium.mapping.merging.wall_alignment import refine_on_walls, wall_sample
+
+NEARLY = math.radians(1.5)
+"""By how much a rotation may miss a quarter turn that is exact [rad]."""
+
+REACH_CELLS = 6
+"""By how many cells a translation may miss the exact one."""
+
+SAME = 0.9
+"""Share of the walls that meet occupied cells of the other map: only copies of cells do so."""
+
+SAMPLES = 2000
+
+
+def _exact_motion(a: DescribedMap, b: DescribedMap, a_from_b: Transform) -> Transform | None:
+    """Return the motion by whole cells and quarter turns near another one, if the maps share cells.
+
+    Parameters
+    ----------
+    a, b : DescribedMap
+        Maps of one resolution.
+    a_from_b : Transform
+        The motion that was found.
+
+    Returns
+    -------
+    Transform or None
+        The exact one; None where the maps do not share their cells.
+    """
+    quarters = round(a_from_b.theta / (0.5 * math.pi))
+    if abs(a_from_b.theta - quarters * 0.5 * math.pi) > NEARLY or len(b.walls) == 0:
+        return None
+    cosine, sine = ((1, 0), (0, 1), (-1, 0), (0, -1))[quarters % 4]
+    turn = np.array([[cosine, -sine], [sine, cosine]], np.int64)
+    cells = np.floor(b.walls / b.resolution).astype(np.int64)
+    middle = b.walls.mean(axis=0)
+    # Corners of cells turn into corners: a cell is named by its centre's.
+    turned = (np.floor((cells + 0.5) @ turn.T)).astype(np.int64)
+    start = np.rint((a_from_b.apply(middle) - turn @ middle) / a.resolution).astype(np.int64)
+    few = turned[wall_sample(len(turned), SAMPLES)]
+    reach = np.arange(-REACH_CELLS, REACH_CELLS + 1)
+    steps = start + np.stack(np.meshgrid(reach, reach), axis=-1).reshape(-1, 2)
+    best = steps[int(np.argmax([_same(a.levels, few + step)[0] for step in steps]))]
+    hits, share = _same(a.levels, turned + best)
+    if share < SAME or hits == 0:
+        return None
+    x, y = (best * a.resolution).tolist()
+    return Transform(x, y, math.remainder(quarters * 0.5 * math.pi, 2.0 * math.pi))
+
+
+def _same(levels: NDArray[np.uint8], cells: NDArray[np.int64]) -> tuple[int, float]:
+    """Return how many cells (n, 2) meet occupied ones, and their share of those that meet known ones."""
+    rows, columns = levels.shape
+    x, y = cells.T
+    is_inside = (x >= 0) & (x < columns) & (y >= 0) & (y < rows)
+    found = levels[y[is_inside], x[is_inside]]
+    hits, known = int((found == OCCUPIED).sum()), int((found != UNKNOWN).sum())
+    return hits, hits / max(known, 1)
+
+
+NO_POINTS: NDArray[np.float64] = np.zeros((0, 2))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PairResult:
+    """What came of two maps.
+
+    Attributes
+    ----------
+    is_accepted : bool
+        Whether they are one place.
+    reason : str
+        Why they are refused; ``accepted`` where they are not.
+    a_from_b : Transform or None
+        The best transform that was found, also of a refused pair.
+    matches, inliers : int
+        Number of matched corners, and of those that agree with the transform.
+    score : float
+        1 less the share of contradicting cells; the agreement in discs in the thesis's mode.
+    agreement : Agreement
+        What the score is made of.
+    found_by : str
+        ``corners``, ``regions``, ``correlation``, or ``verification`` of what was found before; ``bend``
+        where the maps agree only once they are bent; ``scale`` where one has grown.
+    time_ms : float
+        Processor time, descriptions of the maps not included [ms].
+    joined : ((n, 2), (n, 2)) float64
+        The corners that agree, in map a and in map b [m].
+    tried : tuple of Transform
+        All transforms that were refined and judged.
+    ranked : tuple of Hypothesis
+        The most evident of them with the bend under each, the best first; empty where no bend was sought, see
+        `explained`.
+    confidence : float
+        That the best of these is right, by a model of strangers.
+    """
+
+    is_accepted: bool
+    reason: str
+    a_from_b: Transform | None = None
+    matches: int = 0
+    inliers: int = 0
+    score: float = 0.0
+    agreement: Agreement = field(default_factory=Agreement)
+    found_by: str = "corners"
+    time_ms: float = 0.0
+    joined: tuple[NDArray[np.float64], NDArray[np.float64]] = (NO_POINTS, NO_POINTS)
+    tried: tuple[Transform, ...] = ()
+    ranked: tuple[Hypothesis, ...] = ()
+    confidence: float = 0.0
+
+
+def explained(a: DescribedMap, b: DescribedMap, result: PairResult, settings: MergeSettings) -> PairResult:
+    """Return a result with its hypotheses ranked, and the confidence of the best.
+
+    Parameters
+    ----------
+    a, b : DescribedMap
+        The maps.
+    result : PairResult
+        What came of them.
+    settings : MergeSettings
+        How much they may be bent.
+    """
+    if result.ranked or not (len(a.walls) and len(b.walls)):
+        return result
+    found = () if result.a_from_b is None else (result.a_from_b,)
+    ranked = ranked_hypotheses(a, b, [*found, *result.tried], settings.bend)
+    return replace(result, ranked=tuple(ranked), confidence=confidence_of(signs_of(a, b, ranked)) if ranked else 0.0)
+
+
+def _or_bent(a: DescribedMap, b: DescribedMap, result: PairResult, settings: MergeSettings) -> PairResult:
+    """Return a refused result, or that of the maps bent where they agree then."""
+    if result.is_accepted or settings.confidence > 1.0 or settings.bend.candidates == 0:
+        return result
+    known = explained(a, b, result, settings)
+    if not known.ranked or known.confidence < settings.confidence:
+        return known
+    best = known.ranked[0]
+    return replace(
+        known,
+        is_accepted=True,
+        reason="accepted",
+        a_from_b=best.bend.a_from_b,
+        inliers=0,
+        score=best.agreement.score,
+        agreement=best.agreement,
+        found_by="bend",
+        joined=(NO_POINTS, NO_POINTS),
+    )
+
 
 NO_WALLS = "too few corners: a map has no walls that border on free space"
 
@@ -70,9 +215,7 @@ def merge_pair(a: DescribedMap, b: DescribedMap, settings: MergeSettings | None 
     """
     settings = settings or MergeSettings()
     if not math.isclose(a.resolution, b.resolution, rel_tol=1e-6):
-        raise ValueError(
-            f"maps have resolutions of {a.resolution} and {b.resolution} m; want one, see resampled"
-        )
+        raise ValueError(f"maps have resolutions of {a.resolution} and {b.resolution} m; want one, see resampled")
     began = time.process_time()
     matches = NO_MATCHES
     if settings.structure != "regions":
@@ -82,9 +225,7 @@ def merge_pair(a: DescribedMap, b: DescribedMap, settings: MergeSettings | None 
     return replace(result, matches=len(matches), time_ms=1e3 * (time.process_time() - began))
 
 
-def merge_near(
-    a: DescribedMap, b: DescribedMap, guess: Transform, settings: MergeSettings | None = None
-) -> PairResult:
+def merge_near(a: DescribedMap, b: DescribedMap, guess: Transform, settings: MergeSettings | None = None) -> PairResult:
     """Find the transform that joins two maps near a guess.
 
     Parameters
@@ -119,7 +260,7 @@ def merge_near(
         found_by="guess",
         tried=tuple(one.candidate.a_from_b for one in judged),
     )
-    result = _exactly(a, b, or_bent(a, b, result, settings), settings)
+    result = _exactly(a, b, _or_bent(a, b, result, settings), settings)
     return replace(result, time_ms=1e3 * (time.process_time() - began))
 
 
@@ -127,7 +268,7 @@ def _exactly(a: DescribedMap, b: DescribedMap, result: PairResult, settings: Mer
     """Return an accepted result with the exact motion where the maps share their cells."""
     if not result.is_accepted or result.a_from_b is None:
         return result
-    motion = exact_motion(a, b, result.a_from_b)
+    motion = _exact_motion(a, b, result.a_from_b)
     if motion is None:
         return result
     agreement = compare(a, b, motion, settings.validation)
@@ -168,7 +309,7 @@ def verify_pair(
         found_by="verification",
         tried=(a_from_b,),
     )
-    return replace(or_bent(a, b, result, settings), time_ms=1e3 * (time.process_time() - began))
+    return replace(_or_bent(a, b, result, settings), time_ms=1e3 * (time.process_time() - began))
 
 
 def is_contradicted(a: DescribedMap, b: DescribedMap, a_from_b: Transform, settings: MergeSettings) -> bool:
@@ -183,18 +324,14 @@ def is_contradicted(a: DescribedMap, b: DescribedMap, a_from_b: Transform, setti
 
     def contradicts(transform: Transform) -> bool:
         agreement = compare(a, b, transform, validation)
-        return agreement.overlap_m2 >= validation.least_overlap_m2 and has_contradiction(
-            agreement, validation
-        )
+        return agreement.overlap_m2 >= validation.least_overlap_m2 and has_contradiction(agreement, validation)
 
     return contradicts(a_from_b) and contradicts(
         refine_on_walls(a, b, a_from_b, settings.cycle_distance_m, settings.alignment.wall_samples)
     )
 
 
-def _merge_by_walls(
-    a: DescribedMap, b: DescribedMap, matches: Matches, settings: MergeSettings
-) -> PairResult:
+def _merge_by_walls(a: DescribedMap, b: DescribedMap, matches: Matches, settings: MergeSettings) -> PairResult:
     if len(a.walls) == 0 or len(b.walls) == 0:
         return PairResult(False, NO_WALLS)
     judged, best, found_by, shortage = _searched(a, b, matches, settings)
@@ -217,7 +354,7 @@ def _merge_by_walls(
         joined=joined,
         tried=tuple(one.candidate.a_from_b for one in judged),
     )
-    return or_bent(a, b, result, settings)
+    return _or_bent(a, b, result, settings)
 
 
 class _Search(NamedTuple):
@@ -235,8 +372,7 @@ def _searched(a: DescribedMap, b: DescribedMap, matches: Matches, settings: Merg
     if settings.structure != "regions":
         candidates, shortage = corner_candidates(a, b, matches, settings)
         judged = [
-            judge(a, b, refine(a, b, matches, candidate, settings.alignment), settings)
-            for candidate in candidates
+            judge(a, b, refine(a, b, matches, candidate, settings.alignment), settings) for candidate in candidates
         ]
         best = most_evident(judged)
     if settings.structure != "corners" and (best is None or best.refusal is not None):
@@ -269,9 +405,7 @@ def _better(best: Judged | None, judged: list[Judged], by: tuple[str, str]) -> t
     return found, by[0] if found is best else by[1]
 
 
-def _merge_by_discs(
-    a: DescribedMap, b: DescribedMap, matches: Matches, settings: MergeSettings
-) -> PairResult:
+def _merge_by_discs(a: DescribedMap, b: DescribedMap, matches: Matches, settings: MergeSettings) -> PairResult:
     """Merge by the thesis's rules.
 
     The proposal with most inliers, refined, is accepted where the discs around its inliers agree.

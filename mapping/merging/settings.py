@@ -4,14 +4,14 @@ import math
 from dataclasses import dataclass, field
 
 from lidarium.mapping.geometry.bounds import Angle, FromZero, Length, check_settings
-from lidarium.mapping.merging.agreement.validation import ValidationSettings
+from lidarium.mapping.merging.agreement import ValidationSettings
 from lidarium.mapping.merging.alignment import AlignmentSettings
 from lidarium.mapping.merging.bend.estimation import BendSettings
+from lidarium.mapping.merging.corners import CornerSettings
 from lidarium.mapping.merging.correlation import CorrelationSettings
 from lidarium.mapping.merging.correspondence import CorrespondenceSettings
-from lidarium.mapping.merging.description.corners import CornerSettings
-from lidarium.mapping.merging.description.descriptors import DescriptorSettings
-from lidarium.mapping.merging.regions.settings import RegionSettings
+from lidarium.mapping.merging.descriptors import DescriptorSettings
+from lidarium.mapping.merging.regions.segmentation import RegionSettings
 
 MODES = ("default", "thesis")
 
@@ -60,9 +60,7 @@ class MergeSettings:
     def __post_init__(self) -> None:
         check_settings(self, "merging")
         if self.structure not in STRUCTURES:
-            raise ValueError(
-                f"structure of merging is {self.structure!r}; want one of {', '.join(STRUCTURES)}"
-            )
+            raise ValueError(f"structure of merging is {self.structure!r}; want one of {', '.join(STRUCTURES)}")
         if self.structure != "corners" and self.validation.test == "discs":
             raise ValueError("the disc test needs matched corners; want structure corners with it")
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.grids.occupancy import FREE, OCCUPIED
 from lidarium.mapping.kernels.compilation import Array, kernel
-from lidarium.mapping.merging.description.described_map import FACING_DISTANCE_M, DescribedMap, faces_away
+from lidarium.mapping.merging.described_map import FACING_DISTANCE_M, DescribedMap, faces_away
 
 
 def wall_sample(walls: int, count: int) -> NDArray[np.int64]:
@@ -60,9 +60,7 @@ def _score_walls(
         scores[k] = hits - 2 * misses
 
 
-def refine_on_walls(
-    a: DescribedMap, b: DescribedMap, a_from_b: Transform, reach_m: float, samples: int
-) -> Transform:
+def refine_on_walls(a: DescribedMap, b: DescribedMap, a_from_b: Transform, reach_m: float, samples: int) -> Transform:
     """Return the transform that aligns walls of map b with those of map a.
 
     By least squares, on walls that face the same direction.

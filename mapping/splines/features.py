@@ -14,13 +14,180 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.mapping.geometry.rigid import Transform
+from lidarium.mapping.grids.scan_geometry import ScanGeometry
 from lidarium.mapping.kernels.compilation import Array, kernel
-from lidarium.mapping.splines.breakpoints import clusters
-from lidarium.mapping.splines.curves.bspline import Spline
-from lidarium.mapping.splines.curves.fitting import fit_bspline
-from lidarium.mapping.splines.curves.settings import SplineSettings
-from lidarium.mapping.splines.scan_points import ScanPoints
+from lidarium.mapping.splines.bspline import Spline
+from lidarium.mapping.splines.fitting import fit_bspline
 from lidarium.mapping.splines.segmentation import Cut, split_merge
+from lidarium.mapping.splines.settings import BREAKPOINT_TESTS, PointSettings, SegmentationSettings, SplineSettings
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _ScanPoints:
+    """Where the beams of a scan ended, in the frame of the robot at the last beam.
+
+    Attributes
+    ----------
+    points : (n, 2) float64
+        Ends of the beams that returned, in their order [m].
+    beams : (n,) int64
+        Their numbers.
+    ranges : (n,) float64
+        Their ranges [m].
+    sigmas : (n,) float64
+        Standard deviations of these [m].
+    scan : (beams,) float64
+        The whole scan [m]; inf for no return, nan for what is invalid or out of the laser's reach.
+    geometry : ScanGeometry
+        Directions of the beams.
+    """
+
+    points: NDArray[np.float64]
+    beams: NDArray[np.int64]
+    ranges: NDArray[np.float64]
+    sigmas: NDArray[np.float64]
+    scan: NDArray[np.float64]
+    geometry: ScanGeometry
+
+
+def scan_points(
+    ranges: NDArray[np.float32],
+    geometry: ScanGeometry,
+    settings: PointSettings | None = None,
+    motion: Transform | None = None,
+    motion_s: float = 0.0,
+) -> _ScanPoints:
+    """Turn a scan into points.
+
+    Parameters
+    ----------
+    ranges : (beams,) float32
+        The scan [m]; inf for no return, nan for an invalid beam. What is nearer than the laser's least range
+        is invalid, what is farther than its greatest is no return.
+    geometry : ScanGeometry
+        The laser.
+    settings : PointSettings or None
+        Time between beams, place and noise of the laser.
+    motion : Transform or None
+        How the robot has moved in the time before the last beam, ``before_from_now``; None for a robot at
+        rest.
+    motion_s : float
+        That time [s]. Speeds are taken as constant in it.
+
+    Raises
+    ------
+    ValueError
+        Where there are not as many ranges as beams.
+    """
+    settings = settings or PointSettings()
+    measured = np.asarray(ranges, np.float64)
+    if measured.shape != (geometry.beams,):
+        raise ValueError(f"the scan has shape {measured.shape}; the laser has {geometry.beams} beams")
+    scan = np.where(measured < geometry.range_min, np.nan, np.where(measured > geometry.range_max, np.inf, measured))
+    beams = np.flatnonzero(np.isfinite(scan))
+    hits = scan[beams]
+    cosines, sines = geometry.unit_vectors[:, beams]
+    points = np.stack([hits * cosines + settings.laser_x, hits * sines], axis=1)
+    if motion is not None and motion_s > 0.0 and settings.beam_interval_s > 0.0:
+        shares = (geometry.beams - 1 - beams) * (settings.beam_interval_s / motion_s)
+        back = motion.inverse()
+        _undo_motion(points, shares, back.x, back.y, back.theta)
+    sigmas = np.maximum(settings.noise_floor, settings.noise_share * hits)
+    return _ScanPoints(points, beams.astype(np.int64), hits, sigmas, scan, geometry)
+
+
+@kernel
+def _undo_motion(points: Array, shares: Array, x: float, y: float, theta: float) -> None:
+    """Bring each point, seen a share of the motion ago, into the present frame.
+
+    The frame is the robot's; ``x, y, theta`` is the former pose in it.
+    """
+    for k in range(points.shape[0]):
+        cosine, sine = np.cos(shares[k] * theta), np.sin(shares[k] * theta)
+        px, py = points[k, 0], points[k, 1]
+        points[k, 0] = cosine * px - sine * py + shares[k] * x
+        points[k, 1] = sine * px + cosine * py + shares[k] * y
+
+
+def clusters(points: _ScanPoints, settings: SegmentationSettings | None = None) -> NDArray[np.int64]:
+    """Cut the points of a scan where the surface ends.
+
+    A beam without a return, or an invalid one, always breaks. Dietmayer's test is printed with a difference
+    of the ranges where their smaller one is meant, and with its sense turned round; it is used as meant.
+
+    Parameters
+    ----------
+    points : ScanPoints
+        The scan.
+    settings : SegmentationSettings or None
+        Which test; clusters with too few points are left out.
+
+    Returns
+    -------
+    (k, 2) int64
+        First point of each cluster and the one after its last.
+    """
+    settings = settings or SegmentationSettings()
+    count = len(points.points)
+    if count == 0:
+        return np.empty((0, 2), np.int64)
+    is_break = np.zeros(count, np.bool_)
+    numbers = np.array(
+        [
+            points.geometry.angle_increment,
+            settings.incidence,
+            settings.noise_sigmas,
+            settings.dietmayer_floor,
+            settings.dietmayer_share,
+            settings.step_ratio,
+            settings.most_turn,
+        ]
+    )
+    test = BREAKPOINT_TESTS.index(settings.test)
+    _find_breaks(points.points, points.beams, points.ranges, points.sigmas, numbers, test, is_break)
+    edges = np.flatnonzero(np.append(is_break, True))
+    found = np.stack([np.append(0, edges[:-1]), edges], axis=1)
+    return np.asarray(found[found[:, 1] - found[:, 0] >= settings.least_points], np.int64)
+
+
+@kernel
+def _find_breaks(
+    points: Array, beams: Array, ranges: Array, sigmas: Array, numbers: Array, test: int, is_break: Array
+) -> None:
+    """Mark each point that does not belong to the one before it.
+
+    ``test`` is an index into ``BREAKPOINT_TESTS``.
+    """
+    increment, incidence, noise_sigmas, floor, share, step_ratio, most_turn = numbers
+    count = points.shape[0]
+    grazing = math.sin(increment) / math.sin(max(incidence - increment, 1e-3))
+    direct = 2.0 * math.sin(increment / 2.0)
+    for k in range(1, count):
+        if beams[k] != beams[k - 1] + 1:
+            is_break[k] = True
+            continue
+        x, y = points[k, 0] - points[k - 1, 0], points[k, 1] - points[k - 1, 1]
+        distance = math.sqrt(x * x + y * y)
+        nearer = min(ranges[k], ranges[k - 1])
+        if test == 0:
+            is_break[k] = distance > nearer * grazing + noise_sigmas * max(sigmas[k], sigmas[k - 1])
+        elif test == 1:
+            is_break[k] = distance > nearer * direct + max(floor, share * max(ranges[k], ranges[k - 1]))
+    if test != 2:
+        return
+    for k in range(1, count - 1):
+        if is_break[k] or beams[k + 1] != beams[k] + 1:
+            continue
+        ax, ay = points[k, 0] - points[k - 1, 0], points[k, 1] - points[k - 1, 1]
+        bx, by = points[k + 1, 0] - points[k, 0], points[k + 1, 1] - points[k, 1]
+        before, after = math.sqrt(ax * ax + ay * ay), math.sqrt(bx * bx + by * by)
+        # Steps and turns that noise alone can make show nothing.
+        noise = noise_sigmas * sigmas[k]
+        if max(before, after) > step_ratio * max(min(before, after), noise):
+            is_break[k if before > after else k + 1] = True
+        elif min(before, after) > noise and abs(math.atan2(ax * by - ay * bx, ax * bx + ay * by)) > most_turn:
+            is_break[k + 1] = True
+
 
 PEAK_JUMP = 0.3
 """What follows a peak lies at least so much farther away [m]."""
@@ -85,12 +252,12 @@ class Observation:
         Corners, peaks and lines.
     """
 
-    points: ScanPoints
+    points: _ScanPoints
     pieces: tuple[tuple[int, int], ...]
     features: Features
 
 
-def observe(points: ScanPoints, settings: SplineSettings | None = None) -> Observation:
+def observe(points: _ScanPoints, settings: SplineSettings | None = None) -> Observation:
     """Cut a scan into smooth pieces and find its features."""
     settings = settings or SplineSettings()
     pieces: list[tuple[int, int]] = []
@@ -162,7 +329,7 @@ def _are_lines(cut: Cut, sigmas: NDArray[np.float64], settings: SplineSettings) 
     return np.asarray(is_long & (cut.lines[:, 4] < np.maximum(limits.split_distance / 2.0, 1.25 * noise)))
 
 
-def _is_peak(points: ScanPoints, end: int, step: int) -> bool:
+def _is_peak(points: _ScanPoints, end: int, step: int) -> bool:
     """Return whether a cluster ends at a point because its surface does.
 
     Points are followed in steps of 1 or -1.

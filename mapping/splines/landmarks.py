@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.mapping.geometry.rigid import Transform
-from lidarium.mapping.splines.curves.settings import MapSettings
 from lidarium.mapping.splines.features import match_points
+from lidarium.mapping.splines.settings import MapSettings
 
 
 @dataclass(frozen=True, slots=True, eq=False)

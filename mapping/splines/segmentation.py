@@ -16,8 +16,118 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.mapping.kernels.compilation import Array, kernel
-from lidarium.mapping.splines.curves.settings import CORNER_RULES, SegmentationSettings
-from lidarium.mapping.splines.line_segments import fit_line, merge_runs, split_runs
+from lidarium.mapping.splines.settings import CORNER_RULES, SegmentationSettings
+
+
+@kernel
+def _fit_line(points: Array, first: int, last: int) -> tuple[float, float, float, float, float]:
+    """Fit a line to points first .. last by total least squares.
+
+    Returns middle x, y, direction along the points [rad], half length, rms [m].
+    """
+    count = last - first + 1
+    x, y = 0.0, 0.0
+    for k in range(first, last + 1):
+        x += points[k, 0]
+        y += points[k, 1]
+    x, y = x / count, y / count
+    xx, xy, yy = 0.0, 0.0, 0.0
+    for k in range(first, last + 1):
+        dx, dy = points[k, 0] - x, points[k, 1] - y
+        xx += dx * dx
+        xy += dx * dy
+        yy += dy * dy
+    theta = 0.5 * np.arctan2(2.0 * xy, xx - yy)
+    if (
+        np.cos(theta) * (points[last, 0] - points[first, 0]) + np.sin(theta) * (points[last, 1] - points[first, 1])
+        < 0.0
+    ):
+        theta += np.pi if theta <= 0.0 else -np.pi
+    cosine, sine = np.cos(theta), np.sin(theta)
+    low, high, across = np.inf, -np.inf, 0.0
+    for k in range(first, last + 1):
+        dx, dy = points[k, 0] - x, points[k, 1] - y
+        along, aside = cosine * dx + sine * dy, cosine * dy - sine * dx
+        low, high = min(low, along), max(high, along)
+        across += aside * aside
+    middle = (low + high) / 2.0
+    return x + cosine * middle, y + sine * middle, theta, (high - low) / 2.0, np.sqrt(across / count)
+
+
+@kernel
+def _farthest(points: Array, sigmas: Array, first: int, last: int, limit: float, noise_sigmas: float) -> int:
+    """Return the point farthest from the line through the ends.
+
+    If it is too far, else -1.
+    """
+    x, y = points[first, 0], points[first, 1]
+    dx, dy = points[last, 0] - x, points[last, 1] - y
+    length = np.sqrt(dx * dx + dy * dy)
+    best, farthest = -1, 0.0
+    for k in range(first + 1, last):
+        px, py = points[k, 0] - x, points[k, 1] - y
+        distance = abs(dx * py - dy * px) / length if length > 0.0 else np.sqrt(px * px + py * py)
+        excess = distance - max(limit, noise_sigmas * sigmas[k])
+        if excess > 0.0 and distance > farthest:
+            best, farthest = k, distance
+    return best
+
+
+@kernel
+def _split_runs(points: Array, sigmas: Array, limit: float, noise_sigmas: float, ends: Array) -> int:
+    """Write the ends of the leaves, first and last point included.
+
+    Return the number of leaves.
+    """
+    stack = np.empty(points.shape[0] + 1, np.int64)
+    ends[0], stack[0] = 0, points.shape[0] - 1
+    height, count, first = 1, 0, 0
+    while height > 0:
+        last = stack[height - 1]
+        at = _farthest(points, sigmas, first, last, limit, noise_sigmas)
+        if at > first:
+            stack[height] = at
+            height += 1
+        else:
+            count += 1
+            ends[count] = last
+            first = last
+            height -= 1
+    return count
+
+
+@kernel
+def _merge_runs(
+    points: Array, sigmas: Array, limit: float, noise_sigmas: float, collinear: float, ends: Array, count: int
+) -> int:
+    """Join neighbouring leaves until no two fit one line; return their number.
+
+    Joined leaves have about one direction, and their points fit one line.
+    """
+    is_changed = True
+    while is_changed and count > 1:
+        is_changed = False
+        k = 1
+        while k < count:
+            before, after = _fit_line(points, ends[k - 1], ends[k]), _fit_line(points, ends[k], ends[k + 1])
+            turn = abs(np.arctan2(np.sin(after[2] - before[2]), np.cos(after[2] - before[2])))
+            joined = _fit_line(points, ends[k - 1], ends[k + 1])
+            cosine, sine = np.cos(joined[2]), np.sin(joined[2])
+            is_straight = turn <= collinear
+            for i in range(ends[k - 1], ends[k + 1] + 1):
+                aside = abs(cosine * (points[i, 1] - joined[1]) - sine * (points[i, 0] - joined[0]))
+                if aside > max(limit, noise_sigmas * sigmas[i]):
+                    is_straight = False
+                    break
+            if is_straight:
+                for i in range(k, count):
+                    ends[i] = ends[i + 1]
+                count -= 1
+                is_changed = True
+            else:
+                k += 1
+    return count
+
 
 _REACH_SIGMAS = 10.0
 
@@ -136,9 +246,7 @@ def _reach(points: Array, at: int, step: int, length: float) -> int:
 
 
 @kernel
-def _is_round(
-    points: Array, first: int, low: int, high: int, last: int, reach: float, least: int, turn: float
-) -> bool:
+def _is_round(points: Array, first: int, low: int, high: int, last: int, reach: float, least: int, turn: float) -> bool:
     """Return whether a wall goes on turning beyond a corner, as a round one does.
 
     The turn [rad] was estimated from the parts low .. high.
@@ -151,7 +259,7 @@ def _is_round(
     before, after = max(_reach(points, low, -1, reach), first), min(_reach(points, high, 1, reach), last)
     if low - before + 1 < least or after - high + 1 < least:
         return False
-    farther = fit_line(points, high, after)[2] - fit_line(points, before, low)[2]
+    farther = _fit_line(points, high, after)[2] - _fit_line(points, before, low)[2]
     ratio = math.atan2(math.sin(farther), math.cos(farther)) / math.atan2(math.sin(turn), math.cos(turn))
     return ratio > _ROUND_RATIO
 
@@ -183,10 +291,10 @@ def _cut(
     Return the number of leaves.
     """
     limit, noise_sigmas, collinear, corner_angle, corner_reach, least, by = rule
-    count = split_runs(points, sigmas, limit, noise_sigmas, ends)
-    count = merge_runs(points, sigmas, limit, noise_sigmas, collinear, ends, count)
+    count = _split_runs(points, sigmas, limit, noise_sigmas, ends)
+    count = _merge_runs(points, sigmas, limit, noise_sigmas, collinear, ends, count)
     for k in range(count):
-        lines[k] = fit_line(points, ends[k], ends[k + 1])
+        lines[k] = _fit_line(points, ends[k], ends[k + 1])
     last_cut = 0
     for k in range(1, count):
         at = ends[k]
@@ -196,15 +304,13 @@ def _cut(
         low, high = max(_reach(points, at, -1, reach), last_cut), _reach(points, at, 1, reach)
         if at - low + 1 < least or high - at + 1 < least:
             continue
-        before, after = fit_line(points, low, at), fit_line(points, at, high)
+        before, after = _fit_line(points, low, at), _fit_line(points, at, high)
         turn = after[2] - before[2]
         if by == 1:
             is_sharp = abs(np.tan(after[2]) - np.tan(before[2])) > np.tan(corner_angle)
         else:
             is_sharp = abs(np.arctan2(np.sin(turn), np.cos(turn))) > corner_angle
-        if not is_sharp or (
-            by == 0 and _is_round(points, ends[k - 1], low, high, ends[k + 1], reach, least, turn)
-        ):
+        if not is_sharp or (by == 0 and _is_round(points, ends[k - 1], low, high, ends[k + 1], reach, least, turn)):
             continue
         is_corner[k] = True
         last_cut = at

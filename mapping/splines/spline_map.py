@@ -6,15 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.mapping.geometry.rigid import Transform
-from lidarium.mapping.splines.association import are_near, mark_along
+from lidarium.mapping.splines.association import Places, Way, are_near, common_places, join, mark_along
+from lidarium.mapping.splines.bspline import ORDER, Spline
 from lidarium.mapping.splines.curve import Curve, box_of, curves_in, fit_curve
-from lidarium.mapping.splines.curves.basis import ORDER
-from lidarium.mapping.splines.curves.bspline import Spline
-from lidarium.mapping.splines.curves.settings import SplineSettings
 from lidarium.mapping.splines.features import Observation, curves_of
-from lidarium.mapping.splines.joining import Places, Way, common_places, join
 from lidarium.mapping.splines.landmarks import no_landmarks
 from lidarium.mapping.splines.segmentation import split_merge
+from lidarium.mapping.splines.settings import SplineSettings
 
 
 class SplineMap:
@@ -93,9 +91,7 @@ class SplineMap:
         found = SplineMap(self.settings)
         curves = [curve.moved(there) for curve in self.curves]
         found.curves = [curves[k] for k in curves_in(curves, (-reach, -reach, reach, reach))]
-        found.corners, found.peaks = (
-            marks.moved(there).within(reach) for marks in (self.corners, self.peaks)
-        )
+        found.corners, found.peaks = (marks.moved(there).within(reach) for marks in (self.corners, self.peaks))
         found.updates = self.updates
         return found
 
@@ -183,9 +179,7 @@ class SplineMap:
     def _near(self, way: Way, distance: float) -> list[int]:
         """Return the curves whose boxes come within a distance of that of a way [m]."""
         low_x, low_y, high_x, high_y = box_of(way.points)
-        return curves_in(
-            self.curves, (low_x - distance, low_y - distance, high_x + distance, high_y + distance)
-        )
+        return curves_in(self.curves, (low_x - distance, low_y - distance, high_x + distance, high_y + distance))
 
     def _best_match(self, way: Way, control_points: NDArray[np.float64]) -> tuple[int, Places] | None:
         """Return which curve runs along a way the longest, and where."""
@@ -209,7 +203,4 @@ class SplineMap:
         cut = split_merge(way.points, 0.01 / np.sqrt(way.weights), self.settings.segmentation)
         if len(cut.pieces) == 1:
             return [way]
-        return [
-            Way(way.points[first : last + 1], way.weights[first : last + 1])
-            for first, last in cut.pieces.tolist()
-        ]
+        return [Way(way.points[first : last + 1], way.weights[first : last + 1]) for first, last in cut.pieces.tolist()]

@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from lidarium.mapping.files.map_files import MapImage
     from lidarium.mapping.geometry.rigid import Transform
     from lidarium.mapping.merging.bend.deforming import Deformation, Deformed
-    from lidarium.mapping.merging.joining.merged_maps import Merged
-    from lidarium.mapping.merging.regions.settings import RegionSettings
+    from lidarium.mapping.merging.joining import Merged
+    from lidarium.mapping.merging.regions.segmentation import RegionSettings
     from lidarium.mapping.merging.settings import MergeSettings
 
 DEFAULT_FOLDER = Path("merged")
@@ -138,7 +138,7 @@ def _merged(
 ) -> "tuple[Merged, dict[str, MapImage], float]":
     """Merge maps; return also the maps with the second one grown, and by how much it has."""
     from lidarium.mapping.merging.merger import Question, merge_maps
-    from lidarium.mapping.merging.scaling.scaled_merge import merge_scaled
+    from lidarium.mapping.merging.scaling import merge_scaled
 
     factor = command.factor
     if factor is None:

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from lidarium.evaluation.metrics.relations import Relations
     from lidarium.mapping.files.laser_logs import LaserLog
-    from lidarium.mapping.localization.matching.settings.slam import SlamSettings
+    from lidarium.mapping.localization.settings import SlamSettings
     from lidarium.mapping.localization.slam.following import Followed
 
 DEFAULT_FOLDER = Path("slam")

@@ -61,15 +61,12 @@ def test_the_same_seed_gives_the_same_run(name):
     assert first.env.scorer.ended_because == second.env.scorer.ended_because
     assert first.given_up == second.given_up
     assert all(
-        np.array_equal(a, b)
-        for a, b in zip(first.env.beliefs.log_odds, second.env.beliefs.log_odds, strict=True)
+        np.array_equal(a, b) for a, b in zip(first.env.beliefs.log_odds, second.env.beliefs.log_odds, strict=True)
     )
 
 
 def test_another_seed_gives_another_random_walk():
-    assert not np.array_equal(
-        finished("random_walk", 3).env.world.poses, finished("random_walk", 3, 2).env.world.poses
-    )
+    assert not np.array_equal(finished("random_walk", 3).env.world.poses, finished("random_walk", 3, 2).env.world.poses)
 
 
 def test_a_policy_object_is_used_again_as_if_new():
@@ -157,9 +154,7 @@ class StopsOne(Recorder):
 def test_a_robot_that_stops_is_terminated_at_that_step_and_shown_no_more():
     policy, env = (
         StopsOne(),
-        lidarium.parallel_env(
-            "scene_room", robots=2, horizon_s=10.0, stop_coverage=None, map_cells=32, observe=ALL
-        ),
+        lidarium.parallel_env("scene_room", robots=2, horizon_s=10.0, stop_coverage=None, map_cells=32, observe=ALL),
     )
     run_episode(policy, env, 3)
     assert policy.calls[0] == ["robot_0", "robot_1"]
@@ -170,9 +165,7 @@ def test_a_robot_that_stops_is_terminated_at_that_step_and_shown_no_more():
 
 def test_the_runner_tells_of_every_decision_and_refuses_an_unknown_level():
     times = []
-    env = lidarium.parallel_env(
-        "scene_room", robots=1, horizon_s=10.0, stop_coverage=None, map_cells=32, observe=ALL
-    )
+    env = lidarium.parallel_env("scene_room", robots=1, horizon_s=10.0, stop_coverage=None, map_cells=32, observe=ALL)
     episode = run_episode(Recorder(), env, 3, on_decision=lambda each: times.append(each.scorer.time))
     assert times[0] == 0.0
     assert times == sorted(times)
@@ -232,9 +225,7 @@ def test_a_first_interrupt_waits_for_the_end_of_the_step_and_a_second_does_not()
 @pytest.mark.parametrize("is_ignored", [False, True])
 def test_an_application_that_handles_or_ignores_interrupts_keeps_doing_so(is_ignored):
     noted = []
-    env = lidarium.parallel_env(
-        "scene_room", robots=1, horizon_s=10.0, stop_coverage=None, map_cells=32, observe=ALL
-    )
+    env = lidarium.parallel_env("scene_room", robots=1, horizon_s=10.0, stop_coverage=None, map_cells=32, observe=ALL)
     with interrupts_handled_by(signal.SIG_IGN if is_ignored else lambda number, _: noted.append(number)):
         episode = run_episode(PressesControlC(1), env, 1, raise_interrupt=False)
     assert bool(noted) != is_ignored

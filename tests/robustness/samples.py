@@ -13,8 +13,7 @@ from bag_forms import write_form
 from drawn_decisions import drawn_decision
 
 import lidarium
-from lidarium.agents.learned.network import shapes
-from lidarium.agents.learned.weights import save_weights
+from lidarium.agents.learned.network import _shapes, save_weights
 from lidarium.envs.settings.making import make_settings
 from lidarium.evaluation.episodes.runner import run_episode
 from lidarium.evaluation.episodes.watching import WatchedExploration
@@ -29,8 +28,7 @@ from lidarium.mapping.files.spline_files import write_spline_map
 from lidarium.mapping.files.trajectories import write_tum
 from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.grids.scan_geometry import ScanGeometry
-from lidarium.mapping.splines.features import observe
-from lidarium.mapping.splines.scan_points import scan_points
+from lidarium.mapping.splines.features import observe, scan_points
 from lidarium.mapping.splines.spline_map import SplineMap
 from lidarium.training.teaching.samples import samples_of, write_samples
 from lidarium.training.teaching.teacher import Lesson
@@ -174,9 +172,7 @@ def _floors(folder: Path) -> None:
         _drawing(folder / "dxf.dxf")
     (folder / "drawn.json").write_text(json.dumps(PLAN, indent=1))
     np.save(folder / "array.npy", _room())
-    np.savez_compressed(
-        folder / "array.npz", solid=_room() == 0, origin=np.array([0.0, 1.0]), resolution=np.array(0.1)
-    )
+    np.savez_compressed(folder / "array.npz", solid=_room() == 0, origin=np.array([0.0, 1.0]), resolution=np.array(0.1))
 
 
 def _drawing(path: Path) -> None:
@@ -261,10 +257,8 @@ def _results(folder: Path) -> None:
 
 def _trainings(folder: Path) -> None:
     generator = np.random.default_rng(0)
-    drawn = {name: 0.1 * generator.normal(size=shape) for name, shape in shapes().items()}
-    save_weights(
-        folder / "weights.safetensors", {name: each.astype(np.float32) for name, each in drawn.items()}
-    )
+    drawn = {name: 0.1 * generator.normal(size=shape) for name, shape in _shapes().items()}
+    save_weights(folder / "weights.safetensors", {name: each.astype(np.float32) for name, each in drawn.items()})
     lessons = [Lesson(drawn_decision(generator, 4, 2), generator.uniform(0, 9, 4)) for _ in range(3)]
     write_samples(folder / "lessons.npz", samples_of(lessons))
     (folder / "training.toml").write_text(TRAINING)

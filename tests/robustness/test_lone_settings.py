@@ -13,12 +13,12 @@ from lidarium.mapping.geometry.bounds import UNBOUNDED, rules_of
 from lidarium.mapping.grids.occupancy import OccupancySettings
 from lidarium.mapping.grids.scan_geometry import ScanGeometry
 from lidarium.mapping.localization.on_splines.spline_filter import SplineFilterSettings
-from lidarium.mapping.merging.agreement.validation import ValidationSettings
+from lidarium.mapping.merging.agreement import ValidationSettings
 from lidarium.mapping.merging.alignment import AlignmentSettings
+from lidarium.mapping.merging.corners import CornerSettings
 from lidarium.mapping.merging.correlation import CorrelationSettings
 from lidarium.mapping.merging.correspondence import CorrespondenceSettings
-from lidarium.mapping.merging.description.corners import CornerSettings
-from lidarium.mapping.merging.description.descriptors import DescriptorSettings
+from lidarium.mapping.merging.descriptors import DescriptorSettings
 from lidarium.mapping.merging.settings import MergeSettings
 
 KINDS = (

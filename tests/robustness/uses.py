@@ -8,8 +8,7 @@ import numpy as np
 from drawn_decisions import drawn_decision
 
 from lidarium.agents import make_policy
-from lidarium.agents.learned.network import Network
-from lidarium.agents.learned.weights import load_weights
+from lidarium.agents.learned.network import Network, load_weights
 from lidarium.envs.floors.catalogue.drawn import load_drawn
 from lidarium.envs.floors.catalogue.names import load_floor
 from lidarium.envs.floors.floor import Floor
@@ -28,7 +27,7 @@ from lidarium.mapping.files.map_files import cropped, read_grey_map, read_ros_ma
 from lidarium.mapping.files.npz_logs import read_npz_log
 from lidarium.mapping.files.spline_files import compact_arrays, read_spline_map
 from lidarium.mapping.files.trajectories import interpolated, read_tum
-from lidarium.mapping.localization.dead_reckoning.localizer import Sensing
+from lidarium.mapping.localization.localizer import Sensing
 from lidarium.mapping.localization.registry import make_localizer
 from lidarium.scripts.commands.evaluate import summary_of
 from lidarium.training.places import place_of

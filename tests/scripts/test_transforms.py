@@ -5,7 +5,7 @@ import math
 import pytest
 
 from lidarium.mapping.geometry.rigid import Transform
-from lidarium.mapping.merging.pair_result import PairResult
+from lidarium.mapping.merging.pair import PairResult
 from lidarium.scripts.transforms import CONTRADICTS, WAITS, PlacedMaps, transforms
 
 FOUND = Transform(1.0, 2.0, math.pi / 2)

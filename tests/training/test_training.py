@@ -9,7 +9,7 @@ from contextlib import closing
 import numpy as np
 import pytest
 
-from lidarium.agents.learned.weights import load_weights
+from lidarium.agents.learned.network import load_weights
 from lidarium.training.settings import training_of
 from lidarium.training.training import Training
 

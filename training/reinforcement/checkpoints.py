@@ -11,7 +11,7 @@ from safetensors import SafetensorError
 from safetensors.numpy import load, save
 from torch import nn
 
-from lidarium.agents.learned.weights import load_weights, save_weights
+from lidarium.agents.learned.network import load_weights, save_weights
 from lidarium.mapping.files.guarded_reading import read_bytes, read_text, reading, shortened
 from lidarium.mapping.files.output import write_json, write_whole
 from lidarium.training.torch_network import ExplorerNetwork

@@ -16,7 +16,7 @@ from stable_baselines3.common.logger import configure
 from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env import DummyVecEnv, SubprocVecEnv, VecEnv
 
-from lidarium.agents.learned.weights import load_weights
+from lidarium.agents.learned.network import load_weights
 from lidarium.training.places import Place, first_number, place_of
 from lidarium.training.progress import Progress
 from lidarium.training.reinforcement.checkpoints import (

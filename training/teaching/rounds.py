@@ -8,8 +8,7 @@ from pathlib import Path
 import torch
 
 from lidarium.agents.learned.decision import Chooser, choose_classic
-from lidarium.agents.learned.network import Network
-from lidarium.agents.learned.weights import load_weights, save_weights
+from lidarium.agents.learned.network import Network, load_weights, save_weights
 from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.evaluation.episodes.runner import run_episode
 from lidarium.evaluation.processes import shared_out

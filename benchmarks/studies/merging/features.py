@@ -20,11 +20,11 @@ from lidarium.benchmarks.studies.merging.peers import FEATURES, finders
 from lidarium.benchmarks.studies.merging.trials import padded
 from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.merging.alignment import AlignmentSettings, find_inliers
+from lidarium.mapping.merging.corners import Corners, CornerSettings, detect_corners
 from lidarium.mapping.merging.correspondence import METHODS, CorrespondenceSettings, match_corners
-from lidarium.mapping.merging.description.corners import Corners, CornerSettings, detect_corners
-from lidarium.mapping.merging.description.described_map import DescribedMap
-from lidarium.mapping.merging.description.descriptors import VARIANTS, DescriptorSettings, describe_corners
-from lidarium.mapping.merging.description.grey_images import trajkovic_corners
+from lidarium.mapping.merging.described_map import DescribedMap
+from lidarium.mapping.merging.descriptors import VARIANTS, DescriptorSettings, describe_corners
+from lidarium.mapping.merging.grey_images import trajkovic_corners
 from lidarium.mapping.merging.pair import described
 from lidarium.mapping.merging.settings import MergeSettings
 

@@ -22,9 +22,8 @@ from lidarium.benchmarks.studies.merging.real_maps import (
 )
 from lidarium.mapping.files.map_files import read_grey_map
 from lidarium.mapping.geometry.rigid import Transform
-from lidarium.mapping.merging.pair_result import PairResult
-from lidarium.mapping.merging.scaling.scale_search import ScaleSettings
-from lidarium.mapping.merging.scaling.scaled_merge import merge_scaled
+from lidarium.mapping.merging.pair import PairResult
+from lidarium.mapping.merging.scaling import ScaleSettings, merge_scaled
 from lidarium.mapping.merging.settings import MergeSettings
 
 THRESHOLDS = (0.5, 0.8, 0.9, 0.95, 0.98, 0.99)

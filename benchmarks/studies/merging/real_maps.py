@@ -17,9 +17,8 @@ from numpy.typing import NDArray
 from lidarium.benchmarks.studies.merging.figures import Share
 from lidarium.mapping.files.map_files import read_grey_map, read_ros_map
 from lidarium.mapping.geometry.rigid import Transform
-from lidarium.mapping.merging.description.resampling import resampled
-from lidarium.mapping.merging.pair import described, merge_pair
-from lidarium.mapping.merging.pair_result import PairResult, explained
+from lidarium.mapping.merging.described_map import resampled
+from lidarium.mapping.merging.pair import PairResult, described, explained, merge_pair
 from lidarium.mapping.merging.settings import TOLERANCES, MergeSettings, merge_settings
 
 HALMSTAD_M, REAL_M = 0.02, 0.05

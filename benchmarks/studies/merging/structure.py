@@ -19,7 +19,7 @@ from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.grids.occupancy import FREE, OCCUPIED, UNKNOWN
 from lidarium.mapping.merging.pair import described, merge_pair
 from lidarium.mapping.merging.regions.graph import find_regions
-from lidarium.mapping.merging.regions.settings import RegionSettings
+from lidarium.mapping.merging.regions.segmentation import RegionSettings
 from lidarium.mapping.merging.settings import STRUCTURES, merge_settings
 
 SIDE_M = 0.05

@@ -13,10 +13,9 @@ from lidarium.benchmarks.studies.merging.bank.bank import BankMap, Pair
 from lidarium.benchmarks.studies.merging.bank.drives import RESOLUTION
 from lidarium.benchmarks.studies.merging.bank.pairs import PLENTY
 from lidarium.mapping.grids.occupancy import UNKNOWN
-from lidarium.mapping.merging.agreement.counts import disc_agreement
-from lidarium.mapping.merging.agreement.validation import compare
+from lidarium.mapping.merging.agreement import compare, disc_agreement
 from lidarium.mapping.merging.correspondence import match_corners
-from lidarium.mapping.merging.description.described_map import DescribedMap
+from lidarium.mapping.merging.described_map import DescribedMap
 from lidarium.mapping.merging.pair import described, merge_pair
 from lidarium.mapping.merging.settings import merge_settings
 

@@ -23,8 +23,8 @@ from lidarium.evaluation.processes import shared_out
 from lidarium.mapping.files.output import write_json
 from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.grids.occupancy import UNKNOWN
-from lidarium.mapping.merging.agreement.validation import Agreement
-from lidarium.mapping.merging.description.described_map import DescribedMap
+from lidarium.mapping.merging.agreement import Agreement
+from lidarium.mapping.merging.described_map import DescribedMap
 from lidarium.mapping.merging.pair import described, merge_pair
 from lidarium.mapping.merging.settings import MODES, MergeSettings, merge_settings
 

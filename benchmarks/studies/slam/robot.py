@@ -13,8 +13,8 @@ from lidarium.envs.settings.making import make_settings
 from lidarium.evaluation.episodes.runner import run_episode
 from lidarium.evaluation.episodes.watching import WatchedExploration, Watcher
 from lidarium.mapping.geometry.rigid import composed, relative
-from lidarium.mapping.localization.dead_reckoning.localizer import Sensing
-from lidarium.mapping.localization.matching.settings.slam import SlamSettings
+from lidarium.mapping.localization.localizer import Sensing
+from lidarium.mapping.localization.settings import SlamSettings
 from lidarium.mapping.localization.slam.localizer import Slam
 
 

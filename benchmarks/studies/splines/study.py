@@ -34,7 +34,7 @@ from lidarium.evaluation.drawing.spline_picture import save_spline_picture
 from lidarium.evaluation.episodes.runner import run_episode
 from lidarium.evaluation.episodes.watching import WatchedExploration, Watcher
 from lidarium.mapping.geometry.rigid import Transform
-from lidarium.mapping.localization.dead_reckoning.localizer import Sensing
+from lidarium.mapping.localization.localizer import Sensing
 from lidarium.mapping.localization.on_splines.spline_ekf import SplineEkf
 from lidarium.mapping.localization.on_splines.spline_filter import SplineFilter
 

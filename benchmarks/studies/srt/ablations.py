@@ -13,9 +13,9 @@ import numpy as np
 from lidarium.benchmarks.studies.shared.map_figures import map_figures
 from lidarium.benchmarks.studies.srt.goal_runs import GoalRun, Way, drive_to_goal
 from lidarium.evaluation.suites.episodes_file import KEY
-from lidarium.mapping.localization.dead_reckoning.localizer import Sensing
+from lidarium.mapping.localization.localizer import Sensing
 from lidarium.mapping.localization.on_splines.spline_filter import SplineFilter, SplineFilterSettings
-from lidarium.mapping.splines.curves.settings import FitSettings, SegmentationSettings, SplineSettings
+from lidarium.mapping.splines.settings import FitSettings, SegmentationSettings, SplineSettings
 
 _DEFAULT = SplineFilterSettings()
 NO_CORNER = 3.1

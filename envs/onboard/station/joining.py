@@ -4,8 +4,7 @@ Maps of a few rooms that robots have just begun can agree without being of one p
 on it at once. So what was found is found once more on maps that have grown, and has to convince.
 """
 
-from lidarium.mapping.merging.agreement.confirmation import Confirmation
-from lidarium.mapping.merging.agreement.validation import ValidationSettings
+from lidarium.mapping.merging.agreement import Confirmation, ValidationSettings
 
 TEAM_CONFIRMATION = ValidationSettings(
     least_overlap_m2=8.0, most_contradiction_m=0.3, least_across_share=0.2, least_evidence_per_m2=0.3

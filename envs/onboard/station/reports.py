@@ -20,7 +20,7 @@ from lidarium.envs.onboard.station.operating import Operating, order_delay
 from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.grids.occupancy import three_levels
 from lidarium.mapping.merging.fusion import FusedMap
-from lidarium.mapping.merging.growing_maps import GrowingMap
+from lidarium.mapping.merging.incremental import GrowingMap
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

@@ -16,11 +16,10 @@ from lidarium.envs.onboard.station.reports import known_map
 from lidarium.envs.onboard.station.trails import without_own_trail
 from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.grids.occupancy import UNKNOWN
-from lidarium.mapping.merging.agreement.confirmation import Confirmation
+from lidarium.mapping.merging.agreement import Confirmation
 from lidarium.mapping.merging.fusion import FusedMap, fuse
-from lidarium.mapping.merging.growing_maps import GrowingMap
-from lidarium.mapping.merging.incremental import IncrementalMerger
-from lidarium.mapping.merging.joining.merged_maps import placed
+from lidarium.mapping.merging.incremental import GrowingMap, IncrementalMerger
+from lidarium.mapping.merging.joining import placed
 from lidarium.mapping.merging.settings import MergeSettings
 
 Frames = dict[tuple[str, str], Transform]

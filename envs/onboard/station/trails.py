@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.mapping.grids.occupancy import OCCUPIED, UNKNOWN
-from lidarium.mapping.merging.growing_maps import GrowingMap
+from lidarium.mapping.merging.incremental import GrowingMap
 from lidarium.mapping.planning.footprint import footprint_mask
 
 

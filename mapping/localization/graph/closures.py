@@ -15,8 +15,7 @@ from lidarium.mapping.geometry.rigid import composed, relative, turned, wrapped
 from lidarium.mapping.localization.matching.branch_and_bound import Pyramid, place, pyramid
 from lidarium.mapping.localization.matching.local_mapping import Finished
 from lidarium.mapping.localization.matching.scan_matching import Match, refine
-from lidarium.mapping.localization.matching.settings.graph import ClosureSettings
-from lidarium.mapping.localization.matching.settings.matching import MatchingSettings
+from lidarium.mapping.localization.settings import ClosureSettings, MatchingSettings
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -99,9 +98,7 @@ class ClosureFinder:
         """
         settings = self._settings
         variances = np.linalg.eigvalsh(covariance[:2, :2])
-        reach_m = min(
-            max(settings.deviations * float(np.sqrt(variances[-1])), settings.search_m), settings.most_m
-        )
+        reach_m = min(max(settings.deviations * float(np.sqrt(variances[-1])), settings.search_m), settings.most_m)
         reach_angle = min(
             max(settings.deviations * float(np.sqrt(covariance[2, 2])), settings.search_angle),
             settings.most_angle,
@@ -114,9 +111,7 @@ class ClosureFinder:
                 closures += self._confirmed(int(old.nodes[0]), closure, poses, covariance_since(closure.old))
         return closures
 
-    def _nearest(
-        self, poses: NDArray[np.float64], path: float, within: float
-    ) -> list[tuple[_Remembered, int]]:
+    def _nearest(self, poses: NDArray[np.float64], path: float, within: float) -> list[tuple[_Remembered, int]]:
         """Return old enough local maps near the last pose, the nearest first.
 
         Each has a node within a given distance; that node's index comes with it.
@@ -228,9 +223,7 @@ class ClosureFinder:
             return [closure]
         agreeing = [(first, other) for first, other in self._doubtful if self._agree(other, closure, poses)]
         # One local map may resemble another place, to all scans that are taken there.
-        is_single = (is_improbable or settings.doubts_one_map) and all(
-            first == first_node for first, _ in agreeing
-        )
+        is_single = (is_improbable or settings.doubts_one_map) and all(first == first_node for first, _ in agreeing)
         if len(agreeing) + 1 < settings.confirmations or is_single:
             self._doubtful = [*self._doubtful[-20:], (first_node, closure)]
             return []
@@ -244,6 +237,5 @@ class ClosureFinder:
         gap = relative(ends[0], ends[1]) - driven
         settings = self._settings
         return bool(
-            np.hypot(gap[0], gap[1]) <= settings.agree_m
-            and abs(wrapped(float(gap[2]))) <= settings.agree_angle
+            np.hypot(gap[0], gap[1]) <= settings.agree_m and abs(wrapped(float(gap[2]))) <= settings.agree_angle
         )

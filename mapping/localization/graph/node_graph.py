@@ -5,11 +5,11 @@ from numpy.typing import NDArray
 
 from lidarium.mapping.geometry.rigid import composed, relative, wrapped
 from lidarium.mapping.grids.growing_array import GrowingArray
-from lidarium.mapping.localization.dead_reckoning.odometry import compounded
 from lidarium.mapping.localization.graph.closures import Closure
 from lidarium.mapping.localization.graph.pose_graph import Edges, optimised, residuals
-from lidarium.mapping.localization.matching.settings.graph import GraphSettings
 from lidarium.mapping.localization.matching.wall_compass import WallCompass
+from lidarium.mapping.localization.odometry import compounded
+from lidarium.mapping.localization.settings import GraphSettings
 
 Edge = tuple[int, int, NDArray[np.float64], NDArray[np.float64], bool]
 """Nodes a and b, b as seen from a, its information, and whether that may be wrong."""
@@ -35,9 +35,7 @@ class NodeGraph:
         That of the last node against the first [m^2, m rad, rad^2].
     """
 
-    def __init__(
-        self, settings: GraphSettings, compass: WallCompass | None, pose: NDArray[np.float64]
-    ) -> None:
+    def __init__(self, settings: GraphSettings, compass: WallCompass | None, pose: NDArray[np.float64]) -> None:
         self._settings, self._compass = settings, compass
         self.nodes = np.array(pose, np.float64)[None]
         self.covariance = np.zeros((3, 3))
@@ -57,9 +55,7 @@ class NodeGraph:
         self.covariance = compounded(last, self.covariance, since, covariance)
         pose = composed(last, since)
         if self._compass is not None:
-            turn, variance = self._compass.turn(
-                number, float(since[2]), float(covariance[2, 2]), float(pose[2])
-            )
+            turn, variance = self._compass.turn(number, float(since[2]), float(covariance[2, 2]), float(pose[2]))
             pose[2] = wrapped(pose[2] + turn)
             share = np.array([1.0, 1.0, np.sqrt(min(variance / self.covariance[2, 2], 1.0))])
             self.covariance *= share[:, None] * share
@@ -94,8 +90,7 @@ class NodeGraph:
         Return whether poses are to be settled: they contradict some, or enough of them wait.
         """
         self._closures += [
-            (closure.old, closure.new, closure.measured, _inverse(closure.covariance), True)
-            for closure in closures
+            (closure.old, closure.new, closure.measured, _inverse(closure.covariance), True) for closure in closures
         ]
         self._waiting += len(closures)
         rest = np.abs(residuals(self.nodes, _arrays(self._closures[-len(closures) :])))

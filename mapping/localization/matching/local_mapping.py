@@ -9,12 +9,253 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.mapping.geometry.rigid import relative
+from lidarium.mapping.geometry.rigid import relative, turned
 from lidarium.mapping.grids.scan_geometry import ScanGeometry
-from lidarium.mapping.localization.matching.local_matching import LocalMatcher
-from lidarium.mapping.localization.matching.scan_matching import Match
-from lidarium.mapping.localization.matching.settings.slam import SlamSettings
+from lidarium.mapping.localization.matching.branch_and_bound import place, pyramid
+from lidarium.mapping.localization.matching.scan_matching import Match, refine
+from lidarium.mapping.localization.matching.scan_search import search
 from lidarium.mapping.localization.matching.submaps import AgreementGrid, Submap
+from lidarium.mapping.localization.settings import SlamSettings
+
+
+class _LocalMatcher:
+    """Lays scans on a local map, and knows how well they have agreed of late.
+
+    Parameters
+    ----------
+    settings : SlamSettings
+        How.
+    geometry : ScanGeometry
+        Directions of the beams.
+
+    Attributes
+    ----------
+    usual_score : float
+        Agreement of matches of late.
+    contradiction : float
+        Share of the last scan's returns that lay, from where odometry led, in what the local map knows to be
+        free.
+    recoveries : int
+        Scans that were found in another direction or place than odometry said, as nothing there agreed.
+    explains : bool
+        Whether the last match explains enough of its scan.
+    """
+
+    def __init__(self, settings: SlamSettings, geometry: ScanGeometry) -> None:
+        self._matching, self._uses_odometry, self._geometry = (
+            settings.matching,
+            settings.uses_odometry,
+            geometry,
+        )
+        self.usual_score, self.contradiction, self.recoveries = 0.0, 0.0, 0
+        self.explains = True
+
+    def match(
+        self,
+        submap: Submap,
+        points: NDArray[np.float64],
+        predicted: NDArray[np.float64],
+        moved: NDArray[np.float64],
+        uncertainty: NDArray[np.float64],
+        failed: int,
+    ) -> Match | None:
+        """Return where a scan lies on a local map; None where it does not match.
+
+        Near what odometry says it is searched first, weighing both. Where that does not convince, odometry
+        may be wrong (a wheel slips, the robot was pushed), and the search goes farther, without it, for scans
+        of enough returns; what is found there has to be clearly better. On new ground, and where a scan
+        hardly has a return, nothing but odometry measures where the robot is.
+
+        Parameters
+        ----------
+        submap : Submap
+            The local map.
+        points : (n, 2) float64
+            Points in the robot's frame [m].
+        predicted : (3,) float64
+            Where the robot should be, in the local map's frame [m, rad].
+        moved : (3,) float64
+            The motion since the last match that led there.
+        uncertainty : (3, 3) float64
+            Covariance of that motion, in the robot's frame at its end [m^2, m rad, rad^2].
+        failed : int
+            How many scans in a row did not match before.
+        """
+        settings = self._matching
+        is_blind = not self._uses_odometry or failed >= settings.wide_after
+        near = self._match_near(submap, points, predicted, uncertainty) if self._uses_odometry else None
+        self.contradiction = 1.0 if near is None else near.contradiction
+        is_sparse = near is not None and len(points) < settings.wide_share * self._geometry.beams
+        if near is not None and self._is_new_ground(near, len(points)):
+            nothing = np.zeros((3, 3))
+            unmatched = Match(predicted, near.score, near.overlap, near.contradiction, nothing, near.prior)
+            known = None if is_sparse else self._beyond_odometry(submap, points, predicted)
+            return unmatched if known is None else self._noted(known)
+        if near is not None and self._is_good(near) and near.score >= settings.convincing_share * self.usual_score:
+            self.explains = self._explains(near)
+            return self._noted(near)
+        reach = (settings.blind_m, settings.blind_angle) if is_blind else self._reach(moved)
+        far = None if is_sparse else self._match_far(submap, points, predicted, reach)
+        if self._uses_odometry and is_blind and far is not None:
+            # So far from odometry something a little similar, or in part, is soon found.
+            is_alike = (
+                far.score >= settings.convincing_share * self.usual_score and far.overlap >= settings.blind_overlap
+            )
+            far = far if is_alike else None
+        good = [match for match in (near, far) if match is not None and self._is_good(match)]
+        found = good[0] if good else None
+        if len(good) == 2 and _outweighs(good[1], good[0], settings.better_by):
+            found = good[1]
+        if self._uses_odometry and not is_sparse and not self._explains(found):
+            found = self._beyond_odometry(submap, points, predicted) or found
+        self.explains = self._explains(found)
+        return None if found is None else self._noted(found)
+
+    def _explains(self, match: Match | None) -> bool:
+        """Whether a match explains enough of a scan: points near what the map knows, and how they agree."""
+        least = self._matching.explained_share * self.usual_score
+        return match is not None and match.score * match.overlap >= least
+
+    def _beyond_odometry(
+        self, submap: Submap, points: NDArray[np.float64], predicted: NDArray[np.float64]
+    ) -> Match | None:
+        """Return the match in any direction that alone explains most of a scan, or None.
+
+        Odometry may not know of a motion at all: a robot was turned by hand, or scans are missing.
+        """
+        settings = self._matching
+        reach, alike = (settings.blind_m, math.pi), settings.convincing_share * self.usual_score
+        coarse, least = pyramid(submap.finished()), 0.6 * settings.blind_overlap * alike
+        best, is_over = place(coarse, points, predicted, reach, least, settings.lost_evaluations)
+        if best is None or not is_over:
+            return None
+        match = self._refined(submap, points, best.pose)
+        if (
+            match.score < max(alike, settings.least_score)
+            or match.overlap < settings.blind_overlap
+            or match.contradiction > settings.most_contradiction
+        ):
+            return None
+        apart = (best.pose, settings.apart_m, settings.apart_angle)
+        second, is_over = place(
+            coarse,
+            points,
+            predicted,
+            reach,
+            settings.ambiguity * best.score,
+            settings.lost_evaluations,
+            apart,
+        )
+        if second is not None or not is_over:
+            return None
+        self.recoveries += 1
+        return match
+
+    def _reach(self, moved: NDArray[np.float64]) -> tuple[float, float]:
+        """Return how far to search without odometry, [m] and [rad]."""
+        settings, distance = self._matching, math.hypot(float(moved[0]), float(moved[1]))
+        # Twice the motion and more: also where a robot is that went back while odometry said forth.
+        return (
+            min(settings.search_m + 2.2 * distance, settings.blind_m),
+            min(settings.search_angle + 2.2 * abs(float(moved[2])), settings.blind_angle),
+        )
+
+    def _noted(self, match: Match) -> Match:
+        self.usual_score = match.score if self.usual_score == 0.0 else 0.9 * self.usual_score + 0.1 * match.score
+        return match
+
+    def _is_new_ground(self, match: Match, points: int) -> bool:
+        """Whether a scan sees hardly anything that the local map has observed.
+
+        Also true where it sees hardly anything at all.
+        """
+        settings = self._matching
+        is_sparse = points < min(settings.least_points, self._geometry.beams // 8)
+        return is_sparse or (
+            match.overlap < settings.least_overlap and match.contradiction <= settings.most_contradiction
+        )
+
+    def _is_good(self, match: Match) -> bool:
+        settings = self._matching
+        least_score = max(settings.least_score, settings.least_share * self.usual_score)
+        agrees = match.score >= least_score and match.overlap >= settings.least_overlap
+        return agrees and match.contradiction <= settings.most_contradiction
+
+    def _match_near(
+        self,
+        submap: Submap,
+        points: NDArray[np.float64],
+        predicted: NDArray[np.float64],
+        uncertainty: NDArray[np.float64],
+    ) -> Match:
+        settings, grid = self._matching, submap.grid
+        spread = np.sqrt(np.diag(uncertainty))
+        # Odometry that leaps leads nowhere, and is not sought farther than where there is none.
+        reach_m = min(
+            settings.search_m + settings.search_deviations * float(spread[:2].max()),
+            max(settings.search_m, settings.blind_m),
+        )
+        reach_angle = min(
+            settings.search_angle + settings.search_deviations * float(spread[2]),
+            max(settings.search_angle, settings.blind_angle),
+        )
+        information = turned(np.asarray(np.linalg.inv(uncertainty), np.float64), float(predicted[2]))
+        weight = settings.weight(len(points))
+        start = search(grid, points, predicted, reach_m, reach_angle, information, weight, settings.unseen)
+        return refine(grid, points, start, predicted, information, weight, settings.unseen, settings.surface_m)
+
+    def _match_far(
+        self,
+        submap: Submap,
+        points: NDArray[np.float64],
+        predicted: NDArray[np.float64],
+        reach: tuple[float, float],
+    ) -> Match | None:
+        settings = self._matching
+        least = 0.5 * settings.least_score * settings.least_overlap
+        found, _ = place(pyramid(submap.finished()), points, predicted, reach, least, settings.evaluations)
+        return None if found is None else self._refined(submap, points, found.pose)
+
+    def _refined(self, submap: Submap, points: NDArray[np.float64], pose: NDArray[np.float64]) -> Match:
+        """Return the match near a pose (3,), without odometry."""
+        settings, nothing = self._matching, np.zeros((3, 3))
+        weight = settings.weight(len(points))
+        return refine(submap.grid, points, pose, pose, nothing, weight, settings.unseen, settings.surface_m)
+
+    def judge(self, submap: Submap, points: NDArray[np.float64], pose: NDArray[np.float64]) -> None:
+        """Note how well points (n, 2) agree with a local map near a pose (3,) found otherwise."""
+        match = self._refined(submap, points, pose)
+        if self._is_good(match) and not self._is_new_ground(match, len(points)):
+            self._noted(match)
+
+    def match_first(self, submap: Submap, points: NDArray[np.float64]) -> Match | None:
+        """Return where the first scan of a local map now lies on that map.
+
+        Its points are (n, 2) [m]. None if they do not match.
+        """
+        settings, nowhere = self._matching, np.zeros(3)
+        grid = submap.grid
+        weight = settings.weight(len(points))
+        match = refine(grid, points, nowhere, nowhere, np.zeros((3, 3)), weight, settings.unseen, settings.surface_m)
+        return match if self._is_good(match) and not self._is_new_ground(match, len(points)) else None
+
+
+def _outweighs(far: Match, near: Match, better_by: float) -> bool:
+    """Return whether a match outweighs odometry, which then has to be wrong.
+
+    The match against odometry must be better than one with it by enough.
+
+    Where nearly all of a scan lies near known walls, and elsewhere only a part of it, that part may agree
+    better by chance, as on the other side of a wall: all points together must not agree less.
+
+    Parameters
+    ----------
+    far, near : Match
+        The match against odometry, and that with it.
+    better_by : float
+        By how much more the points near what the map has observed have to agree.
+    """
+    return far.score > near.score + better_by and far.score * far.overlap >= near.score * near.overlap
 
 
 @dataclass(slots=True, eq=False)
@@ -80,7 +321,7 @@ class LocalMapper:
         self._matching, self._submaps = settings.matching, settings.submaps
         self._geometry = geometry
         self._active: list[_Active] = []
-        self._matcher = LocalMatcher(settings, geometry)
+        self._matcher = _LocalMatcher(settings, geometry)
 
     @property
     def node(self) -> int:
@@ -104,17 +345,17 @@ class LocalMapper:
 
     @property
     def contradiction(self) -> float:
-        """How much the last scan contradicted the local map, see ``LocalMatcher``."""
+        """How much the last scan contradicted the local map, see ``_LocalMatcher``."""
         return self._matcher.contradiction
 
     @property
     def recoveries(self) -> int:
-        """How many scans were found elsewhere than odometry said, see ``LocalMatcher``."""
+        """How many scans were found elsewhere than odometry said, see ``_LocalMatcher``."""
         return self._matcher.recoveries
 
     @property
     def explains(self) -> bool:
-        """Whether the last match explains enough of its scan, see ``LocalMatcher``."""
+        """Whether the last match explains enough of its scan, see ``_LocalMatcher``."""
         return self._matcher.explains
 
     def match(
@@ -125,7 +366,7 @@ class LocalMapper:
         uncertainty: NDArray[np.float64],
         failed: int,
     ) -> Match | None:
-        """Return where a scan lies on the older local map, see ``LocalMatcher.match``."""
+        """Return where a scan lies on the older local map, see ``_LocalMatcher.match``."""
         return self._matcher.match(self._active[0].submap, points, predicted, moved, uncertainty, failed)
 
     def judge(self, points: NDArray[np.float64], pose: NDArray[np.float64]) -> None:
@@ -171,8 +412,7 @@ class LocalMapper:
         """Whether it is time to begin another local map, at a new node."""
         newest = self._active[-1]
         is_full = (
-            newest.submap.scans >= max(self._submaps.least_scans // 2, 1)
-            and newest.path >= 0.5 * self._submaps.path_m
+            newest.submap.scans >= max(self._submaps.least_scans // 2, 1) and newest.path >= 0.5 * self._submaps.path_m
         )
         return len(self._active) == 1 and is_full
 

@@ -19,9 +19,161 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.mapping.kernels.compilation import Array, kernel
-from lidarium.mapping.localization.matching.smoothed_agreement import agreement, extremes_around, is_unseen
-from lidarium.mapping.localization.matching.submaps import FREE_LEVEL, UNSEEN, AgreementGrid
-from lidarium.mapping.localization.matching.surface_normals import find_normals
+from lidarium.mapping.localization.matching.submaps import FREE_LEVEL, FULL_LEVEL, UNSEEN, AgreementGrid
+
+LEVEL_RANGE = float(FULL_LEVEL - FREE_LEVEL)
+"""Levels from no agreement to full agreement."""
+
+NEAR_CELLS = 3
+"""A cell is near another within so many rows and columns."""
+
+
+@kernel(forceinline=True, nrt=False)
+def _spline_weights(t: float) -> tuple[float, float, float, float]:
+    """Return the weights of four neighbouring cells in a cubic B-spline.
+
+    t runs from 0 to 1 between the middle two.
+    """
+    u, square, cube = 1.0 - t, t * t, t * t * t
+    return (
+        u * u * u / 6.0,
+        (3.0 * cube - 6.0 * square + 4.0) / 6.0,
+        (-3.0 * cube + 3.0 * square + 3.0 * t + 1.0) / 6.0,
+        cube / 6.0,
+    )
+
+
+@kernel(forceinline=True, nrt=False)
+def _spline_slopes(t: float) -> tuple[float, float, float, float]:
+    """Return the slopes of the weights."""
+    u, square = 1.0 - t, t * t
+    return -0.5 * u * u, 1.5 * square - 2.0 * t, -1.5 * square + t + 0.5, 0.5 * square
+
+
+@kernel(forceinline=True, nrt=False)
+def _agreement(levels: Array, x: float, y: float) -> tuple[float, float, float]:
+    """Return the smoothed agreement at x, y [cells] and its slopes [1/cell] (kernel).
+
+    Zero where the map ends.
+    """
+    u, v = x - 0.5, y - 0.5
+    column, row = int(math.floor(u)), int(math.floor(v))
+    if not (1 <= column < levels.shape[1] - 2 and 1 <= row < levels.shape[0] - 2):
+        return 0.0, 0.0, 0.0
+    across, across_slopes = _spline_weights(u - column), _spline_slopes(u - column)
+    along, along_slopes = _spline_weights(v - row), _spline_slopes(v - row)
+    value, slope_x, slope_y = 0.0, 0.0, 0.0
+    for i in range(4):
+        line, line_slope = 0.0, 0.0
+        for j in range(4):
+            level = max(float(levels[row + i - 1, column + j - 1]) - FREE_LEVEL, 0.0)
+            line += across[j] * level
+            line_slope += across_slopes[j] * level
+        value += along[i] * line
+        slope_x += along[i] * line_slope
+        slope_y += along_slopes[i] * line
+    return value / LEVEL_RANGE, slope_x / LEVEL_RANGE, slope_y / LEVEL_RANGE
+
+
+@kernel(forceinline=True, nrt=False)
+def _is_unseen(levels: Array, x: float, y: float) -> bool:
+    """Whether the map has not observed the cell at x, y [cells] (kernel)."""
+    column, row = int(math.floor(x)), int(math.floor(y))
+    return not (0 <= column < levels.shape[1] and 0 <= row < levels.shape[0]) or levels[row, column] == UNSEEN
+
+
+@kernel(nrt=False)
+def _extremes_around(levels: Array, column: int, row: int) -> tuple[int, int]:
+    """Return the lowest and the highest level within three cells (kernel).
+
+    What lies outside of the map is not observed.
+    """
+    rows, columns = levels.shape
+    lowest, highest = FULL_LEVEL, UNSEEN
+    for i in range(row - NEAR_CELLS, row + NEAR_CELLS + 1):
+        for j in range(column - NEAR_CELLS, column + NEAR_CELLS + 1):
+            level = int(levels[i, j]) if 0 <= i < rows and 0 <= j < columns else UNSEEN
+            lowest, highest = min(lowest, level), max(highest, level)
+    return lowest, highest
+
+
+SURFACE_GAP = 0.3
+"""Largest gap between neighbouring points on one surface.
+
+As a share of their distance, or in metres.
+"""
+
+MOST_BEND = 0.15
+"""Largest ratio of the points' variance across the surface to that along it.
+
+Above this there is a corner.
+"""
+
+LEAST_POINTS = 3
+"""Fewer points have no axis of their own."""
+
+
+@kernel(forceinline=True)
+def _is_one_surface(points: Array, k: int) -> bool:
+    """Whether a point and the next one lie on one surface."""
+    gap = SURFACE_GAP * max(math.hypot(points[k, 0], points[k, 1]), 1.0)
+    return bool(math.hypot(points[k + 1, 0] - points[k, 0], points[k + 1, 1] - points[k, 1]) <= gap)
+
+
+@kernel
+def _find_normals(points: Array, reach: float, normals: Array) -> None:
+    """Fill ``normals`` (n, 2) with unit normals of the surfaces (kernel).
+
+    The surface at each point is that of the point and its neighbours; zero for a point alone.
+
+    Two neighbours give it where the surface bends; elsewhere all within reach do, since noise turns what lies
+    between two near points.
+    """
+    count = points.shape[0]
+    for k in range(count):
+        before, after = k, k
+        while before > 0 and _is_one_surface(points, before - 1) and _is_near(points, before - 1, k, reach):
+            before -= 1
+        while after + 1 < count and _is_one_surface(points, after) and _is_near(points, after + 1, k, reach):
+            after += 1
+        along_x, along_y, is_bent = _axis(points[before : after + 1])
+        if is_bent:
+            before = k - 1 if k > 0 and _is_one_surface(points, k - 1) else k
+            after = k + 1 if k + 1 < count and _is_one_surface(points, k) else k
+            along_x, along_y = points[after, 0] - points[before, 0], points[after, 1] - points[before, 1]
+        length = math.hypot(along_x, along_y)
+        if length > 0.0:
+            normals[k, 0], normals[k, 1] = -along_y / length, along_x / length
+
+
+@kernel(forceinline=True)
+def _is_near(points: Array, k: int, m: int, reach: float) -> bool:
+    return bool(math.hypot(points[k, 0] - points[m, 0], points[k, 1] - points[m, 1]) <= reach)
+
+
+@kernel
+def _axis(points: Array) -> tuple[float, float, bool]:
+    """Return the axis of largest variance of points, and whether it is unclear.
+
+    The axis is of unit length, zero for fewer than three points. Unclear where points do not lie along
+    it, or are too few.
+    """
+    count = points.shape[0]
+    if count < LEAST_POINTS:
+        return 0.0, 0.0, True
+    x, y = 0.0, 0.0
+    for k in range(count):
+        x += points[k, 0] / count
+        y += points[k, 1] / count
+    xx, xy, yy = 0.0, 0.0, 0.0
+    for k in range(count):
+        xx += (points[k, 0] - x) * (points[k, 0] - x)
+        xy += (points[k, 0] - x) * (points[k, 1] - y)
+        yy += (points[k, 1] - y) * (points[k, 1] - y)
+    half, middle = math.hypot(0.5 * (xx - yy), xy), 0.5 * (xx + yy)
+    angle = 0.5 * math.atan2(2.0 * xy, xx - yy)
+    return math.cos(angle), math.sin(angle), middle - half > MOST_BEND * (middle + half)
+
 
 FULL_AGREEMENT = 2.0 / 3.0
 """Greatest smoothed agreement that a point can have.
@@ -50,7 +202,7 @@ PROBES = 4
 """Places around a pose at which curvature is measured, half a cell to each side."""
 
 
-class Objective(NamedTuple):
+class _Objective(NamedTuple):
     """What the cost of a pose is made of.
 
     Attributes
@@ -153,15 +305,15 @@ def refine(
     if count == 0:
         return Match(pose, 0.0, 0.0, 0.0, np.zeros((3, 3)), information)
     normals = np.zeros((count, 2))
-    find_normals(points, surface_m, normals)
-    objective = Objective(grid, points, normals, prior, information, weight / count, unseen)
+    _find_normals(points, surface_m, normals)
+    objective = _Objective(grid, points, normals, prior, information, weight / count, unseen)
     _refine(objective, pose, hessian, judgement)
     score, overlap, contradiction = judgement.tolist()
     return Match(pose, score, overlap, contradiction, hessian, information)
 
 
 @kernel
-def _refine(objective: Objective, pose: Array, hessian: Array, judgement: Array) -> None:
+def _refine(objective: _Objective, pose: Array, hessian: Array, judgement: Array) -> None:
     """Move a pose to where the cost is least.
 
     Tell the Hessian and what ``_judge`` says.
@@ -172,7 +324,7 @@ def _refine(objective: Objective, pose: Array, hessian: Array, judgement: Array)
 
 
 @kernel
-def _descend(objective: Objective, pose: Array, hessian: Array) -> None:
+def _descend(objective: _Objective, pose: Array, hessian: Array) -> None:
     """Move a pose to where the cost is least (Levenberg and Marquardt)."""
     prior, information, weight = objective.prior, objective.information, objective.weight
     gradient, trial_gradient, trial_hessian = np.empty(3), np.empty(3), np.empty((3, 3))
@@ -203,7 +355,7 @@ def _descend(objective: Objective, pose: Array, hessian: Array) -> None:
 
 
 @kernel
-def _curve_around(objective: Objective, pose: Array, hessian: Array) -> None:
+def _curve_around(objective: _Objective, pose: Array, hessian: Array) -> None:
     """Fill the weighed Hessian from half a cell around a pose.
 
     On the crest of a wall slopes vanish: how steep it is, is seen half a cell away.
@@ -219,7 +371,7 @@ def _curve_around(objective: Objective, pose: Array, hessian: Array) -> None:
 
 
 @kernel(nrt=False)
-def _normal_equations(objective: Objective, pose: Array, hessian: Array, gradient: Array) -> float:
+def _normal_equations(objective: _Objective, pose: Array, hessian: Array, gradient: Array) -> float:
     """Fill the normal equations of the points' disagreement at a pose.
 
     Return the sum of its squares.
@@ -232,8 +384,8 @@ def _normal_equations(objective: Objective, pose: Array, hessian: Array, gradien
     for k in range(points.shape[0]):
         x, y = cosine * points[k, 0] - sine * points[k, 1], sine * points[k, 0] + cosine * points[k, 1]
         u, v = (x + pose[0]) / side - first_column, (y + pose[1]) / side - first_row
-        value, slope_x, slope_y = agreement(levels, u, v)
-        if value == 0.0 and is_unseen(levels, u, v):
+        value, slope_x, slope_y = _agreement(levels, u, v)
+        if value == 0.0 and _is_unseen(levels, u, v):
             cost += unseen
             continue
         rest = 1.0 - value / FULL_AGREEMENT
@@ -271,12 +423,12 @@ def _judge(grid: AgreementGrid, points: Array, pose: Array, judgement: Array) ->
     for k in range(points.shape[0]):
         x = (cosine * points[k, 0] - sine * points[k, 1] + pose[0]) / side - first_column
         y = (sine * points[k, 0] + cosine * points[k, 1] + pose[1]) / side - first_row
-        value, _, _ = agreement(levels, x, y)
+        value, _, _ = _agreement(levels, x, y)
         agreeing += min(value / FULL_AGREEMENT, 1.0)
         if value > 0.0:
             known += 1
         else:
-            lowest, highest = extremes_around(levels, int(math.floor(x)), int(math.floor(y)))
+            lowest, highest = _extremes_around(levels, int(math.floor(x)), int(math.floor(y)))
             known += highest > UNSEEN
             contradicting += lowest == FREE_LEVEL and highest == FREE_LEVEL
     judgement[0], judgement[1], judgement[2] = (

@@ -32,7 +32,7 @@ LEAST_STEP, DEFAULT_STEP, MOST_STEP = math.radians(0.25), math.radians(1.0), mat
 """Step of an angle at least, where there are no points, and at most [rad]."""
 
 
-class Window(NamedTuple):
+class _Window(NamedTuple):
     """Poses among which a search chooses.
 
     Attributes
@@ -83,7 +83,7 @@ def search(
     if len(points) == 0 or steps + turns == 0:
         return around
     found = np.empty(3)
-    window = Window(around, steps, turns, step)
+    window = _Window(around, steps, turns, step)
     _search(grid, points, window, information, weight / len(points), unseen, found)
     return found
 
@@ -103,7 +103,7 @@ def angle_step(points: NDArray[np.float64], resolution: float) -> float:
 def _search(
     grid: AgreementGrid,
     points: Array,
-    window: Window,
+    window: _Window,
     information: Array,
     weight: float,
     unseen: float,

@@ -17,17 +17,16 @@ from numpy.typing import NDArray
 from lidarium.mapping.geometry.bounds import Distance, FromZero, Turn, check_settings
 from lidarium.mapping.geometry.rigid import Transform, wrapped
 from lidarium.mapping.grids.scan_geometry import ScanGeometry
-from lidarium.mapping.localization.on_splines.linear_measurements import (
+from lidarium.mapping.localization.on_splines.spline_matches import (
     TURNED,
+    Matches,
     Measured,
+    TrackingSettings,
     measured_lines,
     measured_rays,
     rotation_of,
 )
-from lidarium.mapping.localization.on_splines.motion_steps import steps_of
-from lidarium.mapping.localization.on_splines.spline_matches import Matches
-from lidarium.mapping.localization.on_splines.spline_tracking import SplineTracker
-from lidarium.mapping.localization.on_splines.tracking_settings import TrackingSettings
+from lidarium.mapping.localization.on_splines.spline_tracking import SplineTracker, steps_of
 from lidarium.mapping.splines.features import Observation, match_points
 
 POSE, SCALES = 3, 2
@@ -87,9 +86,7 @@ class SplineEkf(SplineTracker):
 
     Settings = SplineEkfSettings
 
-    def __init__(
-        self, settings: SplineEkfSettings | None = None, geometry: ScanGeometry | None = None
-    ) -> None:
+    def __init__(self, settings: SplineEkfSettings | None = None, geometry: ScanGeometry | None = None) -> None:
         self.settings = settings or SplineEkfSettings()
         super().__init__(self.settings.tracking, geometry or ScanGeometry())
 
@@ -132,9 +129,7 @@ class SplineEkf(SplineTracker):
             ]
         )
         by_pose = np.array([[1.0, 0.0, -distance * sine], [0.0, 1.0, distance * cosine], [0.0, 0.0, 1.0]])
-        by_steps = np.array(
-            [[-distance * sine, cosine, 0.0], [distance * cosine, sine, 0.0], [1.0, 0.0, 1.0]]
-        )
+        by_steps = np.array([[-distance * sine, cosine, 0.0], [distance * cosine, sine, 0.0], [1.0, 0.0, 1.0]])
         by_body = np.eye(BODY)
         by_body[:POSE, :POSE] = by_pose
         by_body[:POSE, POSE] = by_steps[:, 1] * measured[1]
@@ -149,9 +144,7 @@ class SplineEkf(SplineTracker):
         seen = np.concatenate([observation.features.corners, observation.features.peaks])
         sigmas = np.concatenate([observation.features.corner_sigmas, observation.features.peak_sigmas])
         here = Transform(*(float(value) for value in self.local))
-        which, known = match_points(
-            here.apply(seen), self.landmarks, self.tracking.splines.association.point_distance
-        )
+        which, known = match_points(here.apply(seen), self.landmarks, self.tracking.splines.association.point_distance)
         of_walls = [
             self._gated(part)
             for part in (

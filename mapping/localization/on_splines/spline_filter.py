@@ -15,7 +15,7 @@ it is in the weight.
 
 import math
 from dataclasses import dataclass, field
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,23 +23,95 @@ from numpy.typing import NDArray
 from lidarium.mapping.geometry.bounds import Distance, FromZero, Turn, check_settings, share, within
 from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.grids.scan_geometry import ScanGeometry
-from lidarium.mapping.localization.on_splines.linear_measurements import (
+from lidarium.mapping.kernels.compilation import Array, kernel
+from lidarium.mapping.localization.on_splines.spline_matches import (
+    Matches,
+    TrackingSettings,
     joined,
     measured_lines,
     measured_points,
     measured_rays,
 )
-from lidarium.mapping.localization.on_splines.motion_steps import driven, steps_of
-from lidarium.mapping.localization.on_splines.particle_weights import (
-    MatchedFeatures,
-    ray_likelihoods,
-    weigh_features,
-    weigh_rays,
-)
-from lidarium.mapping.localization.on_splines.spline_matches import Matches
-from lidarium.mapping.localization.on_splines.spline_tracking import SplineTracker
-from lidarium.mapping.localization.on_splines.tracking_settings import TrackingSettings
+from lidarium.mapping.localization.on_splines.spline_tracking import SplineTracker, driven, steps_of
 from lidarium.mapping.splines.features import Observation
+
+_HIT_SHARE = 0.95
+_ENTRIES_PER_METRE, _FARTHEST = 2000.0, 0.5
+
+
+def _ray_likelihoods(sigma: float) -> NDArray[np.float64]:
+    """Return log-likelihood and likelihood of a ray, shape (entries, 2).
+
+    By the distance of the ray's end from a curve.
+    """
+    gaps = (np.arange(round(_FARTHEST * _ENTRIES_PER_METRE)) + 0.5) / _ENTRIES_PER_METRE
+    likelihoods = _HIT_SHARE * np.exp(-0.5 * (gaps / sigma) ** 2) + 1.0 - _HIT_SHARE
+    likelihoods[-1] = 1.0 - _HIT_SHARE
+    return np.stack([np.log(likelihoods), likelihoods], axis=1)
+
+
+class _MatchedFeatures(NamedTuple):
+    """Features as seen and in the map, and their deviations; see ``Matches``."""
+
+    seen: Array
+    known: Array
+    sigmas: Array
+
+
+@kernel
+def _weigh_features(
+    particles: Array,
+    matched_points: _MatchedFeatures,
+    matched_lines: _MatchedFeatures,
+    angle_sigma: float,
+    logarithms: Array,
+) -> None:
+    """Add to each particle's log-likelihood (particles,) how well features fit."""
+    points, known_points, point_sigmas = matched_points
+    lines, known_lines, line_sigmas = matched_lines
+    cosines, sines = np.cos(particles[:, 2]), np.sin(particles[:, 2])
+    for k in range(points.shape[0]):
+        for i in range(particles.shape[0]):
+            dx = particles[i, 0] + cosines[i] * points[k, 0] - sines[i] * points[k, 1] - known_points[k, 0]
+            dy = particles[i, 1] + sines[i] * points[k, 0] + cosines[i] * points[k, 1] - known_points[k, 1]
+            logarithms[i] -= 0.5 * (dx * dx + dy * dy) / (point_sigmas[k] * point_sigmas[k])
+    for k in range(lines.shape[0]):
+        along_x, along_y = math.cos(known_lines[k, 2]), math.sin(known_lines[k, 2])
+        for i in range(particles.shape[0]):
+            dx = particles[i, 0] + cosines[i] * lines[k, 0] - sines[i] * lines[k, 1] - known_lines[k, 0]
+            dy = particles[i, 1] + sines[i] * lines[k, 0] + cosines[i] * lines[k, 1] - known_lines[k, 1]
+            aside = dy * along_x - dx * along_y
+            turns = (particles[i, 2] + lines[k, 2] - known_lines[k, 2]) / (2.0 * math.pi)
+            turn = (turns - math.floor(turns + 0.5)) * (2.0 * math.pi)
+            logarithms[i] -= 0.5 * ((aside / line_sigmas[k]) ** 2 + (turn / angle_sigma) ** 2)
+
+
+@kernel
+def _weigh_rays(
+    particles: Array,
+    rays: Array,
+    pieces: Array,
+    ray_table: Array,
+    share: float,
+    logarithms: Array,
+    fits: Array,
+) -> None:
+    """Weigh particles by the distances of ray ends from their matched pieces.
+
+    Rays are (k, 2), pieces (k, 5). Writes how well the rays fit, from 0.05 to 1.
+    """
+    last_entry = ray_table.shape[0] - 1
+    cosines, sines = np.cos(particles[:, 2]), np.sin(particles[:, 2])
+    for k in range(rays.shape[0]):
+        ray_x, ray_y = rays[k]
+        middle_x, middle_y, along_x, along_y, _ = pieces[k]
+        for i in range(particles.shape[0]):
+            dx = particles[i, 0] + cosines[i] * ray_x - sines[i] * ray_y - middle_x
+            dy = particles[i, 1] + sines[i] * ray_x + cosines[i] * ray_y - middle_y
+            entry = min(int(abs(dy * along_x - dx * along_y) * _ENTRIES_PER_METRE), last_entry)
+            logarithms[i] += share * ray_table[entry, 0]
+            fits[i] += ray_table[entry, 1] / rays.shape[0]
+
 
 _GATE_SIGMAS = 3.0
 _LEAST_MOTION = np.array([1e-4, 1e-4, 1e-4])
@@ -113,9 +185,7 @@ class SplineFilter(SplineTracker):
 
     Settings = SplineFilterSettings
 
-    def __init__(
-        self, settings: SplineFilterSettings | None = None, geometry: ScanGeometry | None = None
-    ) -> None:
+    def __init__(self, settings: SplineFilterSettings | None = None, geometry: ScanGeometry | None = None) -> None:
         self.settings = settings or SplineFilterSettings()
         super().__init__(self.settings.tracking, geometry or ScanGeometry())
 
@@ -132,18 +202,16 @@ class SplineFilter(SplineTracker):
         spread = np.array([settings.start_distance, settings.start_distance, settings.start_turn])
         self.particles = pose + spread * self._generator.standard_normal((settings.particles, 3))
         self.weights = np.full(settings.particles, 1.0 / settings.particles)
-        self.scales = 1.0 + np.array(
-            [settings.distance_bias, settings.turn_bias]
-        ) * self._generator.standard_normal((settings.particles, 2))
+        self.scales = 1.0 + np.array([settings.distance_bias, settings.turn_bias]) * self._generator.standard_normal(
+            (settings.particles, 2)
+        )
         self.resamplings, self._lost_steps, self._box = 0, 0, 0.0
-        self._ray_table = ray_likelihoods(self.tracking.curve_sigma)
+        self._ray_table = _ray_likelihoods(self.tracking.curve_sigma)
         # Where odometry alone leads each particle from its last place, and the covariance of that motion.
         self._expected, self._motion_covariance = self.particles.copy(), np.diag(_LEAST_MOTION**2)
 
     def _change_frame(self, change: Transform, reach: float) -> None:
-        self.particles = np.column_stack(
-            [change.apply(self.particles[:, :2]), self.particles[:, 2] + change.theta]
-        )
+        self.particles = np.column_stack([change.apply(self.particles[:, :2]), self.particles[:, 2] + change.theta])
 
     def _predict(self, motion: Transform) -> NDArray[np.float64]:
         first, distance, second = steps_of(motion)
@@ -172,29 +240,27 @@ class SplineFilter(SplineTracker):
         )
         heading = float(pose[2]) - second
         cosine, sine = math.cos(heading), math.sin(heading)
-        by_steps = np.array(
-            [[-distance * sine, cosine, 0.0], [distance * cosine, sine, 0.0], [1.0, 0.0, 1.0]]
-        )
+        by_steps = np.array([[-distance * sine, cosine, 0.0], [distance * cosine, sine, 0.0], [1.0, 0.0, 1.0]])
         self._motion_covariance = (by_steps * spread**2) @ by_steps.T + np.diag(_LEAST_MOTION**2)
         return pose
 
     def _correct(self, matches: Matches, observation: Observation) -> NDArray[np.float64]:
         tracking = self.tracking
         logarithms, fits = np.zeros(len(self.particles)), np.zeros(len(self.particles))
-        weigh_features(
+        _weigh_features(
             self.particles,
-            MatchedFeatures(
+            _MatchedFeatures(
                 matches.points,
                 matches.known_points,
                 np.maximum(matches.point_sigmas, tracking.feature_sigma),
             ),
-            MatchedFeatures(
+            _MatchedFeatures(
                 matches.lines, matches.known_lines, np.maximum(matches.line_sigmas, tracking.feature_sigma)
             ),
             tracking.line_angle_sigma,
             logarithms,
         )
-        weigh_rays(
+        _weigh_rays(
             self.particles,
             matches.rays,
             matches.pieces,
@@ -283,9 +349,7 @@ class SplineFilter(SplineTracker):
         drawn = round(settings.recovered_share * len(self.particles))
         if self._lost_steps >= _RECOVERY_STEPS and drawn > 0:
             self._box = 1.0 if is_lost else 0.5 * self._box
-            box = self._box * np.array(
-                [settings.recovery_distance, settings.recovery_distance, settings.recovery_turn]
-            )
+            box = self._box * np.array([settings.recovery_distance, settings.recovery_distance, settings.recovery_turn])
             which = self._generator.permutation(len(self.particles))[:drawn]
             self.particles[which] = pose + box * self._generator.uniform(-1.0, 1.0, (drawn, 3))
             self._lost_steps = 0

@@ -16,15 +16,13 @@ from numpy.typing import NDArray
 
 from lidarium.mapping.geometry.rigid import Transform, composed, relative, turned, wrapped
 from lidarium.mapping.grids.scan_geometry import ScanGeometry
-from lidarium.mapping.localization.dead_reckoning.localizer import KeyScans, Sensing
-from lidarium.mapping.localization.dead_reckoning.odometry import compounded
+from lidarium.mapping.localization.localizer import KeyScans, Sensing
 from lidarium.mapping.localization.matching.scan_points import at_last_beam
-from lidarium.mapping.localization.on_splines.spline_matches import Matches, match
-from lidarium.mapping.localization.on_splines.tracking_settings import TrackingSettings
+from lidarium.mapping.localization.odometry import compounded
+from lidarium.mapping.localization.on_splines.spline_matches import Matches, TrackingSettings, match
 from lidarium.mapping.localization.slam.mapped_path import MappedPath
-from lidarium.mapping.splines.curve_lookup import CurveLookup
-from lidarium.mapping.splines.features import Observation, observe
-from lidarium.mapping.splines.scan_points import scan_points
+from lidarium.mapping.splines.curve import CurveLookup
+from lidarium.mapping.splines.features import Observation, observe, scan_points
 from lidarium.mapping.splines.spline_map import SplineMap
 
 
@@ -234,9 +232,7 @@ class SplineTracker(ABC):
         now = self.local_covariance + np.diag([1e-10, 1e-10, 1e-10])
         root = np.linalg.cholesky(now)
         back = np.linalg.inv(root)
-        shares, directions = np.linalg.eigh(
-            np.eye(3) - back @ lever @ self._spread_at_node @ lever.T @ back.T
-        )
+        shares, directions = np.linalg.eigh(np.eye(3) - back @ lever @ self._spread_at_node @ lever.T @ back.T)
         grown = root @ directions
         return np.asarray((grown * np.maximum(shares, 0.0)) @ grown.T)
 
@@ -250,3 +246,31 @@ class SplineTracker(ABC):
 
 def _is_beyond(motion: Transform, distance: float, turn: float) -> bool:
     return math.hypot(motion.x, motion.y) >= distance or abs(motion.theta) >= turn
+
+
+def steps_of(motion: Transform) -> tuple[float, float, float]:
+    """Split a motion into a turn, a straight segment and a turn [rad, m, rad].
+
+    The segment leads ahead or back.
+    """
+    distance = math.hypot(motion.x, motion.y)
+    if distance < 0.001:
+        return 0.0, distance, motion.theta
+    first = math.atan2(motion.y, motion.x)
+    # A robot that backs up has not turned round twice.
+    if abs(first) > math.pi / 2.0:
+        first, distance = wrapped(first + math.pi), -distance
+    return first, distance, wrapped(motion.theta - first)
+
+
+def driven(poses: NDArray[np.float64], steps: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return poses (n, 3) after a turn, a straight segment and a turn each, (n, 3) [rad, m, rad]."""
+    headings = poses[:, 2] + steps[:, 0]
+    return np.stack(
+        [
+            poses[:, 0] + steps[:, 1] * np.cos(headings),
+            poses[:, 1] + steps[:, 1] * np.sin(headings),
+            headings + steps[:, 2],
+        ],
+        axis=1,
+    )

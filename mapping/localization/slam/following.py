@@ -10,14 +10,15 @@ from numpy.typing import NDArray
 
 from lidarium.mapping.files.laser_logs import LaserLog
 from lidarium.mapping.geometry.rigid import composed, relative
-from lidarium.mapping.localization.dead_reckoning.localizer import Sensing
-from lidarium.mapping.localization.matching.settings.graph import (
+from lidarium.mapping.localization.localizer import Sensing
+from lidarium.mapping.localization.settings import (
     ClosureSettings,
     CompassSettings,
     GraphSettings,
+    MatchingSettings,
+    SlamSettings,
+    SubmapSettings,
 )
-from lidarium.mapping.localization.matching.settings.matching import MatchingSettings, SubmapSettings
-from lidarium.mapping.localization.matching.settings.slam import SlamSettings
 from lidarium.mapping.localization.slam.localizer import Slam
 
 LOG_SETTINGS = SlamSettings(
@@ -91,13 +92,9 @@ def follow(
     clock : callable
         CPU time [s].
     """
-    matching = replace(
-        settings.matching, beam_interval_s=log.beam_interval_s or settings.matching.beam_interval_s
-    )
+    matching = replace(settings.matching, beam_interval_s=log.beam_interval_s or settings.matching.beam_interval_s)
     slam = Slam(
-        replace(
-            settings, matching=matching, uses_odometry=settings.uses_odometry and log.odometry is not None
-        ),
+        replace(settings, matching=matching, uses_odometry=settings.uses_odometry and log.odometry is not None),
         log.geometry,
     )
     slam.reset(log.laser_pose, 0)
@@ -114,9 +111,7 @@ def follow(
     slam.finish()
     finish_s = clock() - began
     laser = composed(slam.nodes[numbers], places)
-    return Followed(
-        slam, _of_robot(laser, log.laser_pose), _of_robot(online, log.laser_pose), scan_s, finish_s
-    )
+    return Followed(slam, _of_robot(laser, log.laser_pose), _of_robot(online, log.laser_pose), scan_s, finish_s)
 
 
 def _of_robot(laser: NDArray[np.float64], laser_pose: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -8,7 +8,7 @@ References
 The plan is that of Hess et al., Real-time loop closure in 2D LIDAR SLAM (ICRA 2016).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,18 +16,66 @@ from numpy.typing import NDArray
 from lidarium.mapping.geometry.rigid import composed, relative, turned
 from lidarium.mapping.grids.occupancy import OccupancyGrid
 from lidarium.mapping.grids.scan_geometry import ScanGeometry
-from lidarium.mapping.localization.dead_reckoning.localizer import KeyScans, Sensing
-from lidarium.mapping.localization.dead_reckoning.odometry import compounded
+from lidarium.mapping.localization.localizer import KeyScans, Sensing
 from lidarium.mapping.localization.matching.scan_matching import Match
 from lidarium.mapping.localization.matching.scan_points import at_last_beam
-from lidarium.mapping.localization.matching.settings.slam import SlamSettings
-from lidarium.mapping.localization.slam.doubts import ELSEWHERE, LITTLE, NO_MATCH, ODOMETRY_ALONE, Doubts
+from lidarium.mapping.localization.odometry import compounded
+from lidarium.mapping.localization.settings import SlamSettings
 from lidarium.mapping.localization.slam.mapped_path import MappedPath
 from lidarium.mapping.localization.slam.odometry_motion import OdometryMotion
 
+ODOMETRY_ALONE = "odometry alone: the scans show what the map does not hold"
+NO_MATCH = "no match: the scans contradict the map where odometry leads, and no other place is sure"
+
+ELSEWHERE = "odometry contradicted: the scans agree with the map in another direction or place alone"
+
+LITTLE = "little explained: hardly any of the scans agrees with the map, and no other place is sure"
+
+
+@dataclass(frozen=True, slots=True)
+class _Doubt:
+    """A stretch that is doubtful.
+
+    Attributes
+    ----------
+    start_s, end_s : float
+        Times of the last scan before it that was matched, and of the last scan in it [s].
+    scans : int
+        Scans in it.
+    reason : str
+        Why.
+    """
+
+    start_s: float
+    end_s: float
+    scans: int
+    reason: str
+
+
+class _Doubts:
+    """Doubtful stretches so far, in the order of time."""
+
+    def __init__(self) -> None:
+        self.stretches: list[_Doubt] = []
+        self._sure_s: float | None = None
+        self._is_open = False
+
+    def note(self, time_s: float, reason: str | None) -> None:
+        """Take in that a scan was matched (None), or why it is not sure where it was taken."""
+        if reason is None:
+            self._sure_s, self._is_open = time_s, False
+            return
+        if self._is_open and self.stretches[-1].reason == reason:
+            last = self.stretches[-1]
+            self.stretches[-1] = replace(last, end_s=time_s, scans=last.scans + 1)
+        else:
+            start_s = time_s if self._sure_s is None else self._sure_s
+            self.stretches.append(_Doubt(start_s, time_s, 1, reason))
+        self._is_open = True
+
 
 @dataclass(slots=True)
-class SlamCounts:
+class _SlamCounts:
     """What a localizer has done so far."""
 
     scans: int = 0
@@ -66,7 +114,7 @@ class Slam:
     def reset(self, pose: NDArray[np.float64], seed: int) -> None:
         """Begin again at x, y, theta (3,) [m, rad]; nothing is drawn."""
         self._path = MappedPath(self._settings, self._geometry, pose)
-        self.counts, self.doubts = SlamCounts(), Doubts()
+        self.counts, self.doubts = _SlamCounts(), _Doubts()
         self._has_begun = False
         self._motion = OdometryMotion(self._settings)
         self._failed, self._time_s = 0, 0.0
@@ -82,9 +130,7 @@ class Slam:
             Where the number of ranges is not that of the geometry.
         """
         if sensing.ranges.shape != (self._geometry.beams,):
-            raise ValueError(
-                f"ranges have shape {sensing.ranges.shape}; want ({self._geometry.beams},), one per beam"
-            )
+            raise ValueError(f"ranges have shape {sensing.ranges.shape}; want ({self._geometry.beams},), one per beam")
         self.counts.scans += 1
         self._time_s = sensing.time_s
         self._correct(sensing.time_s)

@@ -7,18 +7,201 @@ and end, nodes are set, places are recognised, and all nodes are brought to agre
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.mapping.geometry.rigid import composed, relative
-from lidarium.mapping.grids.occupancy import OccupancyGrid
+from lidarium.mapping.geometry.rigid import Transform, composed, relative
+from lidarium.mapping.grids.growing_array import GrowingArray
+from lidarium.mapping.grids.occupancy import OccupancyGrid, OccupancySettings
 from lidarium.mapping.grids.scan_geometry import ScanGeometry
-from lidarium.mapping.localization.dead_reckoning.localizer import KeyScans
-from lidarium.mapping.localization.dead_reckoning.odometry import compounded
+from lidarium.mapping.localization.graph.closures import Closure, ClosureFinder
 from lidarium.mapping.localization.graph.node_graph import NodeGraph
-from lidarium.mapping.localization.matching.local_mapping import LocalMapper, way
-from lidarium.mapping.localization.matching.settings.slam import SlamSettings
-from lidarium.mapping.localization.slam.loop_closing import LoopClosing
-from lidarium.mapping.localization.slam.scan_history import ScanHistory
-from lidarium.mapping.localization.slam.scan_sampling import ScanSampling
-from lidarium.mapping.localization.slam.wall_survey import WallSurvey
+from lidarium.mapping.localization.localizer import KeyScans
+from lidarium.mapping.localization.matching.local_mapping import Finished, LocalMapper, way
+from lidarium.mapping.localization.matching.scan_points import scan_points
+from lidarium.mapping.localization.matching.wall_compass import WallCompass
+from lidarium.mapping.localization.odometry import compounded
+from lidarium.mapping.localization.settings import SlamSettings
+
+
+class _LoopClosing:
+    """Finds closures, and keeps them until their time has come.
+
+    Parameters
+    ----------
+    settings : SlamSettings
+        How places are recognised, and how long a closure takes to act.
+    """
+
+    def __init__(self, settings: SlamSettings) -> None:
+        self._delay_s = settings.closures.delay_s
+        self._finder = ClosureFinder(settings.closures, settings.matching)
+        self._due: list[tuple[float, Closure]] = []
+
+    @property
+    def pending(self) -> int:
+        """How many closures were found that have not acted yet."""
+        return len(self._due)
+
+    def remember(self, ended: list[Finished], path: float) -> None:
+        """Take in finished local maps, after so much of the whole path [m]."""
+        for finished in ended:
+            self._finder.remember(finished, path)
+
+    def find(
+        self, graph: NodeGraph, points: NDArray[np.float64], path: float, usual_score: float, time_s: float
+    ) -> None:
+        """Find what the last node's scan recognises.
+
+        Parameters
+        ----------
+        graph : NodeGraph
+            The nodes.
+        points : (n, 2) float64
+            The last node's scan in its own frame [m].
+        path : float
+            Length of the path so far [m].
+        usual_score : float
+            Agreement of matches of late.
+        time_s : float
+            Now [s].
+        """
+        for closure in self._finder.find(
+            graph.nodes, points, graph.covariance, graph.covariance_since, path, usual_score
+        ):
+            self._due.append((time_s + self._delay_s, closure))
+
+    def take_due(self, time_s: float) -> list[Closure]:
+        """Return the closures whose time has come, once."""
+        acting = [closure for due, closure in self._due if due <= time_s]
+        if acting:
+            self._due = [(due, closure) for due, closure in self._due if due > time_s]
+        return acting
+
+
+class _ScanHistory:
+    """Matched scans, each with the node before it and its pose in that node's frame.
+
+    Parameters
+    ----------
+    geometry : ScanGeometry
+        Directions of the beams.
+    resolution : float
+        Side of the map's cells [m].
+    """
+
+    def __init__(self, geometry: ScanGeometry, resolution: float) -> None:
+        self._geometry, self._resolution = geometry, resolution
+        self._nodes, self._poses = GrowingArray((), np.int64), GrowingArray((3,), np.float64)
+        self._ranges = GrowingArray((geometry.beams,), np.float32)
+        self._times = GrowingArray((), np.float64)
+        self._map, self._mapped = OccupancyGrid(), 0
+
+    def append(self, node: int, pose: NDArray[np.float64], ranges: NDArray[np.float32], time_s: float) -> None:
+        """Take in a scan that was taken at a time [s]."""
+        self._nodes.append(node)
+        self._poses.append(pose)
+        self._ranges.append(ranges)
+        self._times.append(time_s)
+
+    def scans(self, nodes: NDArray[np.float64]) -> KeyScans:
+        """Return all scans at their poses, by the poses of the nodes (n, 3) [m, rad]."""
+        poses = composed(nodes[self._nodes.rows], self._poses.rows)
+        return KeyScans(poses, self._ranges.rows, self._times.rows)
+
+    def since(self, node: int) -> NDArray[np.int64]:
+        """Return the numbers of the scans that were taken at a node or after it."""
+        return np.flatnonzero(self._nodes.rows >= node)
+
+    def map(self, nodes: NDArray[np.float64]) -> OccupancyGrid:
+        """Return the map of all scans, by the poses of the nodes (n, 3) [m, rad]."""
+        if self._mapped == 0:
+            self._map = OccupancyGrid(OccupancySettings(resolution=self._resolution))
+        scans = self.scans(nodes)
+        for pose, ranges in zip(scans.poses[self._mapped :], scans.ranges[self._mapped :], strict=True):
+            self._map.integrate(pose, ranges, self._geometry)
+        self._mapped = len(self._ranges)
+        return self._map
+
+    def discard_map(self) -> None:
+        """Render the map again when it is next asked for: nodes have moved."""
+        self._mapped = 0
+
+
+class _ScanSampling:
+    """Samples the points of scans, in the robot's frame.
+
+    Parameters
+    ----------
+    settings : SlamSettings
+        How far points are taken, and how dense.
+    geometry : ScanGeometry
+        Directions of the beams.
+    """
+
+    def __init__(self, settings: SlamSettings, geometry: ScanGeometry) -> None:
+        self._settings, self._geometry = settings, geometry
+        self._unit_vectors = geometry.unit_vectors
+
+    def points(self, ranges: NDArray[np.float32], spacing_m: float, limit: int) -> NDArray[np.float64]:
+        """Return representative points in which beams ended, (n, 2) [m], thinned to few."""
+        longest = min(self._settings.matching.range_m, self._geometry.range_max)
+        return scan_points(ranges, self._unit_vectors, self._geometry.angle_increment, longest, spacing_m, limit)
+
+    def all_points(self, ranges: NDArray[np.float32]) -> NDArray[np.float64]:
+        """Return nearly all points in which beams ended.
+
+        They serve what is found once per run and gains from each point, such as the direction of
+        walls.
+        """
+        return self.points(ranges, self._settings.compass.spacing_m, self._geometry.beams)
+
+
+class _WallSurvey:
+    """Surveys where walls run, and compares later scans with them.
+
+    Parameters
+    ----------
+    settings : SlamSettings
+        Whether walls are used, and after how much of a path they are surveyed.
+    sampling : ScanSampling
+        Samples the points of scans.
+
+    Attributes
+    ----------
+    compass : WallCompass or None
+        Directions of walls; None where they are not used.
+    """
+
+    def __init__(self, settings: SlamSettings, sampling: _ScanSampling) -> None:
+        self.compass = WallCompass(settings.compass) if settings.uses_walls else None
+        self._sampling, self._after_m = sampling, settings.graph.start_path_m
+        self._due_m = self._after_m
+
+    def restart(self, length_m: float) -> None:
+        """Survey again after as much of the path: other local maps begin at this length [m]."""
+        if self.compass is not None:
+            self.compass.forget()
+            self._due_m = length_m + self._after_m
+
+    def observe(self, ranges: NDArray[np.float32], pose: NDArray[np.float64]) -> None:
+        """Compare the walls of a scan at a pose (3,) in the frame of the last node [m, rad]."""
+        if self.compass is not None and self.compass.is_surveyed:
+            self.compass.observe(Transform(*pose).apply(self._sampling.all_points(ranges)))
+
+    def survey(self, length_m: float, node: int, history: _ScanHistory, nodes: NDArray[np.float64]) -> None:
+        """Survey where walls run in the local map of a node, if it is time to.
+
+        Where none do, survey again after as much of the path.
+        """
+        if self.compass is None or self.compass.is_surveyed or length_m < self._due_m:
+            return
+        self._due_m = length_m + self._after_m
+        scans, since = history.scans(nodes), history.since(node)
+        poses = relative(nodes[node], scans.poses[since])
+        points = [
+            Transform(*pose).apply(self._sampling.all_points(ranges))
+            for pose, ranges in zip(poses, scans.ranges[since], strict=True)
+        ]
+        if points:  # none of the scans since may have been kept
+            self.compass.survey(np.concatenate(points), node, float(nodes[node, 2]))
 
 
 class MappedPath:
@@ -51,12 +234,12 @@ class MappedPath:
     """
 
     def __init__(self, settings: SlamSettings, geometry: ScanGeometry, pose: NDArray[np.float64]) -> None:
-        self._settings, self.sampling = settings, ScanSampling(settings, geometry)
+        self._settings, self.sampling = settings, _ScanSampling(settings, geometry)
         self.mapper = LocalMapper(settings, geometry)
-        self._loops = LoopClosing(settings)
-        self._walls = WallSurvey(settings, self.sampling)
+        self._loops = _LoopClosing(settings)
+        self._walls = _WallSurvey(settings, self.sampling)
         self._graph = NodeGraph(settings.graph, self._walls.compass, pose)
-        self._history = ScanHistory(geometry, settings.submaps.resolution)
+        self._history = _ScanHistory(geometry, settings.submaps.resolution)
         # The first scan's points and pose, until the map shows how well they match.
         self._first: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
         self.local, self.matched, self.at_node = np.zeros(3), np.zeros(3), np.zeros(3)
@@ -123,9 +306,7 @@ class MappedPath:
         node, pose = self.place
         return compounded(self._graph.nodes[node], self._graph.covariance, pose, spread)
 
-    def begin(
-        self, ranges: NDArray[np.float32], covariance: NDArray[np.float64], time_s: float
-    ) -> NDArray[np.float64]:
+    def begin(self, ranges: NDArray[np.float32], covariance: NDArray[np.float64], time_s: float) -> NDArray[np.float64]:
         """Begin the first local map where the robot is, at a node of its own.
 
         The covariance (3, 3) of its motion from the path's beginning is given. Return the new local map's
@@ -202,9 +383,7 @@ class MappedPath:
             self._graph.settle(len(acting))
             self._note_correction()
 
-    def motion_covariance(
-        self, matched: NDArray[np.float64], since: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
+    def motion_covariance(self, matched: NDArray[np.float64], since: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return how well the motion between two nodes is known, both by matches."""
         graph = self._settings.graph
         along = (graph.deviation_m + graph.deviation_per_metre * float(np.hypot(since[0], since[1]))) ** 2
@@ -236,9 +415,7 @@ class MappedPath:
                 self.mapper.add(self.last_node, self.local, ranges)
             self._loops.find(self._graph, points, self.length, self.mapper.usual_score, time_s)
 
-    def _begin_maps(
-        self, ranges: NDArray[np.float32], covariance: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
+    def _begin_maps(self, ranges: NDArray[np.float32], covariance: NDArray[np.float64]) -> NDArray[np.float64]:
         """Begin new local maps by a scan, at a new node at the robot's pose.
 
         The covariance of its motion since the last node is given.

@@ -1,12 +1,106 @@
 """The motion between sensings, by calibrated odometry or by the last motion."""
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.mapping.geometry.rigid import relative
-from lidarium.mapping.localization.dead_reckoning.localizer import Sensing
-from lidarium.mapping.localization.matching.settings.slam import SlamSettings
-from lidarium.mapping.localization.slam.calibration import OdometryCalibration
+from lidarium.mapping.localization.localizer import Sensing
+from lidarium.mapping.localization.settings import OdometryUncertainty, SlamSettings
+
+
+class OdometryCalibration:
+    """Systematic errors of odometry, and how well they are known.
+
+    Parameters
+    ----------
+    settings : OdometryUncertainty
+        What is known before the robot drives.
+
+    Attributes
+    ----------
+    errors : (3,) float64
+        Share by which a distance is longer than measured, share by which a turn is larger, and turn for each
+        metre [m/m, rad/rad, rad/m].
+    covariance : (3, 3) float64
+        Of the errors.
+    """
+
+    def __init__(self, settings: OdometryUncertainty) -> None:
+        self._settings = settings
+        self.errors = np.zeros(3)
+        self.covariance = self._at_first()
+
+    def _at_first(self) -> NDArray[np.float64]:
+        settings = self._settings
+        return np.diag([settings.distance_share**2, settings.turn_share**2, settings.turn_per_metre**2])
+
+    def corrected(self, motion: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return a small odometry motion without its systematic errors [m, rad].
+
+        The motion is x, y, theta (3,).
+        """
+        along, turn = self.errors[0], self.errors[1] * motion[2] + self.errors[2] * motion[0]
+        half = 0.5 * turn
+        x, y = (1.0 + along) * motion[0], (1.0 + along) * motion[1]
+        cosine, sine = math.cos(half), math.sin(half)
+        return np.array([cosine * x - sine * y, sine * x + cosine * y, motion[2] + turn])
+
+    def uncertainty(self, distance: float, turn: float) -> NDArray[np.float64]:
+        """Return the covariance (3, 3) of a corrected motion, at its end [m, rad].
+
+        The motion consists of a distance (negative backwards) and a turn.
+        """
+        lever = _lever(distance, turn)
+        return np.asarray(self._settings.noise(distance, turn) + lever @ self.covariance @ lever.T)
+
+    def learn(
+        self,
+        distance: float,
+        turn: float,
+        difference: NDArray[np.float64],
+        information: NDArray[np.float64],
+        prior: NDArray[np.float64],
+    ) -> None:
+        """Learn from a match.
+
+        Parameters
+        ----------
+        distance, turn : float
+            What odometry measured since the last match [m, rad].
+        difference : (3,) float64
+            Where the match lies in the frame of where the robot was expected: x, y, theta [m, rad].
+        information : (3, 3) float64
+            What the points of the scan alone measure of that, in the same frame [1/m^2, 1/(m rad), 1/rad^2].
+        prior : (3, 3) float64
+            What was known before, which the match has in it too.
+        """
+        settings = self._settings
+        lever = _lever(distance, turn)
+        # The last match was no better than this one, and what is left of a motion is its noise.
+        share = np.linalg.inv(
+            np.eye(3) + information @ (settings.noise(distance, turn) + np.linalg.pinv(information + prior))
+        )
+        weighted = share @ information
+        seen = share @ (information + prior) @ difference
+        faded = 1.0 - (1.0 - settings.fading) ** (abs(distance) + abs(turn))
+        grown = (1.0 - faded) * self.covariance + faded * self._at_first()
+        before = np.linalg.inv(grown)
+        after = before + lever.T @ weighted @ lever
+        self.covariance = np.asarray(np.linalg.inv(0.5 * (after + after.T)), np.float64)
+        self.errors = self.errors + self.covariance @ (lever.T @ seen)
+        bound = settings.most_deviations * np.sqrt(np.diag(self._at_first()))
+        self.errors = np.clip(self.errors, -bound, bound)
+
+
+def _lever(distance: float, turn: float) -> NDArray[np.float64]:
+    """Return the effect of the errors at the end of a motion, (3, 3).
+
+    In x, y [m] and heading [rad].
+    """
+    half = 0.5 * distance
+    return np.array([[distance, 0.0, 0.0], [0.0, half * turn, half * distance], [0.0, turn, distance]])
 
 
 class OdometryMotion:
@@ -62,9 +156,7 @@ class OdometryMotion:
         """
         return self._calibration.uncertainty(float(self._measured[0]), float(self._measured[1]))
 
-    def learn(
-        self, error: NDArray[np.float64], measured: NDArray[np.float64], prior: NDArray[np.float64]
-    ) -> None:
+    def learn(self, error: NDArray[np.float64], measured: NDArray[np.float64], prior: NDArray[np.float64]) -> None:
         """Learn from a match how odometry errs.
 
         Parameters

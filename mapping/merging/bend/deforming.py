@@ -12,12 +12,10 @@ from numpy.typing import NDArray
 
 from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.grids.occupancy import UNKNOWN
-from lidarium.mapping.merging.agreement.validation import Agreement
-from lidarium.mapping.merging.bend.bent_agreement import compare_bent
-from lidarium.mapping.merging.bend.estimation import Bend, BendSettings, estimate_bend
-from lidarium.mapping.merging.bend.hypotheses import MOST_STRAIN, Hypothesis
-from lidarium.mapping.merging.bend.offset_field import OffsetField
-from lidarium.mapping.merging.description.described_map import DescribedMap, describe_map
+from lidarium.mapping.merging.agreement import Agreement
+from lidarium.mapping.merging.bend.estimation import Bend, BendSettings, OffsetField, estimate_bend
+from lidarium.mapping.merging.bend.hypotheses import MOST_STRAIN, Hypothesis, compare_bent
+from lidarium.mapping.merging.described_map import DescribedMap, describe_map
 from lidarium.mapping.merging.fusion import FusedMap, fuse
 
 
@@ -124,13 +122,11 @@ def deform(
         corner = Transform(*known.origin)
         deformation = _held(under, one, (corner, transform), settings)
         found.append(deformation)
-        laid.append(
-            Laid(one.levels, transform) if deformation is None else bent_map(one, deformation.bend, corner)
-        )
+        laid.append(Laid(one.levels, transform) if deformation is None else _bent_map(one, deformation.bend, corner))
     return Deformed(_fused(laid, resolution), found, laid)
 
 
-def bent_map(one: DescribedMap, bend: Bend, corner: Transform) -> Laid:
+def _bent_map(one: DescribedMap, bend: Bend, corner: Transform) -> Laid:
     """Return a bent map in cells along the axes of the map onto which it is bent.
 
     Parameters

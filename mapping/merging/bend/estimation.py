@@ -20,10 +20,162 @@ from numpy.typing import NDArray
 
 from lidarium.mapping.geometry.bounds import Count, Distance, FromZero, check_settings, within
 from lidarium.mapping.geometry.rigid import Transform
-from lidarium.mapping.merging.bend.equations import add_springs, add_walls, find_gaps
-from lidarium.mapping.merging.bend.offset_field import OffsetField, bilinear
-from lidarium.mapping.merging.description.described_map import DescribedMap
-from lidarium.mapping.merging.wall_alignment import wall_sample
+from lidarium.mapping.kernels.compilation import Array, kernel
+from lidarium.mapping.merging.described_map import DescribedMap
+from lidarium.mapping.merging.wall_alignment import gap_to_wall, wall_sample
+
+
+@kernel
+def _find_gaps(
+    levels: Array,
+    distance: Array,
+    side: float,
+    places: Array,
+    normals: Array,
+    reach: float,
+    gaps: Array,
+    found: Array,
+) -> None:
+    """Write the gap along the normal from each place to a wall [m], and whether there is one in reach."""
+    steps = int(reach / side)
+    for i in range(places.shape[0]):
+        gap = gap_to_wall(
+            levels,
+            distance,
+            side,
+            places[i, 0] / side,
+            places[i, 1] / side,
+            normals[i, 0],
+            normals[i, 1],
+            steps,
+        )
+        found[i] = gap <= steps
+        gaps[i] = gap * side if found[i] else 0.0
+
+
+@kernel
+def _add_walls(
+    nodes: Array,
+    weights: Array,
+    normals: Array,
+    offsets: Array,
+    gaps: Array,
+    trust: Array,
+    band: Array,
+    right: Array,
+) -> None:
+    """Add to normal equations that the offsets along each wall's normal shall close its gap.
+
+    The band holds the lower triangle: entry (i, j) is at (i - j, j).
+    """
+    for i in range(nodes.shape[0]):
+        if trust[i] == 0.0:
+            continue
+        wanted = gaps[i]
+        for j in range(4):
+            for axis in range(2):
+                wanted += weights[i, j] * normals[i, axis] * offsets[nodes[i, j], axis]
+        for j in range(4):
+            for axis in range(2):
+                row = 2 * nodes[i, j] + axis
+                left = trust[i] * weights[i, j] * normals[i, axis]
+                right[row] += left * wanted
+                for k in range(4):
+                    for other in range(2):
+                        column = 2 * nodes[i, k] + other
+                        if column <= row:
+                            band[row - column, column] += left * weights[i, k] * normals[i, other]
+
+
+@kernel
+def _add_springs(columns: int, strength: float, band: Array) -> None:
+    """Add springs between the neighbouring nodes of a grid of so many columns to a band."""
+    count = band.shape[1] // 2
+    for node in range(count):
+        for step in (1, columns):
+            other = node + step
+            if other < count and (step > 1 or columns == 1 or other % columns != 0):
+                for axis in range(2):
+                    band[0, 2 * node + axis] += strength
+                    band[0, 2 * other + axis] += strength
+                    band[2 * step, 2 * node + axis] -= strength
+            if columns == 1:
+                break
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class OffsetField:
+    """Offsets of a map's points from where a rigid motion takes them.
+
+    Attributes
+    ----------
+    corner : (x, y)
+        The first node, in the map that is bent [m].
+    spacing_m : float
+        Between nodes, along both axes [m].
+    offsets : (rows, columns, 2) float64
+        At the nodes, along the axes of the other map [m].
+    """
+
+    corner: tuple[float, float]
+    spacing_m: float
+    offsets: NDArray[np.float64]
+
+    def at(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the offsets of points (n, 2) of the bent map [m]; beyond the grid those of its rim."""
+        found = np.empty((len(points), 2))
+        _interpolate(np.ascontiguousarray(points), self.corner, self.spacing_m, self.offsets, found)
+        return found
+
+    def bent(self, a_from_b: Transform, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return where points (n, 2) of the bent map b lie in map a [m]."""
+        return np.asarray(a_from_b.apply(points) + self.at(points))
+
+    def unbent(self, a_from_b: Transform, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return where points (n, 2) of map a lie in the bent map b [m].
+
+        Offsets change by a small share of the distance, so that two steps are exact to a millimetre.
+        """
+        back = a_from_b.inverse()
+        found = back.apply(points)
+        for _ in range(2):
+            found = back.apply(points - self.at(found))
+        return np.asarray(found)
+
+
+def _bilinear(
+    points: NDArray[np.float64], corner: tuple[float, float], spacing: float, shape: tuple[int, ...]
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Return the four nodes around each point and their weights, both (n, 4)."""
+    rows, columns = shape
+    place = (points - corner) / spacing
+    x, y = np.clip(place[:, 0], 0.0, columns - 1.0), np.clip(place[:, 1], 0.0, rows - 1.0)
+    left = np.minimum(x.astype(np.int64), max(columns - 2, 0))
+    low = np.minimum(y.astype(np.int64), max(rows - 2, 0))
+    u, v = x - left, y - low
+    right, high = np.minimum(left + 1, columns - 1), np.minimum(low + 1, rows - 1)
+    nodes = np.stack(
+        [low * columns + left, low * columns + right, high * columns + left, high * columns + right], axis=1
+    )
+    weights = np.stack([(1 - u) * (1 - v), u * (1 - v), (1 - u) * v, u * v], axis=1)
+    return nodes, weights
+
+
+@kernel
+def _interpolate(points: Array, corner: tuple[float, float], spacing: float, offsets: Array, found: Array) -> None:
+    """Write the bilinear offsets of points; `bilinear` is the plain form."""
+    rows, columns = offsets.shape[0], offsets.shape[1]
+    for i in range(points.shape[0]):
+        x = min(max((points[i, 0] - corner[0]) / spacing, 0.0), columns - 1.0)
+        y = min(max((points[i, 1] - corner[1]) / spacing, 0.0), rows - 1.0)
+        left, low = min(int(x), max(columns - 2, 0)), min(int(y), max(rows - 2, 0))
+        right, high = min(left + 1, columns - 1), min(low + 1, rows - 1)
+        u, v = x - left, y - low
+        for axis in range(2):
+            lower = (1.0 - u) * offsets[low, left, axis] + u * offsets[low, right, axis]
+            upper = (1.0 - u) * offsets[high, left, axis] + u * offsets[high, right, axis]
+            found[i, axis] = (1.0 - v) * lower + v * upper
+
 
 INDEPENDENT_M = 0.5
 """Length of wall that errs alike [m]."""
@@ -126,7 +278,7 @@ def estimate_bend(a: DescribedMap, b: DescribedMap, a_from_b: Transform, setting
     spacing = max(settings.spacing_m, float((high - low).max()) / max(settings.most_nodes - 1, 1))
     columns, rows = (int(count) for count in np.ceil((high - low) / spacing - 1e-9).astype(np.int64) + 1)
     corner = (float(low[0]), float(low[1]))
-    nodes, weights = bilinear(walls, corner, spacing, (rows, columns))
+    nodes, weights = _bilinear(walls, corner, spacing, (rows, columns))
     offsets = np.zeros((rows * columns, 2))
     start = a_from_b.apply(walls)
     gaps, found = np.zeros(len(walls)), np.zeros(len(walls), np.bool_)
@@ -135,14 +287,12 @@ def estimate_bend(a: DescribedMap, b: DescribedMap, a_from_b: Transform, setting
         reach = settings.reach_m * (settings.last_reach_m / settings.reach_m) ** share
         reach = max(reach, 2.0 * a.resolution)
         places = start + (weights[..., None] * offsets[nodes]).sum(axis=1)
-        find_gaps(a.levels, a.distance, a.resolution, places, normals, reach, gaps, found)
+        _find_gaps(a.levels, a.distance, a.resolution, places, normals, reach, gaps, found)
         if found.sum() < 3:
             break
-        offsets = _solved(
-            nodes, weights, normals, offsets, (gaps, found, reach), (columns, settings.stiffness)
-        )
+        offsets = _solved(nodes, weights, normals, offsets, (gaps, found, reach), (columns, settings.stiffness))
     places = start + (weights[..., None] * offsets[nodes]).sum(axis=1)
-    find_gaps(a.levels, a.distance, a.resolution, places, normals, settings.last_reach_m, gaps, found)
+    _find_gaps(a.levels, a.distance, a.resolution, places, normals, settings.last_reach_m, gaps, found)
     field = OffsetField(corner, spacing, offsets.reshape(rows, columns, 2))
     wall_m = b.resolution * len(b.walls) / max(len(sample), 1)
     return _described(a_from_b, field, (walls, normals, gaps), found, wall_m)
@@ -169,10 +319,10 @@ def _solved(
     # Large gaps count less: they may lead to another wall.
     trust = np.where(found, 1.0 / (1.0 + (2.0 * gaps / reach) ** 2), 0.0)
     band, right = np.zeros((2 * columns + 4, 2 * count)), np.zeros(2 * count)
-    add_walls(nodes, weights, normals, offsets, gaps, trust, band, right)
+    _add_walls(nodes, weights, normals, offsets, gaps, trust, band, right)
     # The springs are as strong as the walls of a node.
     strength = trust.sum() / count
-    add_springs(columns, stiffness * strength, band)
+    _add_springs(columns, stiffness * strength, band)
     band[0] += ANCHOR * strength
     return np.asarray(scipy.linalg.solveh_banded(band, right, lower=True).reshape(count, 2))
 

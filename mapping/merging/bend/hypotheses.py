@@ -10,10 +10,60 @@ from typing import NamedTuple
 import numpy as np
 
 from lidarium.mapping.geometry.rigid import Transform
-from lidarium.mapping.merging.agreement.validation import Agreement, ValidationSettings, compare
-from lidarium.mapping.merging.bend.bent_agreement import compare_bent
+from lidarium.mapping.merging.agreement import (
+    Agreement,
+    ValidationSettings,
+    WallField,
+    agreement_of,
+    compare,
+    count_walls,
+)
 from lidarium.mapping.merging.bend.estimation import Bend, BendSettings, estimate_bend
-from lidarium.mapping.merging.description.described_map import DescribedMap
+from lidarium.mapping.merging.described_map import DescribedMap
+
+SHARP_M, BLUNT_M = 0.075, 0.15
+"""Least and greatest distance at which walls agree [m]: half of a thin wall's thickness, and all of it."""
+
+SPREADS = 2.5
+"""So many standard deviations of the gaps that a bend leaves, walls agree."""
+
+
+def _tolerance(bend: Bend, resolution: float) -> tuple[float, float]:
+    """Return at which distance walls agree, and beyond which they contradict [m].
+
+    Both follow from the spread of the gaps that the bend has left.
+    """
+    hit = max(min(max(SHARP_M, SPREADS * bend.spread_m), BLUNT_M), 1.5 * resolution)
+    return hit, max(2.0 * hit + 0.025, 2.5 * resolution)
+
+
+def compare_bent(a: DescribedMap, b: DescribedMap, bend: Bend) -> Agreement:
+    """Lay map b over map a and bend it.
+
+    Parameters
+    ----------
+    a, b : DescribedMap
+        Maps of one resolution.
+    bend : Bend
+        How b lies and is bent.
+
+    Returns
+    -------
+    Agreement
+        What agrees and what does not, within the tolerance of the bend.
+    """
+    hit, miss = _tolerance(bend, a.resolution)
+    walls, facing = np.zeros((2, 3), np.int64), np.zeros((2, 3))
+    turn = Transform(0.0, 0.0, bend.a_from_b.theta)
+    laid = (
+        (a, bend.field.bent(bend.a_from_b, b.walls), turn.apply(b.normals)),
+        (b, bend.field.unbent(bend.a_from_b, a.walls), turn.inverse().apply(a.normals)),
+    )
+    for k, (under, places, normals) in enumerate(laid):
+        field = WallField(under.levels, under.distance, under.is_open, 1.0 / under.resolution, hit, miss)
+        count_walls(field, places, normals, (0.0, 0.0, 0.0), walls[k], facing[k])
+    return agreement_of(a, b, bend.a_from_b, walls, facing)
+
 
 LOOSE = ValidationSettings(hit_distance_m=0.3, miss_distance_m=0.6)
 """Tolerance with which transforms are chosen that are worth bending: bends of halls are not longer."""
@@ -84,7 +134,7 @@ def _bent(a: DescribedMap, b: DescribedMap, a_from_b: Transform, settings: BendS
     return Hypothesis(bend, compare_bent(a, b, bend))
 
 
-def is_other(one: Hypothesis, other: Hypothesis) -> bool:
+def _is_other(one: Hypothesis, other: Hypothesis) -> bool:
     """Whether two hypotheses are of different places."""
     distance, angle = one.bend.a_from_b.difference(other.bend.a_from_b, one.agreement.centre)
     return distance > RIVAL_M or angle > RIVAL_ANGLE
@@ -96,7 +146,7 @@ def agrees_bent(a: DescribedMap, b: DescribedMap, a_from_b: Transform, settings:
     return bent.agreement.wall_m == 0.0 or bent.evidence_m > 0.0
 
 
-class Signs(NamedTuple):
+class _Signs(NamedTuple):
     """What distinguishes maps of one place from strangers.
 
     Attributes
@@ -132,12 +182,12 @@ class Signs(NamedTuple):
     spread_m: float
 
 
-def signs_of(a: DescribedMap, b: DescribedMap, ranked: list[Hypothesis]) -> Signs:
+def signs_of(a: DescribedMap, b: DescribedMap, ranked: list[Hypothesis]) -> _Signs:
     """Return what distinguishes the best of ranked hypotheses from a chance."""
     best = ranked[0]
     evidence = max(best.evidence_m, 0.0)
-    rival = next((one.evidence_m for one in ranked[1:] if is_other(best, one)), 0.0)
-    return Signs(
+    rival = next((one.evidence_m for one in ranked[1:] if _is_other(best, one)), 0.0)
+    return _Signs(
         evidence,
         evidence / max(best.agreement.agreeing_m, 1e-9),
         best.agreement.overlap_m2,
@@ -150,7 +200,7 @@ def signs_of(a: DescribedMap, b: DescribedMap, ranked: list[Hypothesis]) -> Sign
     )
 
 
-def confidence_of(signs: Signs) -> float:
+def confidence_of(signs: _Signs) -> float:
     """Return how sure it is that two maps are of one place, from 0 to 1.
 
     It is 0 where an overlap is no larger than rooms that are alike, where another place explains the maps

@@ -2,17 +2,176 @@
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.mapping.grids.occupancy import FREE, OCCUPIED, UNKNOWN
-from lidarium.mapping.merging.regions.directions import direction_histogram, region_axes, wall_slopes
-from lidarium.mapping.merging.regions.doors import Doors, find_doors
-from lidarium.mapping.merging.regions.meetings import NONE, find_meetings
-from lidarium.mapping.merging.regions.segmentation import clearance_of, free_space, split_regions
-from lidarium.mapping.merging.regions.settings import RegionSettings
+from lidarium.mapping.merging.regions.segmentation import (
+    NONE,
+    Meetings,
+    RegionSettings,
+    clearance_of,
+    find_meetings,
+    free_space,
+    split_regions,
+)
+
+QUARTER = math.pi / 2.0
+BINS = 90
+"""Bins of a histogram of directions, over a quarter turn."""
+
+LEAST_CONTRAST = 1.3
+"""The likeliest rotation is so many times as likely as the mean, where walls have directions at all."""
+
+LIKELY = 0.4
+"""Rotations are tried that are likelier than the mean by this share of what the likeliest one is."""
+
+_SMOOTH_CELLS, _SMOOTH_BINS = 2.0, 2.0
+"""Standard deviations with which free space and histograms are smoothed [cells, bins]."""
+
+
+class _Slopes(NamedTuple):
+    """Slopes of free space at the cells beside walls: directions (n,) [rad] and regions (n,) int32."""
+
+    directions: NDArray[np.float64]
+    regions: NDArray[np.int32]
+
+
+def _wall_slopes(levels: NDArray[np.uint8], free: NDArray[np.uint8], labels: NDArray[np.int32]) -> _Slopes:
+    """Return across which directions walls run, at each cell of a region beside one.
+
+    Parameters
+    ----------
+    levels, free, labels : (rows, columns) uint8, uint8, int32
+        The three-level map, 1 where it is free, and its regions.
+    """
+    smooth = cv2.GaussianBlur(free.astype(np.float32), (0, 0), _SMOOTH_CELLS)
+    is_wall = cv2.dilate((levels == OCCUPIED).astype(np.uint8), np.ones((3, 3), np.uint8))
+    rows, columns = np.nonzero((is_wall > 0) & (labels != NONE))
+    x, y = (cv2.Scharr(smooth, cv2.CV_32F, *order)[rows, columns] for order in ((1, 0), (0, 1)))
+    return _Slopes(np.arctan2(y, x).astype(np.float64), labels[rows, columns])
+
+
+def _region_axes(slopes: _Slopes, count: int) -> NDArray[np.float64]:
+    """Return the direction of each region's walls from 0 to a quarter turn, of all where it has none."""
+    # Fourfold angles are alike for all four directions of a rectangle's walls.
+    around = np.exp(4j * slopes.directions)
+    sums = np.bincount(slopes.regions, around.real, count) + 1j * np.bincount(slopes.regions, around.imag, count)
+    sums[sums == 0.0] = around.sum()
+    return np.asarray((np.angle(sums) / 4.0) % QUARTER)
+
+
+def _direction_histogram(slopes: _Slopes) -> NDArray[np.float64]:
+    """Return how many walls run in each direction of a quarter turn, smoothed, shape (`BINS`,)."""
+    bins = (slopes.directions % QUARTER / QUARTER * BINS).astype(np.int64) % BINS
+    distance = np.minimum(np.arange(BINS), BINS - np.arange(BINS))
+    smoothing = np.exp(-0.5 * (distance / _SMOOTH_BINS) ** 2)
+    return _circular(np.bincount(bins, minlength=BINS).astype(np.float64), smoothing)
+
+
+def likely_rotations(a: NDArray[np.float64], b: NDArray[np.float64], count: int) -> NDArray[np.float64]:
+    """Return the rotations of map b under which its walls run along those of map a.
+
+    Parameters
+    ----------
+    a, b : (`BINS`,) float64
+        Directions of the maps' walls.
+    count : int
+        Of rotations around the circle; all of them where walls run in all directions.
+
+    Returns
+    -------
+    (n,) float64
+        At most so many rotations, the likeliest among them [rad].
+    """
+    alike = _circular(a, np.roll(b[::-1], 1))
+    mean, most = float(alike.mean()), float(alike.max())
+    every = np.arange(count, dtype=np.float64) * (2.0 * math.pi / count)
+    if most < LEAST_CONTRAST * mean or most == 0.0:
+        return every
+    rotations = every + float(alike.argmax()) / BINS * QUARTER
+    values = alike[np.rint(rotations % QUARTER / QUARTER * BINS).astype(np.int64) % BINS]
+    return np.asarray(rotations[values >= mean + LIKELY * (most - mean)])
+
+
+def _circular(one: NDArray[np.float64], other: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the circular convolution of two arrays of one length."""
+    return np.asarray(np.fft.irfft(np.fft.rfft(one) * np.fft.rfft(other), len(one)))
+
+
+_WIDE_PART = 0.7
+"""The middle of a door is that of the edges with so much of its most clearance."""
+
+
+class Doors(NamedTuple):
+    """Gaps between regions, (n,).
+
+    Attributes
+    ----------
+    regions : (n, 2) int64
+        The regions on both sides; one pair may have several doors.
+    places : (n, 2) float64
+        Middle of the gap, in the map's frame [m].
+    normals : (n,) float64
+        Direction through it, from the first region to the second [rad].
+    widths : (n,) float64
+        Width of the gap [m].
+    """
+
+    regions: NDArray[np.int64]
+    places: NDArray[np.float64]
+    normals: NDArray[np.float64]
+    widths: NDArray[np.float64]
+
+
+def _find_doors(met: Meetings, side: float) -> Doors:
+    """Return the doors of a map, those between the first regions first.
+
+    Parameters
+    ----------
+    met : Meetings
+        Edges between cells of two regions.
+    side : float
+        Side of a cell [m].
+    """
+    is_turned = met.regions[:, 0] > met.regions[:, 1]
+    pairs = np.sort(met.regions, axis=1).astype(np.int64)
+    steps = np.where(is_turned[:, None], -met.steps, met.steps)
+    regions, places, normals, widths = [], [], [], []
+    for pair in np.unique(pairs, axis=0):
+        chosen = np.flatnonzero((pairs == pair).all(axis=1))
+        parts = _connected(met.places[chosen])
+        for part in range(parts.max() + 1):
+            edges = chosen[parts == part]
+            most = met.clearance[edges].max()
+            middle = met.places[edges[met.clearance[edges] >= _WIDE_PART * most]].mean(axis=0)
+            through = steps[edges].sum(axis=0)
+            regions.append(pair)
+            places.append(middle * side)
+            normals.append(np.arctan2(through[1], through[0]))
+            # Clearance is that of a cell's middle: half a cell more or less on average.
+            widths.append((2.0 * most - 0.5) * side)
+    return Doors(
+        np.array(regions, np.int64).reshape(-1, 2),
+        np.array(places).reshape(-1, 2),
+        np.array(normals, np.float64),
+        np.array(widths, np.float64),
+    )
+
+
+def _connected(places: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Return the number of the connected part to which each edge belongs, (n,)."""
+    # Middles of edges lie on a grid of half cells; those of neighbouring cells are at most two apart.
+    points = np.rint(2.0 * places).astype(np.int64)
+    columns, rows = (points - points.min(axis=0) + 2).T
+    drawn = np.zeros((rows.max() + 3, columns.max() + 3), np.uint8)
+    drawn[rows, columns] = 1
+    _, parts = cv2.connectedComponents(cv2.dilate(drawn, np.ones((3, 3), np.uint8)), connectivity=8)
+    return np.asarray(parts[rows, columns], np.int64) - 1
+
 
 _MOST_CELLS = 2000
 """About so many cells of a region show its extents."""
@@ -108,22 +267,20 @@ def find_regions(levels: NDArray[np.uint8], resolution: float, settings: RegionS
     """
     known, corner = _cropped(levels)
     origin = np.array(corner) * resolution
-    count = max(
-        int(settings.cell_m / resolution + 1e-6), math.ceil(math.sqrt(known.size / settings.most_cells))
-    )
+    count = max(int(settings.cell_m / resolution + 1e-6), math.ceil(math.sqrt(known.size / settings.most_cells)))
     known, resolution = _joined(known, count), count * resolution
     free = free_space(known, round(settings.least_obstacle_m / resolution))
     clearance = clearance_of(free)
     labels = split_regions(clearance, resolution, settings)
     count = int(labels.max(initial=NONE)) + 1
-    slopes = wall_slopes(known, free, labels)
-    axes = region_axes(slopes, count)
+    slopes = _wall_slopes(known, free, labels)
+    axes = _region_axes(slopes, count)
     low, high = _boxes(labels, resolution, origin, axes)
-    doors = find_doors(find_meetings(labels, clearance), resolution)
+    doors = _find_doors(find_meetings(labels, clearance), resolution)
     doors = doors._replace(places=doors.places + origin, normals=_snapped(doors, axes))
     areas = np.bincount(labels[labels != NONE], minlength=count).astype(np.float64) * resolution**2
     return RegionGraph(
-        labels, resolution, tuple(origin.tolist()), areas, axes, low, high, doors, direction_histogram(slopes)
+        labels, resolution, tuple(origin.tolist()), areas, axes, low, high, doors, _direction_histogram(slopes)
     )
 
 

@@ -12,9 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.mapping.merging.regions.doors import Doors
-from lidarium.mapping.merging.regions.graph import RegionGraph, turned
-from lidarium.mapping.merging.regions.settings import RegionSettings
+from lidarium.mapping.merging.regions.graph import Doors, RegionGraph, turned
+from lidarium.mapping.merging.regions.segmentation import RegionSettings
 
 QUARTER = math.pi / 2.0
 
@@ -22,7 +21,7 @@ SCALE_STEP = 0.03
 """Between the logarithms of scales that are proposed beside each other."""
 
 
-class BoxPairs(NamedTuple):
+class _BoxPairs(NamedTuple):
     """Boxes of every region of map a and of every one of map b, the latter by a quarter turn or more.
 
     Attributes
@@ -63,12 +62,12 @@ def propose_motions(a: RegionGraph, b: RegionGraph, settings: RegionSettings) ->
     (n, 3) float64
         x, y [m] and theta [rad] of ``a_from_b``.
     """
-    return np.concatenate([by_regions(a, b, settings), by_doors(a.doors, b.doors, settings)])
+    return np.concatenate([_by_regions(a, b, settings), _by_doors(a.doors, b.doors, settings)])
 
 
-def by_regions(a: RegionGraph, b: RegionGraph, settings: RegionSettings) -> NDArray[np.float64]:
+def _by_regions(a: RegionGraph, b: RegionGraph, settings: RegionSettings) -> NDArray[np.float64]:
     """Return the motions (n, 3) under which regions of like extents meet, as `propose_motions`."""
-    pairs = box_pairs(a, b, settings.most_regions)
+    pairs = _box_pairs(a, b, settings.most_regions)
     extents = pairs.extents
     bound = np.maximum(settings.extent_m, settings.extent_share * extents.max(axis=0))
     alike = np.abs(extents[0] - extents[1]) <= bound
@@ -101,7 +100,7 @@ def by_growing_regions(
     (n, 4) float64
         x, y [m] and theta [rad] of ``a_from_b`` of the grown map, and by how much it grows.
     """
-    pairs = box_pairs(a, b, settings.most_regions)
+    pairs = _box_pairs(a, b, settings.most_regions)
     ratios = np.log(np.maximum(pairs.extents[0], 1e-9) / np.maximum(pairs.extents[1], 1e-9))
     alike = np.flatnonzero(np.abs(ratios[:, 0] - ratios[:, 1]) <= settings.scale_share)
     # What was seen of a room in part has other extents: scales beside are proposed about the same middle.
@@ -115,7 +114,7 @@ def by_growing_regions(
     return np.column_stack([shifts, pairs.rotations[pair], growth])
 
 
-def by_doors(a: Doors, b: Doors, settings: RegionSettings) -> NDArray[np.float64]:
+def _by_doors(a: Doors, b: Doors, settings: RegionSettings) -> NDArray[np.float64]:
     """Return the motions (n, 3) under which doors of like widths meet, as `propose_motions`."""
     first, second = (np.argsort(-one.widths, kind="stable")[: settings.most_doors] for one in (a, b))
     i, j = (pairs.ravel() for pairs in np.meshgrid(first, second, indexing="ij"))
@@ -126,7 +125,7 @@ def by_doors(a: Doors, b: Doors, settings: RegionSettings) -> NDArray[np.float64
     return np.column_stack([a.places[i] - turned(b.places[j], rotations), rotations])
 
 
-def box_pairs(a: RegionGraph, b: RegionGraph, most: int) -> BoxPairs:
+def _box_pairs(a: RegionGraph, b: RegionGraph, most: int) -> _BoxPairs:
     """Return each of the largest regions of map a with each of map b, at four quarter turns."""
     first, second = (np.argsort(-one.areas, kind="stable")[:most] for one in (a, b))
     low, high, axes = [], [], []
@@ -137,4 +136,4 @@ def box_pairs(a: RegionGraph, b: RegionGraph, most: int) -> BoxPairs:
         low.append(np.stack([a.low[i], ends.min(axis=0)[j]]))
         high.append(np.stack([a.high[i], ends.max(axis=0)[j]]))
         axes.append(np.stack([a.axes[i], (b.axes[second] - turn)[j]]))
-    return BoxPairs(*(np.concatenate(parts, axis=1) for parts in (low, high, axes)))
+    return _BoxPairs(*(np.concatenate(parts, axis=1) for parts in (low, high, axes)))

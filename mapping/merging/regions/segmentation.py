@@ -11,21 +11,177 @@ depth: Najman, Schmitt, "Geodesic saliency of watershed contours and hierarchica
 Transactions on Pattern Analysis and Machine Intelligence 18, 1996.
 """
 
-from typing import NamedTuple
+import math
+from dataclasses import dataclass
+from typing import Annotated, NamedTuple
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from lidarium.mapping.geometry.bounds import (
+    Angle,
+    Count,
+    Counted,
+    Distance,
+    FromZero,
+    Length,
+    above,
+    check_settings,
+    share,
+    within,
+)
 from lidarium.mapping.grids.occupancy import FREE
 from lidarium.mapping.kernels.compilation import Array, kernel
-from lidarium.mapping.merging.regions.meetings import NONE, find_meetings
-from lidarium.mapping.merging.regions.settings import RegionSettings
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RegionSettings:
+    """How free space is split into regions, and how those of two maps are matched.
+
+    Attributes
+    ----------
+    cell_m : float
+        Side of the cells in which regions are found, or that of the map where it is larger [m].
+    most_cells : int
+        Maps that know more of such cells are split in larger ones: a bound of time.
+    least_obstacle_m : float
+        What stands in free space and is smaller along both axes does not split it [m].
+    widest_door_m : float
+        Widest gap that is a door [m].
+    door_share : float
+        Largest width of a door as a share of the width of the narrower region.
+    least_radius_m : float
+        Radius of the disc that a region holds at least [m].
+    least_area_m2 : float
+        Area of a region at least; smaller ones belong to a neighbour [m2].
+    most_regions, most_doors : int
+        So many of the largest regions, and of the widest doors, are matched.
+    extent_m, extent_share : float
+        By how much the extents of one region may differ between maps [m, share]: the larger of both.
+    door_width_m : float
+        By how much the widths of one door may differ [m].
+    scale_share : float
+        By how much the ratio of a region's extents may differ where a scale is sought, as a share.
+    scale_steps : int
+        So many scales to each side of that of two regions are proposed too, 3 % apart.
+    candidates : int
+        Number of motions that are refined and judged.
+    apart_m, apart_angle : float
+        These differ by more [m, rad].
+    likely_rotations : bool
+        Whether of all rotations only those are tried under which the walls of both maps run alike. That takes
+        half the time, and misses rivals by which strangers are known.
+    """
+
+    cell_m: Length = 0.05
+    most_cells: Annotated[int, within(1000, 100_000_000)] = 500_000
+    least_obstacle_m: Distance = 0.4
+    widest_door_m: Length = 1.5
+    door_share: Annotated[float, share()] = 0.75
+    least_radius_m: Distance = 0.35
+    least_area_m2: FromZero = 1.5
+    most_regions: Count = 24
+    most_doors: Count = 32
+    extent_m: Distance = 0.3
+    extent_share: Annotated[float, share()] = 0.08
+    door_width_m: Distance = 0.3
+    scale_share: Annotated[float, above(0.0, 1.0)] = 0.08
+    scale_steps: Counted = 4
+    candidates: Annotated[int, within(1, 1000)] = 12
+    apart_m: Distance = 0.3
+    apart_angle: Angle = math.radians(4.0)
+    likely_rotations: bool = False
+
+    def __post_init__(self) -> None:
+        check_settings(self, "regions")
+
+
+NONE = -1
+"""Label of cells that are in no region."""
+
+
+class Meetings(NamedTuple):
+    """Edges between cells of two regions.
+
+    Attributes
+    ----------
+    regions : (n, 2) int32
+        The regions.
+    clearance : (n,) float32
+        Of the narrower of both cells [cells].
+    places : (n, 2) float64
+        Middle of each edge, column and row [cells].
+    steps : (n, 2) float64
+        Unit step across it, from the first region to the second.
+    """
+
+    regions: NDArray[np.int32]
+    clearance: NDArray[np.float32]
+    places: NDArray[np.float64]
+    steps: NDArray[np.float64]
+
+
+def find_meetings(labels: NDArray[np.int32], clearance: NDArray[np.float32]) -> Meetings:
+    """Return all edges at which cells of two regions meet.
+
+    Parameters
+    ----------
+    labels : (rows, columns) int32
+        Region of each cell, or `NONE`.
+    clearance : (rows, columns) float32
+        Distance to what is not free [cells].
+    """
+    cells = np.empty((_count(labels), 3), np.int64)
+    _collect(labels, cells)
+    row, column, is_down = cells.T
+    beside = row + is_down, column + 1 - is_down
+    steps = np.column_stack([1 - is_down, is_down]).astype(np.float64)
+    return Meetings(
+        np.column_stack([labels[row, column], labels[beside]]),
+        np.minimum(clearance[row, column], clearance[beside]),
+        np.column_stack([column, row]) + 0.5 + 0.5 * steps,
+        steps,
+    )
+
+
+@kernel
+def _count(labels: Array) -> int:
+    """Return the number of edges at which two regions meet."""
+    count = 0
+    for row in range(labels.shape[0]):
+        for column in range(labels.shape[1]):
+            for down in range(2):
+                if _meets(labels, row, column, down, 1 - down):
+                    count += 1
+    return count
+
+
+@kernel
+def _collect(labels: Array, cells: Array) -> None:
+    """Write the first cell of each edge, and whether the other is below: 1, else 0."""
+    count = 0
+    for row in range(labels.shape[0]):
+        for column in range(labels.shape[1]):
+            for down in range(2):
+                if _meets(labels, row, column, down, 1 - down):
+                    cells[count, 0], cells[count, 1], cells[count, 2] = row, column, down
+                    count += 1
+
+
+@kernel(forceinline=True)
+def _meets(labels: Array, row: int, column: int, down: int, right: int) -> bool:
+    """Whether a cell and that beside it are of two regions."""
+    if labels[row, column] == NONE or row + down >= labels.shape[0] or column + right >= labels.shape[1]:
+        return False
+    other = labels[row + down, column + right]
+    return bool(other != NONE and other != labels[row, column])
+
 
 _LEVELS_A_CELL = 8
 
 
-class SplitRule(NamedTuple):
+class _SplitRule(NamedTuple):
     """Where basins stay apart; lengths in cells.
 
     Half the width of the widest door, its share of the narrower region, radius of a region at least.
@@ -77,7 +233,7 @@ def split_regions(clearance: NDArray[np.float32], side: float, settings: RegionS
     settings : RegionSettings
         Where regions are split.
     """
-    rule = SplitRule(0.5 * settings.widest_door_m / side, settings.door_share, settings.least_radius_m / side)
+    rule = _SplitRule(0.5 * settings.widest_door_m / side, settings.door_share, settings.least_radius_m / side)
     labels = np.full(clearance.shape, NONE, np.int32)
     order = np.empty(np.count_nonzero(clearance), np.int64)
     _sort(clearance, np.zeros(int(clearance.max() * _LEVELS_A_CELL) + 2, np.int64), order)
@@ -109,9 +265,7 @@ def _sort(clearance: Array, ends: Array, order: Array) -> None:
 
 
 @kernel
-def _flood(
-    clearance: Array, order: Array, rule: SplitRule, basins: tuple[Array, Array, Array], labels: Array
-) -> int:
+def _flood(clearance: Array, order: Array, rule: _SplitRule, basins: tuple[Array, Array, Array], labels: Array) -> int:
     """Label the cells by basins, with parent, peak and area of each; returns how many there are.
 
     Each cell joins the basin from which the slope to it is steepest. Where it touches several, those merge
@@ -156,7 +310,7 @@ def _root(parent: Array, basin: int) -> int:
 
 
 @kernel(forceinline=True)
-def _met(parent: Array, peak: Array, one: int, other: int, height: float, rule: SplitRule) -> int:
+def _met(parent: Array, peak: Array, one: int, other: int, height: float, rule: _SplitRule) -> int:
     """Merge two basins that meet, unless a door keeps them apart; returns that of the first one."""
     if one == other or _is_door(height, min(peak[one], peak[other]), rule):
         return one
@@ -166,7 +320,7 @@ def _met(parent: Array, peak: Array, one: int, other: int, height: float, rule: 
 
 
 @kernel(forceinline=True)
-def _is_door(height: float, peak: float, rule: SplitRule) -> bool:
+def _is_door(height: float, peak: float, rule: _SplitRule) -> bool:
     """Whether a passage keeps two basins apart, by its clearance and the peak of the narrower one."""
     return bool(height <= rule.half_door and peak >= rule.least_radius and height <= rule.door_share * peak)
 
@@ -202,9 +356,7 @@ def _without_small(
     return np.asarray(number[into][labels], np.int32)
 
 
-def _give_passages(
-    passages: dict[int, dict[int, float]], basin: int, beside: dict[int, float], target: int
-) -> None:
+def _give_passages(passages: dict[int, dict[int, float]], basin: int, beside: dict[int, float], target: int) -> None:
     """Give the passages of a basin that is no more to another one."""
     for other, height in beside.items():
         del passages[other][basin]

@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 
-from lidarium.agents.learned.decision import decision_of, scene_of, tours_in
+from lidarium.agents.learned.decision import _tours_in, decision_of, scene_of
 from lidarium.agents.learned.features import OPTION_FEATURES, SITUATION_FEATURES, TEAMMATE_FEATURES
-from lidarium.agents.tours.planning import Tourist, first_options, tour_options
-from lidarium.agents.tours.settings import TourSettings
+from lidarium.agents.tours.planning import Tourist, TourSettings, first_options, tour_options
 from lidarium.envs.onboard.navigation import NavigationMap
 from lidarium.mapping.planning.touring.tours import with_first
 
@@ -92,7 +91,7 @@ def test_what_was_picked_just_before_is_not_on_offer():
 
 def test_a_robot_without_a_tour_has_nothing_to_decide():
     scene = scene_in(corridor(), [at(3.0), at(6.0), at(9.0)])
-    tours = tours_in(scene.options.sequence, 2)
+    tours = _tours_in(scene.options.sequence, 2)
     idle = [robot for robot, tour in enumerate(tours) if not tour]
     assert idle
     for robot in idle:

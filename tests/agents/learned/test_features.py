@@ -10,8 +10,8 @@ from lidarium.agents.learned.features import (
     OPTION_FEATURES,
     SITUATION_FEATURES,
     TEAMMATE_FEATURES,
+    _in_frame,
     far_gains,
-    in_frame,
     table_of,
     teammate_features,
 )
@@ -21,7 +21,7 @@ POSE = np.array([2.0, 1.0, math.pi / 2])
 
 
 def test_places_are_seen_ahead_and_to_the_left():
-    ahead, left = in_frame(np.array([[2.0, 4.0], [0.0, 1.0], [3.0, 1.0]]), POSE)
+    ahead, left = _in_frame(np.array([[2.0, 4.0], [0.0, 1.0], [3.0, 1.0]]), POSE)
     np.testing.assert_allclose(ahead, [3.0, 0.0, 0.0], atol=1e-12)
     np.testing.assert_allclose(left, [0.0, 2.0, -1.0], atol=1e-12)
 
@@ -31,7 +31,7 @@ def test_moving_and_rotating_all_changes_nothing():
     places, angle, shift = generator.normal(size=(20, 2)), 1.3, np.array([5.0, -3.0])
     rotation = np.array([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]])
     moved = np.append(rotation @ POSE[:2] + shift, POSE[2] + angle)
-    for one, other in zip(in_frame(places, POSE), in_frame(places @ rotation.T + shift, moved), strict=True):
+    for one, other in zip(_in_frame(places, POSE), _in_frame(places @ rotation.T + shift, moved), strict=True):
         np.testing.assert_allclose(one, other, atol=1e-12)
 
 

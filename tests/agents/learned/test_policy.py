@@ -43,9 +43,7 @@ def test_decisions_show_what_there_is():
         assert decision.situation.shape == (len(SITUATION_FEATURES),)
         assert decision.mask.sum() > 1
         assert decision.scores[decision.mask].max() == 0.0
-        assert all(
-            np.isfinite(each).all() for each in (decision.options, decision.teammates, decision.situation)
-        )
+        assert all(np.isfinite(each).all() for each in (decision.options, decision.teammates, decision.situation))
     picked = [decision.teammates[:, list(TEAMMATE_FEATURES).index("has_picked")].sum() for decision in seen]
     assert set(picked) == {0.0, 1.0, 2.0}
 

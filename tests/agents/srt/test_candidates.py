@@ -7,11 +7,8 @@ import pytest
 from seen_from_nodes import BODY, HERE, PERCEPTION, box_view, node
 
 from lidarium.agents.srt.candidates import CandidateSource
-from lidarium.agents.srt.frontier_arcs import openings_of
-from lidarium.agents.srt.memories.region_memory import RegionMemory
-from lidarium.agents.srt.safe_region import (
-    DIRECTIONS,
-)
+from lidarium.agents.srt.memories import RegionMemory
+from lidarium.agents.srt.safe_region import DIRECTIONS, openings_of
 from lidarium.agents.srt.settings import SrtSettings
 
 

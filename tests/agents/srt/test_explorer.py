@@ -6,13 +6,13 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from driven_rooms import box, cast
-from srt_halls import hall
+from srt_halls import RADIUS, hall
 
-from lidarium.agents.srt.explorer import Explorer
-from lidarium.agents.srt.motion.progress import BLIND_S
+from lidarium.agents.srt.explorer import NEW_NODE, Explorer, _TreeGrowth
+from lidarium.agents.srt.memories import RegionMemory
 from lidarium.agents.srt.senses import Senses
-from lidarium.agents.srt.settings import make_srt_settings
-from lidarium.agents.srt.travel import REST
+from lidarium.agents.srt.settings import SrtSettings, make_srt_settings
+from lidarium.agents.srt.travel import BLIND_S, REST
 from lidarium.agents.srt.tree import Tree
 from lidarium.envs.settings.lidar import Lidar
 from lidarium.envs.settings.robots import ROBOTS
@@ -143,3 +143,63 @@ def test_a_robot_that_is_held_backs_out():
     assert min(speeds) < 0.0
     # Not before it had reason to.
     assert min(speeds[:20]) >= 0.0
+
+
+TREE_GROWTH_LIDAR = Lidar(beams=360, field_of_view=2.0 * math.pi, range_max=6.0)
+MEMORY = hall([])
+
+
+def at(x, y, ranges=2.0):
+    scan = np.full(TREE_GROWTH_LIDAR.beams, ranges, np.float32)
+    return Senses(0.0, np.array([x, y, 0.0]), scan, False, None, [])
+
+
+def planted(tree=None, agent="robot_0", **settings):
+    growth = _TreeGrowth(agent, tree or Tree(), SrtSettings(**settings), TREE_GROWTH_LIDAR, RADIUS)
+    growth.plant(at(4.0, 3.0), MEMORY)
+    return growth
+
+
+def test_the_first_node_is_the_root_where_the_robot_is():
+    growth = planted()
+    assert (growth.root, growth.number, growth.count, growth.known) == (0, 0, 1, {0})
+    assert growth.node.place.tolist() == [4.0, 3.0]
+    assert growth.node.parent is None
+    assert growth.node.agent == "robot_0"
+
+
+def test_a_robot_makes_a_node_only_apart_from_its_last_one():
+    growth = planted()
+    growth.add_if_apart(at(4.0 + 0.9 * NEW_NODE, 3.0), MEMORY)
+    assert growth.count == 1
+    growth.add_if_apart(at(5.0, 3.0), MEMORY)
+    assert (growth.count, growth.number, growth.node.parent) == (2, 1, 0)
+    assert 0 in growth.node.neighbours
+
+
+def test_a_robot_that_comes_to_a_node_joins_it_with_the_last_one():
+    growth = planted()
+    for x in (5.0, 6.0):
+        growth.add(at(x, 3.0, 0.5), growth.number, np.array([x, 3.0, 0.0]), RegionMemory([]))
+    assert growth.move_to(0).number == 0
+    assert growth.number == 0
+    assert 2 in growth.node.neighbours
+    assert 0 in growth.tree.nodes[2].neighbours
+
+
+def test_another_scan_at_a_place_shows_what_the_first_did_not():
+    growth = _TreeGrowth("robot_0", Tree(), SrtSettings(), TREE_GROWTH_LIDAR, RADIUS)
+    blind = at(4.0, 3.0)
+    blind.scan[TREE_GROWTH_LIDAR.beams // 4 : 3 * TREE_GROWTH_LIDAR.beams // 4] = np.nan  # nothing is known ahead
+    growth.plant(blind, MEMORY)
+    ahead, behind = np.array([5.0, 3.0]), np.array([3.0, 3.0])
+    assert not growth.node.safe.contains(ahead)
+    assert growth.node.safe.contains(behind)
+    growth.widen_view(at(4.0, 3.0))
+    assert growth.node.safe.contains(ahead)
+    assert growth.node.safe.contains(behind)
+
+
+@pytest.mark.parametrize(("perception", "expected"), [(4.0, 4.0), (9.0, 6.0)])
+def test_a_robot_perceives_no_farther_than_its_laser(perception, expected):
+    assert planted(perception=perception).perception == expected

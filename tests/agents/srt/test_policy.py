@@ -9,7 +9,7 @@ import pytest
 import lidarium
 from lidarium.agents.policy import Stop
 from lidarium.agents.srt.explorer import Explorer
-from lidarium.agents.srt.memories.map_memory import MapMemory
+from lidarium.agents.srt.memories import MapMemory
 from lidarium.agents.srt.policy import SensorBasedRandomTree
 from lidarium.envs.settings.lidar import Lidar
 from lidarium.evaluation.episodes.runner import run_episode
@@ -171,16 +171,14 @@ def test_the_same_seed_gives_the_same_run():
 )
 def test_only_explorers_that_choose_the_least_cost_plan_tours(chosen, monkeypatch):
     planned = []
-    monkeypatch.setattr("lidarium.agents.srt.choice.first_on_tour", lambda *_: planned.append(1))
+    monkeypatch.setattr("lidarium.agents.srt.choice._first_on_tour", lambda *_: planned.append(1))
     env = lidarium.parallel_env("apartment", robots=1, robot="pioneer", horizon_s=30.0)
     run_episode(SensorBasedRandomTree(**chosen), env, 0)
     assert bool(planned) == (not chosen)
 
 
 def test_a_robot_that_teammates_keep_from_their_goal_ends_as_blocked_and_makes_room():
-    env = lidarium.parallel_env(
-        "srt_lab", robots=3, localization="splines", horizon_s=400.0, stop_coverage=None
-    )
+    env = lidarium.parallel_env("srt_lab", robots=3, localization="splines", horizon_s=400.0, stop_coverage=None)
     run_episode(SensorBasedRandomTree(), env, 0)
     assert sorted(env.scorer.ended_because.values()) == ["blocked", "reached", "reached"]
     assert env.scorer.time < 200.0
@@ -225,9 +223,7 @@ def test_scans_without_any_return_are_survived(value):
 
 
 def test_ranges_below_the_minimum_do_not_keep_a_robot_from_its_goal():
-    env = lidarium.parallel_env(
-        "srt_lab", robots=1, robot="pioneer", horizon_s=200.0, stop_coverage=None, map_cells=32
-    )
+    env = lidarium.parallel_env("srt_lab", robots=1, robot="pioneer", horizon_s=200.0, stop_coverage=None, map_cells=32)
     run_episode(Seen(every_third_below_the_minimum), env, 1)
     assert env.scorer.ended_because == {"robot_0": "reached"}
 
@@ -248,8 +244,7 @@ class Held(SensorBasedRandomTree):
     def act(self, observations):
         wanted = super().act(observations)
         return {
-            agent: action if isinstance(action, Stop) else np.zeros(2, np.float32)
-            for agent, action in wanted.items()
+            agent: action if isinstance(action, Stop) else np.zeros(2, np.float32) for agent, action in wanted.items()
         }
 
 
@@ -267,9 +262,7 @@ class HeldFarAway(Held):
 
 @pytest.mark.parametrize(("budget", "ending"), [({}, "horizon"), ({"time_s": 30.0}, "budget")])
 def test_a_robot_that_something_holds_ends_with_a_reason(budget, ending):
-    env = lidarium.parallel_env(
-        "srt_lab", robots=1, robot="pioneer", horizon_s=90.0, stop_coverage=None, map_cells=32
-    )
+    env = lidarium.parallel_env("srt_lab", robots=1, robot="pioneer", horizon_s=90.0, stop_coverage=None, map_cells=32)
     run_episode(Held(**budget), env, 1)
     assert env.scorer.ended_because == {"robot_0": ending}
 
@@ -323,9 +316,7 @@ class Pushed(SensorBasedRandomTree):
         return super().act(observations)
 
 
-@pytest.mark.parametrize(
-    ("goal", "told"), [((1.5, 0.0), "inside a wall"), ((60.0, 0.0), "outside of the floor")]
-)
+@pytest.mark.parametrize(("goal", "told"), [((1.5, 0.0), "inside a wall"), ((60.0, 0.0), "outside of the floor")])
 def test_a_goal_in_a_wall_or_outside_is_refused_before_the_run(goal, told):
     env = lidarium.parallel_env("srt_cluttered", robots=1)
     with pytest.raises(ValueError, match=told):

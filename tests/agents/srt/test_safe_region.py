@@ -13,8 +13,9 @@ from lidarium.agents.srt.safe_region import (
     DIRECTIONS,
     STEP,
     UNIT,
+    _region_of,
     joined_views,
-    region_of,
+    openings_of,
     safe_region,
     view_of,
 )
@@ -26,7 +27,7 @@ URG = ScanGeometry()
 
 def test_the_five_laser_regions_go_from_right_to_left():
     degrees = np.array([-120, -73, -72, -25, -24, 0, 23, 24, 71, 72, 119, 121, 179])
-    assert region_of(np.radians(degrees)).tolist() == [0, 0, 1, 1, 2, 2, 2, 3, 3, 4, 4, 5, 6]
+    assert _region_of(np.radians(degrees)).tolist() == [0, 0, 1, 1, 2, 2, 2, 3, 3, 4, 4, 5, 6]
 
 
 @settings(max_examples=20)
@@ -65,8 +66,8 @@ def test_a_region_with_a_near_return_is_not_safe_to_turn_in():
     view = box_view()
     view[0] = 0.25
     radii = safe_region(HERE, view, 0.0, "radial", BODY, PERCEPTION, turn_room=0.1).radii
-    assert (radii[region_of(ANGLES) == 2] == 0.0).all()
-    assert (radii[region_of(ANGLES) == 4] > 0.0).all()
+    assert (radii[_region_of(ANGLES) == 2] == 0.0).all()
+    assert (radii[_region_of(ANGLES) == 4] > 0.0).all()
 
 
 def test_a_scan_becomes_ranges_along_the_axes_of_the_map():
@@ -83,3 +84,40 @@ def test_a_scan_becomes_ranges_along_the_axes_of_the_map():
 @pytest.mark.parametrize("value", [5.6, np.float32(5.6), math.inf])
 def test_a_beam_that_meets_nothing_is_endless(value):
     assert np.isinf(view_of(np.full(727, value, np.float32), URG, 0.0)[0])
+
+
+def test_a_closed_room_has_no_opening_and_a_door_is_one():
+    assert openings_of(HERE, box_view(), PERCEPTION, BODY, with_blind=False) == []
+    arcs = [
+        each
+        for each in openings_of(HERE, box_view(door=(0.5, 0.8)), PERCEPTION, BODY, with_blind=False)
+        if not each.is_gap
+    ]
+    assert len(arcs) == 1
+    assert arcs[0].width == pytest.approx(0.3, abs=0.02)
+    assert arcs[0].lengths.sum() == pytest.approx(0.3 * PERCEPTION, rel=0.05)
+
+
+def test_an_arc_across_the_first_direction_is_one_and_a_narrow_one_is_none():
+    across = box_view()
+    across[:60], across[-60:] = np.inf, np.inf
+    assert [
+        each.width for each in openings_of(HERE, across, PERCEPTION, BODY, with_blind=False) if not each.is_gap
+    ] == [pytest.approx(120 * STEP)]
+    narrow = [
+        each
+        for each in openings_of(HERE, box_view(door=(0.5, 0.54)), PERCEPTION, BODY, with_blind=False)
+        if not each.is_gap
+    ]
+    assert narrow == []
+
+
+def test_a_gap_beside_an_edge_is_looked_into_on_the_hidden_side():
+    view = np.full(DIRECTIONS, 3.0)
+    view[: DIRECTIONS // 4] = 1.0
+    gaps = openings_of(HERE, view, PERCEPTION, BODY, with_blind=False)
+    assert len(gaps) == 2
+    first = next(each for each in gaps if each.points[0, 1] > 0.5)
+    assert (first.beyond[:, 0] > first.points[:, 0]).all()
+    assert np.linalg.norm(first.points, axis=1).min() >= 1.0
+    assert np.linalg.norm(first.points, axis=1).max() <= 3.0

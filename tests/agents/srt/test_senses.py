@@ -5,8 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from lidarium.agents.srt.memories.map_memory import MapMemory
-from lidarium.agents.srt.memories.region_memory import RegionMemory
+from lidarium.agents.srt.memories import MapMemory, RegionMemory
 from lidarium.agents.srt.senses import CONTACT_AGE_S, memory_of, senses_of
 from lidarium.agents.srt.settings import SrtSettings
 from lidarium.mapping.grids.scan_geometry import ScanGeometry
@@ -20,8 +19,7 @@ def belief(goal=None, **teammates):
         pose=np.array([1.0, 2.0, 0.5]),
         goal=goal,
         teammates={
-            name: SimpleNamespace(pose=np.array([*place, 0.0]), age_s=age)
-            for name, (place, age) in teammates.items()
+            name: SimpleNamespace(pose=np.array([*place, 0.0]), age_s=age) for name, (place, age) in teammates.items()
         },
     )
 
@@ -44,9 +42,7 @@ def test_teammates_count_that_were_heard_of_recently():
     assert len(senses_of(0.0, observed(), near).teammates) == 1
 
 
-@pytest.mark.parametrize(
-    ("bumper", "is_pressed"), [(np.array([0, 1]), True), (np.zeros(2), False), (None, False)]
-)
+@pytest.mark.parametrize(("bumper", "is_pressed"), [(np.array([0, 1]), True), (np.zeros(2), False), (None, False)])
 def test_a_bumper_is_pressed_where_there_is_one(bumper, is_pressed):
     given = observed() if bumper is None else observed(bumper=bumper)
     assert senses_of(0.0, given, belief()).is_pressed is is_pressed

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from srt_halls import hall, senses_at
 
+from lidarium.agents.srt.senses import Senses
 from lidarium.agents.srt.settings import SrtSettings
-from lidarium.agents.srt.travel import BACKING_S, Travel
+from lidarium.agents.srt.travel import BACKING_S, MOST_TURNS, Travel, _Progress, _TurnPlan
 from lidarium.envs.settings.lidar import Lidar
 from lidarium.envs.settings.robots import Robot
 
@@ -86,3 +87,66 @@ def test_a_robot_looks_around_only_where_it_is_asked_to():
         one = travel(looks_around=looks_around)
         one.look_around(senses_at(2.0, 2.0))
         assert one.turns.is_over is not looks_around
+
+
+def test_blocks_at_one_place_are_counted_in_a_row():
+    def there(x, time_s):
+        return Senses(time_s, np.array([x, 0.0, 0.0]), np.empty(0, np.float32), False, None, [])
+
+    progress = _Progress()
+    assert [progress.note_block(there(x, 0.0)) for x in (1.0, 1.3, 1.1, 3.0, 3.2, 1.0)] == [1, 2, 3, 1, 2, 1]
+    progress.stand(there(1.0, 10.0))
+    assert not progress.is_stuck(there(1.01, 12.9))
+    assert progress.is_stuck(there(1.01, 13.2))
+    assert not progress.is_stuck(there(1.2, 13.3))
+
+
+def facing(heading, x=0.0, y=0.0):
+    return SimpleNamespace(pose=np.array([x, y, heading]))
+
+
+def lidar(degrees, beams=100):
+    return SimpleNamespace(field_of_view=math.radians(degrees), beams=beams)
+
+
+def headings_of(plan):
+    found = []
+    while not plan.is_over:
+        found.append(plan.error(facing(0.0)))
+        plan.end_turn()
+    return found
+
+
+@pytest.mark.parametrize("degrees", [60.0, 90.0, 120.0, 240.0, 270.0])
+@pytest.mark.parametrize("heading", [0.0, 2.5])
+def test_after_all_turns_the_whole_circle_was_seen(degrees, heading):
+    plan = _TurnPlan()
+    plan.plan_circle(facing(heading), lidar(degrees))
+    headings = [heading, *headings_of(plan)]
+    assert len(headings) == math.ceil(360.0 / degrees)
+    around = np.linspace(-math.pi, math.pi, 721)
+    gaps = np.abs([np.angle(np.exp(1j * (around - each))) for each in headings]).min(axis=0)
+    assert gaps.max() <= math.radians(degrees) / 2.0 + 1e-9
+
+
+@pytest.mark.parametrize(
+    "laser",
+    [lidar(360.0), lidar(360.0 / (MOST_TURNS + 2)), lidar(240.0, beams=1)],
+    ids=["full", "narrow", "beam"],
+)
+def test_a_laser_that_sees_all_or_hardly_anything_does_not_turn(laser):
+    plan = _TurnPlan()
+    plan.plan_circle(facing(0.0), laser)
+    assert plan.is_over
+
+
+def test_a_robot_turns_to_a_frontier_the_short_distance():
+    plan = _TurnPlan()
+    focus = np.array([-1.0, 2.0])
+    plan.plan_frontier(focus, facing(3.0, 1.0, 2.0))
+    assert plan.focus is focus
+    assert plan.error(facing(3.0)) == pytest.approx(math.pi - 3.0)
+    assert plan.error(facing(-3.0)) == pytest.approx(3.0 - math.pi)
+    plan.end_turn()
+    assert plan.is_over
+    assert plan.focus is focus

@@ -10,9 +10,7 @@ from lidarium.agents.srt.tree import Tree, way_to
 
 def test_a_tree_has_parents_bridges_and_shortest_ways():
     tree, known = Tree(), set[int]()
-    for number, (place, parent) in enumerate(
-        [((0, 0), None), ((1, 0), 0), ((2, 0), 1), ((2, 1), 2), ((0, 1.2), 3)]
-    ):
+    for number, (place, parent) in enumerate([((0, 0), None), ((1, 0), 0), ((2, 0), 1), ((2, 1), 2), ((0, 1.2), 3)]):
         tree.add(
             node(number, place, box_view(), parent),
             lambda first, second: math.dist(first.place, second.place) < 1.3,

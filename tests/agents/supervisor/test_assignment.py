@@ -47,9 +47,7 @@ def test_more_robots_than_goals_leave_some_without_and_no_way_is_no_goal():
 @given(st.integers(1, 5), st.integers(1, 5), st.integers(0, 1000))
 def test_no_goal_is_given_twice_and_none_that_cannot_be_reached(robots, goals, seed):
     generator = np.random.default_rng(seed)
-    costs = np.where(
-        generator.random((robots, goals)) < 0.3, math.inf, generator.uniform(0.0, 20.0, (robots, goals))
-    )
+    costs = np.where(generator.random((robots, goals)) < 0.3, math.inf, generator.uniform(0.0, 20.0, (robots, goals)))
     seen = np.eye(goals)
     for given_goals in (assign_by_cost(costs), assign_by_utility(costs, seen, np.ones(goals), 0.05)):
         taken = [(robot, goal) for robot, goal in enumerate(given_goals) if goal >= 0]

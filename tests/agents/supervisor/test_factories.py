@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from lidarium.agents import make_policy
-from lidarium.agents.learned.network import shapes
-from lidarium.agents.learned.weights import save_weights
+from lidarium.agents.learned.network import _shapes, save_weights
 from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.settings.making import make_settings
 from lidarium.evaluation.episodes.runner import run_episode
@@ -14,7 +13,7 @@ from lidarium.evaluation.episodes.runner import run_episode
 @pytest.fixture
 def weights(tmp_path):
     generator = np.random.default_rng(0)
-    drawn = {name: 0.1 * generator.normal(size=shape) for name, shape in shapes().items()}
+    drawn = {name: 0.1 * generator.normal(size=shape) for name, shape in _shapes().items()}
     path = tmp_path / "weights.safetensors"
     save_weights(path, {name: array.astype(np.float32) for name, array in drawn.items()})
     return str(path)

@@ -1,9 +1,9 @@
 """The first legs of tours past the frontiers of a map."""
 
 import numpy as np
+import pytest
 
-from lidarium.agents.tours.planning import Tourist, first_options, first_places, leg_to, tour_options
-from lidarium.agents.tours.settings import TourSettings
+from lidarium.agents.tours.planning import Tourist, TourSettings, _first_places, first_options, leg_to, tour_options
 from lidarium.envs.onboard.navigation import NavigationMap
 
 RESOLUTION = 0.05
@@ -100,6 +100,23 @@ def test_robots_without_a_frontier_stay():
 
 
 def test_first_places_are_those_behind_each_separator():
-    assert first_places(np.array([2, 0, 4, 1, 3]), 4) == [2, 1]
-    assert first_places(np.array([3, 1, 0, 4, 2]), 3) == [None, 1, 2]
-    assert first_places(np.array([0, 1]), 0) == [None, None, None]
+    assert _first_places(np.array([2, 0, 4, 1, 3]), 4) == [2, 1]
+    assert _first_places(np.array([3, 1, 0, 4, 2]), 3) == [None, 1, 2]
+    assert _first_places(np.array([0, 1]), 0) == [None, None, None]
+
+
+def test_nothing_counts_that_lies_beyond_the_laser():
+    settings = TourSettings(reach=3.0, around=0.8, depth=1.2)
+    assert settings.rules(2.0).reach == 2.0
+    assert settings.rules(9.0).reach == 3.0
+    assert (settings.rules(9.0).around, settings.rules(9.0).depth) == (0.8, 1.2)
+
+
+def test_the_longest_tour_counts_one_and_the_rest_is_weighed_against_it():
+    assert tuple(TourSettings(total=0.3, waiting=0.2).weights) == (1.0, 0.3, 0.2)
+
+
+@pytest.mark.parametrize(("name", "value"), [("most", 0), ("kept_share", 1.5), ("reach", 0.0), ("kept", -1.0)])
+def test_settings_that_make_no_sense_are_refused(name, value):
+    with pytest.raises(ValueError, match=f"{name} of tours is"):
+        TourSettings(**{name: value})

@@ -10,7 +10,7 @@ import lidarium
 from lidarium.envs.settings.making import REALISM, make_settings
 from lidarium.evaluation.episodes.runner import run_episode
 from lidarium.mapping.geometry.rigid import Transform
-from lidarium.mapping.localization.dead_reckoning.localizer import KeyScans
+from lidarium.mapping.localization.localizer import KeyScans
 from lidarium.mapping.localization.registry import LOCALIZERS
 
 

@@ -11,7 +11,7 @@ from lidarium.envs.onboard.sparse_maps import SparseMapper
 from lidarium.envs.settings.cameras import CAMERAS
 from lidarium.envs.settings.making import make_settings
 from lidarium.mapping.geometry.rigid import Transform, composed, relative
-from lidarium.mapping.localization.dead_reckoning.localizer import KeyScans
+from lidarium.mapping.localization.localizer import KeyScans
 from lidarium.mapping.sparse.exploring.ground import BLOCKED, SEEN
 from tests.ground_views import depth_image
 

@@ -8,7 +8,7 @@ import pytest
 from lidarium.envs.settings import ExplorationSettings, make_settings
 from lidarium.envs.settings.making import assign
 from lidarium.evaluation.episodes.settings_identity import settings_sha256
-from lidarium.mapping.localization.matching.settings.slam import SlamSettings
+from lidarium.mapping.localization.settings import SlamSettings
 
 
 def test_parts_are_given_by_name_by_value_or_by_a_mapping():

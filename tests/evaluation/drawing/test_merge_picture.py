@@ -17,7 +17,7 @@ from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.grids.occupancy import OCCUPIED
 from lidarium.mapping.merging.frame_tree import FrameTree
 from lidarium.mapping.merging.fusion import FusedMap
-from lidarium.mapping.merging.joining.merged_maps import Merged
+from lidarium.mapping.merging.joining import Merged
 from lidarium.mapping.merging.merger import merge_maps
 
 RED, BLUE = (200, 0, 0), (0, 0, 100)

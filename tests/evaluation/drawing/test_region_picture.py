@@ -9,7 +9,7 @@ from lidarium.mapping.files.images import read_image
 from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.grids.occupancy import FREE, OCCUPIED
 from lidarium.mapping.merging.regions.graph import find_regions
-from lidarium.mapping.merging.regions.settings import RegionSettings
+from lidarium.mapping.merging.regions.segmentation import RegionSettings
 
 
 def graph(levels):

@@ -18,8 +18,7 @@ from lidarium.evaluation.metrics.curves import (
 )
 from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.grids.scan_geometry import ScanGeometry
-from lidarium.mapping.splines.features import observe
-from lidarium.mapping.splines.scan_points import scan_points
+from lidarium.mapping.splines.features import observe, scan_points
 from lidarium.mapping.splines.spline_map import SplineMap
 
 WALL = np.array([(0.0, 0.0, 4.0, 0.0)])

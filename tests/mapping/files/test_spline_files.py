@@ -9,9 +9,8 @@ from polygon_scans import scan
 
 from lidarium.mapping.files.spline_files import compact_bytes, read_spline_map, write_spline_map
 from lidarium.mapping.geometry.rigid import Transform
-from lidarium.mapping.splines.curves.settings import SplineSettings
-from lidarium.mapping.splines.features import observe
-from lidarium.mapping.splines.scan_points import scan_points
+from lidarium.mapping.splines.features import observe, scan_points
+from lidarium.mapping.splines.settings import SplineSettings
 from lidarium.mapping.splines.spline_map import SplineMap
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from driven_rooms import GEOMETRY
 
-from lidarium.mapping.localization.dead_reckoning.localizer import Sensing
+from lidarium.mapping.localization.localizer import Sensing
 from lidarium.mapping.localization.registry import LOCALIZERS, make_localizer
 
 
@@ -18,11 +18,7 @@ def test_localizers_are_made_by_name(name):
     made.reset(np.array([1.0, 0.0, 0.0]), 0)
     pose = made.localize(sensing(np.full(GEOMETRY.beams, 1.0), 0))
     # Only particles are spread about the pose that they are told.
-    assert (
-        pose.tolist() == [1.0, 0.0, 0.0]
-        if name != "splines"
-        else pose == pytest.approx([1.0, 0.0, 0.0], abs=0.005)
-    )
+    assert pose.tolist() == [1.0, 0.0, 0.0] if name != "splines" else pose == pytest.approx([1.0, 0.0, 0.0], abs=0.005)
     assert made.covariance.shape == (3, 3)
     assert made.take_correction() is None
 

@@ -7,10 +7,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lidarium.mapping.geometry.rigid import Transform, wrapped
-from lidarium.mapping.merging.alignment import AlignmentSettings, find_inliers, propose, sweep_rotation
+from lidarium.mapping.merging.alignment import AlignmentSettings, _propose, _sweep_rotation, find_inliers
+from lidarium.mapping.merging.corners import Corners, detect_corners
 from lidarium.mapping.merging.correspondence import METHODS, CorrespondenceSettings, Matches, match_corners
-from lidarium.mapping.merging.description.corners import Corners, detect_corners
-from lidarium.mapping.merging.description.described_map import describe_map
+from lidarium.mapping.merging.described_map import describe_map
 
 POSES = st.builds(Transform, st.floats(-5, 5), st.floats(-5, 5), st.floats(-3.1, 3.1))
 
@@ -36,9 +36,7 @@ def scattered(count, seed=0):
 
 
 def seen_from(b_points, b_angles, a_from_b):
-    return corners_at(a_from_b.apply(b_points), np.asarray(b_angles) + a_from_b.theta), corners_at(
-        b_points, b_angles
-    )
+    return corners_at(a_from_b.apply(b_points), np.asarray(b_angles) + a_from_b.theta), corners_at(b_points, b_angles)
 
 
 def paired(first, second):
@@ -51,15 +49,13 @@ def paired(first, second):
 @given(POSES)
 def test_every_exact_match_proposes_the_true_transform(pose):
     first, second = seen_from(*scattered(8), pose)
-    for x, y, theta in propose(first, second, paired(first, second)).tolist():
+    for x, y, theta in _propose(first, second, paired(first, second)).tolist():
         assert close(Transform(x, y, theta), pose, 1e-7, 1e-7)
 
 
 def test_the_transform_maps_b_into_a():
     first, second = seen_from(*scattered(6), Transform(1.0, -2.0, math.radians(30.0)))
-    np.testing.assert_allclose(
-        propose(first, second, paired(first, second))[0], (1.0, -2.0, math.radians(30.0))
-    )
+    np.testing.assert_allclose(_propose(first, second, paired(first, second))[0], (1.0, -2.0, math.radians(30.0)))
 
 
 def test_the_true_transform_wins_among_sixty_percent_wrong_matches():
@@ -79,9 +75,7 @@ def test_the_true_transform_wins_among_sixty_percent_wrong_matches():
 def test_a_corner_takes_part_in_one_inlier_only():
     first, second = seen_from([(1, 1), (1.02, 1.0), (4, 4)], [0, 0, 0], Transform())
     pairs = [(0, 0), (0, 1), (1, 0), (1, 1), (2, 2)]
-    matches = Matches(
-        np.array([p[0] for p in pairs]), np.array([p[1] for p in pairs]), np.ones(5), np.zeros(5)
-    )
+    matches = Matches(np.array([p[0] for p in pairs]), np.array([p[1] for p in pairs]), np.ones(5), np.zeros(5))
     _, is_inlier = find_inliers(first, second, matches, RESOLUTION, AlignmentSettings())
     assert is_inlier.sum(axis=1).max() == 3
 
@@ -100,7 +94,7 @@ def test_the_ratio_rule_is_loose_far_from_the_corner_and_tight_near_it():
 def test_the_sweep_repairs_a_rotation_within_seven_degrees():
     points, _ = scattered(9)
     pose = Transform(1.0, 2.0, 0.5)
-    swept = sweep_rotation(pose.apply(points), points, Transform(1.0, 2.0, 0.5 + math.radians(5.0)))
+    swept = _sweep_rotation(pose.apply(points), points, Transform(1.0, 2.0, 0.5 + math.radians(5.0)))
     assert close(swept, pose, 0.05, math.radians(0.26))
 
 
@@ -108,12 +102,8 @@ def test_the_sweep_repairs_a_rotation_within_seven_degrees():
 def test_each_method_matches_corners_of_a_turned_map(method):
     pose = about_middle(math.pi / 2.0, apartment(), (SPREAD, SPREAD))
     a, b = describe_map(moved(apartment(), pose), RESOLUTION), describe_map(apartment(), RESOLUTION)
-    matches = match_corners(
-        a.corners, b.corners, a.descriptors, b.descriptors, CorrespondenceSettings(method=method)
-    )
-    gaps = np.linalg.norm(
-        pose.apply(b.corners.points[matches.second]) - a.corners.points[matches.first], axis=1
-    )
+    matches = match_corners(a.corners, b.corners, a.descriptors, b.descriptors, CorrespondenceSettings(method=method))
+    gaps = np.linalg.norm(pose.apply(b.corners.points[matches.second]) - a.corners.points[matches.first], axis=1)
     is_right = gaps < 0.1
     assert is_right.sum() >= 0.7 * min(len(a.corners), len(b.corners))
     if method == "descriptors":

@@ -7,7 +7,7 @@ import pytest
 from drawn_maps import RESOLUTION, about_middle, apartment, blank, moved, room
 
 from lidarium.mapping.geometry.rigid import Transform
-from lidarium.mapping.merging.agreement.validation import Agreement
+from lidarium.mapping.merging.agreement import Agreement
 from lidarium.mapping.merging.alignment import Candidate
 from lidarium.mapping.merging.candidates import (
     NEAR_M,
@@ -23,7 +23,7 @@ from lidarium.mapping.merging.candidates import (
     polished,
 )
 from lidarium.mapping.merging.correspondence import Matches, match_corners
-from lidarium.mapping.merging.description.described_map import describe_map
+from lidarium.mapping.merging.described_map import describe_map
 from lidarium.mapping.merging.settings import MergeSettings, merge_settings
 
 SETTINGS = MergeSettings()

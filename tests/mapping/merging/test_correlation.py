@@ -8,7 +8,7 @@ from drawn_maps import RESOLUTION, about_middle, apartment, blank, moved
 
 from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.merging.correlation import CorrelationSettings, best_translations
-from lidarium.mapping.merging.description.described_map import describe_map
+from lidarium.mapping.merging.described_map import describe_map
 
 SETTINGS = CorrelationSettings()
 

@@ -28,9 +28,7 @@ def test_a_chain_of_three_maps_is_looked_up_in_all_directions():
     assert near(tree.lookup("a", "c"), A_FROM_B @ B_FROM_C)
     assert near(tree.lookup("c", "a"), (A_FROM_B @ B_FROM_C).inverse())
     assert near(tree.lookup("b", "b"), Transform())
-    assert near(
-        tree.pose_in("a", "c", Transform(1.0, 0.0, 0.1)), A_FROM_B @ B_FROM_C @ Transform(1.0, 0.0, 0.1)
-    )
+    assert near(tree.pose_in("a", "c", Transform(1.0, 0.0, 0.1)), A_FROM_B @ B_FROM_C @ Transform(1.0, 0.0, 0.1))
     assert tree.groups() == [["a", "b", "c"]]
 
 
@@ -68,9 +66,7 @@ def test_misses_around_a_cycle_are_taken_where_the_maps_overlap():
         Edge("a", "c", about_place, 1.0, place),
     )
     assert tree.dropped == []
-    tree = chain(
-        Edge("a", "b", Transform(), 2.0), Edge("b", "c", Transform(), 2.0), Edge("a", "c", about_place, 1.0)
-    )
+    tree = chain(Edge("a", "b", Transform(), 2.0), Edge("b", "c", Transform(), 2.0), Edge("a", "c", about_place, 1.0))
     assert len(tree.dropped) == 1
 
 
@@ -103,9 +99,7 @@ def test_the_world_stays_where_it_is_while_groups_join_and_edges_improve():
     assert tree.groups() == [["c", "d"], ["a", "b"]]
 
 
-@pytest.mark.parametrize(
-    "edge", [Edge("a", "a", Transform(), 1.0), Edge("a", "b", Transform(math.nan, 0.0, 0.0), 1.0)]
-)
+@pytest.mark.parametrize("edge", [Edge("a", "a", Transform(), 1.0), Edge("a", "b", Transform(math.nan, 0.0, 0.0), 1.0)])
 def test_bad_edges_are_refused(edge):
     with pytest.raises(ValueError, match=r"itself|finite"):
         FrameTree().add_edge(edge)

@@ -6,13 +6,11 @@ from drawn_maps import RESOLUTION, about_middle, apartment, blank, kept, moved, 
 
 from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.merging import pair
-from lidarium.mapping.merging.agreement.confirmation import Confirmation
-from lidarium.mapping.merging.agreement.validation import ValidationSettings
+from lidarium.mapping.merging.agreement import Confirmation, ValidationSettings
 from lidarium.mapping.merging.frame_tree import Edge, FrameTree
-from lidarium.mapping.merging.growing_maps import GrowingMap
-from lidarium.mapping.merging.incremental import IncrementalMerger
+from lidarium.mapping.merging.incremental import GrowingMap, IncrementalMerger, _DescribedMaps
 from lidarium.mapping.merging.pair import described, is_contradicted, verify_pair
-from lidarium.mapping.merging.settings import merge_settings
+from lidarium.mapping.merging.settings import MergeSettings, merge_settings
 
 FIRST, SECOND = about_middle(0.4, apartment()), about_middle(-1.3, apartment())
 
@@ -56,9 +54,7 @@ def test_a_verified_transform_is_not_searched_for_when_maps_grow_and_frames_stay
     for merged in (before, after):
         assert is_true(merged.tree.lookup("a", "b"))
     fused = after.fused(["b", "a"])
-    assert np.count_nonzero(fused.levels == 255) == pytest.approx(
-        np.count_nonzero(apartment() == 255), rel=0.05
-    )
+    assert np.count_nonzero(fused.levels == 255) == pytest.approx(np.count_nonzero(apartment() == 255), rel=0.05)
 
 
 def test_a_transform_that_grown_maps_contradict_is_given_up():
@@ -152,9 +148,7 @@ def test_a_map_that_knows_nothing_of_its_own_joins_none_yet():
 
 def test_a_pair_that_is_found_elsewhere_the_second_time_is_not_confirmed():
     merger = IncrementalMerger(RESOLUTION, confirmation_growth_m2=2.0)
-    merger.update(
-        {"a": GrowingMap(part(slice(0, 150), FIRST)), "b": GrowingMap(part(slice(60, 220), SECOND, 1))}
-    )
+    merger.update({"a": GrowingMap(part(slice(0, 150), FIRST)), "b": GrowingMap(part(slice(60, 220), SECOND, 1))})
     # The second robot's frame has jumped by half a metre: what was found before is gone, and the new place
     # waits in its turn.
     jumped = GrowingMap(part(slice(60, 220), SECOND, 1), (0.5, 0.0))
@@ -256,3 +250,53 @@ def test_maps_that_agree_as_others_imply_are_not_contradicted_wherever_they_woul
     monkeypatch.setattr(pair, "refine_on_walls", lambda *_: across)
     assert not is_contradicted(first, second, Transform(), settings)
     assert is_contradicted(first, second, across, settings)
+
+
+SETTINGS = MergeSettings()
+
+
+def taken_in(maps, number, into=None):
+    into = into or _DescribedMaps()
+    into.update(maps, RESOLUTION, SETTINGS, number)
+    return into
+
+
+def test_only_what_has_changed_is_described_again():
+    known = taken_in({"a": GrowingMap(apartment()), "b": GrowingMap(kept(apartment(), slice(0, 80), slice(0, 90)))}, 1)
+    before = dict(known.features)
+    taken_in({"a": GrowingMap(apartment()), "b": GrowingMap(apartment())}, 2, known)
+    assert known.features["a"] is before["a"]
+    assert known.features["b"] is not before["b"]
+    assert known.changed_at == {"a": 1, "b": 2}
+
+
+def test_a_map_whose_corner_has_moved_has_changed():
+    known = taken_in({"a": GrowingMap(apartment())}, 1)
+    taken_in({"a": GrowingMap(apartment(), (0.0, RESOLUTION))}, 2, known)
+    assert known.changed_at == {"a": 2}
+    assert known.maps["a"].origin == (0.0, RESOLUTION)
+
+
+def test_the_known_area_counts_all_cells_but_unknown_ones():
+    levels = np.full((10, 20), 127, np.uint8)
+    levels[:5, :10], levels[5, :4] = 255, 0
+    known = taken_in({"a": GrowingMap(levels)}, 1)
+    assert known.known_m2["a"] == pytest.approx(54 * RESOLUTION**2)
+
+
+def test_a_map_that_is_missing_is_forgotten():
+    known = taken_in({"a": GrowingMap(apartment()), "b": GrowingMap(apartment())}, 1)
+    taken_in({"b": GrowingMap(apartment())}, 2, known)
+    assert list(known.features) == list(known.maps) == ["b"]
+    taken_in({"a": GrowingMap(apartment()), "b": GrowingMap(apartment())}, 3, known)
+    assert known.changed_at == {"a": 3, "b": 1}
+
+
+def test_what_is_no_map_is_refused_and_what_was_known_is_kept():
+    known = taken_in({"a": GrowingMap(apartment())}, 1)
+    features, area = known.features["a"], known.known_m2["a"]
+    with pytest.raises(ValueError, match="shape"):
+        taken_in({"a": GrowingMap(np.zeros((0, 4), np.uint8)), "b": GrowingMap(apartment())}, 2, known)
+    assert known.features == {"a": features}
+    assert (known.known_m2, known.changed_at) == ({"a": area}, {"a": 1})
+    assert np.array_equal(known.maps["a"].levels, apartment())

@@ -13,8 +13,8 @@ from lidarium.evaluation.episodes.runner import run_episode
 from lidarium.mapping.files.map_files import FREE, UNKNOWN
 from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.grids.occupancy import three_levels
+from lidarium.mapping.merging import joining as joined_tree
 from lidarium.mapping.merging import merger
-from lidarium.mapping.merging.joining.joined_tree import joined_tree
 from lidarium.mapping.merging.merger import merge_maps
 from lidarium.mapping.merging.pair import described, merge_pair
 from lidarium.mapping.merging.settings import MergeSettings, merge_settings
@@ -48,9 +48,7 @@ def test_many_maps_become_one_in_any_order(order):
         assert distance < 0.1
         assert angle < math.radians(1.0)
     fused = merged.fused(groups[0])
-    assert np.count_nonzero(fused.levels == FREE) == pytest.approx(
-        np.count_nonzero(apartment() == FREE), rel=0.05
-    )
+    assert np.count_nonzero(fused.levels == FREE) == pytest.approx(np.count_nonzero(apartment() == FREE), rel=0.05)
     with pytest.raises(ValueError, match="not joined"):
         merged.fused([groups[0][0], "elsewhere"])
 
@@ -110,9 +108,7 @@ def test_bad_maps_are_named(maps, message):
 
 def driven(floor, start, seconds, seed):
     """The map of a robot that starts somewhere, and its pose in the floor."""
-    chosen = make_settings(
-        robots=1, known_starts=False, noise="datasheet", resolution=RESOLUTION, horizon_s=seconds
-    )
+    chosen = make_settings(robots=1, known_starts=False, noise="datasheet", resolution=RESOLUTION, horizon_s=seconds)
     env = ExplorationEnv(floor, chosen)
     run_episode(lidarium.policy("nearest_frontier"), env, seed, {"starts": [start]})
     belief = env.belief("robot_0")
@@ -127,9 +123,7 @@ def test_maps_of_robots_that_start_apart_are_joined_where_they_met():
     first, floor_from_first = driven("apartment", (2.5, 4.0, 0.0), 40.0, 1)
     second, floor_from_second = driven("apartment", (8.5117, 5.0262, -0.966), 40.0, 2)
     other, _ = driven("building:17", (17.025, 22.475, 1.58), 20.0, 3)
-    merged = merge_maps(
-        {"first": (first, RESOLUTION), "other": (other, RESOLUTION), "second": (second, RESOLUTION)}
-    )
+    merged = merge_maps({"first": (first, RESOLUTION), "other": (other, RESOLUTION), "second": (second, RESOLUTION)})
     assert merged.groups() == [["first", "second"], ["other"]]
     found = merged.tree.lookup("first", "second")
     assert found is not None
@@ -149,9 +143,7 @@ def test_a_ring_of_bent_maps_is_joined_and_its_one_false_pair_is_named():
         "all": whole,
     }
     sags = (0.0, 0.25, -0.2, 0.15, 0.3)
-    maps = {
-        name: (bowed(part, sag), RESOLUTION) for (name, part), sag in zip(parts.items(), sags, strict=True)
-    }
+    maps = {name: (bowed(part, sag), RESOLUTION) for (name, part), sag in zip(parts.items(), sags, strict=True)}
     merged = merge_maps(maps)
     assert len(merged.groups()) == 1
     assert not merged.tree.dropped

@@ -3,15 +3,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from drawn_maps import RESOLUTION, about_middle, apartment, blank, kept, moved, noisy, room
+from drawn_maps import RESOLUTION, about_middle, apartment, blank, bowed, hall, kept, moved, noisy, room
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lidarium.mapping.files.map_files import FREE, OCCUPIED, UNKNOWN
 from lidarium.mapping.geometry.rigid import Transform
-from lidarium.mapping.merging.description.described_map import describe_map
-from lidarium.mapping.merging.pair import described, merge_pair
-from lidarium.mapping.merging.settings import TOLERANCES, merge_settings
+from lidarium.mapping.merging.described_map import describe_map
+from lidarium.mapping.merging.pair import PairResult, _exact_motion, _or_bent, described, explained, merge_pair
+from lidarium.mapping.merging.settings import TOLERANCES, MergeSettings, merge_settings
 
 
 def merged(a, b, resolution=RESOLUTION, mode="default", tolerance=None):
@@ -28,9 +28,7 @@ def is_right(result, truth, at, distance=0.1, degrees=1.0):
 
 
 @settings(max_examples=8)
-@given(
-    st.floats(-math.pi, math.pi), st.tuples(st.floats(-1.0, 1.0), st.floats(-1.0, 1.0)), st.integers(0, 99)
-)
+@given(st.floats(-math.pi, math.pi), st.tuples(st.floats(-1.0, 1.0), st.floats(-1.0, 1.0)), st.integers(0, 99))
 def test_a_turned_shifted_and_noisy_map_is_joined_where_it_belongs(theta, shift, seed):
     truth = about_middle(theta, apartment(), shift=shift)
     result = merged(noisy(moved(apartment(), truth), seed), noisy(apartment(), seed + 1))
@@ -230,3 +228,99 @@ def test_the_thesis_joins_an_easy_pair_and_not_two_buildings():
 def test_maps_of_two_resolutions_are_no_pair():
     with pytest.raises(ValueError, match="resolution"):
         merge_pair(describe_map(apartment(), 0.05), describe_map(apartment(), 0.1))
+
+
+@pytest.mark.parametrize("quarters", [0, 1, 2, 3])
+def test_a_turned_copy_is_laid_on_its_cells_exactly(quarters):
+    levels = apartment()
+    # Counter-clockwise with row 0 below.
+    turned = np.ascontiguousarray(np.rot90(levels, -quarters))
+    rows, columns = levels.shape
+    corner = ((0.0, 0.0), (rows, 0.0), (columns, rows), (0.0, columns))[quarters]
+    truth = Transform(
+        corner[0] * RESOLUTION, corner[1] * RESOLUTION, math.remainder(quarters * math.pi / 2.0, math.tau)
+    )
+    start = Transform(truth.x + 0.12, truth.y - 0.08, truth.theta + math.radians(0.5))
+    found = _exact_motion(describe_map(turned, RESOLUTION), describe_map(levels, RESOLUTION), start)
+    assert found is not None
+    assert (found.x, found.y) == pytest.approx((truth.x, truth.y), abs=1e-12)
+    assert math.cos(found.theta - truth.theta) == pytest.approx(1.0, abs=1e-12)
+
+
+def test_a_rotation_that_is_no_quarter_turn_has_no_exact_motion():
+    one = describe_map(apartment(), RESOLUTION)
+    assert _exact_motion(one, one, Transform(theta=math.radians(3.0))) is None
+
+
+def test_maps_that_do_not_share_their_cells_have_no_exact_motion():
+    truth = about_middle(0.02, apartment())
+    other = describe_map(moved(apartment(), truth), RESOLUTION)
+    assert _exact_motion(other, describe_map(apartment(), RESOLUTION), truth) is None
+    one = describe_map(apartment(), RESOLUTION)
+    assert _exact_motion(one, one, Transform(2.0, 0.0, 0.0)) is None
+
+
+def test_maps_that_know_nothing_in_common_have_no_exact_motion():
+    one = describe_map(apartment(), RESOLUTION)
+    assert _exact_motion(one, one, Transform(100.0, 0.0, 0.0)) is None
+    assert _exact_motion(one, describe_map(blank(), RESOLUTION), Transform()) is None
+    assert _exact_motion(describe_map(blank(), RESOLUTION), one, Transform()) is None
+
+
+def test_walls_that_only_one_map_knows_do_not_count():
+    part = apartment()
+    part[:, 110:] = 127
+    a, b = describe_map(part, RESOLUTION), describe_map(apartment(), RESOLUTION)
+    assert _exact_motion(a, b, Transform(0.05, 0.0, 0.0)) == Transform()
+
+
+SETTINGS = MergeSettings()
+REFUSED = PairResult(False, "contradiction", Transform(0.05, 0.05, 0.0), tried=(Transform(3.0, 1.0, 0.4),))
+
+
+@pytest.fixture(scope="module")
+def maps():
+    """A hall, and the same as drift has bent it."""
+    return describe_map(hall(), RESOLUTION), describe_map(bowed(hall(), 0.3), RESOLUTION)
+
+
+def test_what_was_tried_is_ranked_with_the_best_first(maps):
+    known = explained(*maps, REFUSED, SETTINGS)
+    assert len(known.ranked) == 2
+    evidence = [one.evidence_m for one in known.ranked]
+    assert evidence == sorted(evidence, reverse=True)
+    assert abs(known.ranked[0].bend.a_from_b.theta) < 0.05
+    assert known.confidence > 0.9
+    assert (known.is_accepted, known.a_from_b) == (False, REFUSED.a_from_b)
+    assert explained(*maps, known, SETTINGS) is known
+
+
+def test_maps_without_walls_are_explained_by_nothing(maps):
+    none = describe_map(blank(), RESOLUTION)
+    assert explained(maps[0], none, REFUSED, SETTINGS) is REFUSED
+    assert explained(none, maps[0], REFUSED, SETTINGS) is REFUSED
+    without = explained(*maps, PairResult(False, "too few corners"), SETTINGS)
+    assert (without.ranked, without.confidence) == ((), 0.0)
+
+
+def test_a_refused_pair_is_accepted_where_it_agrees_bent(maps):
+    found = _or_bent(*maps, replace(REFUSED, inliers=7), SETTINGS)
+    assert (found.is_accepted, found.reason, found.found_by) == (True, "accepted", "bend")
+    assert found.inliers == 0
+    assert found.a_from_b == found.ranked[0].bend.a_from_b
+    assert found.agreement is found.ranked[0].agreement
+    assert found.score == found.agreement.score
+
+
+def test_what_is_not_believed_stays_refused(maps):
+    assert _or_bent(*maps, replace(REFUSED, is_accepted=True), SETTINGS).found_by == "corners"
+    for changed in (
+        replace(SETTINGS, confidence=2.0),
+        replace(SETTINGS, bend=replace(SETTINGS.bend, candidates=0)),
+    ):
+        assert _or_bent(*maps, REFUSED, changed) is REFUSED
+    other = describe_map(apartment(), RESOLUTION)
+    unsure = _or_bent(maps[0], other, replace(REFUSED, a_from_b=Transform(1.0, 2.0, 0.7), tried=()), SETTINGS)
+    assert not unsure.is_accepted
+    assert unsure.reason == "contradiction"
+    assert unsure.confidence < SETTINGS.confidence

@@ -11,7 +11,7 @@ from lidarium.mapping.grids.occupancy import FREE, OCCUPIED, UNKNOWN
 from lidarium.mapping.merging.correlation import CorrelationSettings
 from lidarium.mapping.merging.merger import merge_maps
 from lidarium.mapping.merging.pair import described, merge_pair
-from lidarium.mapping.merging.scaling.scaled_merge import merge_scaled
+from lidarium.mapping.merging.scaling import merge_scaled
 from lidarium.mapping.merging.settings import STRUCTURES, MergeSettings, merge_settings
 
 ALONE = MergeSettings(structure="regions", correlation=CorrelationSettings(rotations=0))
@@ -83,9 +83,7 @@ def test_a_scale_is_found_by_regions_alone():
 
 
 def test_unknown_structures_are_named_and_discs_need_corners():
-    with pytest.raises(
-        ValueError, match="structure of merging is 'rooms'; want one of corners, regions, all"
-    ):
+    with pytest.raises(ValueError, match="structure of merging is 'rooms'; want one of corners, regions, all"):
         MergeSettings(structure="rooms")
     with pytest.raises(ValueError, match="disc test needs matched corners"):
         replace(merge_settings("thesis"), structure="regions")

@@ -2,7 +2,7 @@
 
 import pytest
 
-from lidarium.mapping.merging.agreement.validation import ValidationSettings
+from lidarium.mapping.merging.agreement import ValidationSettings
 from lidarium.mapping.merging.settings import MergeSettings, merge_settings
 
 

@@ -7,7 +7,7 @@ import pytest
 from drawn_maps import RESOLUTION, about_middle, apartment, blank, kept, moved
 
 from lidarium.mapping.geometry.rigid import Transform
-from lidarium.mapping.merging.description.described_map import describe_map
+from lidarium.mapping.merging.described_map import describe_map
 from lidarium.mapping.merging.wall_alignment import rank_by_walls, refine_on_walls, wall_sample
 
 

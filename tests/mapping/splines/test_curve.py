@@ -4,11 +4,12 @@ import math
 
 import numpy as np
 import pytest
+from curved_room import taken
 
 from lidarium.mapping.geometry.rigid import Transform
-from lidarium.mapping.splines.curve import box_of, control_parameters, curves_in, fit_curve, make_curve
-from lidarium.mapping.splines.curves.settings import FitSettings, MapSettings
-from lidarium.mapping.splines.joining import Way
+from lidarium.mapping.splines.association import Way
+from lidarium.mapping.splines.curve import CurveLookup, _control_parameters, box_of, curves_in, fit_curve, make_curve
+from lidarium.mapping.splines.settings import FitSettings, MapSettings
 
 
 def fitted(points):
@@ -58,7 +59,7 @@ def test_a_curve_moves_with_its_frame():
 
 def test_control_points_act_at_the_means_of_their_inner_knots():
     knots = np.array([0.0, 0.0, 0.0, 0.0, 1.0, 3.0, 3.0, 3.0, 3.0])
-    np.testing.assert_allclose(control_parameters(knots), (0.0, 1.0 / 3.0, 4.0 / 3.0, 7.0 / 3.0, 3.0))
+    np.testing.assert_allclose(_control_parameters(knots), (0.0, 1.0 / 3.0, 4.0 / 3.0, 7.0 / 3.0, 3.0))
 
 
 def test_a_curve_wants_a_weight_for_each_control_point():
@@ -73,3 +74,21 @@ def test_ends_of_little_weight_do_not_run_away():
     weights[-10:] = 1e-3
     curve = fit_curve(Way(points, weights), 1, 1, FitSettings(), MapSettings())
     assert math.dist(curve.way.points[-1], points[-1]) < 0.02
+
+
+@pytest.fixture(scope="module")
+def room_map():
+    return taken()
+
+
+def test_the_lookup_finds_the_nearest_curve_and_how_far_it_is(room_map):
+    lookup = CurveLookup(reach=5.6, distance=0.3)
+    lookup.renew(room_map.curves, np.zeros(2))
+    points = np.array([(2.9, 0.0), (0.0, -1.45), (0.0, 0.0)])
+    pieces, distances = lookup.look_up(points)
+    assert (pieces >= 0).tolist() == [True, True, False]
+    expected = [min(curve.spline.closest([point])[1][0] for curve in room_map.curves) for point in points[:2]]
+    np.testing.assert_allclose(distances[:2], expected, atol=0.002)
+    assert distances[2] == math.inf
+    assert lookup.covers(np.array([0.9, 0.0]))
+    assert not lookup.covers(np.array([1.1, 0.0]))

@@ -3,8 +3,8 @@
 import numpy as np
 
 from lidarium.mapping.geometry.rigid import Transform
-from lidarium.mapping.splines.curves.settings import MapSettings
 from lidarium.mapping.splines.landmarks import no_landmarks
+from lidarium.mapping.splines.settings import MapSettings
 
 SETTINGS = MapSettings()
 

@@ -9,9 +9,8 @@ from polygon_scans import distances_to, scan
 
 from lidarium.mapping.files.spline_files import compact_bytes
 from lidarium.mapping.geometry.rigid import Transform
-from lidarium.mapping.splines.curves.settings import spline_settings
-from lidarium.mapping.splines.features import observe
-from lidarium.mapping.splines.scan_points import scan_points
+from lidarium.mapping.splines.features import observe, scan_points
+from lidarium.mapping.splines.settings import spline_settings
 from lidarium.mapping.splines.spline_map import SplineMap
 
 

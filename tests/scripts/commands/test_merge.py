@@ -13,9 +13,9 @@ from lidarium.mapping.files.map_files import MapImage, read_ros_map, write_ros_m
 from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.grids.occupancy import FREE, UNKNOWN
 from lidarium.mapping.merging.frame_tree import Edge, FrameTree
-from lidarium.mapping.merging.joining.merged_maps import Merged
-from lidarium.mapping.merging.pair_result import PairResult
-from lidarium.mapping.merging.regions.settings import RegionSettings
+from lidarium.mapping.merging.joining import Merged
+from lidarium.mapping.merging.pair import PairResult
+from lidarium.mapping.merging.regions.segmentation import RegionSettings
 from lidarium.scripts.commands.merge import corner_of, draw_regions, write_merged
 from lidarium.scripts.main import main
 

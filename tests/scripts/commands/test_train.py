@@ -10,7 +10,7 @@ import time
 
 import pytest
 
-from lidarium.agents.learned.weights import load_weights
+from lidarium.agents.learned.network import load_weights
 from lidarium.scripts.commands.train import _Shown, _span
 from lidarium.scripts.main import main
 from lidarium.training.progress import Progress

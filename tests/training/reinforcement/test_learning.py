@@ -9,7 +9,7 @@ import pytest
 from stable_baselines3.common.vec_env import SubprocVecEnv
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
-from lidarium.agents.learned.weights import load_weights, save_weights
+from lidarium.agents.learned.network import load_weights, save_weights
 from lidarium.training.reinforcement.checkpoints import latest_checkpoint, weights_of
 from lidarium.training.reinforcement.learning import learn
 from lidarium.training.settings import training_of

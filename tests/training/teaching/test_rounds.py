@@ -8,7 +8,7 @@ import torch
 
 from lidarium.agents import make_policy
 from lidarium.agents.learned.decision import choose_classic
-from lidarium.agents.learned.weights import load_weights
+from lidarium.agents.learned.network import load_weights
 from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.evaluation.episodes.runner import run_episode
 from lidarium.evaluation.suites.starts import drawn_starts

@@ -20,11 +20,11 @@ from lidarium.benchmarks.studies.merging.bank.floors import HALVES, LASER_HEIGHT
 from lidarium.envs.floors.floor import Raster
 from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.grids.occupancy import FREE, OCCUPIED, UNKNOWN
-from lidarium.mapping.merging.agreement.validation import Agreement, ValidationSettings, compare
+from lidarium.mapping.merging.agreement import Agreement, ValidationSettings, compare
 from lidarium.mapping.merging.alignment import distinct
+from lidarium.mapping.merging.corners import CornerSettings
 from lidarium.mapping.merging.correlation import CorrelationSettings, best_translations
-from lidarium.mapping.merging.description.corners import CornerSettings
-from lidarium.mapping.merging.description.described_map import DescribedMap, describe_map
+from lidarium.mapping.merging.described_map import DescribedMap, describe_map
 from lidarium.mapping.merging.wall_alignment import refine_on_walls
 
 OVERLAPPING, PLENTY, APART = 0.15, 0.30, 0.02

@@ -1,7 +1,7 @@
 """What convinces a team that maps are of one place."""
 
 from lidarium.envs.onboard.station.joining import OWN_M2, TEAM_CONFIRMATION, WALL_M, team_confirmation
-from lidarium.mapping.merging.agreement.validation import ValidationSettings
+from lidarium.mapping.merging.agreement import ValidationSettings
 
 
 def test_a_team_asks_for_more_than_a_pair_of_maps():

@@ -4,7 +4,7 @@ import numpy as np
 
 from lidarium.envs.onboard.station.trails import without_bodies, without_own_trail
 from lidarium.mapping.grids.occupancy import FREE, OCCUPIED, UNKNOWN
-from lidarium.mapping.merging.growing_maps import GrowingMap
+from lidarium.mapping.merging.incremental import GrowingMap
 from lidarium.mapping.planning.footprint import MARGIN_M
 
 RADIUS, RESOLUTION = 0.2, 0.1

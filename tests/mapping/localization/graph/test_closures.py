@@ -8,9 +8,8 @@ from lidarium.mapping.geometry.rigid import composed, relative
 from lidarium.mapping.localization.graph.closures import ClosureFinder
 from lidarium.mapping.localization.matching.local_mapping import Finished
 from lidarium.mapping.localization.matching.scan_points import scan_points
-from lidarium.mapping.localization.matching.settings.graph import ClosureSettings
-from lidarium.mapping.localization.matching.settings.matching import MatchingSettings, SubmapSettings
 from lidarium.mapping.localization.matching.submaps import Submap
+from lidarium.mapping.localization.settings import ClosureSettings, MatchingSettings, SubmapSettings
 
 KNOWN = np.diag([0.05**2, 0.05**2, math.radians(1.0) ** 2])
 """How well the pose is known when the robot comes back."""
@@ -62,9 +61,7 @@ def test_a_room_is_recognised_from_where_the_robot_believes_to_be(room_finder):
     for _ in range(1000):
         true = np.array([3.0, 2.2, 0.3]) + generator.uniform(-1.0, 1.0, 3) * [0.2, 0.2, 0.3]
         believed = true + generator.uniform(-1.0, 1.0, 3) * [0.2, 0.2, 0.05]
-        errors += [
-            closure.measured - true for closure in closures_of(room_finder, odd_room(), true, believed)
-        ]
+        errors += [closure.measured - true for closure in closures_of(room_finder, odd_room(), true, believed)]
     # Now and then a scan slides into a place that agrees a little less well, or finds none that is sure.
     distances, turns = np.hypot(*np.array(errors)[:, :2].T), np.abs(np.array(errors)[:, 2])
     assert np.sum((distances < 0.03) & (turns < math.radians(0.8))) >= 985

@@ -5,7 +5,7 @@ import pytest
 
 from lidarium.mapping.geometry.rigid import composed, relative
 from lidarium.mapping.localization.graph.node_graph import NodeGraph
-from lidarium.mapping.localization.matching.settings.graph import GraphSettings
+from lidarium.mapping.localization.settings import GraphSettings
 
 
 def test_all_but_the_first_node_move_together_to_where_the_first_map_begins():

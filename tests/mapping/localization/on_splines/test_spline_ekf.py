@@ -8,8 +8,8 @@ from polygon_scans import biased_odometry
 from tracked_world import POSES, SCANS, follow, gap
 
 from lidarium.mapping.geometry.rigid import Transform
-from lidarium.mapping.localization.on_splines.linear_measurements import Measured
 from lidarium.mapping.localization.on_splines.spline_ekf import BODY, SplineEkf, SplineEkfSettings, _condensed
+from lidarium.mapping.localization.on_splines.spline_matches import Measured
 
 
 @pytest.mark.parametrize("bias", [-0.06, 0.06])
@@ -35,9 +35,7 @@ def test_the_state_holds_a_pose_scales_and_landmarks_that_lie_apart():
 
 def test_condensed_measurements_say_the_same_of_the_pose():
     generator = np.random.default_rng(8)
-    many = Measured(
-        generator.normal(size=40), generator.normal(size=(40, 3)), generator.uniform(0.1, 2.0, 40)
-    )
+    many = Measured(generator.normal(size=40), generator.normal(size=(40, 3)), generator.uniform(0.1, 2.0, 40))
     few = _condensed(many)
     assert len(few.misses) == 3
     for one, other in zip(few.information(), many.information(), strict=True):

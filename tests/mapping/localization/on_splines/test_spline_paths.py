@@ -8,11 +8,11 @@ from driven_rooms import GEOMETRY, RING_ROUND, driven, ring
 from polygon_scans import distances_to, scan
 
 from lidarium.mapping.geometry.rigid import composed
-from lidarium.mapping.localization.dead_reckoning.localizer import Sensing
+from lidarium.mapping.localization.localizer import Sensing
 from lidarium.mapping.localization.on_splines.spline_ekf import SplineEkf
 from lidarium.mapping.localization.on_splines.spline_filter import SplineFilter, SplineFilterSettings
-from lidarium.mapping.localization.on_splines.tracking_settings import TrackingSettings
-from lidarium.mapping.splines.curves.settings import PointSettings, SplineSettings
+from lidarium.mapping.localization.on_splines.spline_matches import TrackingSettings
+from lidarium.mapping.splines.settings import PointSettings, SplineSettings
 
 KINDS = (SplineFilter, SplineEkf)
 WITHIN_95 = 7.815

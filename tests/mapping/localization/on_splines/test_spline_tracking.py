@@ -4,13 +4,16 @@ import pickle
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from polygon_scans import biased_odometry
 from tracked_world import LASER, POSES, SCANS, follow, gap
 
-from lidarium.mapping.geometry.rigid import Transform
-from lidarium.mapping.localization.dead_reckoning.localizer import Localizer, Sensing
+from lidarium.mapping.geometry.rigid import Transform, composed
+from lidarium.mapping.localization.localizer import Localizer, Sensing
 from lidarium.mapping.localization.on_splines.spline_ekf import SplineEkf
 from lidarium.mapping.localization.on_splines.spline_filter import SplineFilter
+from lidarium.mapping.localization.on_splines.spline_tracking import driven, steps_of
 
 KINDS = (SplineFilter, SplineEkf)
 
@@ -58,9 +61,7 @@ def test_a_scan_that_shows_nothing_leaves_the_pose_to_odometry(kind, value):
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_single_blind_scan_among_others_does_no_harm(kind):
-    scans = [
-        np.full(LASER.beams, np.nan, np.float32) if k % 7 == 3 else ranges for k, ranges in enumerate(SCANS)
-    ]
+    scans = [np.full(LASER.beams, np.nan, np.float32) if k % 7 == 3 else ranges for k, ranges in enumerate(SCANS)]
     track = follow(kind(), biased_odometry(POSES, 0.05), scans=scans)
     assert gap(track[-1], POSES[-1])[0] < 0.06
 
@@ -101,3 +102,21 @@ def test_what_cannot_be_sensed_is_refused(kind):
         localizer.localize(Sensing(3.0, np.zeros(3), np.ones(3, np.float32)))
     with pytest.raises(ValueError, match="pose"):
         localizer.reset(np.array([0.0, np.inf, 0.0]), 0)
+
+
+def test_backing_up_is_not_two_half_turns():
+    first, distance, second = steps_of(Transform(-0.2, 0.01, 0.05))
+    assert abs(first) < 0.1
+    assert distance == pytest.approx(-math.hypot(0.2, 0.01))
+    assert first + second == pytest.approx(0.05)
+    assert steps_of(Transform(0.0, 0.0, 0.3)) == (0.0, 0.0, 0.3)
+
+
+@given(st.floats(-2.0, 2.0), st.floats(-2.0, 2.0), st.floats(-3.0, 3.0), st.floats(-3.0, 3.0))
+def test_steps_lead_where_the_motion_leads(x, y, turn, heading):
+    pose, motion = np.array([1.0, -2.0, heading]), Transform(x, y, turn)
+    found = driven(pose[None], np.array([steps_of(motion)]))[0]
+    expected = composed(pose, np.array([x, y, turn]))
+    # Motions of less than a millimetre have no direction.
+    assert math.dist(found[:2], expected[:2]) < 2.1e-3
+    assert abs(math.remainder(found[2] - expected[2], 2.0 * math.pi)) < 1e-9

@@ -8,7 +8,7 @@ from driven_rooms import GEOMETRY, driven, odd_room
 
 from lidarium.mapping.files.laser_logs import LaserLog
 from lidarium.mapping.geometry.rigid import composed
-from lidarium.mapping.localization.matching.settings.slam import SlamSettings
+from lidarium.mapping.localization.settings import SlamSettings
 from lidarium.mapping.localization.slam.following import follow
 
 LASER = np.array([0.2, 0.05, 0.3])

@@ -1,4 +1,5 @@
 import copy
+import math
 import pickle
 from dataclasses import replace
 
@@ -7,11 +8,9 @@ import pytest
 from driven_rooms import GEOMETRY, RING_ROUND, TWINS_VISITED, cast, driven, odd_room, ring, twins
 
 from lidarium.mapping.geometry.rigid import composed, relative
-from lidarium.mapping.localization.dead_reckoning.localizer import Sensing
-from lidarium.mapping.localization.matching.settings.graph import ClosureSettings, GraphSettings
-from lidarium.mapping.localization.matching.settings.matching import MatchingSettings
-from lidarium.mapping.localization.matching.settings.slam import SlamSettings
-from lidarium.mapping.localization.slam.localizer import Slam
+from lidarium.mapping.localization.localizer import Sensing
+from lidarium.mapping.localization.settings import ClosureSettings, GraphSettings, MatchingSettings, SlamSettings
+from lidarium.mapping.localization.slam.localizer import ELSEWHERE, NO_MATCH, ODOMETRY_ALONE, Slam, _Doubt, _Doubts
 
 EAGER = SlamSettings(graph=GraphSettings(waiting=5))
 """Corrects the past also where closures contradict it by little."""
@@ -93,9 +92,7 @@ def test_two_rooms_that_look_alike_are_not_taken_for_one():
     slam.finish()
     poses = final(slam, places)
     assert errors(poses, run.truth).max() < 0.5
-    first, second = (
-        np.argmin(np.hypot(*(run.truth[:, :2] - np.array(room)).T)) for room in ((1.6, 2.2), (7.6, 2.2))
-    )
+    first, second = (np.argmin(np.hypot(*(run.truth[:, :2] - np.array(room)).T)) for room in ((1.6, 2.2), (7.6, 2.2)))
     assert abs(np.hypot(*(poses[second] - poses[first])[:2]) - 6.0) < 0.4
 
 
@@ -138,9 +135,7 @@ def test_the_first_scan_is_laid_on_the_map_that_it_began():
         found = []
         for seed in range(16):
             run = driven(ring(), [(0.9, 0.9), (5.0, 0.9), (2.0, 0.9), (6.0, 0.9)], seed, noise=0.02)
-            slam = Slam(
-                SlamSettings(uses_walls=False, graph=GraphSettings(start_path_m=start_path_m)), GEOMETRY
-            )
+            slam = Slam(SlamSettings(uses_walls=False, graph=GraphSettings(start_path_m=start_path_m)), GEOMETRY)
             told, _ = follow(slam, run.sensings)
             found.append(np.mean(relative(run.truth, told)[len(told) // 2 :, 2]))
             assert (slam.key_scans.poses[0] == 0.0).all()
@@ -169,9 +164,7 @@ def test_the_map_holds_the_walls():
     walls = odd_room()
     along = walls[:, 2:] - walls[:, :2]
     share = np.clip(((places[:, None] - walls[None, :, :2]) * along).sum(-1) / (along**2).sum(-1), 0.0, 1.0)
-    gaps = np.linalg.norm(places[:, None] - walls[None, :, :2] - share[..., None] * along, axis=-1).min(
-        axis=1
-    )
+    gaps = np.linalg.norm(places[:, None] - walls[None, :, :2] - share[..., None] * along, axis=-1).min(axis=1)
     assert len(places) > 300
     assert (gaps < 0.1).mean() > 0.95
 
@@ -257,3 +250,63 @@ def test_scans_are_matched_after_enough_motion_only():
     slam = Slam(SlamSettings(matching=MatchingSettings(distance_m=0.1)), GEOMETRY)
     follow(slam, [sensing(scan, k, 0.001 * k) for k in range(50)])
     assert slam.counts.matches == 0
+
+
+ROUND = [(1.0, 1.0), (4.5, 1.0), (4.5, 2.4), (1.5, 2.4), (1.0, 1.0)]
+
+
+def with_hidden_turn(run):
+    """Leave out the scans of the first turn of more than 60 degrees; odometry does not know it."""
+    turned = np.concatenate([[0.0], np.cumsum(np.diff(run.truth[:, 2]))])
+    first = int(np.flatnonzero(np.abs(np.diff(turned)) > 0.05)[0])
+    last = int(np.flatnonzero(np.abs(turned - turned[first]) > math.radians(80.0))[0])
+    kept = [*range(first + 1), *range(last, len(run.sensings))]
+    odometry, sensings = np.zeros(3), []
+    for before, here in zip([kept[0], *kept[:-1]], kept, strict=True):
+        if here - before <= 1:
+            odometry = composed(odometry, relative(run.truth[before], run.truth[here]))
+        sensings.append(replace(run.sensings[here], odometry=odometry.copy()))
+    return sensings, run.truth[kept], first + 1
+
+
+def test_a_turn_that_odometry_does_not_know_is_found():
+    sensings, truth, at = with_hidden_turn(driven(odd_room(), ROUND))
+    slam = Slam(SlamSettings(), GEOMETRY)
+    found = np.array([slam.localize(sensing) for sensing in sensings])
+    assert abs(relative(truth[at - 1], truth[at])[2]) > math.radians(75.0)
+    assert slam.counts.recoveries == 1
+    assert slam.counts.restarts == 0
+    assert np.hypot(*(found - truth)[:, :2].T).max() < 0.1
+    [doubt] = slam.doubts.stretches
+    assert doubt.reason == ELSEWHERE
+    # A scan is matched after some motion: here the second one after the turn.
+    assert doubt.start_s <= sensings[at].time_s <= doubt.end_s <= sensings[at + 3].time_s
+
+
+def test_stretches_begin_at_the_last_sure_scan_and_grow():
+    doubts = _Doubts()
+    for time_s, reason in [(0.0, None), (1.0, NO_MATCH), (2.0, NO_MATCH), (3.0, None), (4.0, ODOMETRY_ALONE)]:
+        doubts.note(time_s, reason)
+    doubts.note(5.0, NO_MATCH)
+    assert doubts.stretches == [
+        _Doubt(0.0, 2.0, 2, NO_MATCH),
+        _Doubt(3.0, 4.0, 1, ODOMETRY_ALONE),
+        _Doubt(3.0, 5.0, 1, NO_MATCH),
+    ]
+
+
+def test_a_kidnapped_robot_is_doubtful():
+    before = driven(odd_room(), ROUND[:3])
+    other = np.array([[-9.0, -7.0, 9.0, -7.0], [9.0, -7.0, 9.0, 0.4], [9.0, 0.4, -9.0, 0.4], [-9, 0.4, -9, -7]])
+    after = driven(other, [(0.0, 0.0), (2.0, -0.4), (2.0, -2.0)])
+    last = before.sensings[-1]
+    moved = [
+        replace(s, time_s=s.time_s + last.time_s + 1.0, odometry=composed(last.odometry, s.odometry))
+        for s in after.sensings
+    ]
+    slam = Slam(SlamSettings(), GEOMETRY)
+    for sensing in [*before.sensings, *moved]:
+        slam.localize(sensing)
+    doubt = slam.doubts.stretches[0]
+    assert doubt.start_s == pytest.approx(last.time_s, abs=0.6)
+    assert doubt.end_s > last.time_s

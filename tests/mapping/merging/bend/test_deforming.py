@@ -9,7 +9,7 @@ from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.grids.occupancy import OCCUPIED, UNKNOWN
 from lidarium.mapping.merging.bend.deforming import deform
 from lidarium.mapping.merging.bend.estimation import BendSettings
-from lidarium.mapping.merging.description.described_map import describe_map
+from lidarium.mapping.merging.described_map import describe_map
 from lidarium.mapping.merging.fusion import fuse
 from lidarium.mapping.merging.merger import merge_maps
 

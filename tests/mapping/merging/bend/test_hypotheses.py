@@ -1,24 +1,33 @@
 """Hypotheses are ranked, and what speaks against them is weighed."""
 
+import math
+from dataclasses import replace
+
+import numpy as np
 import pytest
-from drawn_maps import RESOLUTION, blank, bowed, hall, room
+from drawn_maps import RESOLUTION, apartment, blank, bowed, hall, room, sagging
 
 from lidarium.mapping.geometry.rigid import Transform
-from lidarium.mapping.merging.bend.estimation import BendSettings
+from lidarium.mapping.merging.agreement import ValidationSettings, compare
+from lidarium.mapping.merging.bend.estimation import Bend, BendSettings, OffsetField
 from lidarium.mapping.merging.bend.hypotheses import (
+    BLUNT_M,
     LEAST_OVERLAP_M2,
     MOST_RIVAL_SHARE,
     MOST_STRAIN,
-    Signs,
+    SHARP_M,
+    _Signs,
+    _tolerance,
+    compare_bent,
     confidence_of,
     ranked_hypotheses,
     signs_of,
 )
-from lidarium.mapping.merging.description.described_map import describe_map
+from lidarium.mapping.merging.described_map import describe_map
 from lidarium.mapping.merging.pair import described, merge_pair
 from lidarium.mapping.merging.settings import MergeSettings
 
-PLAIN = Signs(30.0, 0.85, 80.0, 15.0, 0.2, 80.0, 3.0, 0.01, 0.05)
+PLAIN = _Signs(30.0, 0.85, 80.0, 15.0, 0.2, 80.0, 3.0, 0.01, 0.05)
 
 
 def test_the_best_hypothesis_leads_and_others_are_told():
@@ -51,7 +60,7 @@ def test_each_sign_speaks_for_or_against_a_place(sign, worse):
 
 
 def test_small_overlaps_and_near_rivals_are_never_believed():
-    sure = Signs(500.0, 0.99, 900.0, 200.0, 0.0, 500.0, 0.0, 0.0, 0.01)
+    sure = _Signs(500.0, 0.99, 900.0, 200.0, 0.0, 500.0, 0.0, 0.0, 0.01)
     assert confidence_of(sure) > 0.999
     assert confidence_of(sure._replace(overlap_m2=0.99 * LEAST_OVERLAP_M2)) == 0.0
     assert confidence_of(sure._replace(rival_share=MOST_RIVAL_SHARE + 0.01)) == 0.0
@@ -60,7 +69,7 @@ def test_small_overlaps_and_near_rivals_are_never_believed():
 
 
 def test_sharp_maps_of_a_few_rooms_may_differ_by_furniture_alone():
-    rooms = Signs(40.0, 0.95, 40.0, 15.0, 0.2, 60.0, 2.0, 0.005, 0.02)
+    rooms = _Signs(40.0, 0.95, 40.0, 15.0, 0.2, 60.0, 2.0, 0.005, 0.02)
     assert confidence_of(rooms) > 0.95
     assert confidence_of(rooms._replace(quality=0.85)) == 0.0
     assert confidence_of(rooms._replace(quality=0.85, spread_m=0.05)) > 0.9
@@ -78,3 +87,41 @@ def test_strangers_are_refused_whatever_the_tolerance():
     result = merge_pair(described(hall(), RESOLUTION, chosen), described(other, RESOLUTION, chosen), chosen)
     assert not result.is_accepted
     assert result.confidence < 0.6
+
+
+def bend_of(offsets, pose=(0.0, 0.0, 0.0)):
+    field = OffsetField((0.0, 0.0), 1.0, np.asarray(offsets, np.float64))
+    return Bend(Transform(*pose), field, 0.0, 0.0, 0.01, 1.0, np.eye(3))
+
+
+def test_the_tolerance_grows_with_the_spread_between_two_limits():
+    straight = bend_of(np.zeros((2, 2, 2)))
+    found = [_tolerance(replace(straight, spread_m=spread), 0.025)[0] for spread in (0.0, 0.04, 1.0)]
+    assert found == pytest.approx([SHARP_M, 0.1, BLUNT_M])
+    assert _tolerance(straight, 0.2)[0] == pytest.approx(0.3)
+    for resolution in (0.025, 0.1, 0.4):
+        hit, miss = _tolerance(straight, resolution)
+        assert hit < miss
+
+
+@pytest.mark.parametrize("pose", [(0.0, 0.0, 0.0), (0.2, -0.1, 0.05)])
+def test_maps_without_bend_agree_as_rigid_ones_do(pose):
+    one = describe_map(apartment(), RESOLUTION)
+    rigid = compare(one, one, Transform(*pose), ValidationSettings())
+    bent = compare_bent(one, one, bend_of(np.zeros((3, 3, 2)), pose))
+    assert bent.overlap_m2 == rigid.overlap_m2
+    assert bent.agreeing_m == pytest.approx(rigid.agreeing_m, abs=0.2)
+    assert bent.contradicting_m == pytest.approx(rigid.contradicting_m, abs=0.2)
+
+
+def test_a_bowed_map_agrees_only_once_its_bow_is_undone():
+    length = hall().shape[1] * RESOLUTION
+    a, b = (describe_map(levels, RESOLUTION) for levels in (hall(), bowed(hall(), 0.4)))
+    rows, columns = math.ceil(hall().shape[0] * RESOLUTION) + 1, math.ceil(length) + 1
+    nodes = np.stack(np.meshgrid(np.arange(columns), np.arange(rows)), axis=-1).reshape(-1, 2).astype(float)
+    offsets = -sagging(nodes, 0.4, length).reshape(rows, columns, 2)
+    rigid = compare_bent(a, b, bend_of(np.zeros_like(offsets)))
+    bent = compare_bent(a, b, bend_of(offsets))
+    assert rigid.hit_rate < 0.7
+    assert bent.hit_rate > 0.95
+    assert bent.contradicting_m < 0.1 * rigid.contradicting_m

@@ -8,15 +8,14 @@ from drawn_maps import RESOLUTION, about_middle, apartment, blank, hall, kept, m
 
 from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.grids.occupancy import FREE, OCCUPIED, UNKNOWN
-from lidarium.mapping.merging.regions.directions import BINS, likely_rotations
-from lidarium.mapping.merging.regions.graph import find_regions
+from lidarium.mapping.merging.regions.graph import BINS, find_regions, likely_rotations
 from lidarium.mapping.merging.regions.proposals import (
-    by_doors,
+    _by_doors,
+    _by_regions,
     by_growing_regions,
-    by_regions,
     propose_motions,
 )
-from lidarium.mapping.merging.regions.settings import RegionSettings
+from lidarium.mapping.merging.regions.segmentation import RegionSettings
 
 SETTINGS = RegionSettings()
 
@@ -36,8 +35,8 @@ def test_the_true_motion_is_among_those_of_regions_and_of_doors(theta):
     there = about_middle(theta, apartment(), shift=(0.5, -0.3))
     a, b = graph(apartment()), graph(noisy(moved(apartment(), there), 1))
     truth, at = there.inverse(), there.apply((5.0, 4.0))
-    assert is_near(by_regions(a, b, SETTINGS), truth, at).any()
-    assert is_near(by_doors(a.doors, b.doors, SETTINGS), truth, at, 0.5).any()
+    assert is_near(_by_regions(a, b, SETTINGS), truth, at).any()
+    assert is_near(_by_doors(a.doors, b.doors, SETTINGS), truth, at, 0.5).any()
     # Where nothing else is known, one in twelve is a good share.
     assert is_near(propose_motions(a, b, SETTINGS), truth, at).mean() > 1.0 / 80.0
 
@@ -54,16 +53,14 @@ def test_parts_of_a_floor_propose_their_motion_too(theta):
 def test_a_room_that_was_seen_in_part_meets_at_its_ends():
     whole, part = room(blank(), 20, 20, 60, 100), room(blank(), 20, 20, 60, 100)
     part[:, 70:] = UNKNOWN
-    found = by_regions(graph(whole), graph(part), SETTINGS)
+    found = _by_regions(graph(whole), graph(part), SETTINGS)
     assert is_near(found, Transform(), (2.0, 2.5)).any()
 
 
 def test_regions_of_like_shapes_propose_the_scale():
     truth = about_middle(0.7, apartment(), (480, 480))
     larger = np.kron(apartment(), np.ones((3, 3), np.uint8))[::2, ::2]
-    found = by_growing_regions(
-        graph(larger), graph(moved(apartment(), truth, (480, 480))), SETTINGS, (0.5, 2.0)
-    )
+    found = by_growing_regions(graph(larger), graph(moved(apartment(), truth, (480, 480))), SETTINGS, (0.5, 2.0))
     is_scale = np.abs(found[:, 3] - 1.5) < 0.05
     # A point p of the small map lies at 1.5 R p + t in the large one.
     point = np.array((5.0, 4.0))

@@ -1,19 +1,23 @@
 """Free space that is split into regions at doors."""
 
+import dataclasses
+import math
+
 import numpy as np
 import pytest
 from drawn_maps import RESOLUTION, apartment, blank, room
 
 from lidarium.mapping.grids.occupancy import FREE, OCCUPIED, UNKNOWN
 from lidarium.mapping.merging.regions import segmentation
-from lidarium.mapping.merging.regions.meetings import NONE, find_meetings
 from lidarium.mapping.merging.regions.segmentation import (
-    SplitRule,
+    NONE,
+    RegionSettings,
+    _SplitRule,
     clearance_of,
+    find_meetings,
     free_space,
     split_regions,
 )
-from lidarium.mapping.merging.regions.settings import RegionSettings
 
 SETTINGS = RegionSettings()
 
@@ -48,9 +52,7 @@ def plain_flood(clearance, order, rule):
             low, high = sorted((own, other), key=lambda one: peaks[one])
             height = clearance[row, column]
             is_door = (
-                height <= rule.half_door
-                and peaks[low] >= rule.least_radius
-                and height <= rule.door_share * peaks[low]
+                height <= rule.half_door and peaks[low] >= rule.least_radius and height <= rule.door_share * peaks[low]
             )
             if own == other or is_door:
                 continue
@@ -74,11 +76,9 @@ def clutter(seed, shape=(28, 34)):
 def test_basins_are_those_of_the_plain_watershed(seed):
     clearance = clearance_of(clutter(seed))
     # Distances without ties, so that the order of a cell's neighbours does not matter.
-    clearance = np.where(
-        clearance > 0, clearance + np.random.default_rng(seed).random(clearance.shape) / 9, 0
-    )
+    clearance = np.where(clearance > 0, clearance + np.random.default_rng(seed).random(clearance.shape) / 9, 0)
     clearance = clearance.astype(np.float32)
-    rule = SplitRule(3.0, 0.75, 1.5)
+    rule = _SplitRule(3.0, 0.75, 1.5)
     order = np.argsort(-clearance.ravel(), kind="stable")[: np.count_nonzero(clearance)]
     labels = np.full(clearance.shape, NONE, np.int32)
     parent, peak, areas = (np.zeros(len(order), kind) for kind in (np.int32, np.float32, np.int64))
@@ -164,3 +164,92 @@ def test_each_room_of_an_apartment_is_one_region_or_more():
 def test_maps_of_one_level(level, regions):
     assert labelled(np.full((60, 80), level, np.uint8)).max() + 1 == regions
     assert labelled(np.full((1, 1), level, np.uint8)).max() == NONE
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("cell_m", 0.0),
+        ("most_cells", 999),
+        ("least_obstacle_m", -0.1),
+        ("widest_door_m", math.nan),
+        ("door_share", 1.01),
+        ("least_area_m2", -1.0),
+        ("most_regions", 0),
+        ("most_doors", 2.5),
+        ("scale_share", 0.0),
+        ("scale_steps", -1),
+        ("candidates", 1001),
+        ("apart_angle", "wide"),
+        ("likely_rotations", 3),
+    ],
+)
+def test_a_value_that_makes_no_sense_is_named(name, value):
+    with pytest.raises(ValueError, match=name):
+        RegionSettings(**{name: value})
+
+
+def test_the_ends_of_the_bounds_are_allowed():
+    ends = {"most_cells": 1000, "door_share": 1.0, "scale_steps": 0, "candidates": 1000, "least_area_m2": 0.0}
+    assert dataclasses.asdict(RegionSettings(**ends)).items() >= ends.items()
+
+
+def test_defaults_hold_and_settings_are_values():
+    assert RegionSettings() == RegionSettings()
+    assert RegionSettings(most_doors=8) != RegionSettings()
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        RegionSettings().cell_m = 0.1
+
+
+def by_pairs(labels, clearance):
+    found = []
+    rows, columns = labels.shape
+    for row in range(rows):
+        for column in range(columns):
+            for down, right in ((0, 1), (1, 0)):
+                beside = row + down, column + right
+                if beside[0] >= rows or beside[1] >= columns:
+                    continue
+                pair = labels[row, column], labels[beside]
+                if NONE in pair or pair[0] == pair[1]:
+                    continue
+                middle = (0.5 + column + 0.5 * right, 0.5 + row + 0.5 * down)
+                found.append(
+                    (
+                        *pair,
+                        min(clearance[row, column], clearance[beside]),
+                        *middle,
+                        float(right),
+                        float(down),
+                    )
+                )
+    return sorted(found)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_edges_are_those_of_all_pairs_of_neighbours(seed):
+    generator = np.random.default_rng(seed)
+    labels = generator.integers(NONE, 3, (9, 13)).astype(np.int32)
+    clearance = generator.random((9, 13)).astype(np.float32)
+    met = find_meetings(labels, clearance)
+    assert len(met.regions) > 20
+    columns = (*met.regions.T, met.clearance, *met.places.T, *met.steps.T)
+    assert sorted(zip(*(column.tolist() for column in columns), strict=True)) == by_pairs(labels, clearance)
+
+
+def test_a_meeting_by_hand():
+    labels = np.array([[0, 0, NONE], [1, 0, 2]], np.int32)
+    clearance = np.array([[1.0, 2.0, 0.0], [3.0, 4.0, 5.0]], np.float32)
+    met = find_meetings(labels, clearance)
+    order = np.lexsort(met.places.T)
+    assert met.regions[order].tolist() == [[0, 1], [1, 0], [0, 2]]
+    assert met.places[order].tolist() == [[0.5, 1.0], [1.0, 1.5], [2.0, 1.5]]
+    assert met.steps[order].tolist() == [[0.0, 1.0], [1.0, 0.0], [1.0, 0.0]]
+    assert met.clearance[order].tolist() == [1.0, 3.0, 4.0]
+
+
+@pytest.mark.parametrize("label", [0, NONE])
+def test_one_region_meets_nothing(label):
+    met = find_meetings(np.full((4, 5), label, np.int32), np.ones((4, 5), np.float32))
+    assert met.regions.shape == met.places.shape == met.steps.shape == (0, 2)
+    assert len(met.clearance) == 0

@@ -1,0 +1,1 @@
+"""Policies that drive to frontiers of the occupancy map."""

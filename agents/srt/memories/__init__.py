@@ -1,1 +1,0 @@
-"""What a robot of the tree remembers of the space around it."""

@@ -1,1 +1,0 @@
-"""How one robot of the tree moves."""

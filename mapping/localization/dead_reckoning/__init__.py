@@ -1,1 +1,0 @@
-"""Poses from odometry alone."""

@@ -1,1 +1,0 @@
-"""Whether two maps agree under a motion, by what their cells say."""

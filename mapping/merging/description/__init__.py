@@ -1,1 +1,0 @@
-"""What describes an occupancy map: its corners, with a descriptor of each."""

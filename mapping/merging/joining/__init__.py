@@ -1,1 +1,0 @@
-"""Maps joined by what was accepted of their pairs."""

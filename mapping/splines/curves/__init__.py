@@ -1,1 +1,0 @@
-"""B-spline curves: their basis, their fit to points, lookup along them."""
