@@ -19,10 +19,6 @@ from numpy.typing import NDArray
 from ppo import ROBOT, Report, Scorer, Settings, as_tensors, train
 
 import lidarium
-from lidarium.envs.faces.parallel import ExplorationEnv
-from lidarium.envs.floors.catalogue.names import set_floors
-from lidarium.envs.settings.making import make_settings
-from lidarium.evaluation.episodes.runner import run_episode
 from lidarium.evaluation.statistics.estimates import mean_interval, paired_difference
 from lidarium.mapping.files.output import write_json, write_text
 
@@ -107,7 +103,7 @@ def run_seed(plan: Plan, seed: int) -> dict[str, Any]:
     """Train a network; return its curve, and what it reached on the unseen floors before and after."""
     torch.set_num_threads(1)
     options = {"robots": 1, "horizon_s": plan.horizon_s, "threads": 1}
-    floors = set_floors(plan.floors)
+    floors = lidarium.floor_set(plan.floors)
     torch.manual_seed(seed)
     untrained = final_coverage(drawn_by(Scorer()), floors, {**ROBOT, **options})
     curve: list[Report] = []
@@ -127,9 +123,9 @@ def run_seed(plan: Plan, seed: int) -> dict[str, Any]:
 def run_classic(plan: Plan, name: str) -> list[float]:
     """Return what a policy of the package reaches on each of the unseen floors."""
     reached = []
-    for floor in set_floors(plan.floors):
-        env = ExplorationEnv(floor, make_settings(robots=1, horizon_s=plan.horizon_s, starts="drawn"))
-        run_episode(lidarium.policy(name), env, seed=0)
+    for floor in lidarium.floor_set(plan.floors):
+        env = lidarium.ExplorationEnv(floor, lidarium.make_settings(robots=1, horizon_s=plan.horizon_s, starts="drawn"))
+        lidarium.run_episode(lidarium.policy(name), env, seed=0)
         reached.append(env.scorer.coverage)
     return reached
 
@@ -198,8 +194,8 @@ def main(plan: Plan, name: str = "training") -> None:
     page = PAGE.format(
         seeds=plan.seeds,
         decisions=plan.updates * Settings().decisions,
-        train_floors=len(set_floors(plan.train_floors)),
-        floors=len(set_floors(plan.floors)),
+        train_floors=len(lidarium.floor_set(plan.train_floors)),
+        floors=len(lidarium.floor_set(plan.floors)),
         horizon_s=plan.horizon_s,
         name=name,
         table=table(numbers["coverage"]),
