@@ -451,7 +451,7 @@ _COORDINATES = "xyz"
 def read_cloud(
     path: Path | str,
     scale: float | None = None,
-    intrinsics: Intrinsics | None = None,
+    intrinsics: Intrinsics | tuple[float, float, float, float] | None = None,
     pose: Path | str | None = None,
 ) -> PointCloud:
     """Read a point cloud, or the points of a depth image.
@@ -462,8 +462,8 @@ def read_cloud(
         A PCD, PLY, OBJ, XYZ or NPZ file (an array ``xyz``), or a depth image (PGM, PNG).
     scale : float, optional
         Length of a unit of the file [m]; by default 1, and 0.001 for depth images.
-    intrinsics : Intrinsics, optional
-        Intrinsics of the camera; needed for depth images.
+    intrinsics : Intrinsics or (float, float, float, float), optional
+        fx, fy, cx, cy of the camera [pixels]; needed for depth images.
     pose : Path or str, optional
         A text file of 4 x 4 numbers, the pose of a depth image; by default the camera's own frame.
 
@@ -495,7 +495,8 @@ def read_cloud(
     if kind in ("PGM", "PNG"):
         if intrinsics is None:
             raise ValueError(f"{path} is a depth image; want the intrinsics of its camera")
-        return _checked_cloud(read_depth_image(path, intrinsics, scale or MILLIMETRES, pose))
+        camera = Intrinsics(*intrinsics) if isinstance(intrinsics, tuple) else intrinsics
+        return _checked_cloud(read_depth_image(path, camera, scale or MILLIMETRES, pose))
     if kind == "NPZ":
         cloud = _read_npz(path)
     else:

@@ -3,6 +3,7 @@
 Usage: python docs/how_to/trainers/attention.py --out docs/results
 """
 
+import json
 import time
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
@@ -20,7 +21,6 @@ from sb3_contrib import MaskablePPO
 from stable_baselines3.common.vec_env import VecMonitor
 
 import lidarium
-from lidarium.mapping.files.output import write_json, write_text
 
 ROBOT = {
     "level": "frontier",
@@ -110,8 +110,8 @@ def main(plan: Attention) -> None:
         torch=torch.__version__,
     )
     plan.out.mkdir(parents=True, exist_ok=True)
-    write_json(plan.out / "attention.json", {"coverage": coverage, "seeds": seeds})
-    write_text(plan.out / "attention.md", page)
+    (plan.out / "attention.json").write_text(json.dumps({"coverage": coverage, "seeds": seeds}, indent=2) + "\n")
+    (plan.out / "attention.md").write_text(page)
     print(page)
 
 
