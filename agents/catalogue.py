@@ -90,21 +90,31 @@ POLICIES.register(
 
 
 def register_policy(name: str, make: Callable[..., Policy] | str, summary: str) -> None:
-    """Register a policy by name.
+    """Register a policy, so that `policy`, `evaluate` and commands find it by name.
 
     Parameters
     ----------
     name : str
-        What users call it.
+        Name of the policy.
     make : callable or str
-        Returns a new policy; keyword arguments are its settings. Also ``"module:attribute"``.
+        Function or class that returns a new policy; keyword arguments are its settings. A string
+        ``"module:attribute"`` is imported when it is first used.
     summary : str
-        One line that says what it does.
+        One line that describes it.
 
     Raises
     ------
     ValueError
-        Where the name is taken.
+        If the name is taken.
+
+    Examples
+    --------
+    >>> import lidarium
+    >>> class Idle(lidarium.Policy):
+    ...     level = "velocity"
+    ...     def act(self, observations):
+    ...         return {agent: lidarium.Stop("idle") for agent in observations}
+    >>> lidarium.register_policy("idle", Idle, "stops at once")
     """
     POLICIES.register(name, make, summary)
 
@@ -115,13 +125,25 @@ def policy_names() -> dict[str, str]:
 
 
 def make_policy(name: str, **settings: Any) -> Policy:  # noqa: ANN401
-    """Return a new policy by name, or one of the user's own by ``module:Class``.
+    """Return a new policy by name, or one of your own by ``module:Class``.
+
+    Parameters
+    ----------
+    name : str
+        Name of a policy, see ``lidarium show policies``.
+    **settings
+        Settings of the policy; defaults if left out.
 
     Raises
     ------
     ValueError
-        Where the name, or that of a setting, is unknown; the message suggests the nearest one. Where there is
-        no such module or class, or it makes no policy.
+        If the name or a setting is unknown, the module or class does not exist, or it is not a policy.
+
+    Examples
+    --------
+    >>> import lidarium
+    >>> lidarium.policy("nearest_frontier").level
+    'frontier'
     """
     maker = POLICIES[name] if not isinstance(name, str) or ":" not in name else maker_at(name)
     try:

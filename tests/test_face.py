@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 import lidarium
+from lidarium.registry import REGISTRIES
 
 ROOT = Path(__file__).resolve().parents[1]
 NAMES = [name for name in lidarium.__all__ if not name.startswith("__")]
@@ -55,7 +56,18 @@ def test_the_api_page_documents_every_name():
     assert named == set(NAMES)
 
 
+@pytest.fixture
+def clean_registries():
+    """Take away what an example registers."""
+    before = {kind: set(lidarium.registry(kind)) for kind in REGISTRIES}
+    yield
+    for kind, names in before.items():
+        for name in set(lidarium.registry(kind)) - names:
+            lidarium.registry(kind).unregister(name)
+
+
 @pytest.mark.parametrize("name", NAMES)
+@pytest.mark.usefixtures("clean_registries")
 def test_examples_in_docstrings_run(name):
     found = getattr(lidarium, name)
     tests = doctest.DocTestFinder(recurse=False).find(found, name, globs={"lidarium": lidarium})
@@ -66,10 +78,11 @@ def test_examples_in_docstrings_run(name):
 def test_types_know_the_same_names():
     """What type checkers see is what is imported when it is used."""
     tree = ast.parse((ROOT / "src" / "lidarium" / "__init__.py").read_text(encoding="utf-8"))
-    block = next(node for node in tree.body if isinstance(node, ast.If))
     seen = {
         alias.asname or alias.name: getattr(importlib.import_module(node.module), alias.name)
-        for node in ast.walk(block)
+        for statement in tree.body
+        if isinstance(statement, ast.If | ast.ImportFrom)
+        for node in ast.walk(statement)
         if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("lidarium.")
         for alias in node.names
     }

@@ -61,7 +61,33 @@ class _FunctionTerm:
 def reward_term(
     name: str, summary: str = ""
 ) -> Callable[[Callable[[Rows], NDArray[Any]]], Callable[[Rows], NDArray[Any]]]:
-    """Make a function known as a term of the reward; ``reward.more`` then takes its name."""
+    """Register a function as a term of the reward; ``reward.more`` then takes its name and weight.
+
+    Parameters
+    ----------
+    name : str
+        Name of the term.
+    summary : str, optional
+        One line that describes it; the first line of the function's docstring by default.
+
+    Returns
+    -------
+    callable
+        A decorator of a function that takes ``Rows`` and returns an amount for each row, (rows,).
+
+    Raises
+    ------
+    ValueError
+        If the name is taken.
+
+    Examples
+    --------
+    >>> import lidarium
+    >>> @lidarium.reward_term("fast", "1 if the robot drives faster than 0.3 m/s")
+    ... def fast(rows):
+    ...     return rows.true_velocity[:, 0] > 0.3
+    >>> env = lidarium.parallel_env(reward={"more": {"fast": 0.01}})
+    """
 
     def register(function: Callable[[Rows], NDArray[Any]]) -> Callable[[Rows], NDArray[Any]]:
         said = summary or (function.__doc__ or name).strip().splitlines()[0]

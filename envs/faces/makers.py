@@ -72,7 +72,16 @@ def parallel_env(
 
 
 def env(floor: Floors = "apartment", **options: Any) -> "AECEnv[str, Any, Any]":  # noqa: ANN401
-    """Make the environment of a team in PettingZoo's turn-based form; options as for `parallel_env`."""
+    """Make the environment of a team (PettingZoo AEC API); options as for `parallel_env`.
+
+    Examples
+    --------
+    >>> import lidarium
+    >>> env = lidarium.env(robots=2)
+    >>> env.reset(seed=0)
+    >>> env.agent_selection
+    'robot_0'
+    """
     from pettingzoo.utils.conversions import parallel_to_aec
 
     converted: AECEnv[str, Any, Any] = parallel_to_aec(parallel_env(floor, **options))
@@ -94,8 +103,8 @@ def vector_env(
         As for `parallel_env`; of a set such as ``set:train``, each beginning draws one.
     **options
         The options of `parallel_env`; ``copy=False`` for observations in two sets of arrays that take turns,
-        ``merging`` for merged maps, ``reports=True`` for stations. With
-        ``randomize`` each episode is an engine of its own.
+        ``merging`` for merged maps, ``reports=True`` for stations. With ``randomize`` each episode is an engine
+        of its own.
 
     Raises
     ------

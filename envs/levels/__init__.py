@@ -24,7 +24,20 @@ def level(name: str, summary: str = "") -> Callable[[L], L]:
     name : str
         The name of the level.
     summary : str, optional
-        One line that says what an action is. The first line of the docstring by default.
+        One line that describes an action; the first line of the docstring by default.
+
+    Raises
+    ------
+    ValueError
+        If the name is taken.
+
+    Examples
+    --------
+    >>> import lidarium
+    >>> @lidarium.level("half_speed", "at most half of the maximum speed")
+    ... class HalfSpeed(lidarium.VelocityLevel):
+    ...     def read_rows(self, actions, live):
+    ...         return super().read_rows(0.5 * actions, live)
     """
 
     def register(kind: L) -> L:

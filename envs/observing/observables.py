@@ -64,7 +64,36 @@ TEAMMATES = Observable(teammate_box, _missing_others, teammates)
 def observable(
     name: str, low: float, high: float, shape: tuple[int, ...], summary: str = ""
 ) -> Callable[[Callable[[Rows], NDArray[Any]]], Callable[[Rows], NDArray[Any]]]:
-    """Make a function known as an observable; ``observe`` then takes its name."""
+    """Register a function as an observable; ``observe`` then takes its name, in batches as well.
+
+    Parameters
+    ----------
+    name : str
+        Name of the observable.
+    low, high : float
+        Bounds; values beyond are clipped.
+    shape : tuple of int
+        Shape of the value of one robot.
+    summary : str, optional
+        One line that describes it; the first line of the function's docstring by default.
+
+    Returns
+    -------
+    callable
+        A decorator of a function that takes ``Rows`` and returns an array of shape ``(rows, *shape)``.
+
+    Raises
+    ------
+    ValueError
+        If the name is taken.
+
+    Examples
+    --------
+    >>> import lidarium, numpy as np
+    >>> @lidarium.observable("clearance", low=0.0, high=4.0, shape=(1,), summary="minimum range [m]")
+    ... def clearance(rows):
+    ...     return np.nan_to_num(rows.scan, nan=4.0, posinf=4.0).min(axis=1, keepdims=True)
+    """
     box = spaces.Box(low, high, shape, np.float32)
 
     def register(function: Callable[[Rows], NDArray[Any]]) -> Callable[[Rows], NDArray[Any]]:

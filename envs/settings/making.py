@@ -67,19 +67,19 @@ MOST_LISTED = 300
 
 
 def make_settings(settings: ExplorationSettings | None = None, **options: Any) -> ExplorationSettings:  # noqa: ANN401
-    """Fill settings from the short options of ``lidarium.parallel_env``.
+    """Make settings of an environment from the options of `parallel_env`.
 
     Parameters
     ----------
-    settings : ExplorationSettings or None
-        Where to start from; the defaults if None.
+    settings : ExplorationSettings, optional
+        Settings to start from; the defaults if None.
     **options
-        Any attribute of ``ExplorationSettings``; a part such as ``robot`` or ``reward`` also as a mapping of
+        Any attribute of `ExplorationSettings`; a part such as ``robot`` or ``reward`` also as a mapping of
         its values, and ``robot``, ``lidar``, ``camera``, ``odometry``, ``radio`` and ``battery`` by name.
-        ``noise`` (none, datasheet or thesis) for the laser's noise, ``resolution`` for the maps' cell [m],
-        ``max_cycles`` (steps) in place of ``horizon_s``; ``realism`` (ideal, lab or field) for all of noise,
-        odometry, localization, radio and faults that is not given itself; ``assigned`` for single values, as
-        ``assign`` takes them, set last.
+        ``noise`` ("none", "datasheet" or "thesis") sets the noise of the laser, ``resolution`` the cell of
+        the maps [m], ``max_cycles`` the horizon in steps instead of ``horizon_s``. ``realism`` ("ideal",
+        "lab" or "field") sets noise, odometry, localization, radio and faults unless they are given.
+        ``assigned`` sets single values last, as ``["lidar.beams=180"]``.
 
     Returns
     -------
@@ -89,7 +89,13 @@ def make_settings(settings: ExplorationSettings | None = None, **options: Any) -
     Raises
     ------
     ValueError, TypeError
-        If an option has a bad value or is unknown.
+        If an option is unknown or has a bad value.
+
+    Examples
+    --------
+    >>> import lidarium
+    >>> lidarium.make_settings(robots=3, resolution=0.05, lidar={"beams": 180}).lidar.beams
+    180
     """
     base = settings or ExplorationSettings()
     assigned = options.pop("assigned", ())

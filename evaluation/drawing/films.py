@@ -302,6 +302,13 @@ def film(name: str, summary: str) -> Callable[[FramesMaker], FramesMaker]:
     ------
     ValueError
         If the name is taken.
+
+    Examples
+    --------
+    >>> import lidarium, numpy as np
+    >>> @lidarium.film("dark", "a frame that darkens as the floor is explored")
+    ... def dark(env, width):
+    ...     return np.full((width // 2, width, 3), int(255 * (1 - env.scorer.coverage)), np.uint8)
     """
 
     def register(item: FramesMaker) -> FramesMaker:

@@ -78,27 +78,38 @@ def run_episode(
     policy : Policy
         The policy; its ``Stop`` ends a robot at its next step.
     env : ExplorationEnv
-        Where; it takes the policy's level.
+        The environment; it is switched to the policy's level of decision.
     seed : int
-        If all draws come from: of the environment, and of the policy.
-    options : mapping or None
+        Seed of all draws of the environment and the policy.
+    options : mapping, optional
         Options of ``reset``.
-    on_decision : callable or None
-        Called with the environment after the reset and after every decision, for progress, pictures and
-        records.
-    raise_interrupt : bool
-        Whether ``KeyboardInterrupt`` is passed on. Otherwise a first Ctrl-C ends the episode after the step
-        at hand, and the episode so far is returned; a second one, and one before the first step, is passed on
-        all the same.
-    merging : MergingSettings or None
-        How the robots merge their maps (`MergedMaps`); they do not if None.
-    plans_sparsely : bool
-        Whether robots drive to their goals along routes on their sparse maps (`SparsePlanning`).
+    on_decision : callable, optional
+        Called with the environment after the reset and after every decision.
+    raise_interrupt : bool, optional
+        Whether ``KeyboardInterrupt`` is raised, True by default. If False, a first Ctrl-C ends the episode
+        after the current step and the episode so far is returned; a second one is raised.
+    merging : MergingSettings, optional
+        How the robots merge their maps (`MergedMaps`); by default they do not.
+    plans_sparsely : bool, optional
+        Whether robots drive along routes on their sparse maps (`SparsePlanning`); False by default.
 
     Returns
     -------
     Episode
-        The result.
+        The environment at the end, the seed, wall times, merges and frontiers that were given up.
+
+    Raises
+    ------
+    ValueError
+        If robots lack a sensor that the policy reads, or ``plans_sparsely`` is set for a policy of speeds.
+
+    Examples
+    --------
+    >>> import lidarium
+    >>> env = lidarium.parallel_env("apartment", robots=2, horizon_s=5.0)
+    >>> episode = lidarium.run_episode(lidarium.policy("nearest_frontier"), env, seed=0)
+    >>> env.scorer.time
+    5.0
     """
     check_observed(policy, type(policy).__name__, env.settings.observe)
     env.use_level(policy.level, policy.shares_map, policy.decision_period_s)

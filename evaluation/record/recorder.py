@@ -14,13 +14,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 import lidarium
+from lidarium.agents.catalogue import make_policy
+from lidarium.agents.policy import Policy
 from lidarium.agents.report import GivenUp
 from lidarium.envs.faces.parallel import ExplorationEnv
+from lidarium.envs.floors.floor import Floor
 from lidarium.envs.onboard.radio.messages import Orders
+from lidarium.envs.settings.exploration import ExplorationSettings
+from lidarium.envs.settings.making import make_settings
 from lidarium.evaluation.episodes.events import operating_events, place_of
+from lidarium.evaluation.episodes.runner import run_episode
 from lidarium.evaluation.episodes.settings_identity import settings_sha256
-from lidarium.evaluation.episodes.watching import Watcher
+from lidarium.evaluation.episodes.watching import WatchedExploration, Watcher
 from lidarium.evaluation.record.episode_record import FORMAT, DisplayTrack, EpisodeRecord, MapChanges
+from lidarium.evaluation.record.file import write_record
 from lidarium.evaluation.record.replay import state_sha256
 from lidarium.evaluation.truth.beliefs import cells_beyond
 from lidarium.mapping.grids.map_deltas import OverlaidMaps, note_changes, note_overlaid_changes
@@ -317,3 +324,52 @@ class Recorder(Watcher):
         for robot in np.flatnonzero(collisions > self._collisions).tolist():
             self.note("contact", env.scorer.time, env.possible_agents[robot])
         self._collisions, self._noted_collisions = collisions.copy(), collisions.tobytes()
+
+
+def record(
+    policy: str | Policy,
+    floor: str | Path | Floor = "apartment",
+    settings: ExplorationSettings | None = None,
+    seed: int = 0,
+    path: Path | str | None = None,
+) -> EpisodeRecord:
+    """Run an episode and record it, to be run again or shown later.
+
+    Parameters
+    ----------
+    policy : str or Policy
+        Name of a policy, or a policy.
+    floor : str, Path or Floor, optional
+        Floor as for `load_floor`, "apartment" by default.
+    settings : ExplorationSettings, optional
+        Settings of the environment; defaults of `make_settings` if None.
+    seed : int, optional
+        Seed of the environment and the policy, 0 by default.
+    path : Path or str, optional
+        File (``.npz``) that the record is written to. By default none is written.
+
+    Returns
+    -------
+    EpisodeRecord
+        The record, for `replay`.
+
+    Raises
+    ------
+    ValueError
+        If the policy or the floor is unknown, or robots lack a sensor that the policy needs.
+
+    Examples
+    --------
+    >>> import lidarium
+    >>> recorded = lidarium.record("nearest_frontier", settings=lidarium.make_settings(horizon_s=5.0))
+    >>> len(recorded.commands)
+    50
+    """
+    name = policy if isinstance(policy, str) else type(policy).__name__
+    recorder = Recorder(name, seed, None if isinstance(floor, Floor) else floor)
+    env = WatchedExploration(floor, settings or make_settings(), watchers=[recorder])
+    run_episode(make_policy(policy) if isinstance(policy, str) else policy, env, seed)
+    found = recorder.finish()
+    if path is not None:
+        write_record(Path(path), found)
+    return found

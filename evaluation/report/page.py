@@ -9,13 +9,18 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from lidarium.envs.faces.parallel import ExplorationEnv
+from lidarium.envs.floors.floor import Floor
 from lidarium.evaluation.analysis.episodes import Row, pair_key_of, variant_of
 from lidarium.evaluation.analysis.figures import TIMES, Value, over_bound
 from lidarium.evaluation.analysis.groups import Group
 from lidarium.evaluation.analysis.records import Entry, Key, record_key
+from lidarium.evaluation.drawing.films import FilmSettings
 from lidarium.evaluation.drawing.style import colours
+from lidarium.evaluation.drawing.track_film import save_track_film
 from lidarium.evaluation.episodes.result import METRICS
-from lidarium.evaluation.report.replay_page import Replay
+from lidarium.evaluation.record import EpisodeRecord, read_record, rerun
+from lidarium.evaluation.report.replay_page import Replay, replay_of
 from lidarium.evaluation.report.sections import Section
 from lidarium.evaluation.report.tables import as_text
 from lidarium.evaluation.suites.trial import DEFAULT_VARIANT
@@ -166,6 +171,57 @@ def write_page(path: Path, content: Mapping[str, Any], replays: Sequence[Replay]
 def write_replay_page(path: Path, replay: Replay) -> None:
     """Write the page of one episode; raises as `write_page`."""
     write_page(path, {"kind": "replay", "title": replay.title}, [replay])
+
+
+def replay(
+    record: EpisodeRecord | Path | str,
+    floor: str | Path | Floor | None = None,
+    *,
+    html: Path | str | None = None,
+    film: Path | str | None = None,
+    speed: float = 10.0,
+) -> ExplorationEnv:
+    """Run a recorded episode again, and write a page or a film of it if asked to.
+
+    The version of lidarium that made a record runs it again to the bit.
+
+    Parameters
+    ----------
+    record : EpisodeRecord, Path or str
+        The record, or its file.
+    floor : str, Path or Floor, optional
+        The floor of the episode; by default the one that the record names.
+    html : Path or str, optional
+        File of a page that replays the episode in a browser.
+    film : Path or str, optional
+        File of a film: ``.gif``, ``.webp`` or ``.mp4``.
+    speed : float, optional
+        Simulated seconds per second of the film, 10 by default.
+
+    Returns
+    -------
+    ExplorationEnv
+        The environment at the end of the episode.
+
+    Raises
+    ------
+    ValueError
+        If the record is of another version, the floor is not found, or the end is not the recorded one.
+
+    Examples
+    --------
+    >>> import lidarium
+    >>> recorded = lidarium.record("nearest_frontier", settings=lidarium.make_settings(horizon_s=5.0))
+    >>> lidarium.replay(recorded).scorer.time
+    5.0
+    """
+    found = record if isinstance(record, EpisodeRecord) else read_record(Path(record))
+    env = rerun(found, floor)
+    if html is not None:
+        write_replay_page(Path(html), replay_of(found, None if floor is None else env.floor))
+    if film is not None:
+        save_track_film(Path(film), found, FilmSettings(speed=speed), env.floor)
+    return env
 
 
 def _json(content: Mapping[str, Any]) -> str:

@@ -13,19 +13,17 @@ from contextlib import closing
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from tempfile import TemporaryDirectory
+from typing import Any
 
 import lidarium
 from lidarium.evaluation.processes import shared_out
-from lidarium.evaluation.suites.episodes_file import KEY, EpisodesFile
-from lidarium.evaluation.suites.suite import MOST_SUITE_BYTES, Suite
+from lidarium.evaluation.suites.episodes_file import KEY, EpisodesFile, read_episodes
+from lidarium.evaluation.suites.suite import MOST_SUITE_BYTES, Suite, suite_of
 from lidarium.evaluation.suites.trial import Trial
 from lidarium.evaluation.suites.trial_run import RECORDS_FOLDER, RecordNotWrittenError, run_trial
 from lidarium.mapping.files.guarded_reading import read_text, reason
 from lidarium.mapping.files.output import clear_unfinished, write_json
-
-if TYPE_CHECKING:
-    pass
 
 SUITE_FILE, EPISODES_FILE = "suite.json", "episodes.jsonl"
 
@@ -89,6 +87,93 @@ class Campaign:
         from lidarium.evaluation.suites.on_ray import trials_on_ray
 
         return trials_on_ray(self.suite, missing, records, self.cluster)
+
+
+def evaluate(
+    policies: str | Sequence[str],
+    floors: str | Sequence[str] = "apartment",
+    robots: int | Sequence[int] = 1,
+    seeds: int | Sequence[int] = 3,
+    *,
+    out: Path | str | None = None,
+    settings: Mapping[str, Any] | None = None,
+    workers: int = 1,
+    records: bool = False,
+    bounds: bool = False,
+) -> list[dict[str, Any]]:
+    """Run policies on floors with teams and seeds, as the command ``lidarium evaluate`` does.
+
+    Episodes of the same floor, team and seed have the same starts for every policy. Finished episodes are
+    kept in the folder: an interrupted call continues if it is repeated.
+
+    Parameters
+    ----------
+    policies : str or sequence of str
+        Names of policies (``lidarium show policies``), or ``module:Class`` of your own.
+    floors : str or sequence of str, optional
+        Floors as for `load_floor`, or ``set:NAME`` for a set; "apartment" by default.
+    robots : int or sequence of int, optional
+        Numbers of robots; 1 by default.
+    seeds : int or sequence of int, optional
+        Number of seeds from 0 on, or the seeds; 3 by default.
+    out : Path or str, optional
+        Folder of the episodes, for ``lidarium report``. By default nothing is kept.
+    settings : mapping, optional
+        Options as for `parallel_env`. By default ``horizon_s`` is 1800 and ``stop_coverage`` 0.99.
+    workers : int, optional
+        Number of processes, 1 by default. Processes know policies that are registered in an installed
+        module or in one that ``LIDARIUM_IMPORT`` names.
+    records : bool, optional
+        Whether a record of every episode is written, for replays; False by default.
+    bounds : bool, optional
+        Whether each episode is compared with the bound of a team that has the floor plan; False by default.
+        Needs the extra ``bounds``.
+
+    Returns
+    -------
+    list of dict
+        A row per episode in the order of the request, with ``policy``, ``floor``, ``robots``, ``seed`` and
+        all metrics, such as ``t99_s`` [s].
+
+    Raises
+    ------
+    ValueError
+        If a name or a number is unknown, or the folder holds episodes of other settings.
+    RuntimeError
+        If an episode failed.
+
+    Examples
+    --------
+    >>> import lidarium
+    >>> rows = lidarium.evaluate("nearest_frontier", robots=2, seeds=1, settings={"horizon_s": 5.0})
+    >>> rows[0]["policy"], rows[0]["time_s"]
+    ('nearest_frontier', 5.0)
+    """
+    suite = suite_of(
+        {
+            "policies": policies,
+            "floors": floors,
+            "robots": robots,
+            "seeds": seeds,
+            "settings": {"horizon_s": 1800.0, "stop_coverage": 0.99, **(settings or {})},
+            "bounds": bounds,
+        }
+    )
+    if out is None:
+        with TemporaryDirectory(prefix="lidarium-") as folder:
+            return _rows_of(Campaign(suite, Path(folder), workers, records))
+    return _rows_of(Campaign(suite, Path(out), workers, records))
+
+
+def _rows_of(campaign: Campaign) -> list[dict[str, Any]]:
+    """Run a campaign, and return its rows in the order of its trials."""
+    for _ in campaign.run():
+        pass
+    for trial, error in campaign.failures:
+        message = f"{len(campaign.failures)} of {campaign.total} episodes failed, first {trial.key}: {error}"
+        raise RuntimeError(message) from error
+    rows = {row[KEY]: row for row in read_episodes(campaign.folder / EPISODES_FILE)}
+    return [rows[trial.key] for trial in campaign.suite.trials()]
 
 
 def _check_same(episodes: list[dict[str, Any]], suite: Suite, folder: Path) -> None:

@@ -170,12 +170,12 @@ class MapImage:
     resolution: float
 
 
-def read_ros_map(yaml_path: Path) -> MapImage:
-    """Read a map of ROS map_server.
+def read_ros_map(yaml_path: Path | str) -> MapImage:
+    """Read an occupancy map of ROS map_server.
 
     Parameters
     ----------
-    yaml_path : Path
+    yaml_path : Path or str
         The yaml file; its image is in the same folder.
 
     Returns
@@ -190,6 +190,14 @@ def read_ros_map(yaml_path: Path) -> MapImage:
         If the yaml file or its image is not there.
     ValueError
         If a key is missing or has a bad value, or the image cannot be read.
+
+    Examples
+    --------
+    >>> import lidarium, numpy as np, tempfile
+    >>> levels = np.array([[0, 127], [255, 255]], np.uint8)
+    >>> file = lidarium.write_map(tempfile.mkdtemp(), "map", levels, (0.0, 0.0, 0.0), 0.05)
+    >>> lidarium.read_map(file).levels.tolist()
+    [[0, 127], [255, 255]]
     """
     yaml_path = Path(yaml_path)
     header = _read_header(yaml_path)
@@ -249,16 +257,21 @@ def read_grey_map(path: Path, resolution: float) -> MapImage:
 
 
 def write_ros_map(
-    folder: Path, name: str, levels: NDArray[np.uint8], origin: tuple[float, float, float], resolution: float
+    folder: Path | str,
+    name: str,
+    levels: NDArray[np.uint8],
+    origin: tuple[float, float, float],
+    resolution: float,
 ) -> Path:
-    """Write a map for ROS map_server: ``name.yaml`` and ``name.pgm``.
+    """Write an occupancy map for ROS map_server: ``name.yaml`` and ``name.pgm``.
 
-    Both files are written beside and then renamed, the yaml last, so that a reader never finds half a map.
+    Both files are written under temporary names and then renamed, the yaml last, so that a reader never finds
+    half a map.
 
     Parameters
     ----------
-    folder : Path
-        Folder to write to; made if absent.
+    folder : Path or str
+        Folder to write to; made if it does not exist.
     name : str
         Stem of both files.
     levels : (rows, columns) uint8
@@ -276,7 +289,14 @@ def write_ros_map(
     Raises
     ------
     ValueError
-        If a level is none of the three, the map is empty, or origin or resolution are no good.
+        If a level is none of the three, the map is empty, or origin or resolution are not finite.
+
+    Examples
+    --------
+    >>> import lidarium, numpy as np, tempfile
+    >>> levels = np.full((40, 60), 255, np.uint8)  # 2 m x 3 m of free floor
+    >>> lidarium.write_map(tempfile.mkdtemp(), "room", levels, (0.0, 0.0, 0.0), 0.05).name
+    'room.yaml'
     """
     levels = np.asarray(levels)
     if levels.ndim != 2 or levels.size == 0:

@@ -44,21 +44,21 @@ def merge_maps(
     settings: MergeSettings | None = None,
     question: Question | None = None,
 ) -> Merged:
-    """Merge maps of robots that know nothing of each other's start.
+    """Merge maps of robots that do not know each other's start.
 
-    Pairs of maps that know most are searched for first, by corners before all rotations and translations are
-    tried. Where two maps are joined through others already, they are overlaid as these imply, and
-    searched for only where they do not agree so.
+    Pairs with the most explored area are matched first, by corners and then by all rotations and
+    translations. Two maps that are joined through others already are overlaid as these imply, and matched
+    only if they do not agree so.
 
     Parameters
     ----------
     maps : mapping of str to ((rows, columns) uint8, float)
-        Occupancy (dark is occupied, row 0 at the lowest y) and side of a cell [m] of each map. Where the
-        sides differ, all maps are brought to the coarsest.
-    settings : MergeSettings or None
-        How.
-    question : Question or None
-        What is known of two maps, and what is asked of every pair beside whether it joins.
+        Occupancy (dark is occupied, row 0 at the lowest y) and side of a cell [m] of each map. If the
+        sides differ, all maps are resampled to the coarsest.
+    settings : MergeSettings, optional
+        Settings; defaults if None.
+    question : Question, optional
+        A guess for two maps, and what is reported of each pair.
 
     Returns
     -------
@@ -68,7 +68,18 @@ def merge_maps(
     Raises
     ------
     ValueError
-        Where there are no maps, or one is no map, or the question has no answer.
+        If there are no maps, one is not a map, or a guess is given for other than two maps.
+
+    Examples
+    --------
+    >>> import lidarium, numpy as np
+    >>> rng = np.random.default_rng(0)
+    >>> room = np.full((120, 160), 255, np.uint8)
+    >>> for row, column, rows, columns in rng.integers((0, 0, 4, 4), (110, 150, 30, 30), (12, 4)):
+    ...     room[row : row + rows, column : column + columns] = 0
+    >>> merged = lidarium.merge_maps({"a": (room, 0.05), "b": (np.rot90(room), 0.05)})
+    >>> sorted(merged.pairs)
+    [('a', 'b')]
     """
     settings, question = settings or MergeSettings(), question or Question()
     if not maps:

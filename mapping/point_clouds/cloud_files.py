@@ -451,34 +451,42 @@ _COORDINATES = "xyz"
 def read_cloud(
     path: Path | str,
     scale: float | None = None,
-    intrinsics: Intrinsics | None = None,
+    intrinsics: Intrinsics | tuple[float, float, float, float] | None = None,
     pose: Path | str | None = None,
 ) -> PointCloud:
-    """Read a cloud.
+    """Read a point cloud, or the points of a depth image.
 
     Parameters
     ----------
-    path : Path
+    path : Path or str
         A PCD, PLY, OBJ, XYZ or NPZ file (an array ``xyz``), or a depth image (PGM, PNG).
     scale : float, optional
-        Metres of a unit; by default 1, and 0.001 of depth images.
-    intrinsics : Intrinsics, optional
-        Of the camera; depth images need them.
-    pose : Path, optional
-        A text file of 4 x 4 numbers, the pose of a depth image.
+        Length of a unit of the file [m]; by default 1, and 0.001 for depth images.
+    intrinsics : Intrinsics or (float, float, float, float), optional
+        fx, fy, cx, cy of the camera [pixels]; needed for depth images.
+    pose : Path or str, optional
+        A text file of 4 x 4 numbers, the pose of a depth image; by default the camera's own frame.
 
     Returns
     -------
     PointCloud
-        Its points [m], all of them finite.
+        ``points`` (N, 3) float32 [m], all of them finite.
 
     Raises
     ------
     FileNotFoundError
-        If there is no such file.
+        If the file does not exist.
     ValueError
-        If it is of another kind than its name says, truncated, without points, or has such as are not
-        finite; if its points can be no metres.
+        If the type is not the one of the file's name, the file is truncated or has no points, or points are
+        not finite or more than a kilometre apart.
+
+    Examples
+    --------
+    >>> import lidarium, numpy as np, tempfile
+    >>> folder = tempfile.mkdtemp()
+    >>> np.savez(f"{folder}/cloud.npz", xyz=np.eye(3, dtype=np.float32))
+    >>> lidarium.read_cloud(f"{folder}/cloud.npz").points.shape
+    (3, 3)
     """
     path = Path(path)
     kind = _kind_of(path)
@@ -487,7 +495,8 @@ def read_cloud(
     if kind in ("PGM", "PNG"):
         if intrinsics is None:
             raise ValueError(f"{path} is a depth image; want the intrinsics of its camera")
-        return _checked_cloud(read_depth_image(path, intrinsics, scale or MILLIMETRES, pose))
+        camera = Intrinsics(*intrinsics) if isinstance(intrinsics, tuple) else intrinsics
+        return _checked_cloud(read_depth_image(path, camera, scale or MILLIMETRES, pose))
     if kind == "NPZ":
         cloud = _read_npz(path)
     else:

@@ -417,7 +417,7 @@ def build_graph(
     body: SweptBody,
     settings: GraphSettings | None = None,
 ) -> TopologicalGraph:
-    """Build the graph of free nodes among boxes.
+    """Build the graph that a body can be driven along, from a sparse map or any nodes and boxes.
 
     Parameters
     ----------
@@ -427,8 +427,28 @@ def build_graph(
         Low and high corners of the boxes of occupied codes [m].
     body : SweptBody
         The body that drives.
-    settings : GraphSettings or None
+    settings : GraphSettings, optional
         Settings; defaults if None.
+
+    Returns
+    -------
+    TopologicalGraph
+        Nodes and edges, for `plan`.
+
+    Raises
+    ------
+    ValueError
+        If there are no free nodes, or the body can stand at none of them.
+
+    Examples
+    --------
+    >>> import lidarium, numpy as np
+    >>> x, y = np.meshgrid(np.arange(0.0, 4.0, 0.2), np.arange(0.0, 3.0, 0.2))
+    >>> free = np.stack([x, y, np.zeros_like(x)], axis=-1).reshape(-1, 3)
+    >>> shelf = np.array([[[1.9, 0.0, 0.0], [2.1, 2.0, 1.5]]])  # low and high corner [m]
+    >>> graph = lidarium.build_graph(free, shelf, lidarium.SweptBody(radius=0.2))
+    >>> graph.nodes.shape[1]
+    3
     """
     settings = settings or GraphSettings()
     free = np.ascontiguousarray(free, np.float64).reshape(-1, 3)

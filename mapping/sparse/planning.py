@@ -235,7 +235,7 @@ REASONS = ("", "start in collision", "goal in collision", "no path")
 
 
 @dataclass(frozen=True, eq=False)
-class _Plan:
+class Plan:
     """The answer to a request.
 
     Attributes
@@ -268,17 +268,37 @@ def plan(
     start: NDArray[np.float64],
     goal: NDArray[np.float64],
     shortens: bool = True,
-) -> _Plan:
-    """_Plan a path for the body of a graph.
+) -> Plan:
+    """Plan a path for the body of a graph, by A* and shortcuts.
 
     Parameters
     ----------
     graph : TopologicalGraph
-        Where it can be driven.
+        The graph, from `build_graph`.
     start, goal : (2,) or (3,) float64
         Start and goal [m]; without a height, that of the nearest node.
-    shortens : bool
-        Whether the path leaves the graph if it can be driven straight.
+    shortens : bool, optional
+        Whether the path leaves the graph if it can be driven straight; True by default.
+
+    Returns
+    -------
+    Plan
+        ``path`` (P, 3) [m] and ``length`` [m]; if no path exists, ``reason`` says why.
+
+    Raises
+    ------
+    ValueError
+        If start or goal are not two or three finite numbers.
+
+    Examples
+    --------
+    >>> import lidarium, numpy as np
+    >>> x, y = np.meshgrid(np.arange(0.0, 4.0, 0.2), np.arange(0.0, 3.0, 0.2))
+    >>> free = np.stack([x, y, np.zeros_like(x)], axis=-1).reshape(-1, 3)
+    >>> shelf = np.array([[[1.9, 0.0, 0.0], [2.1, 2.0, 1.5]]])  # low and high corner [m]
+    >>> graph = lidarium.build_graph(free, shelf, lidarium.SweptBody(radius=0.2))
+    >>> lidarium.plan(graph, [1.0, 0.5], [3.0, 0.5]).length > 2.0
+    True
     """
     ends = [_terminal(graph, name, point) for name, point in (("start", start), ("goal", goal))]
     path, nodes, reason = _plan(
@@ -291,7 +311,7 @@ def plan(
         graph.body.numbers,
         shortens,
     )
-    return _Plan(path, REASONS[reason], nodes)
+    return Plan(path, REASONS[reason], nodes)
 
 
 def _terminal(graph: TopologicalGraph, name: str, point: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -40,6 +40,13 @@ def command(name: str, summary: str) -> Callable[[Execute], Execute]:
     ------
     ValueError
         If the name is taken.
+
+    Examples
+    --------
+    >>> import lidarium
+    >>> @lidarium.command("double", "print twice the seed")
+    ... def double(options: lidarium.Command) -> lidarium.Answer:
+    ...     return lidarium.Answer({"double": 2 * options.seed}, f"{2 * options.seed}")
     """
 
     def register(execute: Execute) -> Execute:

@@ -140,17 +140,10 @@ def _settings_of(command: _Slam) -> "SlamSettings":
 
 
 def _read(command: _Slam) -> "LaserLog":
-    from lidarium.mapping.files.bags.reading import is_bag, read_bag_log
-    from lidarium.mapping.files.carmen_logs import read_carmen_log
-    from lidarium.mapping.files.npz_logs import read_npz_log
+    from lidarium.mapping.files.log_files import read_log
 
-    if is_bag(command.log):
-        return read_bag_log(command.log, command.topic)
-    if command.log.suffix == ".npz":
-        return read_npz_log(command.log)
-    return read_carmen_log(
-        command.log, None if command.field_of_view is None else math.radians(command.field_of_view)
-    )
+    field_of_view = None if command.field_of_view is None else math.radians(command.field_of_view)
+    return read_log(command.log, command.topic, field_of_view)
 
 
 def _log(command: _Slam) -> "LaserLog":

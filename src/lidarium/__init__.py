@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, Any
 import gymnasium
 import pettingzoo
 
+from lidarium.registry import registry as registry
+
 if TYPE_CHECKING:
     from importlib.machinery import ModuleSpec
 
@@ -25,7 +27,10 @@ if TYPE_CHECKING:
     from lidarium.envs.faces.sparse_planning import SparsePlanning
     from lidarium.envs.faces.team_exchange import MergingSettings
     from lidarium.envs.floors.catalogue.names import load_floor
+    from lidarium.envs.floors.catalogue.names import set_floors as floor_set
     from lidarium.envs.floors.floor import Floor, Solid
+    from lidarium.envs.floors.generation.buildings import BuildingSettings, generate_building
+    from lidarium.envs.floors.importers import Format as FloorFormat
     from lidarium.envs.levels import level
     from lidarium.envs.levels.velocity import VelocityLevel
     from lidarium.envs.levels.waypoint import WaypointLevel
@@ -41,22 +46,46 @@ if TYPE_CHECKING:
     from lidarium.envs.settings.radio import RadioSettings
     from lidarium.envs.settings.rewards import RewardSettings
     from lidarium.envs.settings.robots import Robot
+    from lidarium.envs.simulation.backends import simulation_of
+    from lidarium.evaluation.drawing import films as film
     from lidarium.evaluation.episodes.runner import run_episode
+    from lidarium.evaluation.metrics import metric
+    from lidarium.evaluation.record.recorder import record
+    from lidarium.evaluation.report.page import replay
+    from lidarium.evaluation.suites.campaign import evaluate
+    from lidarium.mapping.files.log_files import read_log
+    from lidarium.mapping.files.map_files import read_ros_map as read_map
+    from lidarium.mapping.files.map_files import write_ros_map as write_map
+    from lidarium.mapping.localization.slam.following import run_slam
     from lidarium.mapping.merging.merger import merge_maps
     from lidarium.mapping.merging.settings import MergeSettings
-    from lidarium.registry import registry
+    from lidarium.mapping.point_clouds.cloud_files import read_cloud
+    from lidarium.mapping.sparse.graph import build_graph
+    from lidarium.mapping.sparse.mapper.full import map_cloud
+    from lidarium.mapping.sparse.planning import plan
+    from lidarium.mapping.sparse.settings import MapperSettings
+    from lidarium.mapping.sparse.swept_body import SweptBody
+    from lidarium.scripts.commands import command
+    from lidarium.scripts.common import Answer, Command
+    from lidarium.training.reinforcement.frontier_policy import FrontierPolicy
 
 __version__ = "0.3.0"
 
 _FACE: dict[str, str] = {
+    "Answer": "lidarium.scripts.common",
     "Battery": "lidarium.envs.settings.battery",
+    "BuildingSettings": "lidarium.envs.floors.generation.buildings",
+    "Command": "lidarium.scripts.common",
     "DepthCamera": "lidarium.envs.settings.cameras",
     "ExplorationEnv": "lidarium.envs.faces.parallel",
     "ExplorationSettings": "lidarium.envs.settings.exploration",
     "Fault": "lidarium.envs.settings.faults",
     "FaultSettings": "lidarium.envs.settings.faults",
     "Floor": "lidarium.envs.floors.floor",
+    "FloorFormat": "lidarium.envs.floors.importers:Format",
+    "FrontierPolicy": "lidarium.training.reinforcement.frontier_policy",
     "Lidar": "lidarium.envs.settings.lidar",
+    "MapperSettings": "lidarium.mapping.sparse.settings",
     "MergeSettings": "lidarium.mapping.merging.settings",
     "MergedMaps": "lidarium.envs.faces.merged_maps",
     "MergingSettings": "lidarium.envs.faces.team_exchange",
@@ -72,23 +101,41 @@ _FACE: dict[str, str] = {
     "Solid": "lidarium.envs.floors.floor",
     "SparsePlanning": "lidarium.envs.faces.sparse_planning",
     "Stop": "lidarium.agents.policy",
+    "SweptBody": "lidarium.mapping.sparse.swept_body",
     "Target": "lidarium.envs.onboard.radio.messages",
     "VelocityLevel": "lidarium.envs.levels.velocity",
     "WaypointLevel": "lidarium.envs.levels.waypoint",
+    "build_graph": "lidarium.mapping.sparse.graph",
+    "command": "lidarium.scripts.commands",
     "env": "lidarium.envs.faces.makers",
+    "evaluate": "lidarium.evaluation.suites.campaign",
+    "film": "lidarium.evaluation.drawing.films",
+    "floor_set": "lidarium.envs.floors.catalogue.names:set_floors",
+    "generate_building": "lidarium.envs.floors.generation.buildings",
     "level": "lidarium.envs.levels",
     "load_floor": "lidarium.envs.floors.catalogue.names",
     "make_settings": "lidarium.envs.settings.making",
+    "map_cloud": "lidarium.mapping.sparse.mapper.full",
     "merge_maps": "lidarium.mapping.merging.merger",
+    "metric": "lidarium.evaluation.metrics",
     "observable": "lidarium.envs.observing.observables",
     "parallel_env": "lidarium.envs.faces.makers",
+    "plan": "lidarium.mapping.sparse.planning",
     "policy": "lidarium.agents.catalogue:make_policy",
+    "read_cloud": "lidarium.mapping.point_clouds.cloud_files",
+    "read_log": "lidarium.mapping.files.log_files",
+    "read_map": "lidarium.mapping.files.map_files:read_ros_map",
+    "record": "lidarium.evaluation.record.recorder",
     "register_policy": "lidarium.agents.catalogue",
     "registry": "lidarium.registry",
+    "replay": "lidarium.evaluation.report.page",
     "reward_term": "lidarium.envs.engine.reward_terms",
     "run_episode": "lidarium.evaluation.episodes.runner",
+    "run_slam": "lidarium.mapping.localization.slam.following",
     "sb3_vec_env": "lidarium.envs.faces.makers",
+    "simulation_of": "lidarium.envs.simulation.backends",
     "vector_env": "lidarium.envs.faces.makers",
+    "write_map": "lidarium.mapping.files.map_files:write_ros_map",
 }
 """The module of each public name; ``module:name`` if it is called otherwise there."""
 

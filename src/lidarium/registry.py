@@ -58,11 +58,11 @@ class Registry(Mapping[str, T], Generic[T]):
         Parameters
         ----------
         name : str
-            What users call it.
+            Name of the item.
         item : T or str
             The item, or ``"module:attribute"`` that is imported when it is first asked for.
         summary : str
-            One line that says what it is.
+            One line that describes it.
 
         Raises
         ------
@@ -149,12 +149,25 @@ def _shown(name: object) -> str:
 
 
 def registry(kind: str) -> Registry[Any]:
-    """Return the registry of a kind, such as ``policy`` or ``robot``.
+    """Return the registry of a kind, such as ``policy`` or ``robot``: a mapping from names to items.
+
+    Use ``register(name, item, summary)`` of the registry to add an item.
+
+    Parameters
+    ----------
+    kind : str
+        Kind of the items; docs/architecture.md lists them.
 
     Raises
     ------
     ValueError
-        If there is no such kind.
+        If the kind is unknown.
+
+    Examples
+    --------
+    >>> import lidarium
+    >>> "kobuki" in lidarium.registry("robot")
+    True
     """
     if kind not in REGISTRIES:
         raise ValueError(unknown("registry", kind, REGISTRIES))

@@ -27,8 +27,7 @@ def blocks_of(page):
     return re.findall(r"^```(python|text)\n(.*?)^```", text, re.DOTALL | re.MULTILINE)
 
 
-def test_there_are_ten_pages():
-    assert len(PAGES) == 10
+
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)

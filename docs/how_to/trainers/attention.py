@@ -3,6 +3,7 @@
 Usage: python docs/how_to/trainers/attention.py --out docs/results
 """
 
+import json
 import time
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
@@ -20,9 +21,6 @@ from sb3_contrib import MaskablePPO
 from stable_baselines3.common.vec_env import VecMonitor
 
 import lidarium
-from lidarium.envs.floors.catalogue.names import set_floors
-from lidarium.mapping.files.output import write_json, write_text
-from lidarium.training.reinforcement.frontier_policy import FrontierPolicy
 
 ROBOT = {
     "level": "frontier",
@@ -74,7 +72,7 @@ def learn(plan: Attention, seed: int, episodes: int = EPISODES) -> dict[str, Any
     torch.set_num_threads(1)
     env = VecMonitor(lidarium.sb3_vec_env(episodes, plan.train_floors, horizon_s=plan.horizon_s, **ROBOT))
     model = MaskablePPO(
-        FrontierPolicy,
+        lidarium.FrontierPolicy,
         env,
         n_steps=ROLLOUT,
         batch_size=min(512, episodes * ROLLOUT),
@@ -84,7 +82,7 @@ def learn(plan: Attention, seed: int, episodes: int = EPISODES) -> dict[str, Any
         ent_coef=0.005,
         seed=SEEDS_APART * seed,
     )
-    floors, options = set_floors(plan.floors), {**ROBOT, "horizon_s": plan.horizon_s}
+    floors, options = lidarium.floor_set(plan.floors), {**ROBOT, "horizon_s": plan.horizon_s}
     untrained, began = final_coverage(preferred_by(model), floors, options), time.perf_counter()
     model.learn(plan.updates * episodes * ROLLOUT)
     minutes = (time.perf_counter() - began) / 60.0
@@ -103,7 +101,7 @@ def main(plan: Attention) -> None:
         seeds=plan.seeds,
         decisions=plan.updates * EPISODES * ROLLOUT,
         train_floors=plan.train_floors,
-        floors=len(set_floors(plan.floors)),
+        floors=len(lidarium.floor_set(plan.floors)),
         horizon_s=plan.horizon_s,
         table=table(coverage),
         by_seed=", ".join(f"{100 * np.mean(each[LEARNED]):.1f} %" for each in seeds),
@@ -112,8 +110,8 @@ def main(plan: Attention) -> None:
         torch=torch.__version__,
     )
     plan.out.mkdir(parents=True, exist_ok=True)
-    write_json(plan.out / "attention.json", {"coverage": coverage, "seeds": seeds})
-    write_text(plan.out / "attention.md", page)
+    (plan.out / "attention.json").write_text(json.dumps({"coverage": coverage, "seeds": seeds}, indent=2) + "\n")
+    (plan.out / "attention.md").write_text(page)
     print(page)
 
 

@@ -3,6 +3,7 @@
 Usage: python docs/how_to/trainers/learning_run.py --out docs/results
 """
 
+import json
 import time
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
@@ -17,14 +18,9 @@ import torch
 import tyro
 from numpy.typing import NDArray
 from ppo import ROBOT, Report, Scorer, Settings, as_tensors, train
+from scipy import stats
 
 import lidarium
-from lidarium.envs.faces.parallel import ExplorationEnv
-from lidarium.envs.floors.catalogue.names import set_floors
-from lidarium.envs.settings.making import make_settings
-from lidarium.evaluation.episodes.runner import run_episode
-from lidarium.evaluation.statistics.estimates import mean_interval, paired_difference
-from lidarium.mapping.files.output import write_json, write_text
 
 LEARNED, UNTRAINED = "learned", "untrained network"
 CLASSIC = ("random_walk", "nearest_frontier")
@@ -107,7 +103,7 @@ def run_seed(plan: Plan, seed: int) -> dict[str, Any]:
     """Train a network; return its curve, and what it reached on the unseen floors before and after."""
     torch.set_num_threads(1)
     options = {"robots": 1, "horizon_s": plan.horizon_s, "threads": 1}
-    floors = set_floors(plan.floors)
+    floors = lidarium.floor_set(plan.floors)
     torch.manual_seed(seed)
     untrained = final_coverage(drawn_by(Scorer()), floors, {**ROBOT, **options})
     curve: list[Report] = []
@@ -127,9 +123,9 @@ def run_seed(plan: Plan, seed: int) -> dict[str, Any]:
 def run_classic(plan: Plan, name: str) -> list[float]:
     """Return what a policy of the package reaches on each of the unseen floors."""
     reached = []
-    for floor in set_floors(plan.floors):
-        env = ExplorationEnv(floor, make_settings(robots=1, horizon_s=plan.horizon_s, starts="drawn"))
-        run_episode(lidarium.policy(name), env, seed=0)
+    for floor in lidarium.floor_set(plan.floors):
+        env = lidarium.ExplorationEnv(floor, lidarium.make_settings(robots=1, horizon_s=plan.horizon_s, starts="drawn"))
+        lidarium.run_episode(lidarium.policy(name), env, seed=0)
         reached.append(env.scorer.coverage)
     return reached
 
@@ -149,16 +145,23 @@ def run(plan: Plan) -> dict[str, Any]:
     }
 
 
+def interval(sample: NDArray[np.float64]) -> tuple[float, float, float]:
+    """Return the mean and its 95 % interval by Student's t."""
+    mean = float(sample.mean())
+    half = float(stats.t.ppf(0.975, len(sample) - 1) * stats.sem(sample)) if len(sample) > 1 else np.nan
+    return mean, mean - half, mean + half
+
+
 def table(coverage: dict[str, list[float]]) -> str:
     """Return the lines of the table, the least coverage first."""
     lines = []
     for name, reached in sorted(coverage.items(), key=lambda each: float(np.mean(each[1]))):
-        found = mean_interval(reached)
+        mean, low, high = 100.0 * np.array(interval(np.array(reached)))
         less = "-"
         if name != LEARNED:
-            gap = paired_difference(coverage[LEARNED], reached)
-            less = f"{100 * gap.estimate:+.1f} ({100 * gap.low:+.1f} to {100 * gap.high:+.1f}) %"
-        share = f"{100 * found.estimate:.1f} ({100 * found.low:.1f} to {100 * found.high:.1f}) %"
+            gap, lowest, highest = 100.0 * np.array(interval(np.subtract(coverage[LEARNED], reached)))
+            less = f"{gap:+.1f} ({lowest:+.1f} to {highest:+.1f}) %"
+        share = f"{mean:.1f} ({low:.1f} to {high:.1f}) %"
         lines.append(f"| `{name}` | {share} | {less} |")
     return "\n".join(lines)
 
@@ -194,12 +197,12 @@ def main(plan: Plan, name: str = "training") -> None:
     numbers = run(plan)
     minutes = (time.monotonic() - began) / 60.0
     draw({LEARNED: numbers["curves"]}, Settings().decisions, plan.out / f"{name}.png")
-    write_json(plan.out / f"{name}.json", numbers)
+    (plan.out / f"{name}.json").write_text(json.dumps(numbers, indent=2) + "\n")
     page = PAGE.format(
         seeds=plan.seeds,
         decisions=plan.updates * Settings().decisions,
-        train_floors=len(set_floors(plan.train_floors)),
-        floors=len(set_floors(plan.floors)),
+        train_floors=len(lidarium.floor_set(plan.train_floors)),
+        floors=len(lidarium.floor_set(plan.floors)),
         horizon_s=plan.horizon_s,
         name=name,
         table=table(numbers["coverage"]),
@@ -208,7 +211,7 @@ def main(plan: Plan, name: str = "training") -> None:
         workers=plan.workers,
         version=lidarium.__version__,
     )
-    write_text(plan.out / f"{name}.md", page)
+    (plan.out / f"{name}.md").write_text(page)
     print(f"{plan.out / name}.md is written")
 
 

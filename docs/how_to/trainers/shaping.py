@@ -3,6 +3,7 @@
 Usage: python docs/how_to/trainers/shaping.py --out docs/results
 """
 
+import json
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
@@ -18,7 +19,6 @@ from learning_run import SEEDS_APART, draw
 from ppo import Settings, train
 
 import lidarium
-from lidarium.mapping.files.output import write_json, write_text
 
 REWARDS: dict[str, dict[str, Any]] = {
     "area": {},
@@ -105,7 +105,7 @@ def main(plan: Plan) -> None:
     for (name, _), curve in zip(tasks, learned, strict=True):
         curves[name].append(curve)
     draw(curves, FAST.decisions, plan.out / "shaping.png")
-    write_json(plan.out / "shaping.json", curves)
+    (plan.out / "shaping.json").write_text(json.dumps(curves, indent=2) + "\n")
     page = PAGE.format(
         rewards=len(REWARDS),
         seeds=plan.seeds,
@@ -114,7 +114,7 @@ def main(plan: Plan) -> None:
         table=table(curves),
         version=lidarium.__version__,
     )
-    write_text(plan.out / "shaping.md", page)
+    (plan.out / "shaping.md").write_text(page)
     print(f"{plan.out / 'shaping'}.md is written")
 
 

@@ -124,9 +124,15 @@ def load_floor(spec: str | Path | Floor, resolution: float | None = None) -> Flo
     Raises
     ------
     FileNotFoundError
-        If the path leads nowhere.
+        If the file does not exist.
     ValueError
-        If there is no such floor, the seed is not a number, or the file cannot be read.
+        If the floor is unknown, the seed is not a number, or the file cannot be read.
+
+    Examples
+    --------
+    >>> import lidarium
+    >>> lidarium.load_floor("apartment").name
+    'apartment'
     """
     if isinstance(spec, Floor):
         return spec
@@ -162,7 +168,29 @@ def is_generated(spec: str) -> bool:
 
 
 def set_floors(name: str) -> tuple[str, ...]:
-    """Floors of a set as specs for `load_floor`."""
+    """Return the names of all floors of a set, for `load_floor` and ``reset(options={"floor": ...})``.
+
+    Parameters
+    ----------
+    name : str
+        "train" (10,000 floors), "validation" or "test", with a count for the first ones: "test:40".
+
+    Returns
+    -------
+    tuple of str
+        Names of floors.
+
+    Raises
+    ------
+    ValueError
+        If the set is unknown, or has fewer floors.
+
+    Examples
+    --------
+    >>> import lidarium
+    >>> len(lidarium.floor_set("test:3"))
+    3
+    """
     short, colon, wanted = name.removeprefix("set:").partition(":")
     first, count = SETS[_set_name(short)]
     if colon:

@@ -114,6 +114,43 @@ def follow(
     return Followed(slam, _of_robot(laser, log.laser_pose), _of_robot(online, log.laser_pose), scan_s, finish_s)
 
 
+def run_slam(log: LaserLog, settings: SlamSettings | None = None, range_m: float = 30.0) -> Followed:
+    """Make a map and a trajectory of a recorded log, as the command ``lidarium slam`` does.
+
+    Parameters
+    ----------
+    log : LaserLog
+        The log, such as from `read_log`.
+    settings : SlamSettings, optional
+        Settings of SLAM; by default those for recorded logs, with map cells of 0.05 m.
+    range_m : float, optional
+        Maximum range that is used [m], 30 by default. Beams without return do not clear the map.
+
+    Returns
+    -------
+    Followed
+        ``poses`` (scans, 3) of the robot in the frame of the first scan [m, rad], and ``slam``, with its map.
+
+    Raises
+    ------
+    ValueError
+        If no scan has a return within the range.
+
+    Examples
+    --------
+    >>> import lidarium, numpy as np, tempfile
+    >>> folder = tempfile.mkdtemp()
+    >>> np.savez(f"{folder}/log.npz", ranges=np.full((9, 360), 3.0), angle_min=-np.pi,
+    ...          angle_increment=np.pi / 180, max_range=10.0)
+    >>> lidarium.run_slam(lidarium.read_log(f"{folder}/log.npz")).poses.shape
+    (9, 3)
+    """
+    followed = follow(log.limited(range_m, False), settings or LOG_SETTINGS)
+    if not len(followed.slam.key_scans.poses):
+        raise ValueError(f"the log holds no scan with a return within {range_m} m; want a larger range_m")
+    return followed
+
+
 def _of_robot(laser: NDArray[np.float64], laser_pose: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the robot's poses where the laser's are known."""
     return composed(laser, relative(laser_pose, np.zeros(3)))

@@ -34,7 +34,9 @@ def map_cloud(
     pose: NDArray[np.float64] | None = None,
     floor: FloorPlane | None = None,
 ) -> SparseMap:
-    """Make a map of one cloud.
+    """Make a sparse map of a point cloud: boxes of obstacles, and nodes on free floor.
+
+    Use it to plan for bodies of any height (`build_graph`, `plan`) with a few kilobytes instead of a cloud.
 
     Parameters
     ----------
@@ -42,13 +44,12 @@ def map_cloud(
         The cloud [m].
     k : int
         Number of codes, of floor and obstacles together; merging leaves fewer.
-    settings : MapperSettings or None
+    settings : MapperSettings, optional
         Settings; defaults if None.
-    pose : (4, 4) float64 or None
-        Pose of the cloud in the map, whose z axis points up; None if it is given in the map. For a cloud
-        that leans, ``find_floor(points).levelling()``.
-    floor : FloorPlane or None
-        The floor in the map; None to find it.
+    pose : (4, 4) float64, optional
+        Pose of the cloud in the map, whose z axis points up; by default the identity.
+    floor : FloorPlane, optional
+        The floor in the map; by default it is found.
 
     Returns
     -------
@@ -58,7 +59,16 @@ def map_cloud(
     Raises
     ------
     ValueError
-        If there are no points, they are not in metres, there is no floor, or k is too small.
+        If there are no points, they are not in metres, no floor is found, or k is too small.
+
+    Examples
+    --------
+    >>> import lidarium, numpy as np
+    >>> x, y = np.meshgrid(np.arange(0.0, 4.0, 0.05), np.arange(0.0, 3.0, 0.05))
+    >>> floor = np.stack([x, y, np.zeros_like(x)], axis=-1).reshape(-1, 3)
+    >>> room = lidarium.map_cloud(np.concatenate([floor, floor[:400] + (0.0, 0.0, 0.5)]), k=64)
+    >>> room.boxes.shape[1:], room.free.shape[1:]
+    ((2, 3), (3,))
     """
     settings = settings or MapperSettings()
     pose = np.eye(4) if pose is None else checked_poses(pose)
