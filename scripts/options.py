@@ -49,8 +49,8 @@ PREFIX = "--supervisor."
 def gathered(words: Sequence[str]) -> list[str]:
     """Return a command line in which all settings of the supervisor are one option.
 
-    ``--supervisor.KEY VALUE`` and ``--supervisor.KEY=VALUE`` become ``--supervisor KEY=VALUE ...`` at its
-    end; dashes in a key are underscores.
+    ``--supervisor.KEY VALUE`` and ``--supervisor.KEY=VALUE`` become ``--supervisor KEY=VALUE ...`` at its end;
+    dashes in a key are underscores.
     """
     rest: list[str] = []
     found: list[str] = []

@@ -93,8 +93,8 @@ def _write_sparse_maps(folder: Path, episode: "Episode") -> list[str]:
 def write_team(folder: Path, episode: "Episode") -> list[str]:
     """Write each robot's map and, of a team, each group's merged map and ``transforms.json``.
 
-    All are in the robots' own map frames. Merged maps are as the station last knew them; without a station
-    nothing is.
+    All are in the robots' own map frames. Merged maps are as the station last knew them; without a station nothing
+    is.
     """
     from lidarium.mapping.files.map_files import write_ros_map
     from lidarium.mapping.files.output import write_json

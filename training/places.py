@@ -38,8 +38,8 @@ class Place:
 def place_of(training: TrainingSettings, stage: Round, number: int) -> Place:
     """Return where the n-th episode of a training takes place.
 
-    Seeds of floors are those of the training set, from the first on, and begin again behind the last; a floor
-    of another kind with such a seed is in no other set.
+    Seeds of floors are those of the training set, from the first on, and begin again behind the last; a floor of
+    another kind with such a seed is in no other set.
     """
     generator = np.random.default_rng([training.seed, 3, number])
     first, count = SETS["train"]

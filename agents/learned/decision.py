@@ -121,16 +121,8 @@ def scene_of(
 
     Parameters
     ----------
-    options : TourOptions
-        What they may drive to.
-    navigation : NavigationMap
-        The map.
     reach : float
         How far the lasers see [m].
-    weights : TourWeights
-        What tours are weighed by.
-    progress : dict of float
-        ``time``, ``known`` and ``rate``, see ``SITUATION_FEATURES``.
     """
     log_odds, resolution = navigation.log_odds, navigation.resolution
     cells = np.array(
@@ -163,18 +155,12 @@ def scene_of(
 
 
 def decision_of(scene: Scene, robot: int, sequence: NDArray[np.int64], picks: Sequence[int | None]) -> Decision | None:
-    """Return the decision of a robot, None where its tour is empty.
+    """Return the decision of a robot, None if its tour is empty.
 
     Parameters
     ----------
-    scene : Scene
-        What it has in common with the others'.
-    robot : int
-        Which robot.
     sequence : (n + robots - 1,) int64
         The tours, given what others have picked.
-    picks : sequence of int or None
-        What the robots before it have picked.
     """
     options = scene.options
     tours = _tours_in(sequence, len(options.numbers))

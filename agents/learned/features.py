@@ -88,14 +88,8 @@ def option_features(
 
     Parameters
     ----------
-    options : TourOptions
-        What it may drive to.
-    robot : int
-        Which robot.
     costs : (n,) float64
         By how much tours cost more where it visits each first [m].
-    tour : list of int
-        Its own tour.
     views : (n, 2), (n,) float64
         x, y of the views from the corner of the map's first cell [m], and where what they show lies [rad].
     """

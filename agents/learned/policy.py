@@ -67,8 +67,8 @@ class ChosenTours(TourFrontier):
     def _choose(self, scene: Scene, robot: int, decision: Decision, picks: Sequence[int | None]) -> int:
         """Return the option that is chosen.
 
-        It is the only one where there is but one, and what the robot drives to where tours go on to that:
-        choices that change with every plan of the team make robots turn between targets.
+        It is the only one if there is but one, and what the robot drives to where tours go on to that: choices
+        that change with every plan of the team make robots turn between targets.
         """
         if decision.mask.sum() == 1:
             return int(decision.mask.argmax())
@@ -109,7 +109,7 @@ class Learned(ChosenTours):
     Raises
     ------
     ValueError, FileNotFoundError
-        Where the file is not there, or is none of weights for this network.
+        If the file is not there, or is none of weights for this network.
     """
 
     def __init__(self, weights: str | Path = "", shares_map: bool = True, **settings: float) -> None:

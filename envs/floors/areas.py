@@ -32,8 +32,6 @@ def floor_of_area(
 
     Parameters
     ----------
-    name : str
-        Of the floor, and for messages.
     free : (rows, columns) bool
         Free cells, some but not all of them, row 0 at the lowest y.
     origin, resolution : (float, float), float

@@ -55,8 +55,6 @@ def fill_shapes(
         Lower left corner of cell (0, 0) and side of a cell [m].
     shapes : sequence of (E, 4) float64
         Edges x1, y1, x2, y2 of each shape [m]; together they close its rings.
-    value : int
-        Value of the cells inside.
     """
     if not len(shapes):
         return
@@ -78,8 +76,6 @@ def draw_segments(
 
     Parameters
     ----------
-    cells, origin, resolution, value
-        As in `fill_shapes`.
     segments : (N, 4) float64
         x1, y1, x2, y2 per segment [m].
     """
@@ -123,8 +119,6 @@ def strip_edges(
         x1, y1, x2, y2 [m].
     thickness : float or (N,) float64
         Width of the rectangles [m].
-    overhang_share : float
-        How far they go on beyond both ends, as a share of the width.
 
     Returns
     -------

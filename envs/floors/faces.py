@@ -89,8 +89,6 @@ def section_of(floor: Floor, height: float) -> Faces:
 
     Parameters
     ----------
-    floor : Floor
-        Obstacles.
     height : float
         Height of the cut [m]; higher solids get a top there, owned by ``SECTION``.
     """

@@ -41,8 +41,6 @@ def check_extent(what: str, bounds: Iterable[float], rings: Iterable[NDArray[np.
 
     Parameters
     ----------
-    what : str
-        The floor, for messages.
     bounds : (x_min, y_min, x_max, y_max)
         Rectangle that holds it [m].
     rings : iterable of (N, 2) float64

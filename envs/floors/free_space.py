@@ -43,8 +43,6 @@ def configuration_space(raster: Raster, radius: float) -> NDArray[np.bool_]:
 
     Parameters
     ----------
-    raster : Raster
-        Solid cells at the body's height.
     radius : float
         Radius of the robot [m].
 
@@ -86,8 +84,6 @@ def reachable_free_space(raster: Raster, radius: float, starts: NDArray[np.float
 
     Parameters
     ----------
-    raster : Raster
-        Solid cells at the body's height.
     radius : float
         Radius of the robot [m].
     starts : (N, 2 or 3) float64

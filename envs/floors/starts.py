@@ -28,20 +28,14 @@ def draw_starts(
 
     The first proposed ones that fit are taken; the rest are drawn uniformly.
 
-    Drawn starts lie at cell centres of one 4-connected component of the configuration space (with a cell to
-    spare): that of the first proposed start that fits, else the largest. They keep two robot diameters,
-    centre to centre, from all others.
+    Drawn starts lie at cell centres of one 4-connected component of the configuration space (with a cell to spare):
+    that of the first proposed start that fits, else the largest. They keep two robot diameters, centre to centre,
+    from all others.
 
     Parameters
     ----------
-    raster : Raster
-        Solid cells at the body's height.
     radius : float
         Radius of the robot [m].
-    count : int
-        Number of robots, at least 1.
-    generator : numpy.random.Generator
-        Source of the draws.
     proposed : (K, 3) float64
         Starts x, y, theta of the floor [m, rad]. One too near to a wall or a former one is passed over.
 
@@ -78,8 +72,6 @@ def check_starts(raster: Raster, radius: float, starts: NDArray[np.float64]) -> 
 
     Parameters
     ----------
-    raster : Raster
-        Solid cells at the body's height.
     radius : float
         Radius of the robot [m].
     starts : (N, 3) float64
@@ -116,8 +108,6 @@ def check_goal(raster: Raster, goal: tuple[float, float]) -> None:
 
     Parameters
     ----------
-    raster : Raster
-        Solid cells at the body's height.
     goal : (x, y)
         [m]
     """

@@ -350,13 +350,7 @@ def _localizations() -> tuple[str, ...]:
 
 
 def localizer_settings(localization: str, values: Mapping[str, Any]) -> Any:  # noqa: ANN401
-    """Return the own settings of a localizer.
-
-    Raises
-    ------
-    ValueError
-        If the localization has no settings, or not these.
-    """
+    """Return the own settings of a localizer."""
     if localization not in LOCALIZERS:
         raise ValueError(
             f"localization {localization!r} has no settings; choose one of {', '.join(LOCALIZERS)}"

@@ -163,21 +163,7 @@ def _part(name: str, value: Any) -> Any:  # noqa: ANN401
 
 
 def assign(settings: ExplorationSettings, assignments: Iterable[str]) -> ExplorationSettings:
-    """Return settings with single values set.
-
-    Parameters
-    ----------
-    settings : ExplorationSettings
-        Where to start from.
-    assignments : iterable of str
-        ``name=value`` each: a name as ``lidarium show settings`` lists it, such as ``reward.time``, a value
-        as in TOML, ``none`` for None; text needs no quotes.
-
-    Raises
-    ------
-    ValueError
-        If an assignment has no ``=``, names no setting, or has a bad value.
-    """
+    """Return settings with single values set."""
     for assignment in assignments:
         name, equals, text = assignment.partition("=")
         if not equals:
@@ -192,13 +178,7 @@ def assign(settings: ExplorationSettings, assignments: Iterable[str]) -> Explora
 
 
 def set_values(settings: ExplorationSettings, values: Mapping[str, Any]) -> ExplorationSettings:
-    """Return settings with values set by the names that ``lidarium show settings`` lists.
-
-    Raises
-    ------
-    ValueError
-        If a name is no setting, or a value is not one of its own.
-    """
+    """Return settings with values set by the names that ``lidarium show settings`` lists."""
     for name, value in values.items():
         settings = _replaced(settings, name.split("."), value, name)
     return settings

@@ -74,13 +74,7 @@ SENSED.register(
 
 
 def check_sensed(settings: Any) -> None:  # noqa: ANN401
-    """Check that the sensors which are observed are there.
-
-    Raises
-    ------
-    ValueError
-        If one is not; the message says what is missing.
-    """
+    """Check that the sensors which are observed are there."""
     for name in settings.observe:
         missing = SENSED[name].missing(settings) if name in SENSED else ""
         if missing:

@@ -256,13 +256,7 @@ SMALLEST = ("cruise_speed", "max_speed", "max_turn_rate", "max_acceleration", "m
 
 
 def kinds_of(names: Any) -> tuple[str, ...]:  # noqa: ANN401
-    """Return names of robots as a tuple, checked.
-
-    Raises
-    ------
-    ValueError
-        If they are no names, or one is unknown.
-    """
+    """Return names of robots as a tuple, checked."""
     if not isinstance(names, list | tuple):
         raise ValueError(f"kinds is {shown(names)}; want names of robots ({', '.join(ROBOTS)}) in a list")
     chosen = tuple(names)

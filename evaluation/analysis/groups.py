@@ -143,9 +143,9 @@ def floor_set_of(floor: str) -> str:
 def times_to(rows: Sequence[Row], key: str, horizon_s: float) -> _Reached:
     """Return when runs reached a share of the floor.
 
-    A run that missed it is never dropped. If it ended by itself, with nothing left to do, it would not
-    have reached the share later either, and counts as not there at the horizon. If it was cut (by the
-    horizon, by the user, by the physics), it is censored then.
+    A run that missed it is never dropped. If it ended by itself, with nothing left to do, it would not have reached
+    the share later either, and counts as not there at the horizon. If it was cut (by the horizon, by the user, by
+    the physics), it is censored then.
     """
     times, is_reached, cut = [], [], 0
     for row in rows:

@@ -263,8 +263,8 @@ def _planned_and_driven(
 ) -> KnownFloorBound:
     """Plan and drive until enough is seen; ``effort`` is rounds and seed.
 
-    A plan takes lasers to see all around. If a drive passed something unseen, the robot turns to it in the
-    next drive. If no drive sees enough, that which saw most is returned.
+    A plan takes lasers to see all around. If a drive passed something unseen, the robot turns to it in the next
+    drive. If no drive sees enough, that which saw most is returned.
     """
     driven: list[KnownFloorBound] = []
     for margin in MARGINS:

@@ -156,9 +156,9 @@ def save_merge_picture(
 ) -> None:
     """Draw each group of joined maps, and each refused pair as it would lie best.
 
-    Walls and free space have the colour of the map that saw them, walls that several saw are dark, and walls
-    that stand where another map is free are red. Lines join the matched corners of each pair, as far apart as
-    the maps' frames leave them. Axes are those of the ROS frame of each panel's first map.
+    Walls and free space have the colour of the map that saw them, walls that several saw are dark, and walls that
+    stand where another map is free are red. Lines join the matched corners of each pair, as far apart as the maps'
+    frames leave them. Axes are those of the ROS frame of each panel's first map.
     """
     panels = panels_of(merged, deformed)
     if not panels:

@@ -29,8 +29,7 @@ def coverage_curves(group: Group, records: dict[Key, Entry]) -> Curves:
 
     It is of the policy's recorded runs, for the plot and ``report.json``.
 
-    A run that ends keeps its coverage. Ends of intervals that the runs do not bound (fewer than six) are
-    None.
+    A run that ends keeps its coverage. Ends of intervals that the runs do not bound (fewer than six) are None.
     """
     times = np.linspace(0.0, group.horizon_s, CURVE_POINTS)
     curves: Curves = {}

@@ -56,8 +56,8 @@ def _count_footprints(table: Array, episode: int, windows: Array) -> tuple[int, 
 
     Ended robots see nothing.
 
-    If no two footprints can meet, the first count is not needed and is 0. ``windows`` (robots, window
-    rows, words) uint64 is scratch memory, all zero before and after.
+    If no two footprints can meet, the first count is not needed and is 0. ``windows`` (robots, window rows, words)
+    uint64 is scratch memory, all zero before and after.
     """
     world, robots = world_at(table), windows.shape[0]
     first = episode * robots

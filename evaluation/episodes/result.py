@@ -151,9 +151,9 @@ class EpisodeData:
 def result_of(episode: Episode, policy: str | None = None, history: History | None = None) -> dict[str, Any]:
     """Return the figures of a finished or interrupted episode as ``result.json`` has them.
 
-    Times are simulated [s], lengths are in metres, positions of ``given_up`` in the floor's frame. Figures
-    over time are None without a history. ``ended_because`` is None for robots that an interrupted run left at
-    work. A ValueError if the episode was interrupted before it began.
+    Times are simulated [s], lengths are in metres, positions of ``given_up`` in the floor's frame. Figures over
+    time are None without a history. ``ended_because`` is None for robots that an interrupted run left at work. A
+    ValueError if the episode was interrupted before it began.
     """
     env, settings = episode.env, episode.env.settings
     if env.floor is None:

@@ -37,9 +37,9 @@ LATER = (
 def settings_sha256(settings: ExplorationSettings) -> str:
     """Return a hash of all settings that can change a result.
 
-    It is of their JSON with sorted keys, without ``threads``, and without settings that older records do not
-    have if it is not used: `LATER` settings at their defaults, more rewards, the build of robots without
-    forces, sparse maps of robots without cameras.
+    It is of their JSON with sorted keys, without ``threads``, and without settings that older records do not have
+    if it is not used: `LATER` settings at their defaults, more rewards, the build of robots without forces, sparse
+    maps of robots without cameras.
     """
     values, plain = asdict(settings), ExplorationSettings()
     del values["threads"]

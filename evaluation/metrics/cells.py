@@ -68,8 +68,8 @@ def known_coverage(known: Mask, knowable: Mask) -> float:
 
     Walls count as well (Explore-Bench).
 
-    Explore-Bench's script divides all known cells by the area of the true map that is not unknown, so that
-    cells known beyond that area count and the share can pass 1; here they do not count.
+    Explore-Bench's script divides all known cells by the area of the true map that is not unknown, so that cells
+    known beyond that area count and the share can pass 1; here they do not count.
 
     Parameters
     ----------
@@ -119,8 +119,8 @@ def overlap(masks: Sequence[NDArray[np.uint64]] | NDArray[np.uint64]) -> float:
 def overlap_of_maps(known_shares: ArrayLike) -> float:
     """Return ``Overlap_EB`` = sum_i C_known,i - 1 (Explore-Bench, at T_0.99).
 
-    A share below 0 says that the maps together hold less than the floor once: it is a measure of overlap
-    if the team's map is nearly whole, and of nothing before.
+    A share below 0 says that the maps together hold less than the floor once: it is a measure of overlap if the
+    team's map is nearly whole, and of nothing before.
 
     Parameters
     ----------
@@ -165,8 +165,8 @@ def _widened(cells: Mask, by: int = 1) -> Mask:
 def occupied_f1(believed: Mask, occupied: Mask, tolerance: int = 1, wanted: Mask | None = None) -> float:
     """Return F1 = 2 P R / (P + R) of the occupied cells.
 
-    P is the share of believed cells within the tolerance of a true one, R that of wanted true cells within
-    the tolerance of a believed one. 1 if there is neither, 0 if there is one only.
+    P is the share of believed cells within the tolerance of a true one, R that of wanted true cells within the
+    tolerance of a believed one. 1 if there is neither, 0 if there is one only.
 
     Parameters
     ----------
@@ -189,9 +189,8 @@ def occupied_iou(believed: Mask, occupied: Mask, sensed: Mask) -> float:
 
     1 if both are empty.
 
-    B are the believed occupied cells, S the truth's occupied cells that are 8-adjacent to sensed cells of F,
-    so that the inside of solids does not count. A cell of either is a hit if one of the other is within
-    one cell.
+    B are the believed occupied cells, S the truth's occupied cells that are 8-adjacent to sensed cells of F, so
+    that the inside of solids does not count. A cell of either is a hit if one of the other is within one cell.
 
     Parameters
     ----------

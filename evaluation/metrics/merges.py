@@ -71,8 +71,7 @@ def is_correct(translation_error: float, rotation_error: float, resolution: floa
 def _is_wrong(translation_error: float, rotation_error: float) -> bool:
     """Return whether a merge is wrong.
 
-    It is beyond ``WRONG_TRANSLATION`` or ``WRONG_ROTATION``, with errors as of `transform_error` [m,
-    rad].
+    It is beyond ``WRONG_TRANSLATION`` or ``WRONG_ROTATION``, with errors as of `transform_error` [m, rad].
     """
     return translation_error > WRONG_TRANSLATION or rotation_error > WRONG_ROTATION
 
@@ -115,8 +114,7 @@ def drifted_truth(event: MergeEvent, trajectories: Trajectories) -> tuple[float,
 
     It holds if they overlap.
 
-    Maps drift: the transform between starts is not the true one where two maps meet. A merger
-    sees the maps alone.
+    Maps drift: the transform between starts is not the true one where two maps meet. A merger sees the maps alone.
     """
     at_a = Transform(*event.found).apply(event.at)
     floor_from_a = trajectories.floor_from_map(event.a, at_a, event.time_s)

@@ -65,8 +65,7 @@ def relative_error(believed: Poses, true: Poses, steps: int) -> tuple[float, flo
 
     None if the poses do not span the steps.
 
-    ``E_k = (Q_k^-1 Q_(k+d))^-1 (P_k^-1 P_(k+d))`` of true poses Q and believed ones P; no frames have to
-    agree.
+    ``E_k = (Q_k^-1 Q_(k+d))^-1 (P_k^-1 P_(k+d))`` of true poses Q and believed ones P; no frames have to agree.
 
     Parameters
     ----------

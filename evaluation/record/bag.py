@@ -28,10 +28,10 @@ MAP_FRAME = "map"
 def write_bag(path: Path, record: EpisodeRecord, floor: str | Floor | None = None) -> None:
     """Write a recorded episode as a bag, whole or not at all.
 
-    Topics are ``/map`` (the sum of all maps), and of each robot ``/robot_0/scan``, ``odom`` (dead reckoning
-    of its wheels from its start), ``map`` (what it has mapped itself) and ``path`` (where it truly drove).
-    ``/tf`` leads from ``map`` by ``robot_0/odom`` to ``robot_0/base_link`` at the true pose, ``/tf_static``
-    from there to ``robot_0/laser``.
+    Topics are ``/map`` (the sum of all maps), and of each robot ``/robot_0/scan``, ``odom`` (dead reckoning of its
+    wheels from its start), ``map`` (what it has mapped itself) and ``path`` (where it truly drove). ``/tf`` leads
+    from ``map`` by ``robot_0/odom`` to ``robot_0/base_link`` at the true pose, ``/tf_static`` from there to
+    ``robot_0/laser``.
     """
     with bag(path) as writer:
         recorder = _BagRecorder(writer)

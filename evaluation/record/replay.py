@@ -47,8 +47,8 @@ def state_sha256(env: ExplorationEnv) -> str:
     """Return a hash of the state of an environment's world, to the bit.
 
     It covers the number of steps; true and believed poses, velocities, scans, bumpers and contacts; ways,
-    collisions and counts of seen cells; the scorer's masks and the robots' maps; and why each robot ended. It
-    does not cover what is made of these: observations, plans, clearance.
+    collisions and counts of seen cells; the scorer's masks and the robots' maps; and why each robot ended. It does
+    not cover what is made of these: observations, plans, clearance.
     """
     simulation = env.simulation
     owners = (simulation, simulation.world, simulation.beliefs, simulation.score)

@@ -56,8 +56,8 @@ class Chosen:
 def choose_episodes(directory: Path, wanted: Wanted) -> Chosen:
     """Return the episodes of a film.
 
-    They have the same floor, starts, seed, team and settings. Of all that are wanted those with the most
-    policies are chosen, and of these the first in the directory.
+    They have the same floor, starts, seed, team and settings. Of all that are wanted those with the most policies
+    are chosen, and of these the first in the directory.
     """
     rows = read_episodes(directory).rows
     records, warnings = read_records(directory, rows)

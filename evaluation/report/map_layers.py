@@ -57,8 +57,8 @@ def changed_runs(before: NDArray[np.uint8], after: NDArray[np.uint8]) -> bytes:
 def packed(header: Mapping[str, Any], streams: Mapping[str, bytes]) -> str:
     """Return a header and named streams as text: base64 of deflated bytes.
 
-    Before that: the size of the header in bytes (4 bytes, lowest first), the header as JSON with the names
-    and sizes of the streams, and the streams one after the other.
+    Before that: the size of the header in bytes (4 bytes, lowest first), the header as JSON with the names and
+    sizes of the streams, and the streams one after the other.
     """
     whole = {**header, "streams": [[name, len(stream)] for name, stream in streams.items()]}
     text = json.dumps(whole, allow_nan=False, separators=(",", ":")).encode()

@@ -128,8 +128,8 @@ def _figures(row: Row, values: Sequence[Value]) -> list[float | None]:
 def chosen_replays(groups: Iterable[Group], records: dict[Key, Entry], most: int) -> list[Row]:
     """Return the recorded episodes of which a page has replays.
 
-    All policies on one floor with one seed are together, so that they can be compared; the groups, then the
-    floors, then the seeds take turns.
+    All policies on one floor with one seed are together, so that they can be compared; the groups, then the floors,
+    then the seeds take turns.
     """
     turns: list[tuple[int, int, list[Row]]] = []
     for place, group in enumerate(groups):

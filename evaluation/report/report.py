@@ -41,35 +41,7 @@ def write_report(
     replays: int = REPLAYS,
     progress: Progress = iter,
 ) -> dict[str, Any]:
-    """Write ``report.html``, ``report.md``, ``report.json`` and plots of a directory's episodes.
-
-    Parameters
-    ----------
-    directory : Path
-        Folder that `lidarium evaluate --out` wrote: ``episodes.jsonl``, and ``records`` for the plots that
-        show paths and curves.
-    out : Path
-        Folder of the report.
-    baseline : str or None
-        Policy that the others are compared with; ``nearest_frontier`` if it is there, else the first of
-        the alphabet.
-    seed : int
-        Seed of the bootstrap.
-    replays : int
-        Most recorded episodes that run again for the page's replays.
-    progress : callable
-        Passes on the episodes that run again.
-
-    Returns
-    -------
-    dict
-        The content of ``report.json``.
-
-    Raises
-    ------
-    FileNotFoundError, ValueError, OSError
-        As `read_episodes`; if the baseline is not among the policies; if nothing can be written.
-    """
+    """Write ``report.html``, ``report.md``, ``report.json`` and plots of a directory's episodes."""
     if replays < 0:
         raise ValueError(f"--replays is {replays}; want zero or more")
     check_writable(out)

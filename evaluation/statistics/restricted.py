@@ -230,9 +230,9 @@ def _influences_on(counts: Array, sample: _Sample, areas: Array, influences: Arr
 
     Write the influence of each run on it, whose squares sum to the variance.
 
-    With c the counts, Y the runs at risk before a time and G the area right of it, the influence of run i is
-    sum over events k up to i of c_k G_k / (Y_k (Y_k - c_k)), less G_i / (Y_i - c_i) if i is an event: the
-    derivative of the area by the weight of the run. Of known times it is (T_i - mean) / n.
+    With c the counts, Y the runs at risk before a time and G the area right of it, the influence of run i is sum
+    over events k up to i of c_k G_k / (Y_k (Y_k - c_k)), less G_i / (Y_i - c_i) if i is an event: the derivative of
+    the area by the weight of the run. Of known times it is (T_i - mean) / n.
     """
     times, is_observed, order, horizon = sample
     size = times.size

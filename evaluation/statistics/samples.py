@@ -161,9 +161,8 @@ def studentised_interval(
 
     The interval is from the quantiles q of t = (estimate* - estimate) / error* over resamples.
 
-    With equal tails it goes from estimate - q_high error to estimate - q_low error; the symmetric form takes
-    the quantile of |t| on both sides. An error of 0, if all values are equal, gives an interval of no
-    width.
+    With equal tails it goes from estimate - q_high error to estimate - q_low error; the symmetric form takes the
+    quantile of |t| on both sides. An error of 0, if all values are equal, gives an interval of no width.
     """
     tail = 0.5 * (1.0 - checked_confidence(confidence))
     counts = resample_counts(size, resamples, seed)

@@ -215,13 +215,7 @@ class Suite:
             raise ValueError(f"variant {variant!r} with {robots} robots cannot be used: {error}") from error
 
     def make_policy(self, name: str) -> Policy:
-        """Return a new policy by its name among the policies.
-
-        Raises
-        ------
-        ValueError
-            If there is no such policy, or its settings cannot be used; the message names it.
-        """
+        """Return a new policy by its name among the policies."""
         options = dict(self.policy_settings.get(name, {}))
         try:
             return make_policy(options.pop("policy", name), **options)

@@ -13,8 +13,8 @@ def maps_on_floor(env: ExplorationEnv) -> NDArray[np.int8]:
 
     The shape is (robots, rows, columns) int8; 0 beyond a map.
 
-    Maps of robots that do not know their starts are overlaid on it by their true starts: with true poses that
-    is the best fit of the trajectories.
+    Maps of robots that do not know their starts are overlaid on it by their true starts: with true poses that is
+    the best fit of the trajectories.
     """
     settings = env.settings
     rows, words = env.score.counted_masks[0].shape

@@ -224,8 +224,8 @@ def _count_turned(
 
     Each cell that has changed is transformed to the floor's lattice.
 
-    ``signs`` (rows, words, 2) are the bits on the map's own lattice. As in `beliefs.maps_on_floor`, a cell of
-    the floor is what the cell of the map says in which its centre lies.
+    ``signs`` (rows, words, 2) are the bits on the map's own lattice. As in `beliefs.maps_on_floor`, a cell of the
+    floor is what the cell of the map says in which its centre lies.
     """
     row, truth = team.first + robot, maps.truth
     belief, start, origin, frame = (

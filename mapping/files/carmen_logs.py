@@ -104,8 +104,6 @@ def _stated_beams(start: float, view: float, step: float, count: int) -> _Beams:
     start, view, step : float
         Direction of the first beam, field of view, and angle from beam to beam [rad]; negative steps are
         those of a laser that is mounted upside down.
-    count : int
-        Number of beams.
     """
     if view == 0.0 or abs(view) > 1.01 * WHOLE_TURN or _agrees(abs(view), abs(step), count):
         return _Beams(start, step)
@@ -134,17 +132,13 @@ def _from_right_to_left(ranges: list[float], beams: _Beams) -> tuple[list[float]
 def _resampled(ranges: NDArray[np.float32], beams: _Beams, wanted: _Beams, count: int) -> NDArray[np.float32]:
     """Return a scan at other directions.
 
-    Between two returns of one surface the range is interpolated; else the nearest beam counts. Directions
-    beyond the scan are invalid.
+    Between two returns of one surface the range is interpolated; else the nearest beam counts. Directions beyond
+    the scan are invalid.
 
     Parameters
     ----------
     ranges : (n,) float32
         The scan [m]; inf for no return, nan for an invalid beam.
-    beams, wanted : Beams
-        Its directions, and those that are wanted.
-    count : int
-        Number of wanted directions.
     """
     own = len(ranges)
     is_circle = own * beams.increment > WHOLE_TURN - 0.5 * beams.increment
@@ -247,8 +241,8 @@ def _flaser(words: list[str]) -> _Scan:
 def _robotlaser(words: list[str]) -> _Scan:
     """Read the values of a robot-laser message.
 
-    They are type, start, field of view, step, longest range, accuracy, mode, n, ranges, m, remissions,
-    laser, robot, and the rest.
+    They are type, start, field of view, step, longest range, accuracy, mode, n, ranges, m, remissions, laser,
+    robot, and the rest.
 
     These are five numbers on the drive, the stamp, the host and the logger's stamp.
     """
@@ -297,8 +291,8 @@ def _give_directions(content: _Content, field_of_view: float | None) -> None:
 def _on_one_grid(content: _Content) -> tuple[list[tuple[_Scan, int]], _Beams, NDArray[np.float32], float]:
     """Return the scans that are kept, the directions of most, the ranges in these, and the longest one.
 
-    Scans whose own line has other directions are resampled; a scan without any that has fewer beams than most
-    is damaged.
+    Scans whose own line has other directions are resampled; a scan without any that has fewer beams than most is
+    damaged.
     """
     groups = Counter((len(scan.ranges), scan.beams) for scan, _ in content.scans)
     (count, beams), _ = groups.most_common(1)[0]
@@ -354,23 +348,9 @@ def read_carmen_log(path: Path, field_of_view: float | None = None) -> LaserLog:
 
     Parameters
     ----------
-    path : Path
-        The file; with ``.gz`` at its end it is unpacked.
     field_of_view : float or None
         Angle between the first and the last beam of FLASER lines [rad], which carry none; else that of the
         log's parameters, or of a SICK with a number of beams.
-
-    Returns
-    -------
-    LaserLog
-        The scans in the directions of most. Omitted scans are counted in ``skipped``.
-
-    Raises
-    ------
-    FileNotFoundError
-        If it is not there.
-    ValueError
-        If it holds no usable scan.
     """
     path = Path(path)
     content = _Content()
@@ -458,8 +438,8 @@ def _chained(
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
     """Return the sum of the motions between readings, and which are odometry.
 
-    The first reading after a scan is the scan's pose, from which odometry goes on; if that line is
-    missing, the scan's own stands for it.
+    The first reading after a scan is the scan's pose, from which odometry goes on; if that line is missing, the
+    scan's own stands for it.
     """
     is_own, previous = np.ones(len(readings), np.bool_), readings[np.maximum(np.arange(len(readings)) - 1, 0)]
     for scan, before in scans:

@@ -33,23 +33,11 @@ _GREY = frozenset(("1", "L", "I", "I;16", "I;16B"))
 def read_image(path: Path) -> NDArray[Any]:
     """Read an image file with all its channels.
 
-    Parameters
-    ----------
-    path : Path
-        Any format that OpenCV reads (png, pgm, bmp, jpg, tif, ...).
-
     Returns
     -------
     (rows, columns) or (rows, columns, channels) uint8 or uint16
         The pixels, row 0 at the top, channels in OpenCV's order (blue first). White is the greatest number of
         the type, whatever the file calls white.
-
-    Raises
-    ------
-    FileNotFoundError
-        If there is no such file.
-    ValueError
-        If it is a folder, not an image, or of float pixels that are neither shares nor greys.
     """
     path = Path(path)
     content = read_bytes(path, MAX_IMAGE_BYTES)

@@ -35,9 +35,9 @@ class _Clock(NamedTuple):
 def _continued(stamps: NDArray[np.float64]) -> _Clock:
     """Return stamps in the order of the log.
 
-    A stamp that is before its predecessor is wild itself if those after it go on after the predecessor.
-    The predecessors are wild if they are few and those before them are earlier. Otherwise the clock has
-    restarted there.
+    A stamp that is before its predecessor is wild itself if those after it go on after the predecessor. The
+    predecessors are wild if they are few and those before them are earlier. Otherwise the clock has restarted
+    there.
 
     Parameters
     ----------
@@ -191,11 +191,10 @@ class LaserLog:
 def made_usable(log: LaserLog, where: str) -> LaserLog:
     """Return a log without unusable scans and odometry.
 
-    Scans are dropped without any finite stamp or if stamps go back in time; a clock that restarts is
-    continued. Odometry is dropped if it contains no information, and its jumps are taken out.
+    Scans are dropped without any finite stamp or if stamps go back in time; a clock that restarts is continued.
+    Odometry is dropped if it contains no information, and its jumps are taken out.
 
-    If most stamps stand still or run backwards, the clock is useless, and scans are numbered by the second
-    instead.
+    If most stamps stand still or run backwards, the clock is useless, and scans are numbered by the second instead.
     """
     for poses in (log.odometry, log.corrected, log.readings, log.laser_pose):
         if poses is not None and poses.size and not np.nanmax(np.abs(poses), initial=0.0) <= MAX_POSE_M:
@@ -251,8 +250,8 @@ def symmetric_scans(
 ) -> tuple[NDArray[np.float32], ScanGeometry, float]:
     """Return scans symmetric about the laser's axis, their geometry, and that axis.
 
-    Invalid beams are added on one side. The axis is within half a beam of the heading, by which beams that
-    are not symmetric about the heading are turned: it belongs to the laser's pose on the robot.
+    Invalid beams are added on one side. The axis is within half a beam of the heading, by which beams that are not
+    symmetric about the heading are turned: it belongs to the laser's pose on the robot.
 
     Parameters
     ----------

@@ -124,8 +124,6 @@ def unknown_grey(pixels: NDArray[Any], candidates: tuple[range, ...]) -> int | N
     ----------
     pixels : (rows, columns) or (rows, columns, channels) uint8 or uint16
         The picture; its first channel counts.
-    candidates : tuple of range
-        Which greys it may be, the likelier ones first.
     """
     grey = pixels if pixels.ndim == 2 else pixels[..., 0]
     eight = grey if grey.dtype == np.uint8 else (grey // 257).astype(np.uint8)
@@ -225,27 +223,12 @@ def read_ros_map(yaml_path: Path | str) -> MapImage:
 def read_grey_map(path: Path, resolution: float) -> MapImage:
     """Read a plain image as a map.
 
-    Black is occupied, white is free, and values between are unknown, as is the grey that mappers write for
-    unknown.
+    Black is occupied, white is free, and values between are unknown, as is the grey that mappers write for unknown.
 
     Parameters
     ----------
-    path : Path
-        The image; colours count as their mean.
     resolution : float
         Side of a cell [m].
-
-    Returns
-    -------
-    MapImage
-        The map, its origin at (0, 0).
-
-    Raises
-    ------
-    FileNotFoundError
-        If it is not there.
-    ValueError
-        If it cannot be read, or the resolution is not a positive number.
     """
     if not RESOLUTION.hold(resolution):
         raise ValueError(f"{path}: resolution is {resolution} m; want {RESOLUTION.wanted}")
@@ -370,8 +353,8 @@ def _read_header(path: Path) -> dict[str, Any]:
 def _image_path(yaml_path: Path, name: str) -> Path:
     """Return the path of the image of a map.
 
-    If the header names a path that does not exist, the file of that name in the folder of the header is
-    used, with a warning to the log.
+    If the header names a path that does not exist, the file of that name in the folder of the header is used, with
+    a warning to the log.
     """
     named = yaml_path.parent / name
     beside = yaml_path.parent / PureWindowsPath(name).name

@@ -34,15 +34,7 @@ _NEEDED = ("ranges", "angle_min", "angle_increment")
 
 
 def read_npz_log(path: Path) -> LaserLog:
-    """Read a log of our own format.
-
-    Raises
-    ------
-    FileNotFoundError
-        If it is not there.
-    ValueError
-        If it is no such file or holds no usable scan.
-    """
+    """Read a log of our own format."""
     path = Path(path)
     arrays = read_arrays(path, "an npz file that can be read")
     if not isinstance(arrays, dict):

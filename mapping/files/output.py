@@ -94,23 +94,8 @@ _UNFINISHED = re.compile(r"\.(?P<name>.+)\.[a-z0-9_]{8}")
 def whole_file(path: Path) -> Iterator[Path]:
     """Lend a name beside ``path`` to write to.
 
-    It becomes ``path`` at the end, when it is on the disk, and is removed where writing fails. A link of that
-    name is replaced, not followed.
-
-    Parameters
-    ----------
-    path : Path
-        The file that shall be; its folder is made if absent. The lent name ends as this one does.
-
-    Yields
-    ------
-    Path
-        Where to write.
-
-    Raises
-    ------
-    OSError
-        Where nothing can be written there.
+    It becomes ``path`` at the end, when it is on the disk, and is removed where writing fails. A link of that name
+    is replaced, not followed.
     """
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -135,13 +120,6 @@ def clear_unfinished(folder: Path, suffix: str) -> None:
     """Take away what ``whole_file`` left where its process was killed.
 
     Only what it made goes: a folder of its naming, no link, that holds at most the one file.
-
-    Parameters
-    ----------
-    folder : Path
-        Where it wrote; nobody writes there now.
-    suffix : str
-        How the files' names end, such as ``.npz``.
     """
     for rest in folder.glob(f".*{suffix}.*"):
         named = _UNFINISHED.fullmatch(rest.name)
@@ -154,13 +132,7 @@ def clear_unfinished(folder: Path, suffix: str) -> None:
 
 
 def check_written(folder: Path, names: Iterable[str]) -> None:
-    """Check that the files that were written are still there.
-
-    Raises
-    ------
-    FileNotFoundError
-        Where one is not: the folder was removed or replaced meanwhile.
-    """
+    """Check that the files that were written are still there."""
     for name in names:
         if not (Path(folder) / name).is_file():
             raise FileNotFoundError(
@@ -177,13 +149,7 @@ def write_text(path: Path, text: str) -> None:
 
 
 def as_json(content: Mapping[str, Any]) -> str:
-    """Return JSON text with a line feed at the end.
-
-    Raises
-    ------
-    ValueError
-        Where a number is not finite: JSON has no such numbers.
-    """
+    """Return JSON text with a line feed at the end."""
     text = json.dumps(content, indent=2, allow_nan=False, ensure_ascii=False) + "\n"
     # Bytes of names that are no UTF-8 are escaped as JSON does it.
     return text.encode("utf-8", "backslashreplace").decode()
@@ -198,13 +164,6 @@ def check_writable(folder: Path) -> None:
     """Check that files can be written to a folder that need not exist yet.
 
     The check leaves nothing behind.
-
-    Raises
-    ------
-    NotADirectoryError
-        Where the folder, or one above it, is a file.
-    PermissionError
-        Where nothing can be written there.
     """
     folder = Path(folder)
     nearest = folder.absolute()

@@ -168,8 +168,8 @@ def rules_of(kind: Any) -> dict[str, Rule]:  # noqa: ANN401
 def check_settings(settings: Any, whose: str = "") -> None:  # noqa: ANN401
     """Check the types and bounds of all settings of a dataclass.
 
-    ``whose`` names it in messages, such as ``the robot``. Raises ValueError if a setting has another type or
-    is out of bounds; the message names it, its value and the rule.
+    ``whose`` names it in messages, such as ``the robot``. Raises ValueError if a setting has another type or is out
+    of bounds; the message names it, its value and the rule.
     """
     of = f" of {whose}" if whose else ""
     kind: Any = type(settings)

@@ -66,8 +66,8 @@ def halfway(first: Transform, second: Transform, at: ArrayLike) -> Transform:
 def fit(source: NDArray[np.float64], target: NDArray[np.float64]) -> Transform:
     """Return the rigid motion that best aligns points with others by least squares.
 
-    It maps source to target, (n, 2) each [m]; it is a translation if all source points are equal. Raises
-    ValueError if there are no pairs, or the numbers of points differ.
+    It maps source to target, (n, 2) each [m]; it is a translation if all source points are equal. Raises ValueError
+    if there are no pairs, or the numbers of points differ.
     """
     if len(source) == 0 or source.shape != target.shape:
         raise ValueError(

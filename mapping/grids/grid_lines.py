@@ -20,8 +20,8 @@ def visible(
 ) -> NDArray[np.bool_]:
     """Return which cells are visible from a cell; unknown cells do not block the line.
 
-    Burgard et al., Coordinated multi-robot exploration, IEEE T-RO 2005, lower with it the utility of the
-    frontier cells that a robot will see from its target. Raises ValueError if a cell lies outside the grid.
+    Burgard et al., Coordinated multi-robot exploration, IEEE T-RO 2005, lower with it the utility of the frontier
+    cells that a robot will see from its target. Raises ValueError if a cell lies outside the grid.
 
     Parameters
     ----------
@@ -31,8 +31,6 @@ def visible(
         The cell from which the line of sight begins.
     cells : (N, 2) int
         Cells (row, column) at the other end; their own state does not matter.
-    maximum_range : float
-        Range of sight in cells, between centres.
 
     Returns
     -------

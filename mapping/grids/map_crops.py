@@ -1,7 +1,7 @@
 """Crops of a map around a robot as three levels, aligned with the map or rotated with the robot.
 
 A crop at scale s shows s x s cells of the map as one, by their maximum log-odds: occupied if any is, else
-unknown if any is, else free. Such pooled maps are kept next to the map and updated where it has changed, so
+unknown if any is, else free. Such pooled maps are kept next to the map and updated if it has changed, so
 that a crop reads only the cells that it shows.
 
 A rotated crop is computed by blocks of 8 x 8 cells in registers: at any angle, the cells of a block lie
@@ -43,8 +43,6 @@ def _write_all_indices(
 
     Parameters
     ----------
-    half, cells, step_x, step_y : int
-        As for ``_turn_blocks``.
     corners : (blocks, 2) int64
         Result: first row and column of the patch that each block loads.
     indices : (blocks, 64) uint8
@@ -109,11 +107,6 @@ def _turn_blocks(pools: Array, corners: Array, half: int, step_x: int, step_y: i
         Address, rows and columns of the pooled map of each crop (int8).
     corners : (crops, 2) int64
         Row and column of each pooled map at which the patch begins that its crop touches.
-    half : int
-        Half the rows and columns of that patch.
-    step_x, step_y : int
-        Step of a crop from one cell to the next [2**-15 cells]: to the next column by these, to the next row
-        by -step_y, step_x.
     crops : (crops, side, side) uint8
         Result, as levels; side a multiple of ``SIDE``.
     """
@@ -339,10 +332,10 @@ def _indices_in_patch(half: int, width: int, step_x: int, step_y: int, cells: in
 def crop_turned(pools: Array, x: float, y: float, heading: float, scales: Array, crops: Array) -> None:
     """Fill crops that are rotated with a robot, as levels; cells outside of the map are unknown.
 
-    Rows of a crop go to the robot's left, columns forward; the robot is at the centre. The crop turns about
-    the corner of the pooled cells that is nearest to the robot, so that at headings along the axes a crop is
-    exactly the pooled cells around that corner, turned by quarters. In between, a cell of the crop shows the
-    pooled cell in which its centre lies.
+    Rows of a crop go to the robot's left, columns forward; the robot is at the centre. The crop turns about the
+    corner of the pooled cells that is nearest to the robot, so that at headings along the axes a crop is exactly
+    the pooled cells around that corner, turned by quarters. In between, a cell of the crop shows the pooled cell in
+    which its centre lies.
 
     Parameters
     ----------

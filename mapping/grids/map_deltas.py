@@ -28,8 +28,8 @@ _ALL = np.uint64(2**64 - 1)
 def seen_spans(poses: Array, last: Array, reach: float, frame: Array) -> Array:
     """Return the cells that robots can have seen since ``last``, (robots, 4): columns and rows, low and high.
 
-    ``last`` holds their earlier positions, and is updated. Columns and rows are in the grid of ``frame``
-    (3,), its corner and the side of a cell.
+    ``last`` holds their earlier positions, and is updated. Columns and rows are in the grid of ``frame`` (3,), its
+    corner and the side of a cell.
     """
     spans = np.empty((poses.shape[0], 4), np.int64)
     for robot in range(poses.shape[0]):
@@ -251,12 +251,8 @@ def note_overlaid_changes(
 
     Parameters
     ----------
-    overlaid : OverlaidMaps
-        The robots' maps.
     poses, last : (robots, 2 or more), (robots, 2) float64
         Position of each robot in the frame of its start, now and at the last call (updated) [m].
-    reach, known, occupied, changes
-        As for ``note_changes``.
     """
     rows, words = known.shape
     maps, before, placements, resolution = overlaid

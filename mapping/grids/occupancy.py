@@ -145,8 +145,8 @@ class OccupancyGrid:
     ) -> tuple[int, int, int, int]:
         """Update the map by one scan; return the box of cells outside which nothing has changed.
 
-        Raises ValueError if the pose is not finite, the number of ranges is not that of the geometry, or the
-        noise is negative or not finite.
+        Raises ValueError if the pose is not finite, the number of ranges is not that of the geometry, or the noise
+        is negative or not finite.
 
         Parameters
         ----------
@@ -154,16 +154,9 @@ class OccupancyGrid:
             x, y, theta of the laser in the map's frame [m, rad].
         ranges : (beams,)
             Ranges [m]; inf for no return, nan for an invalid beam.
-        geometry : ScanGeometry
-            Directions of the beams.
         noise : tuple of float
             Standard deviation of the ranges: the larger of the first [m] and the second, a share of the
             range. Returns that it may have put behind a wall count as returns of the wall.
-
-        Returns
-        -------
-        tuple of int
-            row_low, row_high, column_low, column_high, high ends exclusive.
         """
         x, y, theta = np.asarray(pose, np.float64)
         scan = np.asarray(ranges, np.float32)

@@ -50,9 +50,6 @@ def pool_touched(log_odds: Array, touched: Array, scale: int, pooled: Array) -> 
         Bits of the words of 64 cells in which a level has changed, and of their rows, see ``untouched``.
     scale : int
         Side of a pooled cell [cells of the map].
-    pooled : (ceil(rows / scale), ceil(columns / scale)) int8
-        Result, with the sign of the maximum log-odds of the cells of each pooled cell; cells beyond the map
-        count as unknown.
     """
     rows, maxima = log_odds.shape[0], scratch_vector(WORD, np.int8)
     for group in range(rows, touched.shape[0]):

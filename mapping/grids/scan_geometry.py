@@ -136,9 +136,9 @@ def beams_towards(
 ) -> tuple[float, float]:
     """Return the range of beams that a disc at an offset from the laser may meet.
 
-    These are the first beam, not rounded, and the number of beams, which repeat after a full turn. Accurate
-    to a few thousandths of the gap between beams at a third of a degree; a caller that must miss none takes
-    one more beam.
+    These are the first beam, not rounded, and the number of beams, which repeat after a full turn. Accurate to a
+    few thousandths of the gap between beams at a third of a degree; a caller that must miss none takes one more
+    beam.
     """
     squared = offset_x * offset_x + offset_y * offset_y
     beyond = squared - radius * radius

@@ -52,8 +52,8 @@ def _unsettled(
 ) -> int:
     """List the returns that have to be examined; return their number.
 
-    These are the returns at the map's border, and those in cells that are neither occupied, as most are, nor
-    next to a free one. The list is made without branches, which could not be predicted.
+    These are the returns at the map's border, and those in cells that are neither occupied, as most are, nor next
+    to a free one. The list is made without branches, which could not be predicted.
     """
     rows, columns = log_odds.shape
     beams = lengths.shape[0]
@@ -108,8 +108,6 @@ def settle_returns(
     noise : (float, float)
         Standard deviation of the ranges: the larger of the first [cells] and the second, a share of the
         length.
-    occupied : int
-        Log-odds from which on a cell counts as occupied.
     """
     rows, columns = log_odds.shape
     deviation, share = noise
@@ -184,8 +182,6 @@ def integrate_scan(log_odds: Array, scan: SeenScan, increments: Array, touched: 
     ----------
     log_odds : (rows, columns) int8
         The map; columns a multiple of 64.
-    scan : SeenScan
-        The seen area.
     increments : (4,) int64
         ``OccupancySettings.increments``.
     touched : (rows + rows / 64, words) uint64

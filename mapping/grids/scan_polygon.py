@@ -24,8 +24,8 @@ from lidarium.mapping.kernels.views import scratch_vector, vector_at
 def _toggle_bit(bits: int, index: int) -> None:
     """Toggle a bit of the words at an address.
 
-    Words are accessed by address because numba counts references to an array whenever it is passed on or
-    sliced, which would cost more than the few bits of an edge.
+    Words are accessed by address because numba counts references to an array whenever it is passed on or sliced,
+    which would cost more than the few bits of an edge.
     """
     vector_at(bits + (index >> 6 << 3), 1, np.uint64)[0] ^= np.uint64(1) << np.uint64(index & 63)
 
@@ -241,21 +241,12 @@ def fill_scan_polygon(
 
     Parameters
     ----------
-    lengths, directions, ends : arrays
-        As for ``scan_ends``.
     x, y : float
         Position of the laser in the window [cells]; at least the longest range plus 2 from its borders.
     increment : float
         Angle between neighbouring beams [rad].
-    is_full_circle : bool
-        Whether the last beam is a neighbour of the first.
     bits : (rows, words) uint64
         Zero on entry; row 0 at the lowest y, bit 0 of word 0 at the lowest x.
-
-    Returns
-    -------
-    row_low, row_high, word_low, word_high : int
-        The box, high ends exclusive.
     """
     beams = lengths.shape[0]
     flat, width = bits.ctypes.data, 64 * bits.shape[1]

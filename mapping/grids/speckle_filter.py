@@ -18,10 +18,9 @@ _CROSS = np.array([[0, 1, 0], [1, 1, 1], [0, 1, 0]], np.uint8)
 def without_small_components(levels: NDArray[np.uint8]) -> NDArray[np.uint8]:
     """Return a three-level map (rows, columns) with small free components within walls closed, for pictures.
 
-    If cells are finer than the noise of the laser, ends of beams scatter over the front of a wall, and
-    single free cells remain between them. A component is removed if it has at most `LARGEST_COMPONENT`
-    cells, joined over sides, and half or more of its sides are walls. ``levels`` (0 occupied, 127 unknown,
-    255 free) is not changed.
+    If cells are finer than the noise of the laser, ends of beams scatter over the front of a wall, and single free
+    cells remain between them. A component is removed if it has at most `LARGEST_COMPONENT` cells, joined over
+    sides, and half or more of its sides are walls. ``levels`` (0 occupied, 127 unknown, 255 free) is not changed.
     """
     count, labels, statistics, _ = cv2.connectedComponentsWithStats(
         (levels == FREE).astype(np.uint8), connectivity=4

@@ -35,16 +35,8 @@ def user_cache_folder() -> Path | None:
 def cache_folder(*names: str, beside: Path | None = None) -> Path | None:
     """Return a private folder for a cache, made if absent, or None.
 
-    It is the first safe and writable one of: next to the source, in the user's cache folder, in the
-    temporary folder.
-
-    Parameters
-    ----------
-    *names : str
-        Names of the folders, from the outer to the inner.
-    beside : Path, optional
-        A source file whose compiled form is cached. Its own folder is then tried first, as Python does; the
-        owner of the source may own the cache as well, since that code is run already.
+    It is the first safe and writable one of: next to the source, in the user's cache folder, in the temporary
+    folder.
     """
     return next(
         (
@@ -59,17 +51,8 @@ def cache_folder(*names: str, beside: Path | None = None) -> Path | None:
 def trusted_folder(base: Path, names: Collection[str], owners: Collection[int] = ()) -> Path | None:
     """Return a private folder below ``base``, made if absent, or None.
 
-    None if it cannot be made, or if it, or one above it that was made for it, is a link, belongs to another
-    user, or is writable for others.
-
-    Parameters
-    ----------
-    base : Path
-        Existing folder; may be shared if others cannot rename this user's folders there, as in ``/tmp``.
-    names : collection of str
-        Names of the folders below, from the outer to the inner.
-    owners : collection of int
-        User IDs that are trusted besides this one.
+    None if it cannot be made, or if it, or one above it that was made for it, is a link, belongs to another user,
+    or is writable for others.
     """
     trusted = {*owners, os.geteuid()} if _HAS_OWNERS else set()
     try:
@@ -129,8 +112,8 @@ def _candidates(
 def _keeps_names(base: Path, trusted: Collection[int]) -> bool:
     """Whether nobody else can rename this user's folders in it, nor it or one above it.
 
-    Users who may write to a folder may rename its entries, unless it is sticky, as ``/tmp`` is: there only
-    the owners of the folder and of the entry may.
+    Users who may write to a folder may rename its entries, unless it is sticky, as ``/tmp`` is: there only the
+    owners of the folder and of the entry may.
     """
     if not _HAS_OWNERS:
         return True
@@ -142,9 +125,9 @@ def _keeps_names(base: Path, trusted: Collection[int]) -> bool:
 def _is_made_ours(folder: Path, trusted: Collection[int], *, is_inner: bool) -> bool:
     """Make a folder if absent, and return whether it is private.
 
-    An outer folder of this user to which others can write, as some masks leave them, is closed to them: they
-    could have put only other folders there, and these are checked themselves. The inner one may hold their
-    files, and is not used.
+    An outer folder of this user to which others can write, as some masks leave them, is closed to them: they could
+    have put only other folders there, and these are checked themselves. The inner one may hold their files, and is
+    not used.
     """
     try:
         os.mkdir(folder, PRIVATE)

@@ -110,26 +110,7 @@ def kernel(
     inline: str = "never",
     nrt: bool = True,
 ) -> Any:  # noqa: ANN401
-    """Compile a function with ``numba.njit``: with exact floating point, without the GIL, and cached.
-
-    Parameters
-    ----------
-    function : callable
-        The function to compile.
-    parallel : bool, optional
-        Whether ``numba.prange`` loops run on threads. Only loops whose iterations write to elements of their
-        own may, so that the result does not depend on the number of threads. Such a function calls kernels
-        and does nothing else: numba would drop its own writes to arrays viewed at addresses as unused.
-    forceinline : bool, optional
-        Whether LLVM inlines the function into its callers: for small helpers in hot loops.
-    inline : {"never", "always"}, optional
-        "always" lets numba put the function's body into its callers before it compiles them: for thin
-        functions around large ones, since each caller of a compiled function compiles its callees again.
-    nrt : bool, optional
-        Whether numba's runtime counts references to arrays. A function with ``nrt=False`` allocates only by
-        ``scratch_vector`` and ``scratch_grid``, and returns only views at addresses. Otherwise each array
-        that is passed on is counted twice, and so are the forty of a world.
-    """
+    """Compile a function with ``numba.njit``: with exact floating point, without the GIL, and cached."""
     if IS_INTERPRETED:
         return _interpreted if function is None else _interpreted(function)
 
@@ -282,8 +263,8 @@ def _start_threads() -> None:
 def use_threads(threads: int) -> int:
     """Set the number of threads of parallel kernels; return the number they may use.
 
-    It is 1 in a process that was forked after threads had started. They do not exist there, and a parallel
-    kernel would wait for them forever; serial forms give the same.
+    It is 1 in a process that was forked after threads had started. They do not exist there, and a parallel kernel
+    would wait for them forever; serial forms give the same.
     """
     global _process_of_threads  # threads belong to the process
     process = os.getpid()

@@ -44,8 +44,8 @@ def _numba_types() -> Any:  # noqa: ANN401
 def encode_type(argument: Any) -> Any:  # noqa: ANN401
     """Return the numba type of an argument as strings, lists and dicts.
 
-    Scalars are their names; arrays ``dtype:dimensions+layout``, with ``:readonly`` if they are; tuples lists;
-    named tuples ``{"class": "module:name", "of": list}``. Raises ValueError for other types.
+    Scalars are their names; arrays ``dtype:dimensions+layout``, with ``:readonly`` if they are; tuples lists; named
+    tuples ``{"class": "module:name", "of": list}``. Raises ValueError for other types.
     """
     types = _numba_types()
     if isinstance(argument, types.Array):

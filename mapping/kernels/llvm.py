@@ -47,15 +47,8 @@ def has_feature(name: str) -> bool:
 def llvm_overload(function: Callable[..., Any], result: Any, *arguments: Any) -> Callable[[Any], Any]:  # noqa: ANN401
     """Compile calls of a Python function in kernels by the decorated LLVM text.
 
-    As with numba's ``overload``, Python runs the function itself: with ``NUMBA_DISABLE_JIT=1``, and in tests,
-    which compare the two.
-
-    Parameters
-    ----------
-    function : callable
-        The definition.
-    result, *arguments : numba types
-        Arguments of other types are converted to these.
+    As with numba's ``overload``, Python runs the function itself: with ``NUMBA_DISABLE_JIT=1``, and in tests, which
+    compare the two.
     """
     signature = result(*arguments)
 

@@ -55,8 +55,8 @@ def grid_at(address: int, rows: int, columns: int, dtype: Any) -> Any:  # noqa: 
 def scratch_vector(count: int, dtype: Any) -> Any:  # noqa: ANN401
     """Return a vector on the stack of the calling kernel: undefined at first, and gone when it returns.
 
-    For some numbers per beam, not for grids: a stack holds a few megabytes. Do not call it in a loop, which
-    would reserve memory each time.
+    For some numbers per beam, not for grids: a stack holds a few megabytes. Do not call it in a loop, which would
+    reserve memory each time.
     """
     return np.zeros(count, dtype).view(Numbers)
 

@@ -60,8 +60,7 @@ class _Sweep(NamedTuple):
 def _count_rows(log_odds: Array, sweep: _Sweep, column: int, steps: Array, fewest: Array, lane: int) -> None:
     """Apply ``count_rows`` to the columns from ``column`` on; beyond the grid nothing is occupied.
 
-    ``steps`` is (64,); ``fewest`` (rows, width), in which the columns begin at ``lane``, may have one row
-    for all.
+    ``steps`` is (64,); ``fewest`` (rows, width), in which the columns begin at ``lane``, may have one row for all.
     """
     row, step, rows, largest = sweep
     columns, width = log_odds.shape[1], fewest.shape[1]
@@ -272,8 +271,8 @@ def room_for_cells() -> Array:
 def list_cells(listed: Array, count: int, word: np.uint64, row: int, column: int) -> tuple[Array, int]:
     """Add the cells of a block whose bits are set to a list with ``count`` entries (kernel).
 
-    The block is the part of a row from ``column`` on. Returns the list (N, 2), which is a new one if it was
-    full, and its number of entries.
+    The block is the part of a row from ``column`` on. Returns the list (N, 2), which is a new one if it was full,
+    and its number of entries.
     """
     if count + BLOCK > len(listed):
         longer = np.empty((2 * len(listed), 2), np.int64)
@@ -451,8 +450,8 @@ class ClearanceField:
 def stamp_of(limit: int) -> NDArray[np.uint16]:
     """Return the closeness around one occupied cell, up to k cells away: (2 k + 1, 2 k + 1 and more) uint16.
 
-    Rows begin with a block of zeros, and end with zeros up to whole blocks and one more: 64 lanes from any
-    index on exist, and raise nothing beyond the stamp.
+    Rows begin with a block of zeros, and end with zeros up to whole blocks and one more: 64 lanes from any index on
+    exist, and raise nothing beyond the stamp.
     """
     reach = 0
     while (2 * reach + 1) ** 2 < limit:

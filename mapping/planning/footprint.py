@@ -46,8 +46,8 @@ class Footprint:
 def passage_of(footprint: Footprint, resolution: float, limit: int) -> Passage:
     """Return how a body passes over a grid of cells of ``resolution`` [m].
 
-    The grid's clearance field has this ``limit``. Raises ValueError if the footprint needs more clearance
-    than the field's maximum.
+    The grid's clearance field has this ``limit``. Raises ValueError if the footprint needs more clearance than the
+    field's maximum.
     """
     minimum = limit_of(footprint.radius, resolution)
     if limit_of(footprint.preferred, resolution) > limit:
@@ -123,7 +123,7 @@ def passed(
     radius: float,
     resolution: float,
 ) -> NDArray[np.bool_]:
-    """Return the cells of the body's own footprint along its trail, where there can be no wall.
+    """Return the cells of the body's own footprint along its trail, if there can be no wall.
 
     Cells so near to the trail's end that they may show the standing body are excluded.
     """

@@ -94,24 +94,16 @@ def search(
 ) -> Search:
     """Spread costs from a cell over all cells that a body can reach, until an end condition is met.
 
-    Raises ValueError if shapes differ, the belief is no C-contiguous int8, a cell lies outside the grid, or
-    the footprint needs more clearance than the field's maximum.
+    Raises ValueError if shapes differ, the belief is no C-contiguous int8, a cell lies outside the grid, or the
+    footprint needs more clearance than the field's maximum.
 
     Parameters
     ----------
-    space : SearchSpace
-        Scratch memory; the previous search is forgotten.
     log_odds : (rows, columns) int8
         The belief, C-contiguous: < 0 free, 0 unknown, > 0 occupied. Only known free cells are entered.
-    clearance : ClearanceField
-        Clearance of the same belief.
     start : (row, column)
         Cell of the body. If it is too near to a wall or inside a blocked disc, the body may leave along
         cells that are no nearer; such cells are part of paths but count as not reached.
-    footprint : Footprint
-        The body.
-    until : Until
-        End conditions.
     blocked : iterable of (row, column, radius)
         Discs in cells (see :func:`discs_of`), such as teammates with both radii added, that the body's
         centre may not enter.
@@ -167,8 +159,8 @@ def plan(
 ) -> tuple[float, NDArray[np.int64]] | None:
     """Return the cheapest path to one cell, by A* with the octile distance (Hart, Nilsson, Raphael 1968).
 
-    Parameters are those of :func:`search` and :class:`Until`, and so is the cost. Returns the cost [m] and
-    the cells (N, 2) int64 from start to goal, or None if there is no path.
+    Parameters are those of :func:`search` and :class:`Until`, and so is the cost. Returns the cost [m] and the
+    cells (N, 2) int64 from start to goal, or None if there is no path.
     """
     _check_search(space, log_odds, clearance, start, goal)
     passage = passage_of(footprint, space.resolution, clearance.limit)

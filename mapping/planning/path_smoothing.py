@@ -35,8 +35,8 @@ ROUNDING = 1e-9
 def kept_places(path: Array, terrain: Terrain) -> NDArray[np.int64]:
     """Return the indices of the cells of a path that short cuts keep (kernel).
 
-    From each kept cell it goes as far as a line can: it halves the distance until a line fits, then walks on
-    while one does.
+    From each kept cell it goes as far as a line can: it halves the distance until a line fits, then walks on while
+    one does.
     """
     count, closeness = len(path), terrain.closeness
     kept = np.zeros(count, np.int64)

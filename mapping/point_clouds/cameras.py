@@ -44,8 +44,6 @@ def points_of_depth(depth: NDArray[np.floating], intrinsics: Intrinsics) -> NDAr
     ----------
     depth : (rows, columns) or (1, rows, columns) float
         Depths along the axis [m]; 0, nan and inf are no measurement.
-    intrinsics : Intrinsics
-        Of the camera.
 
     Returns
     -------
@@ -80,8 +78,6 @@ def moved(cloud: PointCloud, motion: ArrayLike) -> PointCloud:
 
     Parameters
     ----------
-    cloud : PointCloud
-        The points.
     motion : (4, 4)
         Moves points of their frame to those of the other.
     """

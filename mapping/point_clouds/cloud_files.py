@@ -42,8 +42,6 @@ def _cloud_of_columns(columns: Mapping[str, NDArray[np.generic]], source: str) -
     ----------
     columns : mapping of str to (N,) array
         Those that ``_wanted_columns`` named.
-    source : str
-        The file.
     """
     normals = next((each for each in NORMALS if each[0] in columns), None)
     return PointCloud(

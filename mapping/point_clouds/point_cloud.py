@@ -67,8 +67,6 @@ def thinned(cloud: PointCloud, edge: float) -> PointCloud:
 
     Parameters
     ----------
-    cloud : PointCloud
-        Finite points.
     edge : float
         Edge of a voxel [m]; corners are at multiples of it.
     """

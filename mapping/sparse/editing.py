@@ -22,8 +22,6 @@ def edited(
 
     Parameters
     ----------
-    sparse_map : SparseMap
-        The map.
     add_boxes : (A, 2, 3) float64 or None
         Low and high corners of further obstacles [m].
     remove_boxes : (R, 2, 3) float64 or None
@@ -43,8 +41,6 @@ def join_maps(first: SparseMap, second: SparseMap, transform: NDArray[np.float64
 
     Parameters
     ----------
-    first, second : SparseMap
-        The maps.
     transform : (4, 4) float64
         Maps points of the second into the first.
     """

@@ -76,10 +76,6 @@ def find_floor(
     ----------
     points : (N, 3) float64
         A cloud, spread evenly: means of voxels [m].
-    settings : FloorSettings or None
-        Settings; defaults if None.
-    seed : int
-        Of the draws.
     """
     settings = settings or FloorSettings()
     up = np.array([settings.up_x, settings.up_y, settings.up_z], np.float64)

@@ -85,16 +85,12 @@ def nearest_nodes(grid: NodeGrid, point: Array, found: Array, gaps: Array, witho
 
     Parameters
     ----------
-    grid : NodeGrid
-        The nodes.
     point : (3,) float64
         The point [m].
     found : (count,) int64
         Result: numbers of the nearest nodes, nearest first; of equal ones the lower number comes first.
     gaps : (count,) float64
         Result: their squared distances [m2].
-    without : int
-        A node that is not looked at; -1 for none.
     """
     maximum, number = found.shape[0], 0
     rows, columns, cell = grid.shape[0], grid.shape[1], grid.cell[0]
@@ -146,8 +142,8 @@ def _take_cell(
 def reduced_nodes(nodes: NDArray[np.float64], radius: float) -> NDArray[np.float64]:
     """Merge free nodes that lie close together.
 
-    In their order, each node that is left takes all that are nearer to it than the radius; their mean stands
-    for them.
+    In their order, each node that is left takes all that are nearer to it than the radius; their mean stands for
+    them.
 
     Parameters
     ----------
@@ -239,16 +235,12 @@ def _retracted_nodes(nodes: NDArray[np.float64], index: BoxIndex, body: SweptBod
     ----------
     nodes : (N, 3) float64
         Free nodes [m].
-    index : BoxIndex
-        Obstacles.
-    body : SweptBody
-        The body.
 
     Returns
     -------
     (N, 3) float64
-        The nodes; each is where it was, or at most the body's radius away. Those under boxes, and those that
-        find no place, are left where they were.
+        The nodes; each is if it was, or at most the body's radius away. Those under boxes, and those that
+        find no place, are left if they were.
     """
     return np.asarray(_retract(index, np.ascontiguousarray(nodes, np.float64).reshape(-1, 3), body.numbers))
 
@@ -262,10 +254,6 @@ def _nodes_with_room(
     ----------
     nodes : (N, 3) float64
         Free nodes [m].
-    index : BoxIndex
-        Obstacles.
-    body : SweptBody
-        The body.
     merge_radius : float
         A node that was moved is left out if another one is nearer than this [m].
 
@@ -480,8 +468,7 @@ def graph_of_nodes(
 def candidate_pairs(grid: NodeGrid, neighbours: int, longest: float | None) -> NDArray[np.int64]:
     """Return the pairs of nodes that may have an edge, each once, the lower number first, (P, 2).
 
-    ``longest`` is the longest edge [m]; None for three times the median distance of nearest nodes, at least
-    1 m.
+    ``longest`` is the longest edge [m]; None for three times the median distance of nearest nodes, at least 1 m.
     """
     near, gaps = _nearest_of_all(grid, neighbours)
     if longest is None:

@@ -405,13 +405,6 @@ def write_sparse_map(path: Path, sparse_map: SparseMap, graph: _GraphEdges | Non
     """Write a map, whole or not at all.
 
     The thesis's text if the name ends in ``.txt``, the binary form if it ends in ``.smap``.
-
-    Raises
-    ------
-    ValueError
-        If the name ends otherwise, or a graph is to be kept as text.
-    OSError
-        If nothing can be written there.
     """
     if path.suffix == BINARY_SUFFIX:
         _write_binary(path, sparse_map, graph)
@@ -426,15 +419,7 @@ def write_sparse_map(path: Path, sparse_map: SparseMap, graph: _GraphEdges | Non
 
 
 def read_sparse_map(path: Path) -> tuple[SparseMap, _GraphEdges | None]:
-    """Read a map, with the graph if the file has one.
-
-    Raises
-    ------
-    FileNotFoundError
-        If there is none.
-    ValueError
-        If it is no sparse map; the message names the file and says why.
-    """
+    """Read a map, with the graph if the file has one."""
     with open_guarded(path) as file:
         is_binary = file.read(len(MAGIC)) == MAGIC
     return _read_binary(path) if is_binary or path.suffix == BINARY_SUFFIX else (_read_text_map(path), None)

@@ -85,8 +85,6 @@ def _shortest_path(
     -------
     path : (P,) int64
         Nodes in order; empty if there is no path.
-    cost : float
-        Cost from the start to the goal; inf if there is no path.
     """
     count = nodes.shape[0]
     costs, before = np.full(count, np.inf), np.full(count, NO_NODE)
@@ -142,8 +140,6 @@ def _shortened(index: BoxIndex, path: Array, body: Array) -> Any:  # noqa: ANN40
 
     Parameters
     ----------
-    index : BoxIndex
-        Obstacles.
     path : (P, 3) float64
         Points of the path [m].
     body : (3,) float64
@@ -152,7 +148,7 @@ def _shortened(index: BoxIndex, path: Array, body: Array) -> Any:  # noqa: ANN40
     Returns
     -------
     (Q, 3) float64
-        Points of the shorter path; it begins and ends where the other does.
+        Points of the shorter path; it begins and ends if the other does.
     """
     points = _skipped(index, path, body)
     for _ in range(PULLS):
@@ -376,8 +372,6 @@ def costs_from(graph: TopologicalGraph, start: NDArray[np.float64]) -> NDArray[n
 
     Parameters
     ----------
-    graph : TopologicalGraph
-        The graph.
     start : (3,) float64
         Start [m]; it is connected to its nearest nodes as in a request.
 

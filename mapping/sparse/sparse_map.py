@@ -105,8 +105,8 @@ class FreeCodes:
 def occupied_codes(boxes: NDArray[np.float64], frame: int = 0) -> OccupiedCodes:
     """Return codes of which nothing but the boxes (M, 2, 3) [m] is known.
 
-    Flat boxes are surfaces that face along their shortest side; the weight of a box is its largest face in
-    squares of 5 cm, so that maps from files can be registered.
+    Flat boxes are surfaces that face along their shortest side; the weight of a box is its largest face in squares
+    of 5 cm, so that maps from files can be registered.
     """
     flat = np.ascontiguousarray(boxes, np.float64).reshape(-1, 2, 3)
     if not (np.isfinite(flat).all() and (flat[:, 0] <= flat[:, 1]).all()):
@@ -214,8 +214,6 @@ class SparseMap:
 
         Parameters
         ----------
-        codes : OccupiedCodes
-            Codes at their current positions.
         sources : (M,) int64
             Which code of the map each of them is, -1 for none: those of the map do not become larger by being
             moved there and back.

@@ -187,8 +187,6 @@ def is_free(index: BoxIndex, a: Array, b: Array, body: Array) -> bool:
 
     Parameters
     ----------
-    index : BoxIndex
-        Obstacles.
     a, b : (3,) float64
         Ends of the segment on the floor [m]; the same for a body that stands.
     body : (3,) float64

@@ -87,8 +87,6 @@ class VoxelIndex:
         ----------
         point : (3,) float64
             The place [m].
-        neighbours : int
-            Neighbouring voxels, a key of ``NEIGHBOURHOODS``.
 
         Returns
         -------
@@ -184,8 +182,6 @@ def build_thesis_graph(
     ----------
     free, occupied : (N, 3), (M, 3) float64
         Codes [m].
-    settings : ThesisGraphSettings or None
-        Settings; defaults if None.
     """
     settings = settings or ThesisGraphSettings()
     points = np.ascontiguousarray(occupied, np.float64).reshape(-1, 3)

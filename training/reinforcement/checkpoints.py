@@ -63,8 +63,8 @@ def write_checkpoint(
 ) -> None:
     """Write a checkpoint, and remove all but the last two.
 
-    The file that makes it one is written last and removed first: whenever the process is killed, the part
-    that is found is whole.
+    The file that makes it one is written last and removed first: whenever the process is killed, the part that is
+    found is whole.
     """
     name = _name(checkpoint.decisions)
     save_weights(folder / f"{name}.safetensors", network.weights())

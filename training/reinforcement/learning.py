@@ -133,8 +133,8 @@ def _learn_on(
 ) -> float | None:
     """Learn up to the next checkpoint.
 
-    New episodes begin and all draws are seeded again, so that a training that goes on from a checkpoint does
-    the same as one that was never interrupted.
+    New episodes begin and all draws are seeded again, so that a training that goes on from a checkpoint does the
+    same as one that was never interrupted.
     """
     environment.env_method("begin_at", number * PLACES_PER_CHECKPOINT)
     model.set_random_seed(training.seed + 1 + number)

@@ -26,14 +26,7 @@ from lidarium.mapping.geometry.bounds import shown
 
 
 def _packed_floor(floor: Floor) -> dict[str, NDArray[Any]]:
-    """Return a floor as flat arrays.
-
-    Returns
-    -------
-    dict of arrays
-        ``name`` (UTF-8), ``bounds``, ``heights`` (S, 2), ``rings`` of each solid (S,), ``corners`` of each
-        ring (R,), ``points`` of all rings (N, 2), ``starts`` (K, 3), and ``goal``, (2,) or empty.
-    """
+    """Return a floor as flat arrays."""
     if floor.cells is not None:
         raise ValueError(f"floor {floor.name!r} is made of cells; want one of solids")
     rings = [ring for solid in floor.solids for ring in (solid.polygon, *solid.holes)]
@@ -215,14 +208,7 @@ def _hash_of_floors(specs: Iterable[str]) -> str:
 
 
 def describe_floor(floor: Floor) -> dict[str, Any]:
-    """Describe a floor in figures.
-
-    Returns
-    -------
-    dict
-        ``name``, ``size_m`` [width, height], ``area_m2`` (free), ``loops``, ``clutter``, ``rooms``,
-        ``solids``, ``sha256``, ``remark``; the measures are explained in `BuildingMeasures`.
-    """
+    """Describe a floor in figures."""
     measures = measure_building(floor)
     x_min, y_min, x_max, y_max = floor.bounds
     return {

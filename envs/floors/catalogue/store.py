@@ -219,8 +219,8 @@ def _content(path: Path) -> bytes:
 def _files(folder: Path) -> list[tuple[float, int, Path]]:
     """Return time of last use, size and path of a folder's entries.
 
-    Unfinished writes of broken processes are included; what else lies there is nobody's to remove, and what
-    a link leads to is another's.
+    Unfinished writes of broken processes are included; what else lies there is nobody's to remove, and what a link
+    leads to is another's.
     """
     files: list[tuple[float, int, Path]] = []
     if folder.is_symlink():

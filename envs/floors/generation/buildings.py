@@ -128,8 +128,7 @@ def _guilty(
 ) -> int:
     """Return the index of the last piece of furniture that obstructs the floor.
 
-    Such a piece is beside a part cut off or in a room that is not reached. Without one, the last piece is
-    returned.
+    Such a piece is beside a part cut off or in a room that is not reached. Without one, the last piece is returned.
     """
     reach = ROBOT_RADIUS + 3 * MARGIN
     corner = np.tile(origin, 2) + np.array([reach, reach, -reach, -reach])

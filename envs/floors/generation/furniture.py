@@ -234,8 +234,6 @@ def place(
 
     Parameters
     ----------
-    kind : str
-        A name in `PIECES`.
     x, y : float
         Middle of its footprint [m].
     theta : float
@@ -350,12 +348,8 @@ def _room_wishes(
 
     Parameters
     ----------
-    kind : str
-        "apartment", "office" or "corridors".
     areas : (rooms,) float64
         Of the rooms [m²]; their use follows from these.
-    generator : np.random.Generator
-        Distribution of the uses of the rooms of an office.
     """
     if kind == "corridors":
         return [CORRIDORS["hall"]]
@@ -501,8 +495,8 @@ class FurniturePlaces:
     def _is_free(self, room: int, rectangle: Rectangle, wall: Boundary | None) -> bool:
         """Whether a rectangle is free for a piece in a room.
 
-        It is inside the room with a passage before it, off the doors, and beside or well away from
-        all other pieces.
+        It is inside the room with a passage before it, off the doors, and beside or well away from all other
+        pieces.
         """
         if not self._is_inside(room, _with_passage(rectangle, wall, room, self._half_wall)):
             return False
@@ -570,18 +564,10 @@ def furnish(
 
     Parameters
     ----------
-    kind : str
-        "apartment", "office" or "corridors".
     labels : (rows, columns) int32
         The plan.
-    doors : list of Door
-        Areas to keep clear.
-    clutter : float
-        Share of the area of the rooms to cover.
     wall_thickness : float
         Of the walls between rooms [m].
-    generator : np.random.Generator
-        Source of all draws.
     """
     areas = room_areas(labels)
     wishes = _room_wishes(kind, areas, generator)

@@ -135,11 +135,6 @@ def choose_doors(
         The plan.
     door_width : float
         Clear width of every door [m].
-    loops : float
-        Share of the further possible doors that are made, 0 to 1; a larger share keeps all doors of a smaller
-        one.
-    generator : np.random.Generator
-        Source of all draws.
     """
     areas = room_areas(labels)
     candidates = [
@@ -177,8 +172,8 @@ def _door(boundary: Boundary, width: float, generator: np.random.Generator) -> D
 def wall_rectangles(labels: Labels, doors: list[Door], thickness: float) -> list[Rectangle]:
     """Walls between rooms as rectangles, doors left open.
 
-    Boundaries on one line are one wall, and walls reach half their thickness beyond their ends, so that
-    corners close.
+    Boundaries on one line are one wall, and walls reach half their thickness beyond their ends, so that corners
+    close.
     """
     half = thickness / 2
     gaps: dict[tuple[bool, float], list[tuple[float, float]]] = {}

@@ -88,26 +88,9 @@ def load_file(path: Path, resolution: float | None = None) -> Floor:
 
     Parameters
     ----------
-    path : Path
-        The file: ROS map (yaml), dungeon or plain image, KTH XML, LIFULL or AMRL text, HouseExpo JSON, numpy
-        array, MovingAI grid map, SVG or DXF drawing, SDF world.
     resolution : float or None
         Side of a pixel [m] if the file does not state it: needed for plain images, numpy arrays,
         grid maps and drawings.
-
-    Returns
-    -------
-    Floor
-        The floor. If it comes from pixels or rooms, its largest connected free area is free (of a dungeon:
-        that of the start) and all else is solid. It has starts only if the file has.
-
-    Raises
-    ------
-    FileNotFoundError
-        If there is no such file.
-    ValueError
-        If it is a folder, of no known format, or not what its name says, or if a resolution is missing, not
-        positive, or given for a file that has its own scale.
     """
     path = Path(path)
     check_file(path)

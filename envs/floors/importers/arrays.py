@@ -22,9 +22,8 @@ def has_scale(path: Path) -> bool:
 def load(path: Path, resolution: float | None) -> Floor:
     """Read an array.
 
-    ``.npy`` is an image, row 0 at the top: grey levels (above 127 is free) or booleans (true is solid); it
-    needs a resolution. ``.npz`` holds ``solid`` (row 0 at the lowest y), ``origin`` (x, y) and ``resolution``
-    [m].
+    ``.npy`` is an image, row 0 at the top: grey levels (above 127 is free) or booleans (true is solid); it needs a
+    resolution. ``.npz`` holds ``solid`` (row 0 at the lowest y), ``origin`` (x, y) and ``resolution`` [m].
     """
     content = read_arrays(path, "a numpy array that can be read")
     if isinstance(content, dict):

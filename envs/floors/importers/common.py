@@ -79,8 +79,6 @@ def floor_of_cells(
 
     Parameters
     ----------
-    path : Path
-        The file, for the name and for messages.
     free : (rows, columns) bool
         Free cells, row 0 at the lowest y.
     origin, resolution : (float, float), float
@@ -104,8 +102,6 @@ def floor_of_lines(path: Path, walls: NDArray[np.float64], openings: NDArray[np.
 
     Parameters
     ----------
-    path : Path
-        The file, for the name and for messages.
     walls : (N, 4) float64
         Wall lines x1, y1, x2, y2 [m]; they become `WALL_THICKNESS` thick.
     openings : (M, 4) float64
@@ -136,8 +132,8 @@ def enclosed(
 
     The outlines run along the middle of the outer walls.
 
-    Drawings have gaps in the outer wall. They are closed by widening the lines, step by step, until nearly as
-    much is enclosed as with the widest. Areas that a smaller widening encloses keep their finer outline.
+    Drawings have gaps in the outer wall. They are closed by widening the lines, step by step, until nearly as much
+    is enclosed as with the widest. Areas that a smaller widening encloses keep their finer outline.
     """
     widest = max(_GAPS) + WALL_THICKNESS
     size = high - low + 2.0 * widest

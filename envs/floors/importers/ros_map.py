@@ -34,8 +34,8 @@ def load(path: Path, resolution: float | None) -> Floor:
 def _turned(image: MapImage, free: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], tuple[float, float], float]:
     """Return the free cells along the axes, with origin and resolution.
 
-    The cells have half the size: walls of one pixel stay 4-connected when turned only if sampled more densely
-    than a cell's diagonal.
+    The cells have half the size: walls of one pixel stay 4-connected when turned only if sampled more densely than
+    a cell's diagonal.
     """
     x, y, yaw = image.origin
     cosine, sine = math.cos(yaw), math.sin(yaw)

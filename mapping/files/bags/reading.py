@@ -54,24 +54,8 @@ def is_bag(path: Path) -> bool:
 def read_bag_log(path: Path, topic: str | None = None) -> LaserLog:
     """Read a log from the scans of a bag of ROS 1 or 2.
 
-    Odometry is read from the topic whose name begins most like that of the scans, else from the transforms
-    from a frame that ends with ``odom``. The laser's pose on the robot is read from ``/tf_static``.
-
-    Parameters
-    ----------
-    path : Path
-        A file (``.mcap``, ``.db3``, ``.bag``, or the first two with ``.zstd``), or a folder with the files of
-        one bag.
-    topic : str, optional
-        The topic of the scans; needed if there is more than one.
-
-    Raises
-    ------
-    FileNotFoundError
-        If the file does not exist.
-    ValueError
-        If the bag is damaged, has no scans or several topics of them, or if the extra ``bags`` is not
-        installed.
+    Odometry is read from the topic whose name begins most like that of the scans, else from the transforms from a
+    frame that ends with ``odom``. The laser's pose on the robot is read from ``/tf_static``.
     """
     path = Path(path)
     try:

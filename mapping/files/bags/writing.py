@@ -203,8 +203,8 @@ def bag(path: Path) -> Iterator[BagWriter]:
 def write_mcap_log(path: Path, log: LaserLog, robot: str = "robot") -> None:
     """Write a log of scans and odometry as an MCAP file, whole or not at all.
 
-    Stamps are rounded to nanoseconds, angles of beams to single precision. Names of topics and frames begin
-    with the name of the robot.
+    Stamps are rounded to nanoseconds, angles of beams to single precision. Names of topics and frames begin with
+    the name of the robot.
     """
     frames = {name: f"{robot}/{name}" for name in ("odom", "base_link", "laser")}
     # Messages of ROS have no times before zero.

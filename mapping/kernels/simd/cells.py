@@ -116,8 +116,7 @@ def _(builder: Builder, first: Value, second: Value, result: Value) -> Value:
 def max_of_groups(rows: int, stride: int, count: int, minimum: int, halvings: int, result: int) -> None:
     """Write the maxima of groups of ``2 ** halvings`` columns of ``count`` blocks, and of ``minimum``.
 
-    Blocks are ``stride`` bytes apart. 64 bytes are written, of which the first 64 / 2 ** halvings are the
-    maxima.
+    Blocks are ``stride`` bytes apart. 64 bytes are written, of which the first 64 / 2 ** halvings are the maxima.
     """
     blocks = [vector_at(rows + k * stride, BLOCK, np.int8) for k in range(count)]
     maxima = np.max([np.full(BLOCK, minimum), *blocks], axis=0).reshape(-1, 2**halvings).max(axis=1)

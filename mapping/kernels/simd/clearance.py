@@ -48,18 +48,7 @@ def _(builder: Builder, log_odds: Value, numbers: Value, number: Value) -> Value
 def count_rows(
     log_odds: int, stride: int, rows: int, steps: int, maximum: int, minima: int, width: int
 ) -> None:
-    """Count the rows since the last occupied cell of each of 64 columns, row by row.
-
-    Parameters
-    ----------
-    log_odds, stride, rows : int
-        The first row's block, the bytes to the next one (negative on the way back), and the number of rows.
-    steps : int
-        A block with the steps before the first row, and after the last one in the end: one more in each row
-        up to ``maximum``, 0 if log-odds are positive.
-    minima, width : int
-        The first row's block that is lowered to the steps, and the bytes to the next one.
-    """
+    """Count the rows since the last occupied cell of each of 64 columns, row by row."""
     counted = vector_at(steps, BLOCK, np.uint16)
     for row in range(rows):
         is_occupied = vector_at(log_odds + row * stride, BLOCK, np.int8) > 0

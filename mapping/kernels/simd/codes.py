@@ -29,9 +29,9 @@ _SIZE, _VECTOR_SIZE = 4, 4 * _LANES
 def nearest_in_tile(points: int, codes: int, numbers: int, count: int, squares: int, labels: int) -> None:
     """Lower squared distances of a tile's points to those of codes, and note the nearest.
 
-    All but ``count`` are addresses: of the (3, 64) float32 coordinates, (count, 3) float32 codes, (count,)
-    int32 numbers of the codes, (64,) float32 squared distances so far, and (64,) int32 labels so far. Of
-    equal codes the first stays.
+    All but ``count`` are addresses: of the (3, 64) float32 coordinates, (count, 3) float32 codes, (count,) int32
+    numbers of the codes, (64,) float32 squared distances so far, and (64,) int32 labels so far. Of equal codes the
+    first stays.
     """
     nearest, chosen = vector_at(squares, TILE, np.float32), vector_at(labels, TILE, np.int32)
     coordinates = np.array(grid_at(points, 3, TILE, np.float32))

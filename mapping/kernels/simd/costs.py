@@ -48,14 +48,6 @@ def relax_forwards(costs: int, straight: int, diagonal: int, kinds: int, at: int
     """Lower the costs of the 16 cells at an index, in the order of columns; return which have changed.
 
     They are lowered by the costs of the row above or below, and by those of the cells before them.
-
-    Parameters
-    ----------
-    costs, straight, diagonal, kinds : int
-        Addresses of the grids: int32 costs; int32 half costs of straight and diagonal steps into and out of
-        a cell, 0 if the body does not fit; uint8 kinds.
-    at, beside : int
-        Indices of the first cell of the block, and of that above or below it.
     """
     return _relax((costs, straight, diagonal, kinds), at, beside, 1)
 
@@ -137,8 +129,8 @@ def _relax_along(
 ) -> Value:
     """Lower costs by those of the cells before them in the row.
 
-    ``step_costs`` are those of the steps that lead to each cell; n rounds take all cells of up to 2 ** n
-    steps before into account.
+    ``step_costs`` are those of the steps that lead to each cell; n rounds take all cells of up to 2 ** n steps
+    before into account.
     """
     first = ir.Constant(INT, 0 if step > 0 else LANES - 1)
     carried = _cells(builder, costs, at, -1 if step > 0 else LANES, INT)
@@ -184,20 +176,7 @@ def _(builder: Builder, costs: Value, limit: Value) -> Value:
 
 
 def look_up_costs(log_odds: int, closeness: int, body: int, kinds: int, straight: int, diagonal: int) -> None:
-    """Write the kinds of 16 cells, and half the costs of steps into and out of them.
-
-    Parameters
-    ----------
-    log_odds, closeness : int
-        Addresses of the cells' log-odds, int8, and closeness, uint16.
-    body : int
-        Address of five int64: the address of the int32 costs by closeness, first of straight and then of
-        diagonal steps; the number of each; the closeness up to which all cost the same, up to which the body
-        fits, and up to which a cell is roomy.
-    kinds, straight, diagonal : int
-        Addresses of the results, uint8 kinds and int32 costs: 0 if the body does not fit, and not written if
-        it fits in none of the cells.
-    """
+    """Write the kinds of 16 cells, and half the costs of steps into and out of them."""
     table, length, same_up_to, tight, roomy = vector_at(body, 5, np.int64).tolist()
     near = np.array(vector_at(closeness, LANES, np.uint16))
     free = np.array(vector_at(log_odds, LANES, np.int8) < 0)

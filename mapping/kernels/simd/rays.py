@@ -62,21 +62,7 @@ def travel_rays(
     stride: int,
     ranges: int,
 ) -> None:
-    """Write the distances at which 32 rays enter a solid cell, at most the reach. All in cells.
-
-    Parameters
-    ----------
-    squares : int
-        Address of the sides (4, rows, columns) uint8 of the empty squares that open from each cell into each
-        quadrant, with ``BEHIND`` bytes to read after them.
-    shape : tuple of int
-        Cells of a plane, and its columns.
-    origin : tuple of float
-        x, y and the reach.
-    together, directions, ranges : int
-        Addresses of the distances (2,) up to which each group is free; of the four rows of directions x, y
-        and their inverses (32,), ``stride`` bytes apart; of the ranges (32,). All float64.
-    """
+    """Write the distances at which 32 rays enter a solid cell, at most the reach. All in cells."""
     table = _squares(squares, shape)
     rows = np.array([vector_at(directions + k * stride, RAYS, np.float64) for k in range(4)])
     free, found = vector_at(together, RAYS // GROUP, np.float64), vector_at(ranges, RAYS, np.float64)
@@ -94,9 +80,9 @@ def travel_bundles(
 ) -> None:
     """Write how far 32 bundles of rays run through squares that hold them all.
 
-    The seven rows of bundles (7, 32), ``stride`` bytes apart, hold the direction x, y of the first and of the
-    last ray, their smallest inverses along x and y, signed, and the result. Rays stop ``inside`` before a
-    border. The rest is as in ``travel_rays``.
+    The seven rows of bundles (7, 32), ``stride`` bytes apart, hold the direction x, y of the first and of the last
+    ray, their smallest inverses along x and y, signed, and the result. Rays stop ``inside`` before a border. The
+    rest is as in ``travel_rays``.
     """
     table = _squares(squares, shape)
     rows = [vector_at(bundles + k * stride, RAYS, np.float64) for k in range(7)]

@@ -1,6 +1,6 @@
 """Frontiers that a body can approach, and the cheapest cells to do so.
 
-A frontier cell is often where the body does not fit, next to a wall or the edge of the known area. It is
+A frontier cell is often if the body does not fit, next to a wall or the edge of the known area. It is
 enough to stand within reach of it and to see it: a frontier behind an occupied cell is not approached,
 however near it is.
 """
@@ -92,16 +92,12 @@ def approach(
 ) -> _Approaches:
     """Return the cheapest approach of a searched body to each cluster.
 
-    It is the cheapest cell from which a frontier cell is in reach and sight, or the cheapest in reach if
-    there is none; ties go to the first frontier cell of the cluster, then to the lower row and column.
-    Raises ValueError if ``thin`` is not one value per cluster, or another search has used the space since.
+    It is the cheapest cell from which a frontier cell is in reach and sight, or the cheapest in reach if there is
+    none; ties go to the first frontier cell of the cluster, then to the lower row and column. Raises ValueError if
+    ``thin`` is not one value per cluster, or another search has used the space since.
 
     Parameters
     ----------
-    clusters : Clusters
-        Clusters to approach.
-    found : Search
-        A search over all cells that the body can reach.
     log_odds : (rows, columns) int8
         The belief that was searched.
     reach : float
@@ -147,10 +143,6 @@ def nearest_frontier(
 
     Parameters
     ----------
-    frontiers : FrontierMap
-        The frontiers.
-    space, log_odds, clearance, start, footprint, blocked
-        As for :func:`lidarium.mapping.planning.grid_planning.search`.
     reach : float, optional
         Maximum distance [m]; by default the radius and two cells.
     """
@@ -180,8 +172,7 @@ def _approach_places(
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.bool_]]:
     """Return the cell, its frontier cell, budget and visibility per cluster (kernel).
 
-    The budget is the remaining one at the cell; visibility is whether the frontier cell is visible from
-    there.
+    The budget is the remaining one at the cell; visibility is whether the frontier cell is visible from there.
     """
     rows, columns = log_odds.shape
     reach = len(spans) // 2
@@ -252,8 +243,6 @@ def cheapest_views(
         Start of each cluster.
     log_odds : (rows, columns) int8
         The belief.
-    swept : SweptCosts
-        Costs of the paths on it.
     spans : (2 k + 1,) int64
         The disc of cells near a frontier cell, see ``disc_spans``.
 

@@ -277,8 +277,8 @@ class FrontierMap:
     def update(self, log_odds: NDArray[np.int8], window: Window | None = None) -> None:
         """Recompute the flags around a window of the belief that changed, by default everywhere.
 
-        The window is (row_low, row_high, column_low, column_high). Raises ValueError if the belief's shape
-        is not that of the map.
+        The window is (row_low, row_high, column_low, column_high). Raises ValueError if the belief's shape is not
+        that of the map.
         """
         if log_odds.shape != self.flags.shape:
             raise ValueError(f"log_odds has shape {log_odds.shape}; this map was made for {self.flags.shape}")

@@ -91,14 +91,10 @@ def views_of(
         The map: < 0 free, 0 unknown, > 0 occupied.
     resolution : float
         Side of its cells [m].
-    grid : CoarseGrid
-        Cells in which a body may stand.
     lengths : (rows, columns) int32
         Lengths of the paths to all coarse cells.
     clusters : (N, 2) int64, (K + 1,) int64
         Cells (row, column) of the map, and the start of each cluster.
-    rules : ViewRules
-        Settings.
     """
     frame = _frame_of(grid, resolution, rules)
     cells, gains, found = _view_all(log_odds, lengths, clusters[0], clusters[1], _rays(), frame)

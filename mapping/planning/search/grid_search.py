@@ -180,9 +180,8 @@ def _step_is_open(terrain: Terrain, flat: _Flat, here: int, k: int, nearest: int
 
     The ends have closeness up to ``nearest``.
 
-    Between the centres of two diagonal neighbours the squared clearance in half cells falls at most 2 below
-    that of both ends, and not at all if both cells next to the step have it too. So the path of centres is
-    exact.
+    Between the centres of two diagonal neighbours the squared clearance in half cells falls at most 2 below that of
+    both ends, and not at all if both cells next to the step have it too. So the path of centres is exact.
     """
     beside = np.uintp(np.int64(here) + ROW_STEPS[k] * terrain.log_odds.shape[1])
     abeam = np.uintp(np.int64(here) + COLUMN_STEPS[k])
@@ -297,15 +296,8 @@ def _is_blocked(terrain: Terrain, state: SearchState, row: int, column: int) -> 
 def spread(terrain: Terrain, state: SearchState, task: Task, lookout: Lookout) -> tuple[int, int, int]:
     """Spread costs from the start until an end condition is met (kernel).
 
-    It ends at the goal, the wanted number of targets and ``beyond`` their costs, the budget, or when all
-    cells are reached. Buckets grow if they are too small.
-
-    Returns
-    -------
-    touched, hits : int
-        Numbers of touched cells and of targets hit.
-    band : int
-        The last band of costs that is final.
+    It ends at the goal, the wanted number of targets and ``beyond`` their costs, the budget, or when all cells are
+    reached. Buckets grow if they are too small.
     """
     counts, sizes, remaining = state.counts, state.sizes, state.remaining
     slots = state.buckets.shape[0] - 1

@@ -104,23 +104,13 @@ def _search_in(
 
     Parameters
     ----------
-    terrain : Terrain
-        Belief, clearance and obstacles.
     memory : (6,) int64
         A row of ``SearchMemory.table``.
-    task : Task
-        Start, goal and end conditions.
-    lookout : Lookout
-        Targets.
 
     Returns
     -------
     remaining, parent : (rows, columns) int32 and uint8
         Remaining budget of each cell, and the step by which it was reached.
-    count, hit_count : int
-        Number of touched cells, for ``clear_memory``, and of targets hit.
-    settled : int
-        Costs up to this one are final.
     """
     state = _state_in(memory, terrain.log_odds.shape[0], terrain.log_odds.shape[1])
     state.counts[TOUCHED] = close_discs(state.remaining, state.touched, terrain.discs)
@@ -179,10 +169,6 @@ def search_all(
     remaining, parent : (rows, columns) int32 and uint8
         What remains of ``LARGEST_BUDGET`` in each cell, and the step by which it was reached; see
         ``search_state``.
-    count : int
-        Number of touched cells, for ``clear_memory``.
-    minimum : int
-        Minimum remaining budget of cells whose costs are final.
     """
     terrain = Terrain(log_odds, closeness, passage, np.empty((0, 3)))
     task = Task(start_row, start_column, -1, -1, LARGEST_BUDGET, False, 0, 0)
@@ -215,19 +201,13 @@ def find_path(
 
     Parameters
     ----------
-    terrain : Terrain
-        Belief, clearance and obstacles.
     memory : (6,) int64
         A row of ``SearchMemory.table``.
     start, goal : (int, int)
         Cells (row, column) within the grid.
-    budget : int
-        Budget, see ``budget_of``.
 
     Returns
     -------
-    cost : int
-        In units of searches; negative if there is no path.
     cells : (N, 2) int64
         Cells (row, column) from the start to the goal.
     """
@@ -388,11 +368,6 @@ class Search:
         (N, 2) int64
             Cells (row, column) from the start to ``cell``, both included; neighbours differ by at most one in
             each.
-
-        Raises
-        ------
-        ValueError
-            If the cell was not reached, or another search has used the space since.
         """
         if math.isinf(self.cost(cell)):
             raise ValueError(

@@ -69,8 +69,6 @@ def coarse_grid(
     ----------
     log_odds : (rows, columns) int8
         The map: < 0 free.
-    clearance : ClearanceField
-        Its clearance.
     radius : float
         Radius of the body [m].
     side : float
@@ -96,12 +94,8 @@ def place_in(
 
     Parameters
     ----------
-    grid : CoarseGrid
-        Coarse cells of the map.
     log_odds : (rows, columns) int8
         The map: < 0 free.
-    clearance : ClearanceField
-        Its clearance.
     cell : (row, column)
         The coarse cell.
     """
@@ -119,8 +113,6 @@ def distances_from(
 
     Parameters
     ----------
-    grid : CoarseGrid
-        Coarse cells of the map.
     starts : (n, 2) int64
         Coarse cells (row, column); they count as open.
     maximum : float
@@ -145,8 +137,6 @@ def distances_among(
 
     Parameters
     ----------
-    grid : CoarseGrid
-        Coarse cells of the map.
     places : (n, 2) int64
         Open coarse cells (row, column).
     others : (m, 2) int64
@@ -217,8 +207,8 @@ def _spread(
 ) -> None:
     """Spread lengths from each start over open cells.
 
-    If ``is_among``, it ends when all cells up to the length of the farthest target are reached. Targets are
-    the others and the starts that follow: paths have the same length in both directions.
+    If ``is_among``, it ends when all cells up to the length of the farthest target are reached. Targets are the
+    others and the starts that follow: paths have the same length in both directions.
     """
     rows, columns = is_open.shape
     # The border and closed cells have length -1, so that no path is shorter.

@@ -30,8 +30,6 @@ def map_crops(
         Cells (row, column) of the pieces.
     directions : (n,) float64
         Direction of each piece [rad].
-    side : int
-        Number of squares per side of a piece.
     step : float
         Side of a square [m].
 

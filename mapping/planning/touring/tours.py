@@ -24,10 +24,9 @@ _LESS = 1e-9
 def shortest_tour(first: NDArray[np.float64], between: NDArray[np.float64]) -> NDArray[np.int64]:
     """Return the order, (n,) int64, in which an approximately shortest open tour visits all places.
 
-    Tours continue at the nearest place from each of the nearest beginnings, and are improved by reversing
-    pieces (2-opt; Croes 1958) and by moving pieces (Or 1976) until neither helps. Explorers that plan tours
-    and drive to the first place have shorter paths than those that go to the nearest one (Kulich, Faigl and
-    Preucil 2011).
+    Tours continue at the nearest place from each of the nearest beginnings, and are improved by reversing pieces
+    (2-opt; Croes 1958) and by moving pieces (Or 1976) until neither helps. Explorers that plan tours and drive to
+    the first place have shorter paths than those that go to the nearest one (Kulich, Faigl and Preucil 2011).
 
     Parameters
     ----------
@@ -142,8 +141,8 @@ def team_tours(
 ) -> NDArray[np.int64]:
     """Return the places that each robot of a team visits, in order: approximately the best open tours.
 
-    Places are inserted one by one at the lowest cost, the cheapest first; then pieces are reversed (2-opt;
-    Croes 1958) and moved, within a tour or to another robot's (Or 1976), until neither helps.
+    Places are inserted one by one at the lowest cost, the cheapest first; then pieces are reversed (2-opt; Croes
+    1958) and moved, within a tour or to another robot's (Or 1976), until neither helps.
 
     Parameters
     ----------
@@ -153,8 +152,6 @@ def team_tours(
         Cost of the paths between places; finite.
     worth : (n,) float64
         Worth of each place.
-    weights : TourWeights
-        Weights of the cost.
 
     Returns
     -------
@@ -199,17 +196,13 @@ def costs_of_firsts(
 ) -> NDArray[np.float64]:
     """Return the extra cost of tours if a robot visits each place first, (n,).
 
-    All other places keep their order. The extra cost may be 0 or less if places are equal, or tours are not
-    the best ones.
+    All other places keep their order. The extra cost may be 0 or less if places are equal, or tours are not the
+    best ones.
 
     Parameters
     ----------
     sequence : (n + robots - 1,) int64
         The tours, as ``team_tours`` returns them.
-    robot : int
-        The robot whose tour begins with the place.
-    first, between, worth, weights
-        As in ``team_tours``.
     """
     count, size = first.shape[1], sequence.shape[0]
     costs = np.empty(count)
@@ -224,8 +217,8 @@ def costs_of_firsts(
 def with_first(sequence: NDArray[np.int64], robot: int, place: int, count: int) -> NDArray[np.int64]:
     """Return tours past ``count`` places in which a robot visits one of them first.
 
-    All other places keep their order. ``sequence`` (count + robots - 1,) int64 are the tours, as
-    ``team_tours`` returns them.
+    All other places keep their order. ``sequence`` (count + robots - 1,) int64 are the tours, as ``team_tours``
+    returns them.
     """
     changed = np.empty_like(sequence)
     size, tour = 0, 0

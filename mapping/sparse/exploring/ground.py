@@ -132,8 +132,6 @@ def _ground_pixels(depth: Array, camera: _CameraNumbers) -> Array:
     ----------
     depth : (rows, columns) float32
         Depths along the axis [m]; 0 is no measurement.
-    camera : CameraNumbers
-        The camera.
 
     Returns
     -------
@@ -191,8 +189,6 @@ def are_seen_through(
         Low and high corners [m].
     depth : (rows, columns) float32
         The image [m]; 0 is no measurement, and shows nothing.
-    intrinsics : Intrinsics
-        Of its camera.
     pose : (4, 4) float64
         Pose of the camera's optical frame among the boxes.
     range_m : float
@@ -346,8 +342,6 @@ def _mark(
         Number of the first cell along x and y.
     cell, radius : float
         Side of a cell and radius of the body [m].
-    camera : CameraNumbers
-        The camera.
     pose : (3,) float64
         x, y, theta of the robot [m, rad].
     shown : (image rows, image columns) bool
@@ -458,8 +452,6 @@ def ground_map(
         Side of a cell [m].
     boxes : (M, 2, 3) float64
         Low and high corners of the obstacles [m]; boxes that a body passes below take up no cell.
-    body : SweptBody
-        The body.
     """
     levels = np.where(cells, SEEN, UNKNOWN).astype(np.int8)
     flat = np.ascontiguousarray(boxes.reshape(-1, 6))

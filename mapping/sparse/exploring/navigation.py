@@ -80,10 +80,6 @@ def _plan_route(
 
     Parameters
     ----------
-    graph : TopologicalGraph
-        Where it can be driven.
-    ground : GroundMap
-        The known ground.
     start, goal : (3,) float64
         Start and goal [m].
     trail : (T, 3) float64
@@ -118,8 +114,6 @@ def _path_to_stand(
 
     Parameters
     ----------
-    graph : TopologicalGraph
-        Where it can.
     start : (3,) float64
         Where it is [m].
     trail : (T, 3) float64
@@ -172,13 +166,11 @@ def _room_along(graph: TopologicalGraph, points: NDArray[np.float64]) -> NDArray
 def _shortened_on_ground(index: BoxIndex, path: Array, body: Array, levels: Array, frame: Array) -> Array:
     """Shorten a path if a body can drive straight over seen ground.
 
-    If there is clearance of the body the path goes straight as far as that lasts; else no farther than
-    ``TIGHT_M`` at once, so that it keeps its distance from obstacles if it can.
+    If there is clearance of the body the path goes straight as far as that lasts; else no farther than ``TIGHT_M``
+    at once, so that it keeps its distance from obstacles if it can.
 
     Parameters
     ----------
-    index : BoxIndex
-        Obstacles.
     path : (P, 3) float64
         Points of the path [m]; its pieces can be driven.
     body : (3,) float64
@@ -337,9 +329,8 @@ class SparseNavigation:
     def unknown_ground(self, least_m: float) -> Clusters:
         """Return the unknown cells adjacent to seen ground, in connected groups.
 
-        Only ground counts that is joined to where the robot has been by seen ground: behind the foot of a
-        wall is none. Groups shorter than ``least_m`` [m] are left out, and patches on which the body could
-        not stand.
+        Only ground counts that is joined to where the robot has been by seen ground: behind the foot of a wall is
+        none. Groups shorter than ``least_m`` [m] are left out, and patches on which the body could not stand.
         """
         levels = _without_patches(self._joined_levels(), self.body.radius / self.ground.cell_m)
         # To this grid what is seen is unknown, and what is unknown is free: its frontiers are the other side.
@@ -433,16 +424,10 @@ def sparse_navigation(
         Free codes [m].
     boxes : (M, 2, 3) float64
         Boxes of occupied codes [m].
-    ground : GroundMap
-        The seen ground.
     trail : (T, 3) float64
         Positions of the robot, the last one last [m]; nodes as well.
-    body : SweptBody
-        The robot's body.
     margin_m : float
         By how much it is taken to be wider [m].
-    settings : GraphSettings or None
-        Settings of the graph; defaults if None.
     """
     settings, index = settings or GraphSettings(), index_boxes(boxes)
     wide = replace(body, radius=body.radius + margin_m)

@@ -165,10 +165,6 @@ def _coded(
         Points [m], at least one.
     weights : (N,) float64
         Their weights, above zero.
-    count : int
-        Number of codes; fewer if there are fewer points.
-    seed : int
-        Of the first codes.
 
     Returns
     -------
@@ -208,8 +204,6 @@ def cut_labels(
         Code of each point, from 0; each code has one.
     pad : float
         By how much boxes are taken to be larger along each axis, as flat ones have no room [m].
-    most : int or None
-        Number of cuts are made, those that gain most room; None for all.
 
     Returns
     -------
@@ -368,12 +362,6 @@ def coded_obstacles(
     ----------
     points : (N, 3) float64
         Points in the map [m].
-    count : int
-        Number of codes, at most, before those whose boxes are mostly empty are cut.
-    settings : MapperSettings
-        How.
-    frame : int
-        The frame's number.
     """
     if len(points) == 0 or count < 1:
         return occupied_codes(np.empty((0, 2, 3)), frame)
@@ -425,14 +413,6 @@ def coded_as_points(
     ----------
     points : (N, 3) float64
         Points in the map [m].
-    count : int
-        Number of codes.
-    floor : FloorPlane
-        The floor.
-    settings : MapperSettings
-        How.
-    frame : int
-        The frame's number.
     """
     voxels = voxels_of(points, settings.voxel_m)
     centres, labels = _coded(voxels.means, voxels.weights, count, settings.seed + frame)

@@ -108,8 +108,6 @@ def boxes_of(points: NDArray[np.float64], labels: NDArray[np.int64], count: int)
         Points [m].
     labels : (N,) int64
         Code of each point; each code has one.
-    count : int
-        Number of codes there are.
 
     Returns
     -------
@@ -151,8 +149,6 @@ def normals_of(
         Their weights.
     labels : (N,) int64
         Code of each point.
-    count : int
-        Number of codes there are.
 
     Returns
     -------
@@ -243,8 +239,6 @@ def _merged_boxes(
         Free codes [m]: merged boxes cover none that was not covered before.
     slack : float
         How far from the boxes a union may reach [m].
-    most : int
-        With more boxes than this, the slack grows up to ``MAX_SLACK_M``.
 
     Returns
     -------
@@ -458,17 +452,11 @@ def merged_codes(
 
     Parameters
     ----------
-    codes : OccupiedCodes
-        All codes at their current positions.
     free : (N, 3) float64
         Free codes [m]: boxes do not grow over them.
-    settings : MapperSettings
-        How far unions may reach, and how many boxes there may be.
 
     Returns
     -------
-    OccupiedCodes
-        Codes of boxes that cover the same.
     (K,) int64
         Which code each of them is; -1 for those of several.
     """

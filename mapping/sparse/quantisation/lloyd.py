@@ -44,8 +44,6 @@ def _label_points(
 
     Parameters
     ----------
-    tiles : Tiles
-        The points.
     codes : (k, 3) float32
         The codes [m].
     labels : (tiles, TILE) int32
@@ -199,8 +197,6 @@ def drawn_codes(
     -------
     codes : (count, 3) float32
         Different points.
-    nearest : Nearest
-        The nearest of them of every point.
     """
     nearest, codes = _nearest_of_none(tiles), np.empty((count, 3), np.float32)
     found = _draw_codes(tiles, generator.random(count), codes, nearest)
@@ -328,15 +324,8 @@ def improved(tiles: Tiles, codes: Codes, steps: int, keeps_empty: bool = False) 
 
     Parameters
     ----------
-    tiles : Tiles
-        The points.
     codes : (k, 3) float32
         Codes to start from [m].
-    steps : int
-        Number of steps.
-    keeps_empty : bool
-        Whether a code without points stays where it is, as in the thesis; else it goes to the point that is
-        farthest from all codes.
 
     Returns
     -------
@@ -445,12 +434,8 @@ def summary_of(tiles: Tiles, codes: NDArray[np.float32], nearest: Nearest) -> Su
 
     Parameters
     ----------
-    tiles : Tiles
-        The points.
     codes : (k, 3) float32
         The codes [m].
-    nearest : Nearest
-        The nearest code of every point, with the distance to it.
     """
     count = len(codes)
     boxes = np.empty((count, 2, 3), np.float32)

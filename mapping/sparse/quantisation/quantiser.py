@@ -132,21 +132,15 @@ def _relocated(
 
     Parameters
     ----------
-    tiles : Tiles
-        The points.
     codes : (k, 3) float32
         Codes to start from [m].
     deadline : float
         When to end, on the clock of ``time.perf_counter`` [s]; a round that takes longer is not begun.
-    keeps_empty : bool
-        Whether codes without points stay where they are.
 
     Returns
     -------
     codes : (k, 3) float32
         Codes whose mean squared distance is not above that of those given.
-    nearest : Nearest
-        The nearest of them of every point.
     """
     began = time.perf_counter()
     best = nearest = nearest_codes(tiles, codes)
@@ -175,10 +169,6 @@ def _exchanged(codes: Codes, summary: Summary, maximum: int) -> Codes:
     ----------
     codes : (k, 3) float32
         At least three codes [m].
-    summary : Summary
-        Of their points.
-    most : int
-        Most exchanges.
 
     Returns
     -------
@@ -221,8 +211,6 @@ def _merging_costs(
         The codes, at least two [m].
     masses : (k,) float64
         Weights of their points.
-    neighbours : int
-        Number of nearest codes are looked at.
 
     Returns
     -------
@@ -324,12 +312,8 @@ def _quantisation_of(tiles: Tiles, codes: NDArray[np.float32], nearest: Nearest)
 
     Parameters
     ----------
-    tiles : Tiles
-        The points.
     codes : (k, 3) float32
         The codes [m].
-    nearest : Nearest
-        The nearest code of every point.
     """
     summary = summary_of(tiles, codes, nearest)
     is_empty = summary.counts == 0
@@ -385,27 +369,10 @@ def quantise(
     ----------
     points : (N, 3)
         The points, rounded to float32 [m].
-    count : int
-        Number of codes, k.
-    settings : QuantisationSettings
-        How.
     weights : (N,), optional
         Number of points that each represents, above 0; all 1 by default.
     start : (k, 3), optional
         Codes to start from, in place of drawn or split ones [m].
-
-    Returns
-    -------
-    Quantisation
-        Codes, labels and statistics of each code.
-
-    Raises
-    ------
-    ValueError
-        If there are no points, fewer different ones than codes, or such as are not finite; if all are
-        equal; if weights or start do not fit; if LBG is asked for a number that is not a power of two.
-    RuntimeError
-        If a GPU is asked for and there is none.
     """
     began = time.perf_counter()
     places = _checked_points(points, count)

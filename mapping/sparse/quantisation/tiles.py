@@ -38,8 +38,6 @@ def _morton_order(points: Array, low: Array, per_metre: float, spread: Array) ->
         The points [m].
     low : (3,) float64
         Corner of the first cell [m]; points beyond the cells count to the outermost ones.
-    per_metre : float
-        Cells of a metre.
     spread : (CELLS,) uint32
         ``SPREAD``.
 
