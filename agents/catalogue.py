@@ -95,16 +95,16 @@ def register_policy(name: str, make: Callable[..., Policy] | str, summary: str) 
     Parameters
     ----------
     name : str
-        What users call it.
+        Name in the registry.
     make : callable or str
         Returns a new policy; keyword arguments are its settings. Also ``"module:attribute"``.
     summary : str
-        One line that says what it does.
+        One line of description.
 
     Raises
     ------
     ValueError
-        Where the name is taken.
+        If the name is taken.
     """
     POLICIES.register(name, make, summary)
 
@@ -120,7 +120,7 @@ def make_policy(name: str, **settings: Any) -> Policy:  # noqa: ANN401
     Raises
     ------
     ValueError
-        Where the name, or that of a setting, is unknown; the message suggests the nearest one. Where there is
+        If the name, or that of a setting, is unknown; the message suggests the nearest one. If there is
         no such module or class, or it makes no policy.
     """
     maker = POLICIES[name] if not isinstance(name, str) or ":" not in name else maker_at(name)
@@ -136,7 +136,7 @@ def make_policy(name: str, **settings: Any) -> Policy:  # noqa: ANN401
 
 
 def _unknown_setting(maker: Callable[..., Any], error: TypeError) -> str:
-    """Return the message for a setting that what makes a policy does not have."""
+    """Return the message for a setting that the policy's factory does not have."""
     wrong = str(error).partition("argument ")[2].split("'")[1]
     parameters = inspect.signature(maker).parameters
     if any(each.kind == each.VAR_KEYWORD for each in parameters.values()):
@@ -145,18 +145,7 @@ def _unknown_setting(maker: Callable[..., Any], error: TypeError) -> str:
 
 
 def maker_at(name: str) -> Callable[..., Any]:
-    """Return what makes a policy of the user's own.
-
-    Parameters
-    ----------
-    name : str
-        ``module:attribute``; the module is installed, or in the folder that the command is called in.
-
-    Raises
-    ------
-    ValueError
-        Where it cannot be imported, or has no such attribute.
-    """
+    """Return the factory of a user's own policy."""
     module_name, _, attribute = name.partition(":")
     here = os.getcwd()
     try:

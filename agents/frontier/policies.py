@@ -135,7 +135,7 @@ class UtilityFrontier(FrontierExplorer):
     The method is that of Burgard, Moors, Stachniss and Schneider (2005).
 
     Every frontier has utility 1; when a robot takes one, the utility of the others falls with the chance that
-    they are seen from there: 1 less their distance over the laser's range, where there is a line of sight.
+    they are seen from there: 1 less their distance over the laser's range, if there is a line of sight.
 
     Parameters
     ----------

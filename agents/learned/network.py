@@ -68,13 +68,7 @@ def _shapes() -> dict[str, tuple[int, ...]]:
 
 @dataclass(frozen=True, slots=True)
 class Network:
-    """A network with its weights.
-
-    Parameters
-    ----------
-    weights : mapping of str to float32
-        As ``_shapes`` says.
-    """
+    """A network with its weights."""
 
     weights: Weights
 
@@ -124,13 +118,7 @@ class Network:
 
 
 def _check_weights(weights: Weights, name: str) -> None:
-    """Check that weights are those of this network.
-
-    Raises
-    ------
-    ValueError
-        Where names, shapes or types are others, or a number is not finite; the message names the first.
-    """
+    """Check that weights are those of this network."""
     wanted = _shapes()
     for key in sorted({*weights, *wanted}):
         if key not in weights or key not in wanted:
@@ -154,16 +142,7 @@ SHIPPED, CARD = "learned.safetensors", "learned.json"
 
 
 def load_weights(path: str | Path = "") -> dict[str, NDArray[np.float32]]:
-    """Return the weights of a file; where ``path`` is empty, the package's.
-
-    Raises
-    ------
-    ValueError
-        Where ``path`` is no name; where the file is truncated, larger than 5 MB, or of another network; where
-        the package's weights are missing, or not what their card names.
-    OSError
-        Where it cannot be read.
-    """
+    """Return the weights of a file; if ``path`` is empty, the package's."""
     if not isinstance(path, str | Path):
         raise ValueError(f"weights is {shown(path)}; want the name of a file")
     if not str(path):
@@ -172,13 +151,7 @@ def load_weights(path: str | Path = "") -> dict[str, NDArray[np.float32]]:
 
 
 def _weights_from(content: bytes, name: str) -> dict[str, NDArray[np.float32]]:
-    """Return the weights of a file's content; ``name`` is what messages call it.
-
-    Raises
-    ------
-    ValueError
-        Where it is truncated, or of another network.
-    """
+    """Return the weights of a file's content; ``name`` is its name in messages."""
     try:
         weights: dict[str, NDArray[np.float32]] = load(content)
     except (SafetensorError, ValueError, KeyError, TypeError) as error:
@@ -188,15 +161,7 @@ def _weights_from(content: bytes, name: str) -> dict[str, NDArray[np.float32]]:
 
 
 def save_weights(path: Path, weights: Weights) -> str:
-    """Write weights to a file, whole or not at all, and return its SHA-256.
-
-    Raises
-    ------
-    ValueError
-        Where they are not of this network.
-    OSError
-        Where it cannot be written.
-    """
+    """Write weights to a file, whole or not at all, and return its SHA-256."""
     _check_weights(weights, "what was trained")
     content = save({name: np.ascontiguousarray(array) for name, array in weights.items()})
     path.parent.mkdir(parents=True, exist_ok=True)

@@ -64,9 +64,9 @@ class Candidate:
     place : (2,) float64
         Where [m].
     opening : Opening or None
-        What for; None in the base algorithm, for the goal and for a frontier of the map.
+        Its opening; None in the base algorithm, for the goal and for a frontier of the map.
     focus : (2,) float64
-        What there is to observe [m].
+        Point to observe [m].
     is_frontier : bool
         Whether it is for a frontier of the map.
     """
@@ -88,12 +88,12 @@ class CandidateSource:
     body : float
         Radius of the robot with its margin [m].
     generator : numpy.random.Generator
-        Where all draws come from.
+        Source of all random draws.
 
     Attributes
     ----------
     intent : Intent
-        What the robot went for last.
+        Last goal of the robot.
     """
 
     def __init__(self, settings: SrtSettings, body: float, generator: np.random.Generator) -> None:
@@ -105,7 +105,7 @@ class CandidateSource:
     def note_tried(self, candidate: Candidate) -> None:
         """Remember that a robot was at a candidate.
 
-        What it was there to see is not approached from that place again.
+        Its goal is not approached from that position again.
         """
         self._tried.append((candidate.place, candidate.focus))
         if candidate.opening is not None:
@@ -148,7 +148,7 @@ class CandidateSource:
         return [candidate for candidate in candidates if not self._was_tried(candidate)]
 
     def is_open(self, candidate: Candidate, node: Node, memory: Memory) -> bool:
-        """Whether what a candidate is for is still open."""
+        """Whether a candidate's opening is still open."""
         if candidate.is_frontier:
             return memory.is_frontier(candidate.focus)
         return candidate.opening is None or bool(len(self._open(node, candidate.opening, memory)))
@@ -156,7 +156,7 @@ class CandidateSource:
     def may_drop(self, candidate: Candidate, departed: float, senses: Senses) -> bool:
         """Whether a robot that is so far from its last node [m] may drop a candidate that is seen through.
 
-        Every step sees a little more beyond free rays: a target there stands until the robot has got on; so
+        Every step sees a little more beyond free rays: a target there is kept until the robot has got on; so
         does one towards a goal.
         """
         is_along_rays = candidate.opening is not None and not candidate.opening.is_gap

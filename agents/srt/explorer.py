@@ -1,6 +1,6 @@
 """One robot that grows the tree.
 
-It observes, chooses, drives, comes back where nothing is open, and goes home in the end.
+It observes, chooses, drives, comes back if nothing is open, and goes home in the end.
 """
 
 import math
@@ -117,7 +117,7 @@ class _TreeGrowth:
     def _regions(
         self, pose: NDArray[np.float64], view: NDArray[np.float64]
     ) -> tuple[SafeRegion, SafeRegion, list[Opening]]:
-        """Return where the robot is safe, what it has seen, and the openings, of a view."""
+        """Return the safe region, the seen region and the openings of a view."""
         settings, place = self._settings, np.array(pose[:2])
         safe = safe_region(place, view, float(pose[2]), settings.shape, self._body, self.perception, settings.turn_room)
         openings = openings_of(place, view, self.perception, self._body, with_blind=settings.memory == "map")
@@ -139,21 +139,6 @@ NEAR_NODE = 0.5
 
 class Explorer:
     """One robot of the tree.
-
-    Parameters
-    ----------
-    agent : str
-        Its name.
-    tree : Tree
-        The team's graph.
-    settings : SrtSettings
-        How the tree grows.
-    robot : Robot
-        Its body and drive.
-    lidar : Lidar
-        Its laser.
-    generator : numpy.random.Generator
-        Where its draws come from.
 
     Attributes
     ----------
@@ -334,7 +319,7 @@ class Explorer:
         return command
 
     def _arrive(self, leg: Choice, senses: Senses, memory: Memory) -> None:
-        """Take note of where the robot has come."""
+        """Note the robot's progress."""
         self._travel.end_leg()
         if not self._travel.is_aside:
             self._blocks.failures = 0
@@ -396,7 +381,7 @@ class Explorer:
         self._travel.back_out(senses)
 
     def _step_aside(self, senses: Senses) -> None:
-        """Go to a drawn place in sight, where there is one, to step aside."""
+        """Go to a drawn place in sight, if there is one, to step aside."""
         place = self._travel.place_aside(senses, self._growth.perception, self._generator)
         if place is not None:
             candidate = Candidate(self._growth.number, place, None, place)

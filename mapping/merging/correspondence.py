@@ -34,7 +34,7 @@ def _like_clusters(
 ) -> NDArray[np.float64]:
     """Return the share of common distances of each pair of corners within a radius, (n, m).
 
-    The share is that of the larger cluster; 0 where either has fewer than ``LEAST_CLUSTER`` corners beside
+    The share is that of the larger cluster; 0 if either has fewer than ``LEAST_CLUSTER`` corners beside
     its own.
     """
     left, right = (_within(_distances(points), radius_m) for points in (first, second))
@@ -48,7 +48,7 @@ def _like_clusters(
 def _like_triangles(first: NDArray[np.float64], second: NDArray[np.float64], tolerance: float) -> NDArray[np.float64]:
     """Return the similarity of the triangles of each pair of corners, (n, m).
 
-    Triangles are with the two nearest neighbours; 0 where they are not alike.
+    Triangles are with the two nearest neighbours; 0 if they are not alike.
     """
     if len(first) < 3 or len(second) < 3:
         return np.zeros((len(first), len(second)))
@@ -121,7 +121,7 @@ class CorrespondenceSettings:
     margin : float
         A match is at most so much less similar than the best of its corner.
     per_corner : int
-        At most so many matches for a corner of the first map.
+        Maximum number of matches for a corner of the first map.
     shift_window : float
         How far the rotation may differ from the difference of the corners' angles [rad].
     is_known_only : bool
@@ -193,22 +193,7 @@ def match_corners(
     second_descriptors: Descriptors,
     settings: CorrespondenceSettings,
 ) -> Matches:
-    """Match the corners of map a with those of map b.
-
-    Parameters
-    ----------
-    first, second : Corners
-        Of map a and of map b.
-    first_descriptors, second_descriptors : Descriptors
-        Theirs, of the same settings.
-    settings : CorrespondenceSettings
-        The method.
-
-    Returns
-    -------
-    Matches
-        In order of the first map's corners.
-    """
+    """Match the corners of map a with those of map b."""
     if len(first) == 0 or len(second) == 0:
         return Matches(np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0), np.zeros(0))
     difference = first.angles[:, None] - second.angles[None, :]
@@ -289,7 +274,7 @@ def _compared_places(
 
 
 def _energy(first: NDArray[np.floating], second: NDArray[np.floating], measure: str) -> NDArray[np.floating]:
-    """Return what products of samples are divided by: their geometric mean square, or their mean square.
+    """Return the divisor of products of samples: their geometric mean square, or their mean square.
 
     The product over the mean square is 1 less half the square of the difference over it.
     """

@@ -28,7 +28,7 @@ Worth = Annotated[float, within(-1e6, 1e6)]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DescriptorSettings:
-    """What a descriptor samples.
+    """Samples of a descriptor.
 
     Attributes
     ----------
@@ -44,7 +44,7 @@ class DescriptorSettings:
     columns : int
         Samples around the corner.
     occupied, unknown, free : float
-        What a sample of each kind of cell is worth.
+        Value of a sample of each type of cell.
     """
 
     variant: str = "two_rings"
@@ -81,7 +81,7 @@ class Descriptors(NamedTuple):
     Attributes
     ----------
     values : (n, rings, columns) float32
-        What was sampled.
+        Samples.
     known : (n, rings, columns) float32
         Share of each sample that is known.
     """
@@ -112,12 +112,7 @@ def describe_corners(
     corners : Corners
         Where.
     settings : DescriptorSettings or None
-        What is sampled.
-
-    Returns
-    -------
-    Descriptors
-        One for each corner; beyond the border all is unknown.
+        Samples.
     """
     settings = settings or DescriptorSettings()
     bands = _bands(resolution, settings)

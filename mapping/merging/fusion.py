@@ -64,12 +64,12 @@ def fuse(maps: Sequence[NDArray[np.uint8]], common_from_map: Sequence[Transform]
     Returns
     -------
     FusedMap
-        As large as what any of them knows.
+        As large as the known area of them all.
 
     Raises
     ------
     ValueError
-        Where there is no map, more than 64, none that knows anything, or the result would be huge.
+        If there is no map, more than 64, none that knows anything, or the result would be huge.
     """
     if not 0 < len(maps) <= MOST_MAPS or len(maps) != len(common_from_map):
         raise ValueError(
@@ -115,9 +115,9 @@ def _bounds(
 
 
 def overlay(log_odds: NDArray[np.int8], fused: FusedMap, origin: tuple[float, float]) -> None:
-    """Write what a fused map knows into a blank map of the same cells, in its units.
+    """Write the known cells of a fused map into a blank map of the same cells, in its units.
 
-    What lies beyond it is lost.
+    Cells beyond it are lost.
 
     Parameters
     ----------
@@ -153,7 +153,7 @@ def _add(
     log_odds: Array,
     sources: Array,
 ) -> None:
-    """Add what a map says of each cell of the common grid."""
+    """Add a map to the cells of the common grid."""
     cosine, sine = math.cos(map_from_common[2]), math.sin(map_from_common[2])
     for row in range(log_odds.shape[0]):
         y = origin[1] / side + row + 0.5

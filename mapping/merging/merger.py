@@ -21,7 +21,7 @@ from lidarium.mapping.merging.settings import TOLERANCES, MergeSettings
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Question:
-    """What is known of two maps beforehand, and what is asked of pairs.
+    """Prior knowledge of two maps, and the questions asked of pairs.
 
     Attributes
     ----------
@@ -46,18 +46,18 @@ def merge_maps(
     """Merge maps of robots that know nothing of each other's start.
 
     Pairs of maps that know most are searched for first, by corners before all rotations and translations are
-    tried. Where two maps are joined through others already, they are overlaid as these imply, and
-    searched for only where they do not agree so.
+    tried. If two maps are joined through others already, they are overlaid as these imply, and
+    searched for only if they do not agree so.
 
     Parameters
     ----------
     maps : mapping of str to ((rows, columns) uint8, float)
-        Occupancy (dark is occupied, row 0 at the lowest y) and side of a cell [m] of each map. Where the
+        Occupancy (dark is occupied, row 0 at the lowest y) and side of a cell [m] of each map. If the
         sides differ, all maps are brought to the coarsest.
     settings : MergeSettings or None
         How.
     question : Question or None
-        What is known of two maps, and what is asked of every pair beside whether it joins.
+        Prior knowledge of two maps, and the questions asked of every pair besides whether it joins.
 
     Returns
     -------
@@ -67,7 +67,7 @@ def merge_maps(
     Raises
     ------
     ValueError
-        Where there are no maps, or one is no map, or the question has no answer.
+        If there are no maps, or one is no map, or the question has no answer.
     """
     settings, question = settings or MergeSettings(), question or Question()
     if not maps:
@@ -90,7 +90,7 @@ def merge_maps(
 
 
 def _check_guess(a: DescribedMap, b: DescribedMap, guess: Transform) -> None:
-    """Raise ValueError where a guess lays nothing of one map on the other."""
+    """Raise ValueError if a guess lays nothing of one map on the other."""
     known = np.argwhere(b.levels != UNKNOWN)[:, ::-1] + 0.5
     cells = guess.apply(known * b.resolution) / a.resolution
     rows, columns = a.levels.shape
@@ -111,7 +111,7 @@ def _forced(result: PairResult) -> PairResult:
 
 
 def _all_pairs(features: Mapping[str, DescribedMap], settings: MergeSettings) -> dict[tuple[str, str], PairResult]:
-    """Return what comes of each two maps, in their order."""
+    """Return the result of each pair of maps, in their order."""
     every = list(itertools.combinations(features, 2))
     # What corners join spares the search of all rotations and translations, where there is one.
     # Maps are bent only where all are known that speak against it.
@@ -143,7 +143,7 @@ def _implied(
 ) -> PairResult | None:
     """Return the result of aligning two maps as other maps imply, or None.
 
-    None where the others imply no transform, or the maps do not agree under it.
+    None if the others imply no transform, or the maps do not agree under it.
     """
     # The thesis's test needs inliers, which only a search finds.
     if a_from_b is None or settings.validation.test == "discs":

@@ -145,13 +145,6 @@ def _placements(a: DescribedMap, b: DescribedMap, settings: ScaleSettings) -> li
 
     They are ranked by the walls that agree, between what these measure in the one map and in the other: in
     metres of the first, small maps would never win, in metres of the second they would fit anywhere.
-
-    Parameters
-    ----------
-    a, b : DescribedMap
-        Maps of one resolution, as drawn.
-    settings : ScaleSettings
-        How.
     """
     slants = np.arange(-settings.slants, settings.slants + 1) * settings.slant
     quarters = np.arange(4) * (math.pi / 2.0)
@@ -190,17 +183,7 @@ _SAMPLES = 400
 def _region_placements(
     a: DescribedMap, b: DescribedMap, settings: RegionSettings, scaling: ScaleSettings
 ) -> list[_Placement]:
-    """Return the placements of map b under which regions meet, those for which most speaks first.
-
-    Parameters
-    ----------
-    a, b : DescribedMap
-        Maps of one resolution with walls, as drawn.
-    settings : RegionSettings
-        Which regions may be the same.
-    scaling : ScaleSettings
-        By how much map b may grow.
-    """
+    """Return the placements of map b under which regions meet, those for which most speaks first."""
     graphs = [find_regions(one.levels, one.resolution, settings) for one in (a, b)]
     found = by_growing_regions(graphs[0], graphs[1], settings, (scaling.least, scaling.most))
     # Between what walls measure in the one map and in the other, as of all scales.
@@ -237,7 +220,7 @@ class _Grown(NamedTuple):
     described : DescribedMap
         The grown map.
     hypothesis : Hypothesis
-        How it lies and is bent, and what agrees.
+        Its transform and bend, and the agreement.
     """
 
     scale: float
@@ -252,7 +235,7 @@ class _Grown(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ScaledMerge:
-    """What came of two maps of unlike scales.
+    """Result of two maps of different scales.
 
     Attributes
     ----------
@@ -285,7 +268,7 @@ def merge_scaled(
     Raises
     ------
     ValueError
-        Where there are not two maps, or one is no map.
+        If there are not two maps, or one is no map.
     """
     settings, scaling = settings or MergeSettings(), scaling or ScaleSettings()
     if len(maps) != 2:
@@ -343,7 +326,7 @@ def _ranked(
 ) -> list[_Grown]:
     """Return hypotheses of how a map lies at some scale, the best first.
 
-    All scales are tried where regions are not asked, or propose nothing that is believed.
+    All scales are tried if regions are not asked, or propose nothing that is believed.
     """
     b = describe_map(_grown_levels(*grid, a.resolution), a.resolution)
     if len(a.walls) == 0 or len(b.walls) == 0:
@@ -401,7 +384,7 @@ def _is_rival(best: _Grown, other: _Grown) -> bool:
 
 
 def _confidence(a: DescribedMap, ranked: list[_Grown]) -> float:
-    """Return how sure it is that the best hypothesis is right, 0 where there is none."""
+    """Return how sure it is that the best hypothesis is right, 0 if there is none."""
     if not ranked:
         return 0.0
     best = ranked[0]
@@ -411,7 +394,7 @@ def _confidence(a: DescribedMap, ranked: list[_Grown]) -> float:
 
 
 def _result(best: _Grown | None, confidence: float, scaling: ScaleSettings) -> PairResult:
-    """Return what comes of the best hypothesis."""
+    """Return the result of the best hypothesis."""
     if best is None:
         return PairResult(False, NO_WALLS)
     reason = f"no sure scale: at {best.scale:.3f} the confidence is {confidence:.2f}, below {scaling.confidence:g}"

@@ -15,7 +15,7 @@ from lidarium.mapping.merging.described_map import FACING_DISTANCE_M, DescribedM
 
 
 def wall_sample(walls: int, count: int) -> NDArray[np.int64]:
-    """Return the indices of so many of a map's walls, spread over all of them.
+    """Return the indices of a number of a map's walls, spread over all of them.
 
     Of all where there are no more.
     """
@@ -168,7 +168,7 @@ def gap_to_wall(
 ) -> float:
     """Return the distance along the normal to the nearest wall [cells].
 
-    The wall faces the same direction; more than ``steps`` where there is none.
+    The wall faces the same direction; more than ``steps`` if there is none.
     """
     rows, columns = levels.shape
     column, row = int(math.floor(x)), int(math.floor(y))

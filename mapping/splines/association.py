@@ -1,7 +1,7 @@
 """Which curves are of one wall, and along which part of both.
 
 Rough step: curves some of whose control points are near each other are candidates. Fine step: from an end of
-the seen curve the nearest point of the known curve is looked up. Where that is an end of the known curve, the
+the seen curve the nearest point of the known curve is looked up. If that is an end of the known curve, the
 known curve ends first, and the overlap begins at the seen curve's point nearest to it; else it begins at the
 seen curve's own end. The same at the other end: four cases.
 """
@@ -69,7 +69,7 @@ def overlap_of(seen: Spline, known: Spline, settings: AssociationSettings | None
     Returns
     -------
     Overlap or None
-        None where they have no common part of the least length, lie too far apart, or run different ways.
+        None if they have no common part of the least length, lie too far apart, or run different ways.
     """
     settings = settings or AssociationSettings()
     seen_at, known_at = seen.sample_parameters(SAMPLE_SPACING), known.sample_parameters(SAMPLE_SPACING)
@@ -166,7 +166,7 @@ def _find_overlap(seen: Array, known: Array) -> tuple[float, float, float, float
     -------
     tuple
         Places where it begins and ends on the seen way and on the known one, counted in points; its length
-        along the seen way [m]; mean distance [m] and mean angle [rad]; 1 where the known way's end begins it,
+        along the seen way [m]; mean distance [m] and mean angle [rad]; 1 if the known way's end begins it,
         plus 2 where one ends it. A length of 0 for none.
     """
     ends = np.empty(4)
@@ -236,7 +236,7 @@ class Places:
 
 
 def common_places(seen: Way, known: Way, settings: AssociationSettings) -> Places | None:
-    """Return where two ways run together, None where they are not of one wall."""
+    """Return where two ways run together, None if they are not of one wall."""
     seen_from, seen_to, known_from, known_to, length, distance, turn, _ = _find_overlap(seen.points, known.points)
     if length < settings.least_overlap or distance > settings.mean_distance or turn > settings.mean_turn:
         return None

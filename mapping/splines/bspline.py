@@ -30,11 +30,6 @@ def _basis_matrix(knots: ArrayLike, parameters: ArrayLike) -> NDArray[np.float64
         Not decreasing.
     parameters : (m,) float64
         From knot 3 to knot n; the last span is closed.
-
-    Raises
-    ------
-    ValueError
-        Where a parameter lies outside.
     """
     all_knots, wanted = np.asarray(knots, np.float64), np.atleast_1d(np.asarray(parameters, np.float64))
     count = len(all_knots) - ORDER
@@ -241,7 +236,7 @@ def _descend(
 
     Near a given parameter, between two others.
 
-    Newton's method; where a step leads farther away, as it does beside cusps, half of it is tried.
+    Newton's method; if a step leads farther away, as it does near cusps, half of it is tried.
     """
     parameter = begin
     x, y = point_at(knots, control_points, parameter, 0, values)
@@ -274,7 +269,7 @@ def _descend(
 
 
 class _Ray(NamedTuple):
-    """Where a ray begins [m], and its direction."""
+    """Origin of a ray [m], and its direction."""
 
     x: float
     y: float
@@ -434,7 +429,7 @@ class Spline:
     def ray(self, origin: ArrayLike, direction: float) -> float:
         """Return the distance at which a ray first meets the curve [m].
 
-        From a point (2,) along a direction [rad]; inf where it does not.
+        From a point (2,) along a direction [rad]; inf if it does not.
         """
         x, y = (float(value) for value in np.asarray(origin, np.float64))
         return float(_ray_crossing(self.knots, self.control_points, x, y, math.cos(direction), math.sin(direction)))

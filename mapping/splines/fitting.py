@@ -61,7 +61,7 @@ class _Samples(NamedTuple):
     Attributes
     ----------
     points : (m, 2) float64
-        Where they lie [m].
+        Their positions [m].
     sigmas : (m,) float64
         Their standard deviations [m].
     parameters : (m,) float64
@@ -258,7 +258,7 @@ def _accumulate(samples: _Samples, knots: Array, stiffness: float, normal: Array
 
 @kernel
 def _misfit(samples: _Samples, knots: Array, control_points: Array, closeness: _Closeness) -> tuple[float, float]:
-    """Return how far points lie beside the curve at their parameters.
+    """Return the distances of points from the curve at their parameters.
 
     Along it, parameters are but estimates.
 
@@ -309,7 +309,7 @@ class Fit:
     spline : Spline
         The curve; its knots run along it in metres.
     rms : float
-        Root mean square of how far the points lie beside the curve [m].
+        Root mean square of the distances of the points from the curve [m].
     normal : (n, 4) float64
         The lower band of the weighted normal matrix, weights in 1 / m2.
     """
@@ -360,7 +360,7 @@ def fit_bspline(points: ArrayLike, settings: FitSettings | None = None, sigmas: 
     Raises
     ------
     ValueError
-        Where there are fewer than 4 points, or all are the same.
+        If there are fewer than 4 points, or all are the same.
     """
     settings = settings or FitSettings()
     places = np.ascontiguousarray(points, np.float64)
@@ -395,7 +395,7 @@ def fit_bspline(points: ArrayLike, settings: FitSettings | None = None, sigmas: 
 
 
 def _averaged_knots(parameters: ArrayLike, count: int) -> NDArray[np.float64]:
-    """Return knots (count + 4,) for so many control points.
+    """Return knots (count + 4,) for ``count`` control points.
 
     Every span has its share of the parameters (m,).
     """

@@ -23,18 +23,18 @@ from lidarium.mapping.kernels.compilation import Array, kernel
 
 
 class _Elimination(NamedTuple):
-    """Where the blocks of a factor are, column by column in the order of elimination.
+    """Layout of the blocks of a factor, column by column in the order of elimination.
 
     Attributes
     ----------
     turn : (poses,) int64
         When each pose is eliminated: its row and column.
     starts : (poses + 1,) int64
-        Where each column's blocks begin; the first of a column is the diagonal's.
+        Index of each column's first block, which is on the diagonal.
     rows : (blocks,) int64
         Row of each block, ascending within a column, none above the diagonal.
     row_starts : (poses + 1,) int64
-        Where each row begins in the two below.
+        Index of each row's first entry in the next two.
     row_blocks, row_columns : (blocks,) int64
         Number and column of each block, row by row; the last of a row is the diagonal's.
     """
@@ -86,16 +86,10 @@ def _factorise(places: _Elimination, blocks: Array) -> bool:
     Parameters
     ----------
     places : Elimination
-        Where its blocks are.
+        Layout of its blocks.
     blocks : (blocks, 3, 3) float64
-        The blocks, zero where only the factor has any; changed. Of those on the diagonal only the lower
+        The blocks, zero if only the factor has any; changed. Of those on the diagonal only the lower
         triangle is read.
-
-    Returns
-    -------
-    bool
-        Whether there is a factor: the matrix is positive definite. Where there is none, the blocks are of no
-        use.
     """
     starts, rows = places.starts, places.rows
     count = len(starts) - 1
@@ -187,7 +181,7 @@ def _divide(block: Array, diagonal: Array, quotient: Array) -> None:
 
 
 class Edges(NamedTuple):
-    """What was measured between poses.
+    """Measurements between poses.
 
     Attributes
     ----------
@@ -218,16 +212,16 @@ def optimised(
     Parameters
     ----------
     poses : (poses, 3) float64
-        Where to begin: x, y, theta [m, rad]; every pose but the first is joined with the first by edges.
+        Initial poses: x, y, theta [m, rad]; every pose but the first is joined with the first by edges.
     edges : Edges
-        What was measured.
+        Measurements.
     robust_scale : float
         Residual, in standard deviations, from which on an edge that may be wrong counts less.
     iterations : int
-        At most so many steps for each scale, at least 1.
+        Maximum number of steps for each scale, at least 1.
     newest : int
-        So many of the last edges have not had their say yet. Where they pull hard, they count fully at first,
-        and what others contradict is let go little by little.
+        So many of the last edges have not had their say yet. If they pull hard, they count fully at first,
+        and measurements that others contradict lose weight gradually.
 
     Returns
     -------

@@ -86,7 +86,7 @@ def _is_unseen(levels: Array, x: float, y: float) -> bool:
 def _extremes_around(levels: Array, column: int, row: int) -> tuple[int, int]:
     """Return the lowest and the highest level within three cells (kernel).
 
-    What lies outside of the map is not observed.
+    Cells outside of the map are unobserved.
     """
     rows, columns = levels.shape
     lowest, highest = FULL_LEVEL, UNSEEN
@@ -126,7 +126,7 @@ def _find_normals(points: Array, reach: float, normals: Array) -> None:
 
     The surface at each point is that of the point and its neighbours; zero for a point alone.
 
-    Two neighbours give it where the surface bends; elsewhere all within reach do, since noise turns what lies
+    Two neighbours give it if the surface bends; elsewhere all within reach do, since noise turns what lies
     between two near points.
     """
     count = points.shape[0]
@@ -203,20 +203,20 @@ PROBES = 4
 
 
 class _Objective(NamedTuple):
-    """What the cost of a pose is made of.
+    """Terms of the cost of a pose.
 
     Attributes
     ----------
     grid : AgreementGrid
         The map.
     points, normals : (n, 2) float64
-        Points in the robot's frame [m], and unit normals of their surfaces; zero where there is none.
+        Points in the robot's frame [m], and unit normals of their surfaces; zero if there is none.
     prior, information : (3,), (3, 3) float64
-        Where odometry says the robot is, and how much that counts.
+        Pose by odometry, and its weight.
     weight : float
         How much full disagreement of one point counts.
     unseen : float
-        Square of the disagreement of a point in what the map has not observed.
+        Squared disagreement of a point in cells that the map has not observed.
     """
 
     grid: AgreementGrid
@@ -230,20 +230,20 @@ class _Objective(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Match:
-    """Where a scan lies on a local map.
+    """Pose of a scan on a local map.
 
     Attributes
     ----------
     pose : (3,) float64
         x, y, theta in the map's frame [m, rad].
     score : float
-        Mean agreement, from 0 to 1, of the points that lie near what the map has observed.
+        Mean agreement, from 0 to 1, of the points near observed cells of the map.
     overlap : float
         Share of the points that do.
     contradiction : float
-        Share of the points that lie in what the map knows to be free.
+        Share of the points that lie in free cells of the map.
     information, prior : (3, 3) float64
-        What the points alone say of the pose, and what was known before [1/m^2, 1/(m rad), 1/rad^2].
+        Information of the points alone on the pose, and prior information [1/m^2, 1/(m rad), 1/rad^2].
     """
 
     pose: NDArray[np.float64]
@@ -257,7 +257,7 @@ class Match:
     def covariance(self) -> NDArray[np.float64]:
         """Covariance of the pose, (3, 3) [m^2, m rad, rad^2].
 
-        A metre and a radian at most, for what nothing measures.
+        At most a metre and a radian, for unmeasured directions.
         """
         return np.asarray(np.linalg.inv(self.information + self.prior + np.eye(3)), np.float64)
 
@@ -275,7 +275,7 @@ def refine(
     """Return the pose near a start at which the points agree best with the map.
 
     Minimises ``weight / n sum (1 - agreement_k)^2 + d^T information d``, d the difference of the pose from a
-    prior one; a point in what the map has not observed counts as ``unseen``. Points move across the surfaces
+    prior one; a point in unobserved cells counts as ``unseen``. Points move across the surfaces
     that they lie on, not along: where a wall goes on beyond what the map has observed of it, the points there
     would draw the scan back to where the map ends, and a robot in a corridor with them.
 
@@ -286,14 +286,14 @@ def refine(
     points : (n, 2) float64
         Points in the robot's frame, in the order of the beams [m].
     start, prior : (3,) float64
-        Where to begin, and where odometry says the robot is: x, y, theta in the map's frame [m, rad].
+        Initial pose, and pose by odometry: x, y, theta in the map's frame [m, rad].
     information : (3, 3) float64
         How much that counts [1/m^2, 1/(m rad), 1/rad^2]; zero for not at all.
     weight : float
         How much full disagreement of all points counts: independent points / variance of the disagreement of
         one.
     unseen : float
-        Square of the disagreement of a point in what the map has not observed. As that of most points, it
+        Squared disagreement of a point in cells that the map has not observed. As that of most points, it
         speaks neither for nor against a pose; if it counted in full, a wall that goes on beyond where the map
         ends would hold the robot back to where the scan covers the known part of it, and in a bare corridor
         nothing else speaks.
@@ -316,7 +316,7 @@ def refine(
 def _refine(objective: _Objective, pose: Array, hessian: Array, judgement: Array) -> None:
     """Move a pose to where the cost is least.
 
-    Tell the Hessian and what ``_judge`` says.
+    Return the Hessian and the result of ``_judge``.
     """
     _descend(objective, pose, hessian)
     _curve_around(objective, pose, hessian)

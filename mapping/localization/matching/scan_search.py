@@ -72,7 +72,7 @@ def search(
     points : (n, 2) float64
         Points in the robot's frame [m].
     around : (3,) float64
-        Middle of the search, where odometry says the robot is: x, y, theta in the map's frame [m, rad].
+        Middle of the search, the pose by odometry: x, y, theta in the map's frame [m, rad].
     reach_m, reach_angle : float
         How far the search goes to each side [m, rad].
     information, weight, unseen

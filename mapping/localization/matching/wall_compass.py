@@ -74,7 +74,7 @@ def wall_direction(points: Array) -> tuple[float, float]:
     float
         The direction, in [-pi/4, pi/4), in the frame of the points [rad].
     float
-        Its information, 0 where there are no walls, or hardly any that agree on two directions at right
+        Its information, 0 if there are no walls, or hardly any that agree on two directions at right
         angles [1/rad^2].
     """
     count = len(points)
@@ -180,7 +180,7 @@ def _fine_order(points: Array, direction: float, cell: float, reach: float, coun
 
 @dataclass(frozen=True, slots=True)
 class _Bearing:
-    """Where walls run, as seen from a node of the graph.
+    """Directions of walls, as seen from a node of the graph.
 
     Attributes
     ----------
@@ -202,14 +202,9 @@ class WallCompass:
 
     It collects directions of walls between nodes. The walls are those of the building.
 
-    Where walls run is surveyed once, over the first local map. From then on both are estimated together, by a
+    The directions of walls are surveyed once, over the first local map. From then on both are estimated together, by a
     Kalman filter: what the next nodes show says more of the building, what later ones show more of the
     headings.
-
-    Parameters
-    ----------
-    settings : CompassSettings
-        How.
 
     Attributes
     ----------
@@ -242,12 +237,7 @@ class WallCompass:
         node : int
             The node.
         heading : float
-            What is believed of it [rad].
-
-        Returns
-        -------
-        bool
-            Whether there are such walls.
+            Its believed direction [rad].
         """
         direction, information = wall_direction(points)
         if information == 0.0:
@@ -264,7 +254,7 @@ class WallCompass:
             self._points.append(points)
 
     def forget(self) -> None:
-        """Forget what was seen since the last node."""
+        """Forget everything seen since the last node."""
         self._points = []
 
     def turn(self, node: int, since: float, variance: float, heading: float) -> tuple[float, float]:
@@ -279,7 +269,7 @@ class WallCompass:
         since, variance : float
             Turn since the last one, and its variance [rad, rad^2].
         heading : float
-            What is believed of the new one [rad].
+            Believed direction of the new one [rad].
 
         Returns
         -------

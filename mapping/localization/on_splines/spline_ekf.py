@@ -1,11 +1,11 @@
 """The extended Kalman filter on a map of curves.
 
-One Gaussian over the pose, by what share wheels measure paths and turns too long or too short, and all
+One Gaussian over the pose, the scale errors of the wheels' paths and turns, and all
 corners and peaks that it trusts.
 
 A landmark enters when the map has seen it often enough, with the pose's uncertainty carried over; the cost of
 a correction grows with the square of their number. Curves are measured too: how far the ends of rays lie
-beside them. They hold the pose, and through it the landmarks.
+besides them. They hold the pose, and through it the landmarks.
 """
 
 import math
@@ -43,13 +43,13 @@ class SplineEkfSettings:
     Attributes
     ----------
     tracking : TrackingSettings
-        What is matched, and how the map is made.
+        Settings of matching and of the map.
     gate_sigmas : float
-        Measurements that miss what is expected by more standard deviations are left out.
+        Measurements that differ from their expectation by more standard deviations are left out.
     start_distance, start_turn : float
         Standard deviations of the first pose [m, rad].
     distance_bias, turn_bias : float
-        By what share odometry may measure paths and turns too long or too short all the time, as a standard
+        Constant scale errors of odometry's paths and turns, as a standard
         deviation.
     """
 
@@ -70,14 +70,14 @@ class SplineEkf(SplineTracker):
     Parameters
     ----------
     settings : SplineEkfSettings or None
-        The defaults where None.
+        The defaults if None.
     geometry : ScanGeometry or None
         The laser; the URG-04LX of the theses where None.
 
     Attributes
     ----------
     scales : (2,) float64
-        What a path and a turn are taken to be, of what odometry measures.
+        Scale factors of paths and turns against odometry.
     landmarks : (k, 2) float64
         Corners and peaks in the state, in the frame of the local map [m].
     state_covariance : (5 + 2 k, 5 + 2 k) float64
@@ -235,7 +235,7 @@ class SplineEkf(SplineTracker):
 def _stacked(parts: list[Measured]) -> Measured:
     """Return several measurements as one.
 
-    What one part does not concern is nothing to it.
+    Each part ignores the rest.
     """
     columns = max(part.jacobian.shape[1] for part in parts)
     jacobians = [np.pad(part.jacobian, ((0, 0), (0, columns - part.jacobian.shape[1]))) for part in parts]

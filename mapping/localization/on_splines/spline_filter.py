@@ -2,7 +2,7 @@
 
 Each particle is a pose, weighted by how well features and rays fit the map from there.
 
-A particle also has an opinion of the wheels: by what share they measure paths and turns too long or too
+A particle also has scale errors of the wheels: by how much they measure paths and turns too long or too
 short. What fits the walls survives, and carries the robot past where walls show nothing, as along a corridor.
 
 References
@@ -126,22 +126,22 @@ class SplineFilterSettings:
     Attributes
     ----------
     tracking : TrackingSettings
-        What is matched, and how the map is made.
+        Settings of matching and of the map.
     particles : int
         Number of particles.
     start_distance, start_turn : float
         Standard deviations of the particles around the first pose [m, rad].
     distance_bias, turn_bias : float
-        By what share odometry may measure paths and turns too long or too short all the time, as a standard
+        Constant scale errors of odometry's paths and turns, as a standard
         deviation: particles try how much, and those that fit the walls teach it.
     bias_wander : float
         Standard deviation by which that share is changed whenever particles are drawn again, so that they go
         on trying; at most the share itself. Without evidence it comes back to none.
     lost_likelihood : float
-        Where rays fit worse than this in the mean for ten corrections, some particles are drawn again; 0 for
+        If rays fit worse than this in the mean for ten corrections, some particles are drawn again; 0 for
         never.
     recovered_share, recovery_distance, recovery_turn : float
-        What share of particles, and half of the box around the pose from which they are drawn [m, rad]; then
+        Share of particles, and half of the box around the pose from which they are drawn [m, rad]; then
         from boxes of half the size each, down to a sixteenth.
     """
 
@@ -167,7 +167,7 @@ class SplineFilter(SplineTracker):
     Parameters
     ----------
     settings : SplineFilterSettings or None
-        The defaults where None.
+        The defaults if None.
     geometry : ScanGeometry or None
         The laser; the URG-04LX of the theses where None.
 
@@ -176,7 +176,7 @@ class SplineFilter(SplineTracker):
     particles : (n, 3) float64
         Poses x, y, theta in the frame of the local map [m, rad].
     scales : (n, 2) float64
-        What each takes a path and a turn to be, of what odometry measures.
+        Each particle's scale factors of paths and turns against odometry.
     weights : (n,) float64
         Their weights, which sum to one.
     resamplings : int

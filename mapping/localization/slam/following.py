@@ -50,14 +50,14 @@ robots err by more than walls are thick.
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Followed:
-    """What came of a log.
+    """Result of a log.
 
     Attributes
     ----------
     slam : Slam
-        The localizer at the end: its map, its graph, what it did.
+        The localizer at the end: its map, its graph, its counts.
     poses : (scans, 3) float64
-        Where the robot was at each scan, as is believed at the end; the first is (0, 0, 0) [m, rad].
+        Pose of the robot at each scan, as believed at the end; the first is (0, 0, 0) [m, rad].
     online : (scans, 3) float64
         The same as was believed at that time.
     scan_s : (scans,) float64

@@ -89,7 +89,7 @@ def _add_walls(
 
 @kernel
 def _add_springs(columns: int, strength: float, band: Array) -> None:
-    """Add springs between the neighbouring nodes of a grid of so many columns to a band."""
+    """Add springs between the neighbouring nodes of a grid to a band."""
     count = band.shape[1] // 2
     for node in range(count):
         for step in (1, columns):
@@ -194,7 +194,7 @@ class BendSettings:
     Attributes
     ----------
     spacing_m : float
-        Between the nodes of the grid of offsets [m]; more where there would be more than ``most_nodes``.
+        Between the nodes of the grid of offsets [m]; more if there would be more than ``most_nodes``.
     most_nodes : int
         Along a side of the grid.
     reach_m : float
@@ -202,7 +202,7 @@ class BendSettings:
     last_reach_m : float
         How far at last [m].
     stiffness : float
-        Weight of the difference of two neighbouring offsets beside the gaps of the walls of a node.
+        Weight of the difference of two neighbouring offsets against the gaps of the walls of a node.
     rounds, samples : int
         Number of rounds, and of wall cells that are aligned.
     candidates : int
@@ -232,7 +232,7 @@ class Bend:
     a_from_b : Transform
         The rigid motion that comes nearest to it.
     field : OffsetField
-        What is left.
+        The rest.
     bend_m : float
         Root mean square of the offsets at the walls that agree [m].
     strain : float
@@ -260,17 +260,7 @@ class Bend:
 
 
 def estimate_bend(a: DescribedMap, b: DescribedMap, a_from_b: Transform, settings: BendSettings) -> Bend:
-    """Return how map b is bent against map a near a rigid motion.
-
-    Parameters
-    ----------
-    a, b : DescribedMap
-        Maps of one resolution with walls.
-    a_from_b : Transform
-        A rigid motion that is right to about the reach.
-    settings : BendSettings
-        How much it may be bent.
-    """
+    """Return how map b is bent against map a near a rigid motion."""
     sample = wall_sample(len(b.walls), settings.samples)
     walls = b.walls[sample]
     normals = _turned(a_from_b, b.normals[sample])
@@ -334,7 +324,7 @@ def _described(
     found: NDArray[np.bool_],
     wall_m: float,
 ) -> Bend:
-    """Return what was found about the nearest rigid motion; a sampled cell stands for a length of wall."""
+    """Return the result for the nearest rigid motion; a sampled cell represents a length of wall."""
     walls, normals, gaps = seen
     if found.sum() < 3:
         return Bend(a_from_b, field, 0.0, 0.0, 0.0, 1.0, np.diag([np.inf] * 3))

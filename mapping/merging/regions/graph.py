@@ -34,14 +34,14 @@ _SMOOTH_CELLS, _SMOOTH_BINS = 2.0, 2.0
 
 
 class _Slopes(NamedTuple):
-    """Slopes of free space at the cells beside walls: directions (n,) [rad] and regions (n,) int32."""
+    """Slopes of free space at the cells next to walls: directions (n,) [rad] and regions (n,) int32."""
 
     directions: NDArray[np.float64]
     regions: NDArray[np.int32]
 
 
 def _wall_slopes(levels: NDArray[np.uint8], free: NDArray[np.uint8], labels: NDArray[np.int32]) -> _Slopes:
-    """Return across which directions walls run, at each cell of a region beside one.
+    """Return across which directions walls run, at each cell of a region next to one.
 
     Parameters
     ----------
@@ -80,12 +80,12 @@ def likely_rotations(a: NDArray[np.float64], b: NDArray[np.float64], count: int)
     a, b : (`BINS`,) float64
         Directions of the maps' walls.
     count : int
-        Of rotations around the circle; all of them where walls run in all directions.
+        Of rotations around the circle; all of them if walls run in all directions.
 
     Returns
     -------
     (n,) float64
-        At most so many rotations, the likeliest among them [rad].
+        Maximum number of rotations, the likeliest among them [rad].
     """
     alike = _circular(a, np.roll(b[::-1], 1))
     mean, most = float(alike.mean()), float(alike.max())
@@ -285,7 +285,7 @@ def find_regions(levels: NDArray[np.uint8], resolution: float, settings: RegionS
 
 
 def _cropped(levels: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], tuple[int, int]]:
-    """Return what a map knows of itself, and the column and row at which that begins."""
+    """Return the known part of a map, and the column and row at which it begins."""
     is_known = levels != UNKNOWN
     rows, columns = np.flatnonzero(is_known.any(axis=1)), np.flatnonzero(is_known.any(axis=0))
     if len(rows) == 0:
@@ -295,7 +295,7 @@ def _cropped(levels: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], tuple[int, i
 
 
 def _joined(levels: NDArray[np.uint8], count: int) -> NDArray[np.uint8]:
-    """Return a map in cells of so many rows and columns: as `resampled`, in whole cells."""
+    """Return a map in cells of a number of rows and columns: as `resampled`, in whole cells."""
     if count == 1:
         return levels
     rows, columns = (-(-side // count) for side in levels.shape)
@@ -329,7 +329,7 @@ def _boxes(
 
 
 def _snapped(doors: Doors, axes: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the directions of doors, across walls of their regions where they nearly are."""
+    """Return the directions of doors, across walls of their regions if they nearly are."""
     if len(doors.normals) == 0:
         return doors.normals
     quarter = math.pi / 2.0
