@@ -11,7 +11,7 @@ KEPT = 1.0
 KEPT_NEAR = 0.5
 """What lies this near to what a robot goes for is still the same [m]."""
 
-MOST_RETURNS = 10
+MAX_RETURNS = 10
 """More returns than these change nothing: no tour is shorter by a kilometre."""
 
 
@@ -36,7 +36,7 @@ class Intent:
     @property
     def kept(self) -> float:
         """A tour has to be shorter by this for the robot to go for something else [m]."""
-        return KEPT * 2.0 ** min(self._returns, MOST_RETURNS)
+        return KEPT * 2.0 ** min(self._returns, MAX_RETURNS)
 
     def go_for(self, focus: NDArray[np.float64] | None) -> None:
         """Go for something, or for nothing."""

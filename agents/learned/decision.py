@@ -26,10 +26,10 @@ from lidarium.mapping.planning.touring.tours import TourWeights, costs_of_firsts
 CROP_SIDE, CROP_STEP = 24, 0.25
 """Squares a side of the crop around each option, and the side of a square [m]."""
 
-LEAST_DETOUR = 0.01
+MIN_DETOUR = 0.01
 """Least detour of an option with which tours do not begin [m]."""
 
-MOST_DETOUR = 50.0
+MAX_DETOUR = 50.0
 """Longer detours count as this one [m]."""
 
 
@@ -142,7 +142,7 @@ def scene_of(
     )
     gains, directions = far_gains(log_odds, resolution, cells, reach)
     crops = map_crops(log_odds, resolution, cells, directions, CROP_SIDE, CROP_STEP)
-    places = np.asarray(centres_of(cells, (0.0, 0.0), resolution), np.float64)
+    positions = np.asarray(centres_of(cells, (0.0, 0.0), resolution), np.float64)
     sizes = [len(options.cells_of(k)) * resolution for k in range(len(cells))]
     rows, columns = options.grid.is_open.shape
     rim = np.minimum(options.places, np.array([rows, columns]) - 1 - options.places).min(axis=1)
@@ -159,7 +159,7 @@ def scene_of(
         "gain": float(options.gains.sum()),
         "robots": float(len(options.robots)),
     }
-    return Scene(options, resolution, crops, (places, directions), shared, situation, weights)
+    return Scene(options, resolution, crops, (positions, directions), shared, situation, weights)
 
 
 def decision_of(scene: Scene, robot: int, sequence: NDArray[np.int64], picks: Sequence[int | None]) -> Decision | None:
@@ -182,7 +182,7 @@ def decision_of(scene: Scene, robot: int, sequence: NDArray[np.int64], picks: Se
         return None
     first = tours[robot][0]
     costs = costs_of_firsts(sequence, robot, options.first, options.between, options.gains, scene.weights)
-    costs = np.clip(costs, LEAST_DETOUR, MOST_DETOUR)
+    costs = np.clip(costs, MIN_DETOUR, MAX_DETOUR)
     costs[first] = 0.0
     mask = options.is_reached[robot].copy()
     mask[[pick for pick in picks if pick is not None]] = False

@@ -100,31 +100,31 @@ def option_features(
         x, y of the views from the corner of the map's first cell [m], and the directions of the space shown [rad].
     """
     pose, paths = options.robots[robot].pose, options.lengths[robot]
-    places, directions = views
-    gap = places - pose[:2]
+    positions, directions = views
+    gap = positions - pose[:2]
     straight = np.hypot(gap[:, 0], gap[:, 1])
     bearing = np.arctan2(gap[:, 1], gap[:, 0])
-    ahead, left = _in_frame(places, pose)
+    ahead, left = _in_frame(positions, pose)
     others = np.delete(options.lengths, robot, axis=0)
-    apart = options.between + np.where(np.eye(len(places)) > 0, NO_PATH, 0.0)
-    place = np.zeros(len(places))
-    place[tour] = np.arange(len(tour)) + 1.0
+    apart = options.between + np.where(np.eye(len(positions)) > 0, NO_PATH, 0.0)
+    position = np.zeros(len(positions))
+    position[tour] = np.arange(len(tour)) + 1.0
     is_near, is_around = options.between <= NEAR_M, options.between <= AROUND_M
     return {
         "path": paths,
         "turn": options.turns[robot],
         "gain": options.gains,
         "detour": costs,
-        "is_first": place == 1.0,
-        "place": place,
-        "is_own": place > 0.0,
+        "is_first": position == 1.0,
+        "place": position,
+        "is_own": position > 0.0,
         "is_kept": options.is_kept[robot],
         "ahead": ahead,
         "left": left,
         "cosine": np.cos(bearing - pose[2]),
         "bend": np.log((paths + 1.0) / (straight + 1.0)),
         "gain_ahead": np.cos(directions - bearing),
-        "others_path": others.min(axis=0) if len(others) else np.full(len(places), NO_PATH),
+        "others_path": others.min(axis=0) if len(others) else np.full(len(positions), NO_PATH),
         "nearer_others": (others < paths).sum(axis=0),
         "nearest": apart.min(axis=1),
         "mean": np.minimum(options.between, 100.0).mean(axis=1),

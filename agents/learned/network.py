@@ -134,7 +134,7 @@ def _check_weights(weights: Weights, name: str) -> None:
             raise ValueError(f"{name} holds {key!r} with numbers that are not finite; train again")
 
 
-MOST_BYTES = 5_000_000
+MAX_BYTES = 5_000_000
 """Files of weights are no larger."""
 
 SHIPPED, CARD = "learned.safetensors", "learned.json"
@@ -147,7 +147,7 @@ def load_weights(path: str | Path = "") -> dict[str, NDArray[np.float32]]:
         raise ValueError(f"weights is {shown(path)}; want the name of a file")
     if not str(path):
         return dict(_shipped())
-    return _weights_from(read_bytes(Path(path), MOST_BYTES), str(path))
+    return _weights_from(read_bytes(Path(path), MAX_BYTES), str(path))
 
 
 def _weights_from(content: bytes, name: str) -> dict[str, NDArray[np.float32]]:

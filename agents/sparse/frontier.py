@@ -116,7 +116,7 @@ class _Work:
     def obstacles_at(self, now: float) -> NDArray[np.float64]:
         """Return the positions of assumed obstacles, (N, 2) [m]."""
         self.obstacles = [entry for entry in self.obstacles if entry[0] > now]
-        return np.array([place for _, place in self.obstacles]).reshape(-1, 2)
+        return np.array([position for _, position in self.obstacles]).reshape(-1, 2)
 
 
 KEPT_SHARE = 0.5
@@ -193,8 +193,8 @@ class SparseFrontier(Policy):
     def _known_now(self, agent: str) -> SparseBelief:
         """Return the map that an agent plans on, with the obstacles assumed for now as well."""
         work, belief = self._work[agent], self.team.belief(agent)
-        places = work.obstacles_at(self.team.time_s)
-        known = self._known_for_good(agent).amid(places, OBSTACLE_M, belief.robot.height)
+        positions = work.obstacles_at(self.team.time_s)
+        known = self._known_for_good(agent).amid(positions, OBSTACLE_M, belief.robot.height)
         if work.blocked_s == math.inf:
             # Who works moves aside where it stands in the way.
             return known

@@ -132,7 +132,7 @@ class CandidateSource:
         return [candidate for candidate in candidates if candidate is not None]
 
     def beside(self, node: Node, memory: Memory) -> list[Candidate]:
-        """Return places before each opening of a node.
+        """Return positions before each opening of a node.
 
         They are on the side from which the opening was seen, whether or not a straight path leads
         there.
@@ -143,8 +143,10 @@ class CandidateSource:
             if len(points):
                 middle = int(points[len(points) // 2])
                 inwards = opening.points[middle] - opening.beyond[middle]
-                places = [opening.points[middle] + steps * inwards for steps in STANDS]
-                candidates += [Candidate(node.number, place, opening, opening.points[middle]) for place in places]
+                positions = [opening.points[middle] + steps * inwards for steps in STANDS]
+                candidates += [
+                    Candidate(node.number, position, opening, opening.points[middle]) for position in positions
+                ]
         return [candidate for candidate in candidates if not self._was_tried(candidate)]
 
     def is_open(self, candidate: Candidate, node: Node, memory: Memory) -> bool:
@@ -230,8 +232,8 @@ class CandidateSource:
         """
         for _ in range(self._settings.tries):
             direction = int(self._generator.integers(DIRECTIONS))
-            place = node.place + self._settings.step_share * node.safe.radii[direction] * UNIT[direction]
-            candidate = Candidate(node.number, place, None, place)
+            position = node.place + self._settings.step_share * node.safe.radii[direction] * UNIT[direction]
+            candidate = Candidate(node.number, position, None, position)
             if self.is_valid(candidate, node, others):
                 return [candidate]
         return []
@@ -255,8 +257,8 @@ class CandidateSource:
 
     def _was_tried(self, candidate: Candidate) -> bool:
         return any(
-            math.dist(place, candidate.place) < TRIED_NEAR and math.dist(focus, candidate.focus) < 2.0 * TRIED_NEAR
-            for place, focus in self._tried
+            math.dist(position, candidate.place) < TRIED_NEAR and math.dist(focus, candidate.focus) < 2.0 * TRIED_NEAR
+            for position, focus in self._tried
         )
 
 

@@ -222,7 +222,7 @@ class WayChooser:
             return []
         across = memory.way(senses.pose[:2], goal)
         if across is not None:
-            return [*(Choice(place, None) for place in across[:-1]), Choice(goal, None, is_goal=True)]
+            return [*(Choice(position, None) for position in across[:-1]), Choice(goal, None, is_goal=True)]
         in_sight = [each for each in reached if each.safe.contains(goal)]
         if not in_sight:
             return []
@@ -257,7 +257,7 @@ class WayChooser:
             across = memory.way(senses.pose[:2], candidate.place)
             if across is not None:
                 return [
-                    *(Choice(place, None) for place in across[:-1]),
+                    *(Choice(position, None) for position in across[:-1]),
                     Choice(candidate.place, None, candidate),
                 ]
         return []
@@ -303,7 +303,7 @@ def home_way(tree: Tree, start: int, root: int, known: set[int], senses: Senses,
     legs = _legs(tree, way_to(root, tree.ways(start, known)[1]))
     if not legs and start != root:
         across = memory.way(senses.pose[:2], tree.nodes[root].place)
-        legs = [*(Choice(place, None) for place in across[:-1]), *_legs(tree, [root])] if across else []
+        legs = [*(Choice(position, None) for position in across[:-1]), *_legs(tree, [root])] if across else []
     return legs
 
 
@@ -327,4 +327,4 @@ def _left_by(targets: Sequence[Candidate], found: list[Candidate]) -> list[Candi
 def _to_focus(node: Node, legs: list[NDArray[np.float64]], focus: NDArray[np.float64]) -> list[Choice]:
     """Return a path across the map to a view of a frontier."""
     candidate = Candidate(node.number, legs[-1], None, focus, is_frontier=True)
-    return [*(Choice(place, None) for place in legs[:-1]), Choice(legs[-1], None, candidate)]
+    return [*(Choice(position, None) for position in legs[:-1]), Choice(legs[-1], None, candidate)]

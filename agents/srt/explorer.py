@@ -118,10 +118,12 @@ class _TreeGrowth:
         self, pose: NDArray[np.float64], view: NDArray[np.float64]
     ) -> tuple[SafeRegion, SafeRegion, list[Opening]]:
         """Return the safe region, the seen region and the openings of a view."""
-        settings, place = self._settings, np.array(pose[:2])
-        safe = safe_region(place, view, float(pose[2]), settings.shape, self._body, self.perception, settings.turn_room)
-        openings = openings_of(place, view, self.perception, self._body, with_blind=settings.memory == "map")
-        return safe, seen_region(place, view, self.perception), openings
+        settings, position = self._settings, np.array(pose[:2])
+        safe = safe_region(
+            position, view, float(pose[2]), settings.shape, self._body, self.perception, settings.turn_room
+        )
+        openings = openings_of(position, view, self.perception, self._body, with_blind=settings.memory == "map")
+        return safe, seen_region(position, view, self.perception), openings
 
 
 FINAL = ("budget", "goal_missed", "blocked")
@@ -330,8 +332,8 @@ class Explorer:
             self._growth.add_if_apart(senses, memory)
             self._go_home("goal_missed", senses, memory)
         else:
-            place = leg.place if self._settings.places_nodes_at_targets else senses.pose[:2]
-            self._growth.add(senses, self._growth.number, np.array([*place, senses.pose[2]]), memory)
+            position = leg.place if self._settings.places_nodes_at_targets else senses.pose[:2]
+            self._growth.add(senses, self._growth.number, np.array([*position, senses.pose[2]]), memory)
             if leg.candidate is not None:
                 self._source.note_tried(leg.candidate)
                 self._source.intent.settle()
@@ -381,8 +383,8 @@ class Explorer:
         self._travel.back_out(senses)
 
     def _step_aside(self, senses: Senses) -> None:
-        """Go to a drawn place in sight, if there is one, to step aside."""
-        place = self._travel.place_aside(senses, self._growth.perception, self._generator)
-        if place is not None:
-            candidate = Candidate(self._growth.number, place, None, place)
-            self._set_out([Choice(place, None, candidate)], senses, is_aside=True)
+        """Go to a drawn position in sight, if there is one, to step aside."""
+        position = self._travel.place_aside(senses, self._growth.perception, self._generator)
+        if position is not None:
+            candidate = Candidate(self._growth.number, position, None, position)
+            self._set_out([Choice(position, None, candidate)], senses, is_aside=True)

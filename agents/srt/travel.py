@@ -74,7 +74,7 @@ class _Progress:
         return senses.time_s - self._blind_since >= BLIND_S
 
 
-MOST_TURNS = 8
+MAX_TURNS = 8
 """A laser that would need more turns than this does not turn around."""
 
 TURN_GAIN = 2.0
@@ -103,7 +103,7 @@ class _TurnPlan:
         """Plan the turns after which the robot has seen the whole circle."""
         field = lidar.field_of_view
         turns = math.ceil(2.0 * math.pi / field - 1e-9) - 1
-        if lidar.beams == 1 or turns > MOST_TURNS:
+        if lidar.beams == 1 or turns > MAX_TURNS:
             return
         heading = float(senses.pose[2])
         self._headings = [wrapped(heading + (2.0 * math.pi - field) * (turn + 1) / turns) for turn in range(turns)]

@@ -87,7 +87,7 @@ def assign_by_utility(
     waiting = np.ones(len(costs), np.bool_)
     for _ in range(min(costs.shape)):
         totals = np.where(waiting[:, None], values + worth, -np.inf)
-        robot, goal = (int(place) for place in np.unravel_index(np.argmax(totals), totals.shape))
+        robot, goal = (int(position) for position in np.unravel_index(np.argmax(totals), totals.shape))
         if not np.isfinite(totals[robot, goal]):
             break
         goals[robot], waiting[robot] = goal, False

@@ -375,8 +375,8 @@ class Supervised(Policy):
                 and report is station.reports.get(agent)
                 and math.isclose(report.time_s, now, abs_tol=1e-6)
             ):
-                places = [(entry.x, entry.y) for entry in self.given_up if entry.agent == agent]
-                self._given_up[agent] = np.array(places, np.float64).reshape(-1, 2)
+                positions = [(entry.x, entry.y) for entry in self.given_up if entry.agent == agent]
+                self._given_up[agent] = np.array(positions, np.float64).reshape(-1, 2)
 
     def _inform(self) -> None:
         """Send each robot the map of the others of its group.

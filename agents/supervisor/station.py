@@ -249,8 +249,8 @@ class MergeStation:
         if not frames:
             return None
         maps = [self._map_without_bodies(agent) for agent in frames]
-        places = [frame @ placed(one.origin) for one, frame in zip(maps, frames.values(), strict=True)]
-        return fuse([one.levels for one in maps], places, self.resolution)
+        positions = [frame @ placed(one.origin) for one, frame in zip(maps, frames.values(), strict=True)]
+        return fuse([one.levels for one in maps], positions, self.resolution)
 
     def team_maps(self) -> TeamMaps:
         """Return how the maps of all robots lie, with the merged map of each group."""

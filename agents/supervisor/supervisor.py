@@ -31,7 +31,7 @@ from lidarium.agents.supervisor.tree import (
 from lidarium.envs.onboard.radio.messages import OperatingState, OrderKind, Target
 from lidarium.mapping.planning.footprint import Footprint
 
-LEAST_WAY_M = 1.0
+MIN_WAY_M = 1.0
 """What a metre costs a battery is estimated after a path of this length [m]."""
 
 EXPLAINED_PAUSES = frozenset({"contact", "blocked"})
@@ -174,7 +174,7 @@ class _Judge:
         if report.energy_left_j is None:
             return False
         full = self._full_j.setdefault(agent, report.energy_left_j)
-        if report.travelled_m < LEAST_WAY_M:
+        if report.travelled_m < MIN_WAY_M:
             return False
         metre = (full - report.energy_left_j) / report.travelled_m
         way = survey.way_home_m(agent, report.start)
@@ -193,9 +193,9 @@ def _worth(others: list[str], survey: Survey, taken: Mapping[str, int]) -> NDArr
     """
     worth = np.where(survey.is_goal(), 1.0, -np.inf)
     for teammate in others:
-        place = survey.places[teammate]
-        if place is not None:
-            worth = worth - survey.seen_at(place)
+        position = survey.places[teammate]
+        if position is not None:
+            worth = worth - survey.seen_at(position)
         if taken[teammate] != NOBODY:
             worth[taken[teammate]] = -np.inf
     return worth
@@ -299,8 +299,10 @@ class Supervisor:
         frames = {agent: frame for agent in group if (frame := station.lookup(group[0], agent)) is not None}
         if fused is None:
             return []
-        places = [frames[agent].apply(given_up[agent]) for agent in group if agent in given_up and len(given_up[agent])]
-        all_given_up = np.concatenate(places) if places else np.zeros((0, 2))
+        positions = [
+            frames[agent].apply(given_up[agent]) for agent in group if agent in given_up and len(given_up[agent])
+        ]
+        all_given_up = np.concatenate(positions) if positions else np.zeros((0, 2))
         # Who is paused keeps its target, but goes nowhere.
         reports = {
             agent: replace(report, target=None) if agent in held else report

@@ -197,7 +197,7 @@ class Survey:
             for agent, target in targets.items()
         }
         """Where each robot goes [m], None where it goes nowhere."""
-        self.going = {agent: self._goal_at(place) for agent, place in self.places.items()}
+        self.going = {agent: self._goal_at(position) for agent, position in self.places.items()}
         """The goal that this is, -1 for none."""
 
     @property
@@ -260,12 +260,12 @@ class Survey:
         Both are in its own map frame.
         """
         row = self.workers.index(agent)
-        place, cell = (
+        position, cell = (
             centres_of(cells[row, goal], self.origin, self.resolution)
             for cells in (self.goals.stands, self.goals.observed)
         )
         own = self.frames[agent].inverse()
-        x, y = own.apply(place).tolist()
+        x, y = own.apply(position).tolist()
         observed = own.apply(cell)
         return x, y, math.atan2(observed[1] - y, observed[0] - x)
 

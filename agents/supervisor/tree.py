@@ -219,13 +219,13 @@ def decide(tree: Node, case: Case) -> tuple[Leaf, list[tuple[str, bool]]]:
     Answers are names of questions with yes or no.
     """
     answers: list[tuple[str, bool]] = []
-    place: Node | Leaf = tree
-    while isinstance(place, Node):
+    position: Node | Leaf = tree
+    while isinstance(position, Node):
         # What arrays answered is no bool that JSON can hold.
-        is_so = bool(place.question.holds(case))
-        answers.append((place.question.name, is_so))
-        place = place.yes if is_so else place.no
-    return place, answers
+        is_so = bool(position.question.holds(case))
+        answers.append((position.question.name, is_so))
+        position = position.yes if is_so else position.no
+    return position, answers
 
 
 def leaves(tree: Node | Leaf) -> Iterator[Leaf]:

@@ -231,9 +231,9 @@ def tour_options(
     chosen = _nearest(reached, views.gains, settings)
     if not len(chosen):
         return None
-    places = views.cells[chosen]
-    paths = _metres(lengths[:, places[:, 0], places[:, 1]], grid)
-    among, fields = distances_among(grid, places, starts)
+    positions = views.cells[chosen]
+    paths = _metres(lengths[:, positions[:, 0], positions[:, 1]], grid)
+    among, fields = distances_among(grid, positions, starts)
     between = _metres(among, grid)
     turns = np.stack(
         [_turns(robot.pose, start, fields, grid, resolution) for robot, start in zip(robots, starts, strict=True)]
@@ -243,7 +243,9 @@ def tour_options(
     first = paths + settings.turn_length * turns - kept * is_kept
     gains = views.gains[chosen]
     sequence = team_tours(first, between, gains, settings.weights)
-    return TourOptions(robots, clusters, grid, places, chosen, gains, paths, turns, is_kept, first, between, sequence)
+    return TourOptions(
+        robots, clusters, grid, positions, chosen, gains, paths, turns, is_kept, first, between, sequence
+    )
 
 
 def first_options(options: TourOptions) -> list[int | None]:
@@ -327,9 +329,9 @@ def _are_kept(robot: Tourist, clusters: Clusters, chosen: NDArray[np.int64], res
 
 def leg_to(option: int, options: TourOptions, navigation: NavigationMap, rules: ViewRules) -> Leg:
     """Return the leg that ends at an option."""
-    log_odds, place = navigation.log_odds, options.places[option]
+    log_odds, position = navigation.log_odds, options.places[option]
     cells = options.cells_of(option)
-    cell = place_in(options.grid, log_odds, navigation.clearance, (int(place[0]), int(place[1])))
+    cell = place_in(options.grid, log_odds, navigation.clearance, (int(position[0]), int(position[1])))
     nearest = cells[int(np.argmin(np.hypot(*(cells - np.asarray(cell)).T)))]
     gain, direction = gain_at(log_odds, navigation.resolution, cell, rules)
     return Leg(cell, (int(nearest[0]), int(nearest[1])), cells, gain, direction)

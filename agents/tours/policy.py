@@ -207,8 +207,8 @@ class TourFrontier(FrontierExplorer):
         if leg is None:
             return super()._heading(agent, choice)
         belief = self.team.belief(agent)
-        place = centres_of(np.asarray(choice.cell), belief.map_origin, self.navigation(agent).resolution)
-        run, rise = place - belief.pose[:2]
+        position = centres_of(np.asarray(choice.cell), belief.map_origin, self.navigation(agent).resolution)
+        run, rise = position - belief.pose[:2]
         arrival = math.atan2(rise, run) if math.hypot(run, rise) > ON_THE_SPOT else float(belief.pose[2])
         room = max(0.5 * belief.lidar.field_of_view - SIGHT_MARGIN, 0.0)
         gap = wrapped(leg.direction - arrival)

@@ -386,10 +386,10 @@ class CompassSettings:
         check_settings(self, type(self).__name__)
 
 
-MOST_REACH_M = 200.0
+MAX_REACH_M = 200.0
 """No laser of a local map reaches farther [m]."""
 
-MOST_SUBMAP_CELLS = 8192
+MAX_SUBMAP_CELLS = 8192
 """Most cells of a local map to each side."""
 
 
@@ -418,10 +418,10 @@ class SlamSettings:
 
     def __post_init__(self) -> None:
         check_settings(self, type(self).__name__)
-        reach = min(self.matching.range_m, MOST_REACH_M) + 2.0 * self.submaps.path_m
-        if reach > MOST_SUBMAP_CELLS * self.submaps.resolution:
+        reach = min(self.matching.range_m, MAX_REACH_M) + 2.0 * self.submaps.path_m
+        if reach > MAX_SUBMAP_CELLS * self.submaps.resolution:
             raise ValueError(
                 f"a local map of {reach:g} m (matching.range_m and twice submaps.path_m) in cells of "
-                f"{self.submaps.resolution:g} m is too large; want at most {MOST_SUBMAP_CELLS:,} cells to "
+                f"{self.submaps.resolution:g} m is too large; want at most {MAX_SUBMAP_CELLS:,} cells to "
                 "each side: a coarser submaps.resolution or a shorter submaps.path_m"
             )

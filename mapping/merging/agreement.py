@@ -386,7 +386,7 @@ def _excused(agreement: Agreement, settings: ValidationSettings) -> float:
 DIRECTIONS = 16
 """Directions in which walls face."""
 
-APART_M, LEAST_M = 0.12, 0.3
+APART_M, MIN_M = 0.12, 0.3
 """Gap between two walls that face one direction, and least length of a wall that agrees [m]."""
 
 
@@ -417,7 +417,7 @@ def _distinct_walls(a: DescribedMap, b: DescribedMap, a_from_b: Transform, hit_d
         chosen = walls[facing == direction]
         distances = np.sort(chosen @ np.array([math.cos(angle), math.sin(angle)]))
         lengths = np.diff(np.flatnonzero(np.diff(distances) > APART_M), prepend=-1, append=len(distances) - 1)
-        count += int(np.count_nonzero(lengths * b.resolution >= LEAST_M - 1e-9))
+        count += int(np.count_nonzero(lengths * b.resolution >= MIN_M - 1e-9))
     return count
 
 

@@ -262,11 +262,11 @@ def _find_corners(words: Array, rows: int, columns: int, table: Array, found: Ar
                 _occupied_around(words, row, word),
                 _occupied_around(words, row + 1, word),
             )
-            for place in range(_WORD):
-                column = word * _WORD + place
-                if not is_free >> place & 1 or column == _WORD or column >= columns + _WORD - 1:
+            for position in range(_WORD):
+                column = word * _WORD + position
+                if not is_free >> position & 1 or column == _WORD or column >= columns + _WORD - 1:
                     continue
-                under, beside, over = below >> place & 7, here >> place & 7, above >> place & 7
+                under, beside, over = below >> position & 7, here >> position & 7, above >> position & 7
                 code = (
                     beside >> 2
                     | (over >> 2) << 1

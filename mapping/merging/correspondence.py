@@ -16,7 +16,7 @@ from lidarium.mapping.geometry.rigid import wrapped
 from lidarium.mapping.merging.corners import Corners
 from lidarium.mapping.merging.descriptors import Descriptors
 
-LEAST_CLUSTER = 2
+MIN_CLUSTER = 2
 """Corners beside its own that a cluster needs."""
 
 
@@ -34,7 +34,7 @@ def _like_clusters(
 ) -> NDArray[np.float64]:
     """Return the share of common distances of each pair of corners within a radius, (n, m).
 
-    The share is that of the larger cluster; 0 if either has fewer than ``LEAST_CLUSTER`` corners beside
+    The share is that of the larger cluster; 0 if either has fewer than ``MIN_CLUSTER`` corners beside
     its own.
     """
     left, right = (_within(_distances(points), radius_m) for points in (first, second))
@@ -42,7 +42,7 @@ def _like_clusters(
     sizes = [np.count_nonzero(distances > 0.0, axis=1) for distances in (left, right)]
     larger = np.maximum(sizes[0][:, None], sizes[1][None])
     smaller = np.minimum(sizes[0][:, None], sizes[1][None])
-    return np.where(smaller >= LEAST_CLUSTER, common / np.maximum(larger, 1), 0.0)
+    return np.where(smaller >= MIN_CLUSTER, common / np.maximum(larger, 1), 0.0)
 
 
 def _like_triangles(first: NDArray[np.float64], second: NDArray[np.float64], tolerance: float) -> NDArray[np.float64]:
@@ -67,9 +67,11 @@ def _common(left: NDArray[np.float64], right: NDArray[np.float64], tolerance: fl
             continue
         # A length has a like one if the first not shorter than its lower bound is not longer than its upper
         # bound.
-        place = np.minimum(np.searchsorted(lengths, left * (1.0 - tolerance)), len(lengths) - 1)
+        position = np.minimum(np.searchsorted(lengths, left * (1.0 - tolerance)), len(lengths) - 1)
         votes[:, j] = (
-            (lengths[place] >= left * (1.0 - tolerance)) & (lengths[place] * (1.0 - tolerance) <= left) & (left > 0.0)
+            (lengths[position] >= left * (1.0 - tolerance))
+            & (lengths[position] * (1.0 - tolerance) <= left)
+            & (left > 0.0)
         ).sum(axis=1)
     return votes
 

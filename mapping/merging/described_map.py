@@ -246,9 +246,9 @@ def resampled(levels: NDArray[np.uint8], resolution: float, wanted: float) -> ND
         np.minimum(((np.arange(side) + 0.5) * ratio).astype(np.int64), count - 1)
         for side, count in zip(levels.shape, (rows, columns), strict=True)
     )
-    place = (row[:, None] * columns + column[None, :]).ravel()
+    position = (row[:, None] * columns + column[None, :]).ravel()
     counts = {
-        level: np.bincount(place[(levels == level).ravel()], minlength=rows * columns)
+        level: np.bincount(position[(levels == level).ravel()], minlength=rows * columns)
         for level in (OCCUPIED, UNKNOWN, FREE)
     }
     coarse = np.where(counts[FREE] > counts[UNKNOWN], FREE, UNKNOWN)

@@ -20,7 +20,7 @@ from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.merging.corners import Corners
 
 VARIANTS = ("two_rings", "polar", "log_polar")
-MOST_RINGS = 1000
+MAX_RINGS = 1000
 """Rings of a band at most."""
 
 Worth = Annotated[float, within(-1e6, 1e6)]
@@ -68,10 +68,10 @@ class DescriptorSettings:
             ("far", self.far_min, self.far_max, self.far_step),
         ]
         for name, low, high, step in bands:
-            if not (low < high and step <= high - low <= MOST_RINGS * step):
+            if not (low < high and step <= high - low <= MAX_RINGS * step):
                 raise ValueError(
                     f"{name}_min, _max and _step are {low}, {high} and {step} m; want 0 < min < max, 0 < "
-                    f"step <= max - min and at most {MOST_RINGS} rings"
+                    f"step <= max - min and at most {MAX_RINGS} rings"
                 )
 
 
@@ -120,7 +120,7 @@ def describe_corners(
     values = np.zeros((len(corners), rings, settings.columns), np.float32)
     known = np.zeros_like(values)
     occupied, free = _mask_of(levels, OCCUPIED), _mask_of(levels, FREE)
-    places = corners.cells + 0.5
+    positions = corners.cells + 0.5
     first = 0
     for band in bands:
         solid, open_ = _smoothed(occupied, band.smoothing), _smoothed(free, band.smoothing)
@@ -129,7 +129,7 @@ def describe_corners(
         _sample(
             solid,
             open_,
-            places,
+            positions,
             corners.angles,
             band.radii,
             worth,

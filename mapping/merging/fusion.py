@@ -20,7 +20,7 @@ OCCUPIED_LOG_ODDS, FREE_LOG_ODDS = 1.0, -0.6
 One map that reports occupied outweighs one that reports free, but not two.
 """
 
-MOST_MAPS = 64
+MAX_MAPS = 64
 MAX_CELLS = 400_000_000
 
 
@@ -71,9 +71,9 @@ def fuse(maps: Sequence[NDArray[np.uint8]], common_from_map: Sequence[Transform]
     ValueError
         If there is no map, more than 64, none that knows anything, or the result would be huge.
     """
-    if not 0 < len(maps) <= MOST_MAPS or len(maps) != len(common_from_map):
+    if not 0 < len(maps) <= MAX_MAPS or len(maps) != len(common_from_map):
         raise ValueError(
-            f"{len(maps)} maps with {len(common_from_map)} transforms are to be fused; want 1 to {MOST_MAPS} of each"
+            f"{len(maps)} maps with {len(common_from_map)} transforms are to be fused; want 1 to {MAX_MAPS} of each"
         )
     low, high = _bounds(maps, common_from_map, resolution)
     columns, rows = (high - low).tolist()
@@ -134,7 +134,7 @@ def overlay(log_odds: NDArray[np.int8], fused: FusedMap, origin: tuple[float, fl
         round(OCCUPIED_LOG_ODDS / LOG_ODDS_UNIT),
         round(FREE_LOG_ODDS / LOG_ODDS_UNIT),
     )
-    left, low = (round((place - own) / fused.resolution) for place, own in zip(fused.origin, origin, strict=True))
+    left, low = (round((position - own) / fused.resolution) for position, own in zip(fused.origin, origin, strict=True))
     rows, columns = fused.levels.shape
     inside = log_odds[max(low, 0) : max(low + rows, 0), max(left, 0) : max(left + columns, 0)]
     first_row, first_column = max(-low, 0), max(-left, 0)

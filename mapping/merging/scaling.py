@@ -47,7 +47,7 @@ from lidarium.mapping.merging.wall_alignment import rank_by_walls
 AXIS_STEP = math.radians(0.5)
 """Between the directions of walls that are tried [rad]."""
 
-MOST_WALLS = 4000
+MAX_WALLS = 4000
 """About so many wall cells show the direction of walls."""
 
 
@@ -125,7 +125,7 @@ def _wall_axis(described: DescribedMap) -> float:
     It is that across which walls fall into the fewest bins of a histogram: the sum of the squared counts,
     over both axes, is greatest.
     """
-    walls = described.walls[:: max(len(described.walls) // MOST_WALLS, 1)]
+    walls = described.walls[:: max(len(described.walls) // MAX_WALLS, 1)]
     if len(walls) == 0:
         return 0.0
     angles = np.arange(0.0, math.pi / 2.0, AXIS_STEP)
@@ -190,11 +190,11 @@ def _region_placements(
     values = rank_by_walls(a, b, found, _SAMPLES, LOOSE.hit_distance_m) * np.sqrt(found[:, 3])
     # Where the middle of the grown map's walls comes to lie.
     middle = found[:, 3:] * b.walls.mean(axis=0)
-    places = found[:, :2] + turned(middle, found[:, 2])
+    positions = found[:, :2] + turned(middle, found[:, 2])
     order = np.argsort(-values, kind="stable")
     apart = (scaling.apart_m, scaling.slant)
     kept: list[_Placement] = []
-    for k in distinct(np.column_stack([places, found[:, 2]]), order, np.zeros(2), settings.candidates, apart):
+    for k in distinct(np.column_stack([positions, found[:, 2]]), order, np.zeros(2), settings.candidates, apart):
         x, y, theta, scale = found[k].tolist()
         kept.append(_Placement(scale, Transform(x, y, theta), float(values[k]) * a.resolution))
     return kept
@@ -203,7 +203,7 @@ def _region_placements(
 SAME_SCALE = 0.1
 """Scales whose logarithms differ by more are different ones."""
 
-MOST_GROWTH = 1.05
+MAX_GROWTH = 1.05
 """By so much a scale changes in a round at most."""
 
 SETTLED = 0.003
@@ -363,7 +363,7 @@ def _refined(
         if len(b.walls) == 0:
             return None
         bend = estimate_bend(a, b, a_from_b, settings.bend)
-        growth = min(max(bend.scale, 1.0 / MOST_GROWTH), MOST_GROWTH)
+        growth = min(max(bend.scale, 1.0 / MAX_GROWTH), MAX_GROWTH)
         if rounds == 0 or abs(growth - 1.0) < SETTLED or not bend.is_held:
             return _Grown(scale, b, Hypothesis(bend, compare_bent(a, b, bend)))
         # The map grows about the middle of its walls.

@@ -99,7 +99,7 @@ def _settle(
     """Move a pose so that walls meet walls along their normals."""
     rounds = 10
     count = walls.shape[0]
-    places, facing, gaps = np.empty((count, 2)), np.empty((count, 2)), np.empty(count)
+    positions, facing, gaps = np.empty((count, 2)), np.empty((count, 2)), np.empty(count)
     for step in range(rounds):
         # Half of the rounds narrow the reach, the others settle.
         share = min(2.0 * step / rounds, 1.0)
@@ -115,7 +115,7 @@ def _settle(
             )
             gap = gap_to_wall(levels, distance, side, x, y, u, v, steps)
             if gap <= steps:
-                places[found, 0], places[found, 1] = x, y
+                positions[found, 0], positions[found, 1] = x, y
                 facing[found, 0], facing[found, 1] = u, v
                 gaps[found] = gap
                 found += 1
@@ -125,7 +125,7 @@ def _settle(
             return
         centre_x /= found
         centre_y /= found
-        move = _best_move(places[:found], facing[:found], gaps[:found], centre_x, centre_y)
+        move = _best_move(positions[:found], facing[:found], gaps[:found], centre_x, centre_y)
         cosine, sine = math.cos(move[2]), math.sin(move[2])
         x, y = pose[0] / side - centre_x, pose[1] / side - centre_y
         pose[0] = (centre_x + cosine * x - sine * y + move[0]) * side

@@ -185,7 +185,7 @@ def _closest_point(knots: Array, control_points: Array, points: Array, parameter
     """
     count = control_points.shape[0]
     most = (count - ORDER + 1) * FINE_PIECES
-    places, widths, reaches, used = np.empty(most + 1), np.empty(most), np.empty(most), 0
+    positions, widths, reaches, used = np.empty(most + 1), np.empty(most), np.empty(most), 0
     for span in range(ORDER - 1, count):
         width = (knots[span + 1] - knots[span]) / FINE_PIECES
         if width > 0.0:
@@ -197,25 +197,27 @@ def _closest_point(knots: Array, control_points: Array, points: Array, parameter
                 )
                 fastest = max(fastest, (ORDER - 1) * gap / (knots[k + ORDER - 1] - knots[k]))
             for i in range(FINE_PIECES):
-                places[used], widths[used], reaches[used] = (
+                positions[used], widths[used], reaches[used] = (
                     knots[span] + width * i,
                     width,
                     0.5 * fastest * width,
                 )
                 used += 1
-    places[used] = knots[count]
+    positions[used] = knots[count]
     samples, values, apart = np.empty((used + 1, 2)), np.empty(ORDER), np.empty(used + 1)
     for i in range(used + 1):
-        samples[i, 0], samples[i, 1] = point_at(knots, control_points, places[i], 0, values)
+        samples[i, 0], samples[i, 1] = point_at(knots, control_points, positions[i], 0, values)
     for k in range(points.shape[0]):
         px, py = points[k, 0], points[k, 1]
         for i in range(used + 1):
             apart[i] = math.hypot(samples[i, 0] - px, samples[i, 1] - py)
-        nearest, chosen = apart.min(), places[apart.argmin()]
+        nearest, chosen = apart.min(), positions[apart.argmin()]
         for i in range(used):
             if min(apart[i], apart[i + 1]) - reaches[i] <= nearest:
-                middle = places[i] + 0.5 * widths[i]
-                parameter, squared = _descend(knots, control_points, px, py, places[i], middle, places[i + 1], values)
+                middle = positions[i] + 0.5 * widths[i]
+                parameter, squared = _descend(
+                    knots, control_points, px, py, positions[i], middle, positions[i + 1], values
+                )
                 if math.sqrt(squared) < nearest:
                     nearest, chosen = math.sqrt(squared), parameter
         parameters[k], distances[k] = chosen, nearest
@@ -421,9 +423,9 @@ class Spline:
 
         The nearest points of the curve to points (m, 2).
         """
-        places = np.ascontiguousarray(np.reshape(np.asarray(points, np.float64), (-1, 2)))
-        parameters, distances = np.empty(len(places)), np.empty(len(places))
-        _closest_point(self.knots, self.control_points, places, parameters, distances)
+        positions = np.ascontiguousarray(np.reshape(np.asarray(points, np.float64), (-1, 2)))
+        parameters, distances = np.empty(len(positions)), np.empty(len(positions))
+        _closest_point(self.knots, self.control_points, positions, parameters, distances)
         return parameters, distances
 
     def ray(self, origin: ArrayLike, direction: float) -> float:

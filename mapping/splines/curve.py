@@ -24,7 +24,7 @@ Box = tuple[float, float, float, float]
 
 _END_WEIGHT = 4.0
 
-LEAST_LINE = 0.4
+MIN_LINE = 0.4
 """Shorter lines have no clear direction [m]."""
 
 
@@ -159,7 +159,7 @@ def _find_line(points: Array, line: Array) -> bool:
     for k in range(last + 1):
         aside = (x * (points[k, 1] - points[0, 1]) - y * (points[k, 0] - points[0, 0])) / length
         lowest, highest, total = min(lowest, aside), max(highest, aside), total + aside
-    if not (length >= LEAST_LINE and highest - lowest <= STRAIGHT):
+    if not (length >= MIN_LINE and highest - lowest <= STRAIGHT):
         return False
     mean = total / (last + 1)
     line[0] = (points[0, 0] + points[last, 0]) / 2.0 - mean * y / length

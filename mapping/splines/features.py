@@ -295,9 +295,9 @@ def curves_of(
         if last - first + 1 < settings.segmentation.least_points:
             continue
         sigmas = observation.points.sigmas[first : last + 1]
-        places = observation.points.points[first : last + 1]
-        if float(np.ptp(places, axis=0).max()) > 1e-6:
-            fitted.append((fit_bspline(places, settings.fit, sigmas).spline, sigmas))
+        positions = observation.points.points[first : last + 1]
+        if float(np.ptp(positions, axis=0).max()) > 1e-6:
+            fitted.append((fit_bspline(positions, settings.fit, sigmas).spline, sigmas))
     return fitted
 
 

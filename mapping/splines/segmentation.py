@@ -194,13 +194,13 @@ def split_merge(
         If there are fewer than 2 points.
     """
     settings = settings or SegmentationSettings()
-    places = np.ascontiguousarray(points, np.float64)
-    if places.ndim != 2 or places.shape[1] != 2 or len(places) < 2:
-        raise ValueError(f"points of a cluster have shape {places.shape}; want (n, 2) with n >= 2")
-    noise = np.zeros(len(places)) if sigmas is None else np.ascontiguousarray(sigmas, np.float64)
-    ends = np.empty(len(places) + 1, np.int64)
-    lines, corners = np.empty((len(places), 5)), np.empty((len(places), 2))
-    is_corner = np.zeros(len(places) + 1, np.bool_)
+    positions = np.ascontiguousarray(points, np.float64)
+    if positions.ndim != 2 or positions.shape[1] != 2 or len(positions) < 2:
+        raise ValueError(f"points of a cluster have shape {positions.shape}; want (n, 2) with n >= 2")
+    noise = np.zeros(len(positions)) if sigmas is None else np.ascontiguousarray(sigmas, np.float64)
+    ends = np.empty(len(positions) + 1, np.int64)
+    lines, corners = np.empty((len(positions), 5)), np.empty((len(positions), 2))
+    is_corner = np.zeros(len(positions) + 1, np.bool_)
     rule = _CornerRule(
         settings.split_distance,
         settings.split_sigmas,
@@ -210,7 +210,7 @@ def split_merge(
         settings.least_points,
         CORNER_RULES.index(settings.corner_rule),
     )
-    count = _cut(places, noise, rule, ends, lines, corners, is_corner)
+    count = _cut(positions, noise, rule, ends, lines, corners, is_corner)
     inner = np.flatnonzero(is_corner[: count + 1])
     cut_at = ends[inner]
     is_corner[0] = is_corner[count] = True

@@ -119,8 +119,8 @@ class SplineMap:
     def _way_of(self, spline: Spline, sigmas: NDArray[np.float64]) -> Way:
         """Return points along a seen curve, with standard deviations (m,) of its points [m]."""
         parameters = spline.sample_parameters(self.settings.map.sample_spacing)
-        places = np.arange(len(parameters)) * ((len(sigmas) - 1) / (len(parameters) - 1))
-        noise = np.interp(places, np.arange(len(sigmas)), sigmas)
+        positions = np.arange(len(parameters)) * ((len(sigmas) - 1) / (len(parameters) - 1))
+        noise = np.interp(positions, np.arange(len(sigmas)), sigmas)
         return Way(spline.evaluate(parameters), (0.01 / noise) ** 2)
 
     def _take_in(self, way: Way, control_points: NDArray[np.float64], count: int) -> None:
@@ -177,9 +177,9 @@ class SplineMap:
                 or are_near(way.points, curve.way.points, settings.control_distance)
             ):
                 continue
-            places = common_places(way, curve.way, settings)
-            if places is not None and (best is None or places.length > best[1].length):
-                best = (index, places)
+            positions = common_places(way, curve.way, settings)
+            if positions is not None and (best is None or positions.length > best[1].length):
+                best = (index, positions)
         return best
 
     def _cut_at_corners(self, way: Way) -> list[Way]:

@@ -63,8 +63,8 @@ def _elimination(count: int, a: NDArray[np.int64], b: NDArray[np.int64]) -> _Eli
     # has all blocks.
     poses, joins = np.arange(count), -np.ones(len(a))
     diagonal = np.bincount(a, minlength=count) + np.bincount(b, minlength=count) + 1.0
-    places = np.concatenate([a, b, poses]), np.concatenate([b, a, poses])
-    dominant = scipy.sparse.csc_matrix((np.concatenate([joins, joins, diagonal]), places), shape=(count, count))
+    positions = np.concatenate([a, b, poses]), np.concatenate([b, a, poses])
+    dominant = scipy.sparse.csc_matrix((np.concatenate([joins, joins, diagonal]), positions), shape=(count, count))
     factors = scipy.sparse.linalg.splu(
         dominant, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
     )
@@ -234,18 +234,18 @@ def optimised(
         return poses.copy(), np.zeros((3, 3))
     # The first pose stays where it is: the unknowns are those of all others.
     is_free = (edges.a > 0) & (edges.b > 0)
-    places = _elimination(len(poses) - 1, edges.a[is_free] - 1, edges.b[is_free] - 1)
-    factor = np.empty((len(places.rows), 3, 3))
+    positions = _elimination(len(poses) - 1, edges.a[is_free] - 1, edges.b[is_free] - 1)
+    factor = np.empty((len(positions.rows), 3, 3))
     best = poses.copy()
     pull = _squares(best, edges)[len(edges.a) - newest :]
     scale = max(robust_scale, math.sqrt(float(pull.max())) if len(pull) else 0.0)
     while True:
-        best = _settled(best, edges, scale, iterations, places, factor)
+        best = _settled(best, edges, scale, iterations, positions, factor)
         if scale <= robust_scale:
             break
         scale = max(0.2 * scale, robust_scale)
     best[:, 2] = math.pi - (math.pi - best[:, 2]) % (2.0 * math.pi)
-    return best, _last_covariance(places, factor)
+    return best, _last_covariance(positions, factor)
 
 
 @kernel

@@ -103,13 +103,13 @@ SURFACE_GAP = 0.3
 As a share of their distance, or in metres.
 """
 
-MOST_BEND = 0.15
+MAX_BEND = 0.15
 """Largest ratio of the points' variance across the surface to that along it.
 
 Above this there is a corner.
 """
 
-LEAST_POINTS = 3
+MIN_POINTS = 3
 """Fewer points have no axis of their own."""
 
 
@@ -159,7 +159,7 @@ def _axis(points: Array) -> tuple[float, float, bool]:
     it, or are too few.
     """
     count = points.shape[0]
-    if count < LEAST_POINTS:
+    if count < MIN_POINTS:
         return 0.0, 0.0, True
     x, y = 0.0, 0.0
     for k in range(count):
@@ -172,7 +172,7 @@ def _axis(points: Array) -> tuple[float, float, bool]:
         yy += (points[k, 1] - y) * (points[k, 1] - y)
     half, middle = math.hypot(0.5 * (xx - yy), xy), 0.5 * (xx + yy)
     angle = 0.5 * math.atan2(2.0 * xy, xx - yy)
-    return math.cos(angle), math.sin(angle), middle - half > MOST_BEND * (middle + half)
+    return math.cos(angle), math.sin(angle), middle - half > MAX_BEND * (middle + half)
 
 
 FULL_AGREEMENT = 2.0 / 3.0
@@ -183,16 +183,16 @@ It occurs in the middle of a wall that lies along a row of cells.
 With less, points in the middle of such a wall would agree too well, and scans would come to lie beside it.
 """
 
-MOST_STEPS = 30
+MAX_STEPS = 30
 """Steps of the descent at most."""
 
-FIRST_DAMPING, MOST_DAMPING = 1e-3, 1e3
+FIRST_DAMPING, MAX_DAMPING = 1e-3, 1e3
 """Share by which curvature is raised: at first, and at most before giving up."""
 
 EASING, TIGHTENING = 0.3, 8.0
 """Factors of damping after a step that led down, and after one that did not."""
 
-LEAST_CURVATURE = 1e-9
+MIN_CURVATURE = 1e-9
 """Curvature that is added, so that equations can be solved [1/m^2, 1/rad^2]."""
 
 STILL_M, STILL_ANGLE = 1e-4, 1e-5
@@ -332,10 +332,10 @@ def _descend(objective: _Objective, pose: Array, hessian: Array) -> None:
     away = pose - prior
     cost = weight * _normal_equations(objective, pose, hessian, gradient) + away @ information @ away
     damping = FIRST_DAMPING
-    for _ in range(MOST_STEPS):
+    for _ in range(MAX_STEPS):
         whole = weight * hessian + information
         for k in range(3):
-            whole[k, k] += damping * whole[k, k] + LEAST_CURVATURE
+            whole[k, k] += damping * whole[k, k] + MIN_CURVATURE
         move = np.linalg.solve(whole, weight * gradient - information @ away)
         trial[:] = pose + move
         trial_away = trial - prior
@@ -350,7 +350,7 @@ def _descend(objective: _Objective, pose: Array, hessian: Array) -> None:
                 break
         else:
             damping *= TIGHTENING
-            if damping > MOST_DAMPING:
+            if damping > MAX_DAMPING:
                 break
 
 

@@ -77,13 +77,13 @@ def _undo_motion(
         angle = first + beam * increment - turn
         x = reach * math.cos(angle) - (cosine * ahead + sine * aside)
         y = reach * math.sin(angle) - (cosine * aside - sine * ahead)
-        place = int(math.floor((math.atan2(y, x) - first) / increment + 0.5))
+        position = int(math.floor((math.atan2(y, x) - first) / increment + 0.5))
         if is_full_circle:
-            place %= beams
-        if 0 <= place < beams:
+            position %= beams
+        if 0 <= position < beams:
             distance = math.hypot(x, y) if math.isfinite(value) and value <= range_max else math.inf
-            if not (seen[place] <= distance):
-                seen[place] = distance
+            if not (seen[position] <= distance):
+                seen[position] = distance
 
 
 def scan_points(

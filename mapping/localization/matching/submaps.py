@@ -22,7 +22,7 @@ from lidarium.mapping.grids.scan_polygon import GRAZING, fill_scan_polygon, scan
 from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.localization.settings import SubmapSettings
 
-MOST_BETWEEN = 10
+MAX_BETWEEN = 10
 """Points of a surface between two ends of neighbouring beams.
 
 Ends farther apart [cells] are not joined.
@@ -107,7 +107,7 @@ def _surface_points(lengths: Array, ends: Array, is_hit: Array, increment: float
     Points lie a cell apart between neighbouring ends on one surface.
     """
     beams = lengths.shape[0]
-    points = np.empty((beams * (MOST_BETWEEN + 1), 2))
+    points = np.empty((beams * (MAX_BETWEEN + 1), 2))
     count = 0
     for beam in range(beams):
         if not is_hit[beam]:
@@ -125,7 +125,7 @@ def _surface_points(lengths: Array, ends: Array, is_hit: Array, increment: float
             continue
         gap_x, gap_y = ends[0, follower] - ends[0, beam], ends[1, follower] - ends[1, beam]
         between = int(math.sqrt(gap_x * gap_x + gap_y * gap_y))
-        if between > MOST_BETWEEN:
+        if between > MAX_BETWEEN:
             continue
         for k in range(1, between + 1):
             share = k / (between + 1.0)

@@ -15,7 +15,7 @@ from lidarium.mapping.localization.settings import CompassSettings
 QUARTER = 0.5 * math.pi
 """Turns by so much change nothing about the directions of walls [rad]."""
 
-LEAST_POINTS = 20
+MIN_POINTS = 20
 """Of fewer points nothing is estimated."""
 
 COARSE_POINTS = 600
@@ -27,7 +27,7 @@ COARSE_CELL_M, COARSE_STEPS = 0.05, 180
 Steps are the directions in which points are then counted.
 """
 
-LEAST_GAIN, APART = 0.2, math.radians(10.0)
+MIN_GAIN, APART = 0.2, math.radians(10.0)
 """Least gain in entropy along walls, and the least angle to rivals [nats, rad].
 
 Entropy has to be less by this than in all directions that differ from theirs by more than the angle.
@@ -44,7 +44,7 @@ In coarse cells two walls that run side by side, a few centimetres apart, would 
 FINE_STEPS = (math.radians(0.2), math.radians(0.1), math.radians(0.05))
 """The steps that go with them [rad]."""
 
-MOST_MOVES = 3
+MAX_MOVES = 3
 """At most so often a finer search follows its best direction."""
 
 DEPENDENCE = 3.0
@@ -78,7 +78,7 @@ def wall_direction(points: Array) -> tuple[float, float]:
         angles [1/rad^2].
     """
     count = len(points)
-    if count < LEAST_POINTS:
+    if count < MIN_POINTS:
         return 0.0, 0.0
     reach = 0.0
     for k in range(count):
@@ -92,7 +92,7 @@ def wall_direction(points: Array) -> tuple[float, float]:
         cell, step = FINE_CELLS_M[level], FINE_STEPS[level]
         for k in range(7):
             order[k] = _fine_order(points, direction + (k - 3) * step, cell, reach, counts)
-        for _ in range(MOST_MOVES):
+        for _ in range(MAX_MOVES):
             best = int(np.argmax(order))
             if best == 3:
                 break
@@ -149,7 +149,7 @@ def _coarse_direction(points: Array, reach: float, counts: Array) -> tuple[float
     for step in range(COARSE_STEPS):
         if abs(within_quarter((step - best) * QUARTER / COARSE_STEPS)) >= APART:
             beside = max(beside, order[step])
-    return best * QUARTER / COARSE_STEPS, order[best] - beside >= LEAST_GAIN
+    return best * QUARTER / COARSE_STEPS, order[best] - beside >= MIN_GAIN
 
 
 @kernel
@@ -165,9 +165,9 @@ def _fine_order(points: Array, direction: float, cell: float, reach: float, coun
     for _ in range(2):
         counts[: 2 * middle] = 0.0
         for k in range(len(points)):
-            place = cosine * points[k, 0] + sine * points[k, 1] + middle
-            first = int(place)
-            share = place - first
+            position = cosine * points[k, 0] + sine * points[k, 1] + middle
+            first = int(position)
+            share = position - first
             counts[first] += 1.0 - share
             counts[first + 1] += share
         for k in range(1, 2 * middle - 1):

@@ -216,8 +216,8 @@ class SplineEkf(SplineTracker):
         for seen, sigma in zip(matches.points, matches.point_sigmas, strict=True):
             rotation = rotation_of(float(self.local[2]))
             lever = rotation @ seen
-            place = self.local[:2] + lever
-            if len(self.landmarks) and float(np.linalg.norm(self.landmarks - place, axis=1).min()) < distance:
+            position = self.local[:2] + lever
+            if len(self.landmarks) and float(np.linalg.norm(self.landmarks - position, axis=1).min()) < distance:
                 continue
             by_pose = np.column_stack([np.eye(2), TURNED @ lever])
             old = self.state_covariance
@@ -229,7 +229,7 @@ class SplineEkf(SplineTracker):
             variance = max(float(sigma), self.tracking.feature_sigma) ** 2
             grown[size:, size:] = by_pose @ old[:3, :3] @ by_pose.T + variance * np.eye(2)
             self.state_covariance = grown
-            self.landmarks = np.concatenate([self.landmarks, place[None]])
+            self.landmarks = np.concatenate([self.landmarks, position[None]])
 
 
 def _stacked(parts: list[Measured]) -> Measured:

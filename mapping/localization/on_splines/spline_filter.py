@@ -114,9 +114,9 @@ def _weigh_rays(
 
 
 _GATE_SIGMAS = 3.0
-_LEAST_MOTION = np.array([1e-4, 1e-4, 1e-4])
+_MIN_MOTION = np.array([1e-4, 1e-4, 1e-4])
 _RECOVERY_STEPS = 10
-_LEAST_BOX = 0.1
+_MIN_BOX = 0.1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -208,7 +208,7 @@ class SplineFilter(SplineTracker):
         self.resamplings, self._lost_steps, self._box = 0, 0, 0.0
         self._ray_table = _ray_likelihoods(self.tracking.curve_sigma)
         # Where odometry alone leads each particle from its last place, and the covariance of that motion.
-        self._expected, self._motion_covariance = self.particles.copy(), np.diag(_LEAST_MOTION**2)
+        self._expected, self._motion_covariance = self.particles.copy(), np.diag(_MIN_MOTION**2)
 
     def _change_frame(self, change: Transform, reach: float) -> None:
         self.particles = np.column_stack([change.apply(self.particles[:, :2]), self.particles[:, 2] + change.theta])
@@ -217,7 +217,7 @@ class SplineFilter(SplineTracker):
         first, distance, second = steps_of(motion)
         noise, tracking = self._generator.standard_normal((3, len(self.particles))), self.tracking
         if first == 0.0 and distance == 0.0 and second == 0.0:
-            self._expected, self._motion_covariance = self.particles.copy(), np.diag(_LEAST_MOTION**2)
+            self._expected, self._motion_covariance = self.particles.copy(), np.diag(_MIN_MOTION**2)
             return self.local
         turns = abs(first), abs(second)
         sway = tracking.turn_per_metre * abs(distance)
@@ -241,7 +241,7 @@ class SplineFilter(SplineTracker):
         heading = float(pose[2]) - second
         cosine, sine = math.cos(heading), math.sin(heading)
         by_steps = np.array([[-distance * sine, cosine, 0.0], [distance * cosine, sine, 0.0], [1.0, 0.0, 1.0]])
-        self._motion_covariance = (by_steps * spread**2) @ by_steps.T + np.diag(_LEAST_MOTION**2)
+        self._motion_covariance = (by_steps * spread**2) @ by_steps.T + np.diag(_MIN_MOTION**2)
         return pose
 
     def _correct(self, matches: Matches, observation: Observation) -> NDArray[np.float64]:
@@ -269,7 +269,7 @@ class SplineFilter(SplineTracker):
             logarithms,
             fits,
         )
-        if self._box <= _LEAST_BOX and float(self.weights @ fits) >= self.settings.lost_likelihood:
+        if self._box <= _MIN_BOX and float(self.weights @ fits) >= self.settings.lost_likelihood:
             logarithms = self._move_to_matches(matches)
         weights = self.weights * np.exp(logarithms - logarithms.max())
         self.weights = weights / weights.sum()
@@ -345,7 +345,7 @@ class SplineFilter(SplineTracker):
         """
         settings = self.settings
         is_lost = likelihood < settings.lost_likelihood
-        self._lost_steps = self._lost_steps + 1 if is_lost or self._box > _LEAST_BOX else 0
+        self._lost_steps = self._lost_steps + 1 if is_lost or self._box > _MIN_BOX else 0
         drawn = round(settings.recovered_share * len(self.particles))
         if self._lost_steps >= _RECOVERY_STEPS and drawn > 0:
             self._box = 1.0 if is_lost else 0.5 * self._box

@@ -14,7 +14,7 @@ from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.grids.occupancy import UNKNOWN
 from lidarium.mapping.merging.agreement import Agreement
 from lidarium.mapping.merging.bend.estimation import Bend, BendSettings, OffsetField, estimate_bend
-from lidarium.mapping.merging.bend.hypotheses import MOST_STRAIN, Hypothesis, compare_bent
+from lidarium.mapping.merging.bend.hypotheses import MAX_STRAIN, Hypothesis, compare_bent
 from lidarium.mapping.merging.described_map import DescribedMap, describe_map
 from lidarium.mapping.merging.fusion import FusedMap, fuse
 
@@ -154,7 +154,7 @@ def _held(
     bend = estimate_bend(a, b, a_from_b, settings)
     moves = bend.field.bent(bend.a_from_b, b.walls) - a_from_b.apply(b.walls)
     found = Deformation(bend, moves, compare_bent(a, b, bend), frames[0])
-    if not bend.is_held or bend.strain > MOST_STRAIN or found.most_m > settings.reach_m:
+    if not bend.is_held or bend.strain > MAX_STRAIN or found.most_m > settings.reach_m:
         return None
     rigid = replace(
         bend,

@@ -46,19 +46,19 @@ def compare_bent(a: DescribedMap, b: DescribedMap, bend: Bend) -> Agreement:
         (a, bend.field.bent(bend.a_from_b, b.walls), turn.apply(b.normals)),
         (b, bend.field.unbent(bend.a_from_b, a.walls), turn.inverse().apply(a.normals)),
     )
-    for k, (under, places, normals) in enumerate(laid):
+    for k, (under, positions, normals) in enumerate(laid):
         field = WallField(under.levels, under.distance, under.is_open, 1.0 / under.resolution, hit, miss)
-        count_walls(field, places, normals, (0.0, 0.0, 0.0), walls[k], facing[k])
+        count_walls(field, positions, normals, (0.0, 0.0, 0.0), walls[k], facing[k])
     return agreement_of(a, b, bend.a_from_b, walls, facing)
 
 
 LOOSE = ValidationSettings(hit_distance_m=0.3, miss_distance_m=0.6)
 """Tolerance with which transforms are chosen that are worth bending: bends of halls are not longer."""
 
-LEAST_OVERLAP_M2, LEAST_EVIDENCE_M, MOST_RIVAL_SHARE = 15.0, 4.0, 0.6
+MIN_OVERLAP_M2, MIN_EVIDENCE_M, MAX_RIVAL_SHARE = 15.0, 4.0, 0.6
 """Overlap of a room, which is like others [m2], least evidence [m], and most that a rival may have."""
 
-MOST_STRAIN = 0.05
+MAX_STRAIN = 0.05
 """Most that a map is stretched against another of the same place."""
 
 SHARP_SPREAD_M, FEW_ROOMS_M2, SHARP_QUALITY = 0.035, 60.0, 0.9
@@ -186,10 +186,10 @@ def confidence_of(signs: _Signs) -> float:
     """
     is_sharp = signs.spread_m < SHARP_SPREAD_M and signs.overlap_m2 < FEW_ROOMS_M2
     if (
-        signs.overlap_m2 < LEAST_OVERLAP_M2
-        or signs.evidence_m < LEAST_EVIDENCE_M
-        or signs.rival_share > MOST_RIVAL_SHARE
-        or signs.strain > MOST_STRAIN
+        signs.overlap_m2 < MIN_OVERLAP_M2
+        or signs.evidence_m < MIN_EVIDENCE_M
+        or signs.rival_share > MAX_RIVAL_SHARE
+        or signs.strain > MAX_STRAIN
         or (is_sharp and signs.quality < SHARP_QUALITY)
     ):
         return 0.0
