@@ -1,6 +1,8 @@
 """The choice of a robot's next path from a node.
 
 It leads to a goal in sight of a node, to the first frontier of a tour, through the cheapest opening, or home.
+
+Robots without a goal drive to the first frontier of the shortest tour of all frontiers that are left.
 """
 
 import math

@@ -4,6 +4,11 @@ They follow from the ranges seen from there.
 
 All that was seen from a place is kept as one *view*: a range for each of ``DIRECTIONS`` directions of the
 full circle, along the axes of the map frame, so that scans taken at several headings are one.
+
+Openings of the region seen from a position are arcs of free rays, gaps at edges that hide something, and the
+border of a blind sector. An opening is kept as points along it, each with a point just beyond. It stays open
+until enough of the space beyond was seen by any robot; so openings are found once, when their node is made,
+and are only looked up afterwards.
 """
 
 import math

@@ -4,6 +4,9 @@ The default test counts cells known to both maps: walls that lie on walls, and w
 other has observed and found nothing. A transform is refused where too little agrees, if enough
 contradicts, or where another transform explains the maps nearly as well. The disc test of the thesis compares
 cells around the inliers only, unknown ones included.
+
+Distinct walls are counted, too: two corners of one corridor agree over tens of metres of wall, and yet in
+four walls alone. Two maps of one room agree in as many walls as it has.
 """
 
 import math

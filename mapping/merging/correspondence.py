@@ -1,6 +1,15 @@
 """Which corners of one map may be which of another: four methods behind one call.
 
 Descriptors are compared under all rotations at once: a correlation along the angle is a product of spectra.
+
+Corners are alike by their descriptors, or by the corners around them: distances, triangles and clusters. A
+rigid motion keeps the latter, so they need no descriptors.
+
+References
+----------
+Methods a and b of the thesis on merging; clusters by radius replace its equations 3-10 and 3-11, of which only
+the idea is known: a corner's cluster are the corners within a radius, and two clusters are one if their
+distances are.
 """
 
 import math

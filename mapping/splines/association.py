@@ -4,6 +4,10 @@ Rough step: curves some of whose control points are near each other are candidat
 the seen curve the nearest point of the known curve is looked up. If that is an end of the known curve, the
 known curve ends first, and the overlap begins at the seen curve's point nearest to it; else it begins at the
 seen curve's own end. The same at the other end: four cases.
+
+Curves of one wall are joined as their weighted mean on their common part, and each of them alone elsewhere.
+They are joined as ways, points along them with weights. A weight is a number of observations with a standard
+deviation of 1 cm.
 """
 
 import math

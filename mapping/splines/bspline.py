@@ -4,6 +4,9 @@ Points, derivatives, length, nearest points, and intersections with rays.
 
 Knots here are four-fold at both ends, so that curves begin and end in control points, and run along the curve
 in metres.
+
+A curve has ``n`` control points and ``n + 4`` knots that do not decrease; it is defined from knot 3 to knot
+n.
 """
 
 import math

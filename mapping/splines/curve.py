@@ -1,6 +1,8 @@
 """A curve of the map.
 
 A spline, how well each part of it is known, and quantities derived from it once.
+
+A grid of cells around the robot holds the nearest piece of each cell, for fast lookup.
 """
 
 import math

@@ -5,6 +5,8 @@ Features are corners, free ends of walls (peaks) and straight lines.
 A corner is where two smooth pieces of one cluster meet. A peak is where a surface ends because it ends: the
 scan goes on farther away. If it goes on nearer, something stands in front; if it does not go on, the
 laser's reach has ended; neither is a feature.
+
+The points of a scan are in the frame of the robot, each at the robot's pose at its own time.
 """
 
 import math

@@ -1,4 +1,8 @@
-"""Least-squares fits of cubic B-splines to ordered points."""
+"""Least-squares fits of cubic B-splines to ordered points.
+
+The systems of equations are banded: a symmetric matrix is kept by its lower band, (n, 4), and row i holds
+columns i, i - 1, i - 2, i - 3.
+"""
 
 import math
 from dataclasses import dataclass

@@ -6,9 +6,14 @@ Minimises the sum over the edges of ``rho(e^T W e)``, e the difference of the po
 what was measured, W its information; rho is the identity for motions, and Cauchy's for closures, of which one
 may be wrong.
 
+Steps solve sparse symmetric systems of 3 x 3 blocks, one row and column of blocks per pose, by a Cholesky
+factor. The order of elimination and the blocks that the factor fills depend only on which poses are joined;
+they are found once for all steps, by SuperLU's minimum degree. The factors are computed in kernels.
+
 References
 ----------
 Grisetti et al., A tutorial on graph-based SLAM (IEEE ITS Magazine 2010).
+Davis, Direct Methods for Sparse Linear Systems (SIAM 2006), chapter 4: the left-looking factorisation.
 """
 
 import math

@@ -1,4 +1,15 @@
-"""The motion between sensings, by calibrated odometry or by the last motion."""
+"""The motion between sensings, by calibrated odometry or by the last motion.
+
+Wheels differ in size and spacing from their assumed values. Matches show the robot's true motion if walls
+show it; elsewhere, as along a bare corridor, calibrated odometry continues without them. The errors are the
+scales of distance and turn, and a turn for each metre; their estimate is that of recursive least squares (a
+Kalman filter without motion), and old matches fade.
+
+References
+----------
+The parameters are those of Censi, Franchi, Marchionni, Oriolo, Simultaneous calibration of odometry and
+sensor parameters for mobile robots (IEEE Transactions on Robotics 2013), to first order.
+"""
 
 import math
 

@@ -1,4 +1,10 @@
-"""The regions of a map, their shapes, and the doors between them."""
+"""The regions of a map, their shapes, and the doors between them.
+
+References
+----------
+Rotations by correlated directions of walls: Carpin, "Fast and accurate map merging for multi-robot systems",
+Autonomous Robots 25, 2008.
+"""
 
 import math
 from dataclasses import dataclass
