@@ -143,7 +143,7 @@ def make_policy(name: str, **settings: Any) -> Policy:  # noqa: ANN401
     --------
     >>> import lidarium
     >>> lidarium.policy("nearest_frontier").level
-    'frontier'
+    'waypoint'
     """
     maker = POLICIES[name] if not isinstance(name, str) or ":" not in name else maker_at(name)
     try:
@@ -158,7 +158,7 @@ def make_policy(name: str, **settings: Any) -> Policy:  # noqa: ANN401
 
 
 def _unknown_setting(maker: Callable[..., Any], error: TypeError) -> str:
-    """Return the message for a setting that what makes a policy does not have."""
+    """Return the message for a setting that the policy's factory does not have."""
     wrong = str(error).partition("argument ")[2].split("'")[1]
     parameters = inspect.signature(maker).parameters
     if any(each.kind == each.VAR_KEYWORD for each in parameters.values()):
@@ -167,18 +167,7 @@ def _unknown_setting(maker: Callable[..., Any], error: TypeError) -> str:
 
 
 def maker_at(name: str) -> Callable[..., Any]:
-    """Return what makes a policy of the user's own.
-
-    Parameters
-    ----------
-    name : str
-        ``module:attribute``; the module is installed, or in the folder that the command is called in.
-
-    Raises
-    ------
-    ValueError
-        Where it cannot be imported, or has no such attribute.
-    """
+    """Return the factory of a user's own policy."""
     module_name, _, attribute = name.partition(":")
     here = os.getcwd()
     try:

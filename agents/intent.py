@@ -1,4 +1,4 @@
-"""What a robot goes for, and how firmly."""
+"""The target of a robot, and how firmly it is kept."""
 
 import math
 
@@ -11,12 +11,12 @@ KEPT = 1.0
 KEPT_NEAR = 0.5
 """What lies this near to what a robot goes for is still the same [m]."""
 
-MOST_RETURNS = 10
+MAX_RETURNS = 10
 """More returns than these change nothing: no tour is shorter by a kilometre."""
 
 
 class Intent:
-    """What a robot goes for.
+    """The target of a robot.
 
     Two targets may each seem the nearer one from where the robot is on its way to the other. It would turn
     between them for ever; with every time that it comes back to one that it had left, what it goes for is
@@ -25,7 +25,7 @@ class Intent:
     Attributes
     ----------
     latest : (2,) float64 or None
-        What it went for last [m].
+        Its last target [m].
     """
 
     def __init__(self) -> None:
@@ -36,7 +36,7 @@ class Intent:
     @property
     def kept(self) -> float:
         """A tour has to be shorter by this for the robot to go for something else [m]."""
-        return KEPT * 2.0 ** min(self._returns, MOST_RETURNS)
+        return KEPT * 2.0 ** min(self._returns, MAX_RETURNS)
 
     def go_for(self, focus: NDArray[np.float64] | None) -> None:
         """Go for something, or for nothing."""
@@ -46,7 +46,7 @@ class Intent:
         self.latest = focus
 
     def settle(self) -> None:
-        """Forget what was left before, as the robot has seen what it went for."""
+        """Forget the targets left before, since the robot has seen its target."""
         self._left.clear()
         self._returns = 0
 

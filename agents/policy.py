@@ -1,4 +1,4 @@
-"""What a policy is: it sees observations and beliefs, and decides."""
+"""The interface of policies: they decide by observations and beliefs."""
 
 from abc import ABC, abstractmethod
 from collections import Counter
@@ -20,7 +20,7 @@ from lidarium.mapping.merging.fusion import FusedMap
 
 @dataclass(frozen=True, slots=True)
 class Stop:
-    """A robot ends its work, and says why.
+    """A robot ends its work, with a reason.
 
     Attributes
     ----------
@@ -35,7 +35,7 @@ Action = NDArray[np.float32] | Target | Route | int | Stop | Order | None
 
 
 class Team(Protocol):
-    """What a policy may ask about its team, never the truth."""
+    """Queries of a policy about its team, never ground truth. Environments and `EpisodeTeam` provide it."""
 
     @property
     def agents(self) -> list[str]:
@@ -48,11 +48,11 @@ class Team(Protocol):
         ...
 
     def belief(self, agent: str) -> Belief:
-        """Return what an agent's onboard software knows."""
+        """Return the state of an agent's onboard software."""
         ...
 
     def drive_state(self, agent: str) -> DriveState:
-        """Return what its driving is about."""
+        """Return the state of its driving."""
         ...
 
     def operating_state(self, agent: str) -> OperatingState:
@@ -60,28 +60,28 @@ class Team(Protocol):
         ...
 
     def last_order(self, agent: str) -> Order | None:
-        """Return the last order that an agent took, None where it took none."""
+        """Return the last order that an agent took, None if it took none."""
         ...
 
     def report(self, agent: str) -> Report | None:
-        """Return what last reached the station of an agent, an ended one too.
+        """Return the last report of an agent that reached the station, also of an ended agent.
 
-        None where nothing ever did.
+        None if nothing ever did.
         """
         ...
 
     def send_map(self, agent: str, others: FusedMap | None) -> bool:
-        """Send an agent that does not know its start what others know, in its map frame.
+        """Send an agent that does not know its start the map of the others, in its map frame.
 
         Return whether that reached it.
 
-        It plans and explores on that from now on, where its policy uses the shared map. None takes back
-        what was sent.
+        It plans and explores on that from now on, if its policy uses the shared map. None takes back
+        the map that was sent.
         """
         ...
 
     def forget_walls(self, agent: str, trail: NDArray[np.float64]) -> bool:
-        """Send an agent where another robot drove, (N, 2) in its map frame [m].
+        """Send an agent the trail of another robot, (N, 2) in its map frame [m].
 
         Return whether that reached it.
 
@@ -97,13 +97,13 @@ class Policy(ABC):
     Attributes
     ----------
     level : str
-        What it decides: ``velocity`` (shares of the limits, for a step), ``waypoint`` (a ``Target``, a
+        The level of its decisions: ``velocity`` (shares of the limits, for a step), ``waypoint`` (a ``Target``, a
         ``Route``, None to stay, or two shares, for a decision period) or ``frontier`` (the number of a
         frontier on offer, for a decision period).
     shares_map : bool
-        Whether the robots plan on the team's map, where it reaches them, or on their own.
+        Whether the robots plan on the team's map, if it reaches them, or on their own.
     observes : tuple of str
-        What it reads of observations, of ``settings.observe``; a run checks it before the first step.
+        The observations that it reads, of ``settings.observe``; a run checks it before the first step.
     decision_period_s : float or None
         How often it decides at the level of waypoints [s]; None for as often as the settings say.
     """
@@ -123,40 +123,25 @@ class Policy(ABC):
 
     @property
     def given_up(self) -> Sequence[GivenUp]:
-        """What robots have left unexplored so far; nothing unless a policy overrides it."""
+        """Areas left unexplored so far; empty unless a policy overrides it."""
         return ()
 
     @property
     def decided_by(self) -> Mapping[str, int]:
-        """How often a robot set out, by the part of the policy that sent it; empty where it has one part."""
+        """How often a robot set out, by the part of the policy that sent it; empty if it has one part."""
         return {}
 
     def report(self) -> PolicyReport:
-        """Return what there is to report of the episode."""
+        """Return the report of the episode."""
         return PolicyReport(self.given_up, decided_by=self.decided_by)
 
     def team_maps(self) -> TeamMaps | None:
-        """Return how a station has joined the robots' maps; None where there is no station."""
+        """Return how a station has joined the robots' maps; None if there is no station."""
         return None
 
 
 def check_observed(policy: Policy, name: str, observe: Sequence[str]) -> None:
-    """Check that robots observe what a policy reads.
-
-    Parameters
-    ----------
-    policy : Policy
-        The policy.
-    name : str
-        What messages call it.
-    observe : sequence of str
-        ``settings.observe`` of the environment.
-
-    Raises
-    ------
-    ValueError
-        Where something is missing; the message says how to add it.
-    """
+    """Check that robots observe everything that a policy reads."""
     missing = [each for each in policy.observes if each not in observe]
     if missing:
         camera = ", with a depth camera: camera='xtion_tilted'" if "depth" in missing else ""
@@ -166,12 +151,12 @@ def check_observed(policy: Policy, name: str, observe: Sequence[str]) -> None:
 
 
 def settings_for(policy: Policy, settings: ExplorationSettings) -> ExplorationSettings:
-    """Return settings in which the robots observe, beside all else, what a policy reads.
+    """Return settings with the observations that a policy reads added.
 
     Raises
     ------
     ValueError
-        Where they lack a sensor for it; the message says how to add it.
+        If they lack a sensor for it; the message tells how to add it.
     """
     missing = tuple(each for each in policy.observes if each not in settings.observe)
     return replace(settings, observe=(*settings.observe, *missing)) if missing else settings
@@ -197,7 +182,7 @@ class PerRobot(Policy):
 
     @property
     def given_up(self) -> list[GivenUp]:
-        """What the robots' instances left unexplored, robot by robot."""
+        """Areas left unexplored by the robots' instances, robot by robot."""
         return [entry for policy in self._policies.values() for entry in policy.given_up]
 
     @property

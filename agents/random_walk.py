@@ -16,13 +16,7 @@ NEAR = 0.35
 
 
 class RandomWalk(Policy):
-    """Drives straight on and turns by a random angle where something is near.
-
-    Parameters
-    ----------
-    speed : float
-        Share of the greatest speed.
-    """
+    """Drives straight on and turns by a random angle if something is near."""
 
     level = "velocity"
     observes = ("scan", "pose", "bumper")

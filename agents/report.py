@@ -1,4 +1,4 @@
-"""What a policy reports of an episode."""
+"""Report of a policy on an episode."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -19,7 +19,7 @@ class GivenUp:
     agent : str
         Who gave it up.
     x, y : float
-        Where, in that robot's map frame [m].
+        Position in that robot's map frame [m].
     size_m : float
         How long the frontier is [m].
     reason : str
@@ -48,7 +48,7 @@ class Join:
     found : Transform
         Of b's map frame in that of a.
     at : (x, y)
-        Where errors are taken, the middle of what both maps know, in b's frame [m].
+        Point at which errors are taken, the middle of the area known to both maps, in b's frame [m].
     is_used : bool
         Whether decisions were built on it; otherwise it waited to be confirmed.
     is_direct : bool
@@ -75,11 +75,11 @@ class GivenOrder:
     agent : str
         The robot.
     kind : OrderKind
-        What it is to do.
+        The order.
     place : (float, float)
-        Where it was, in its own map frame [m].
+        Its position, in its own map frame [m].
     goal : (float, float) or None
-        Where it is sent, in its own map frame [m].
+        Its goal, in its own map frame [m].
     """
 
     time_s: float
@@ -98,13 +98,13 @@ class LogEntry(Protocol):
         ...
 
     def as_dict(self) -> dict[str, Any]:
-        """Return what JSON can hold of it."""
+        """Return it as values for JSON."""
         ...
 
 
 @dataclass(frozen=True, slots=True)
 class Supervision:
-    """What a station did in an episode.
+    """Record of a station in an episode.
 
     Attributes
     ----------
@@ -130,14 +130,14 @@ class Supervision:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JoinedGroup:
-    """Robots whose maps are joined.
+    """Robots with joined maps.
 
     Attributes
     ----------
     frames : mapping of str to Transform
         Of each robot's map frame in that of the group's first robot.
     fused : FusedMap or None
-        Their merged map in that frame; None where nobody has merged it.
+        Their merged map in that frame; None if nobody has merged it.
     """
 
     frames: Mapping[str, Transform]
@@ -153,7 +153,7 @@ class TeamMaps:
     groups : sequence of JoinedGroup
         Each robot is in one; who is joined with nobody is alone in it.
     pairs : mapping of (str, str) to PairResult
-        What came of the pairs of maps that were tried last, between the maps' lower left corners.
+        Results of the pairs of maps that were tried last, between the maps' lower left corners.
     corners : mapping of str to Transform
         Of these lower left corners in the robots' map frames.
     used, dropped : frozenset of (str, str)
@@ -169,14 +169,14 @@ class TeamMaps:
 
 @dataclass(frozen=True, slots=True)
 class PolicyReport:
-    """What a policy reports of an episode, at its end or at any time of it.
+    """Report of a policy on an episode, at its end or during it.
 
     Attributes
     ----------
     given_up : sequence of GivenUp
-        What was left unexplored, with reasons.
+        Areas left unexplored, with reasons.
     supervision : Supervision or None
-        What its station did; None without a station.
+        Record of its station; None without a station.
     decided_by : mapping of str to int
         How often a robot set out, by the part of the policy that sent it; empty for policies of one part.
     """

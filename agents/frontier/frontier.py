@@ -1,7 +1,7 @@
 """Frontier explorers: nearest frontier, greatest team utility, least cost.
 
-They share everything but the choice. A robot keeps its target while the frontier there stands; having come
-near and turned to it, what still is frontier there cannot be seen and is given up by name. A robot without a
+They share everything but the choice. A robot keeps its target while the frontier there exists; having come
+near and turned to it, cells that are still frontier cannot be seen and are given up by name. A robot without a
 frontier in reach stays idle and gives way; all stop together when none has work, each with its reason.
 """
 
@@ -37,7 +37,7 @@ MOVED = 0.15
 
 @dataclass(slots=True)
 class _Work:
-    """What a robot is at."""
+    """State of a robot."""
 
     choice: Choice | None = None
     since_s: float = 0.0
@@ -46,13 +46,7 @@ class _Work:
 
 
 class FrontierExplorer(Policy):
-    """What the frontier explorers share; a subclass chooses.
-
-    Parameters
-    ----------
-    shares_map : bool
-        Whether robots explore on the team's map, where it reaches them, or each on its own.
-    """
+    """Base class of the frontier explorers; a subclass chooses the frontier."""
 
     level = "waypoint"
 
@@ -70,7 +64,7 @@ class FrontierExplorer(Policy):
         self.footprint: Footprint = footprint_of(radius)
 
     def act(self, observations: Mapping[str, Observation]) -> dict[str, Action]:
-        """Send every robot to its frontier, or to rest where it has none."""
+        """Send every robot to its frontier, or to rest if it has none."""
         agents = list(observations)
         for agent in agents:
             self._review(agent)
@@ -86,9 +80,9 @@ class FrontierExplorer(Policy):
 
     @property
     def given_up(self) -> list[GivenUp]:
-        """What is left unexplored by now, and why.
+        """The areas left unexplored so far, with reasons.
 
-        What was given up and seen later from elsewhere is not.
+        Areas that were given up but seen later from elsewhere are not included.
         """
         still = [entry for entry, navigation, cell in self._given_up if navigation.frontiers.flags[cell] == IGNORED]
         return still + self._unreached
@@ -108,7 +102,7 @@ class FrontierExplorer(Policy):
         return shared if shared is not None else belief.map
 
     def start_cell(self, agent: str) -> Cell:
-        """Return the cell in which an agent believes to stand."""
+        """Return the cell at which an agent believes itself to be."""
         belief = self.team.belief(agent)
         row, column = cells_of(belief.pose[:2], belief.map_origin, self.navigation(agent).resolution)
         return int(row), int(column)
@@ -125,7 +119,7 @@ class FrontierExplorer(Policy):
     def _review(self, agent: str) -> None:
         """Drop a choice whose frontier is gone, and give up unusable ones.
 
-        Unusable is what cannot be seen or reached.
+        Frontiers that cannot be seen or reached are unusable.
         """
         work = self._work[agent]
         if work.choice is None:
@@ -178,7 +172,7 @@ class FrontierExplorer(Policy):
     def _heading(self, agent: str, choice: Choice) -> float:
         """Return the heading from a robot's future place to the unknown space.
 
-        The place is where it will stand; the unknown space is that beside the frontier cell.
+        The position is the goal of the drive; the unknown space is next to the frontier cell.
         """
         row, column = choice.frontier_cell
         log_odds = self.navigation(agent).log_odds
@@ -193,7 +187,7 @@ class FrontierExplorer(Policy):
         return math.atan2(towards[0] - choice.cell[0], towards[1] - choice.cell[1])
 
     def _reason(self, agent: str) -> str:
-        """Say why an agent has no work, and name what is left."""
+        """Report why an agent has no work, and the frontiers that are left."""
         navigation, belief = self.navigation(agent), self.team.belief(agent)
         clusters = navigation.frontiers.clusters(belief.map_origin)
         if not len(clusters):

@@ -15,7 +15,7 @@ from lidarium.mapping.grids.grid_lines import visible
 from lidarium.mapping.planning.frontiers.approach import nearest_frontier
 from lidarium.mapping.planning.frontiers.frontier_map import Clusters
 
-MOST_UTILITY_LOST = 2.0
+MAX_UTILITY_LOST = 2.0
 """Largest excess of utility that a path to a frontier may cost.
 
 The excess is over the cheapest frontier; one that costs more is not considered.
@@ -135,7 +135,7 @@ class UtilityFrontier(FrontierExplorer):
     The method is that of Burgard, Moors, Stachniss and Schneider (2005).
 
     Every frontier has utility 1; when a robot takes one, the utility of the others falls with the chance that
-    they are seen from there: 1 less their distance over the laser's range, where there is a line of sight.
+    they are seen from there: 1 less their distance over the laser's range, if there is a line of sight.
 
     Parameters
     ----------
@@ -176,7 +176,7 @@ class UtilityFrontier(FrontierExplorer):
         chosen: dict[str, Choice | None] = dict.fromkeys(agents)
         if not len(clusters):
             return chosen
-        most = MOST_UTILITY_LOST / self._cost_weight
+        most = MAX_UTILITY_LOST / self._cost_weight
         slacks = dict.fromkeys(agents, min(FIRST_SLACK, most))
         reaches: dict[str, Reach] = {}
         unsure = list(agents)
@@ -222,7 +222,7 @@ class UtilityFrontier(FrontierExplorer):
     ) -> NDArray[np.float64]:
         """Return by how much each cluster's utility falls when a robot goes to a target."""
         cells = clusters.representatives
-        place = (int(target[0]), int(target[1]))
-        seen = visible(navigation.log_odds, place, cells, self._range / navigation.resolution)
+        position = (int(target[0]), int(target[1]))
+        seen = visible(navigation.log_odds, position, cells, self._range / navigation.resolution)
         distances = np.hypot(*(cells - target).T) * navigation.resolution
         return np.where(seen, np.clip(1.0 - distances / self._range, 0.0, 1.0), 0.0)

@@ -1,4 +1,4 @@
-"""What frontiers cost a robot, as far as a choice among them needs to know.
+"""Costs of frontiers to a robot, as far as a choice among them needs them.
 
 A search over a whole floor costs more than all else that an explorer does, and hardly any choice needs it:
 beyond some cost no frontier can make up for the way to it.
@@ -19,7 +19,7 @@ from lidarium.mapping.planning.grid_planning import Cell, Until, search
 
 @dataclass(frozen=True, slots=True)
 class Choice:
-    """Where a robot goes: the cell to stand in, and the frontier cell to observe."""
+    """The goal of a robot: the cell to drive to, and the frontier cell to observe."""
 
     cell: Cell
     frontier_cell: Cell
@@ -27,16 +27,16 @@ class Choice:
 
 @dataclass(frozen=True, slots=True)
 class Reach:
-    """What each of K clusters costs a robot to come near.
+    """Cost to a robot of coming near each of K clusters.
 
     Attributes
     ----------
     costs : (K,) float64
-        Cost of the way [m]; inf where there is none, or none up to ``beyond``.
+        Cost of the way [m]; inf if there is none, or none up to ``beyond``.
     choices : list of Choice or None
-        Where the robot would stand, and what it would observe.
+        Cell of the robot there, and the cell that it observes.
     beyond : float
-        Clusters without a finite cost cost more than this [m]; inf where they count as out of reach.
+        Clusters without a finite cost cost more than this [m]; inf if they count as out of reach.
     """
 
     costs: NDArray[np.float64]
@@ -68,7 +68,7 @@ def reach_of(
 
     They cost the robot no more than ``slack`` above the cheapest cluster.
 
-    The cheapest one is that of at least ``minimum_size`` [m]; of any size, where no such one is in reach.
+    The cheapest one is that of at least ``minimum_size`` [m]; of any size, if no such one is in reach.
 
     Parameters
     ----------
@@ -77,16 +77,11 @@ def reach_of(
     navigation : NavigationMap
         The map.
     start : (row, column)
-        Where the robot stands.
+        Cell of the robot.
     footprint : Footprint
         Its body.
     minimum_size, slack : float
         See above [m].
-
-    Returns
-    -------
-    Reach
-        What they cost; its ``beyond`` is inf where the robot can reach nothing that costs more.
     """
     distance = default_reach(footprint, navigation.resolution)
     for frontiers in (navigation.long_frontiers(minimum_size), navigation.frontiers):

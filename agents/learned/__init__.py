@@ -1,1 +1,1 @@
-"""Trained explorers: what a network sees of frontiers, how it ranks them, if its weights are."""
+"""Trained explorers: features of frontiers, the network that ranks them, and its weights."""

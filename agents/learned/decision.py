@@ -1,4 +1,4 @@
-"""A decision of one robot: what it may drive to, what it sees of that, and how classic tours rank it."""
+"""A decision of one robot: its options, their features, and their ranks by classic tours."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -26,31 +26,31 @@ from lidarium.mapping.planning.touring.tours import TourWeights, costs_of_firsts
 CROP_SIDE, CROP_STEP = 24, 0.25
 """Squares a side of the crop around each option, and the side of a square [m]."""
 
-LEAST_DETOUR = 0.01
+MIN_DETOUR = 0.01
 """Least detour of an option with which tours do not begin [m]."""
 
-MOST_DETOUR = 50.0
+MAX_DETOUR = 50.0
 """Longer detours count as this one [m]."""
 
 
 @dataclass(frozen=True, slots=True)
 class Decision:
-    """What one robot may drive to, n options, and what it sees.
+    """The n options of one robot, and their features.
 
     Attributes
     ----------
     options : (n, len(OPTION_FEATURES)) float32
-        What it sees of each option.
+        Features of each option.
     crops : (n, CROP_SIDE, CROP_SIDE) int8
         The map around each option, see ``map_crops``.
     teammates : (m, len(TEAMMATE_FEATURES)) float32
-        What it sees of each teammate.
+        Features of each teammate.
     situation : (len(SITUATION_FEATURES),) float32
-        What it sees beside.
+        Features of the situation.
     scores : (n,) float32
-        How classic tours rank the options: minus what they cost more [m], 0 for what they begin with.
+        Ranks by classic tours: minus the extra cost [m], 0 for the option that they begin with.
     mask : (n,) bool
-        What it may drive to: what it reaches, and what no robot has picked just before.
+        The options that it can reach and that no robot has picked just before.
     """
 
     options: NDArray[np.float32]
@@ -75,30 +75,30 @@ class Chooser(Protocol):
 
 
 def choose_classic(decision: Decision) -> int:
-    """Choose what classic tours begin with."""
+    """Choose the option that classic tours begin with."""
     return decision.classic
 
 
 @dataclass(frozen=True, slots=True)
 class Scene:
-    """What the decisions of all robots on one map have in common.
+    """Data shared by the decisions of all robots on one map.
 
     Attributes
     ----------
     options : TourOptions
-        What the robots may drive to.
+        The robots' options.
     resolution : float
         Side of the map's cells [m].
     crops : (n, CROP_SIDE, CROP_SIDE) int8
         The map around each option.
     views : (n, 2), (n,) float64
-        Places of the views [m], and the directions to what they show [rad].
+        Positions of the views [m], and the directions to the space that they show [rad].
     shared : dict of (n,) float64
         Features of the options that are the same for all robots.
     situation : dict of float
         Features of the situation that are.
     weights : TourWeights
-        What tours are weighed by.
+        Weights of tours.
     """
 
     options: TourOptions
@@ -117,12 +117,20 @@ def scene_of(
     weights: TourWeights,
     progress: dict[str, float],
 ) -> Scene:
-    """Return what the decisions of all robots on one map have in common.
+    """Return the data shared by the decisions of all robots on one map.
 
     Parameters
     ----------
+    options : TourOptions
+        The robots' options.
+    navigation : NavigationMap
+        The map.
     reach : float
         How far the lasers see [m].
+    weights : TourWeights
+        Weights of tours.
+    progress : dict of float
+        ``time``, ``known`` and ``rate``, see ``SITUATION_FEATURES``.
     """
     log_odds, resolution = navigation.log_odds, navigation.resolution
     cells = np.array(
@@ -134,7 +142,7 @@ def scene_of(
     )
     gains, directions = far_gains(log_odds, resolution, cells, reach)
     crops = map_crops(log_odds, resolution, cells, directions, CROP_SIDE, CROP_STEP)
-    places = np.asarray(centres_of(cells, (0.0, 0.0), resolution), np.float64)
+    positions = np.asarray(centres_of(cells, (0.0, 0.0), resolution), np.float64)
     sizes = [len(options.cells_of(k)) * resolution for k in range(len(cells))]
     rows, columns = options.grid.is_open.shape
     rim = np.minimum(options.places, np.array([rows, columns]) - 1 - options.places).min(axis=1)
@@ -151,7 +159,7 @@ def scene_of(
         "gain": float(options.gains.sum()),
         "robots": float(len(options.robots)),
     }
-    return Scene(options, resolution, crops, (places, directions), shared, situation, weights)
+    return Scene(options, resolution, crops, (positions, directions), shared, situation, weights)
 
 
 def decision_of(scene: Scene, robot: int, sequence: NDArray[np.int64], picks: Sequence[int | None]) -> Decision | None:
@@ -159,8 +167,14 @@ def decision_of(scene: Scene, robot: int, sequence: NDArray[np.int64], picks: Se
 
     Parameters
     ----------
+    scene : Scene
+        Data shared with the other robots.
+    robot : int
+        Which robot.
     sequence : (n + robots - 1,) int64
-        The tours, given what others have picked.
+        The tours, given the picks of others.
+    picks : sequence of int or None
+        Picks of the robots before it.
     """
     options = scene.options
     tours = _tours_in(sequence, len(options.numbers))
@@ -168,7 +182,7 @@ def decision_of(scene: Scene, robot: int, sequence: NDArray[np.int64], picks: Se
         return None
     first = tours[robot][0]
     costs = costs_of_firsts(sequence, robot, options.first, options.between, options.gains, scene.weights)
-    costs = np.clip(costs, LEAST_DETOUR, MOST_DETOUR)
+    costs = np.clip(costs, MIN_DETOUR, MAX_DETOUR)
     costs[first] = 0.0
     mask = options.is_reached[robot].copy()
     mask[[pick for pick in picks if pick is not None]] = False
@@ -216,7 +230,7 @@ def _length(options: TourOptions, robot: int, tour: list[int]) -> float:
 
 
 def _target_of(scene: Scene, robot: int, picks: Sequence[int | None]) -> NDArray[np.float64] | None:
-    """Return what a robot has picked, or else drives to [m]."""
+    """Return the position that a robot has picked, or else drives to [m]."""
     pick = picks[robot] if robot < len(picks) else None
     if pick is not None:
         return np.asarray(scene.views[0][pick])

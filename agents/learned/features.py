@@ -1,6 +1,6 @@
-"""What a trained explorer sees of each option, of its teammates and of the situation, as numbers near 1.
+"""Features of options, of teammates and of the situation, as numbers near 1.
 
-All is relative to the robot that decides: no feature says where on the floor it is.
+All are relative to the deciding robot: no feature gives its position on the floor.
 """
 
 import math
@@ -17,7 +17,7 @@ NEAR_M, AROUND_M = 3.0, 6.0
 """Options within these paths of an option lie near and around it [m]."""
 
 FAR_REACH, FAR_DEPTH = 8.0, 6.0
-"""What is unknown counts up to the first from a view, and up to the second behind what is known [m]."""
+"""What is unknown counts up to the first from a view, and up to the second behind known space [m]."""
 
 MOST = 4.0
 """No feature is greater than this, or less than the negative of it."""
@@ -84,41 +84,47 @@ def option_features(
     tour: list[int],
     views: tuple[NDArray[np.float64], NDArray[np.float64]],
 ) -> dict[str, NDArray[np.float64]]:
-    """Return what tours and paths say of each option for a robot, by name, (n,) each.
+    """Return the features of tours and paths of each option for a robot, by name, (n,) each.
 
     Parameters
     ----------
+    options : TourOptions
+        Its options.
+    robot : int
+        Which robot.
     costs : (n,) float64
-        By how much tours cost more where it visits each first [m].
+        By how much tours cost more if it visits each first [m].
+    tour : list of int
+        Its own tour.
     views : (n, 2), (n,) float64
-        x, y of the views from the corner of the map's first cell [m], and where what they show lies [rad].
+        x, y of the views from the corner of the map's first cell [m], and the directions of the space shown [rad].
     """
     pose, paths = options.robots[robot].pose, options.lengths[robot]
-    places, directions = views
-    gap = places - pose[:2]
+    positions, directions = views
+    gap = positions - pose[:2]
     straight = np.hypot(gap[:, 0], gap[:, 1])
     bearing = np.arctan2(gap[:, 1], gap[:, 0])
-    ahead, left = _in_frame(places, pose)
+    ahead, left = _in_frame(positions, pose)
     others = np.delete(options.lengths, robot, axis=0)
-    apart = options.between + np.where(np.eye(len(places)) > 0, NO_PATH, 0.0)
-    place = np.zeros(len(places))
-    place[tour] = np.arange(len(tour)) + 1.0
+    apart = options.between + np.where(np.eye(len(positions)) > 0, NO_PATH, 0.0)
+    position = np.zeros(len(positions))
+    position[tour] = np.arange(len(tour)) + 1.0
     is_near, is_around = options.between <= NEAR_M, options.between <= AROUND_M
     return {
         "path": paths,
         "turn": options.turns[robot],
         "gain": options.gains,
         "detour": costs,
-        "is_first": place == 1.0,
-        "place": place,
-        "is_own": place > 0.0,
+        "is_first": position == 1.0,
+        "place": position,
+        "is_own": position > 0.0,
         "is_kept": options.is_kept[robot],
         "ahead": ahead,
         "left": left,
         "cosine": np.cos(bearing - pose[2]),
         "bend": np.log((paths + 1.0) / (straight + 1.0)),
         "gain_ahead": np.cos(directions - bearing),
-        "others_path": others.min(axis=0) if len(others) else np.full(len(places), NO_PATH),
+        "others_path": others.min(axis=0) if len(others) else np.full(len(positions), NO_PATH),
         "nearer_others": (others < paths).sum(axis=0),
         "nearest": apart.min(axis=1),
         "mean": np.minimum(options.between, 100.0).mean(axis=1),
@@ -131,7 +137,7 @@ def option_features(
 def far_gains(
     log_odds: NDArray[np.int8], resolution: float, cells: NDArray[np.int64], reach: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return what each of n cells shows far away [m2], and where [rad], (n,) each.
+    """Return the distant area that each of n cells shows [m2], and its direction [rad], (n,) each.
 
     Parameters
     ----------
@@ -153,12 +159,12 @@ def far_gains(
 def teammate_features(
     robots: list[tuple[Tourist, NDArray[np.float64] | None, bool]], pose: NDArray[np.float64]
 ) -> dict[str, NDArray[np.float64]]:
-    """Return what is seen of m teammates, by name, (m,) each.
+    """Return the features of m teammates, by name, (m,) each.
 
     Parameters
     ----------
     robots : list of (Tourist, (2,) float64 or None, bool)
-        Each teammate, what it drives to [m], and whether it has decided just before.
+        Each teammate, its goal [m], and whether it has decided just before.
     pose : (3,) float64
         Pose of the robot that decides.
     """

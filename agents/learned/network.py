@@ -68,13 +68,7 @@ def _shapes() -> dict[str, tuple[int, ...]]:
 
 @dataclass(frozen=True, slots=True)
 class Network:
-    """A network with its weights.
-
-    Parameters
-    ----------
-    weights : mapping of str to float32
-        As ``_shapes`` says.
-    """
+    """A network with its weights."""
 
     weights: Weights
 
@@ -140,7 +134,7 @@ def _check_weights(weights: Weights, name: str) -> None:
             raise ValueError(f"{name} holds {key!r} with numbers that are not finite; train again")
 
 
-MOST_BYTES = 5_000_000
+MAX_BYTES = 5_000_000
 """Files of weights are no larger."""
 
 SHIPPED, CARD = "learned.safetensors", "learned.json"
@@ -148,16 +142,16 @@ SHIPPED, CARD = "learned.safetensors", "learned.json"
 
 
 def load_weights(path: str | Path = "") -> dict[str, NDArray[np.float32]]:
-    """Return the weights of a file; where ``path`` is empty, the package's."""
+    """Return the weights of a file; if ``path`` is empty, the package's."""
     if not isinstance(path, str | Path):
         raise ValueError(f"weights is {shown(path)}; want the name of a file")
     if not str(path):
         return dict(_shipped())
-    return _weights_from(read_bytes(Path(path), MOST_BYTES), str(path))
+    return _weights_from(read_bytes(Path(path), MAX_BYTES), str(path))
 
 
 def _weights_from(content: bytes, name: str) -> dict[str, NDArray[np.float32]]:
-    """Return the weights of a file's content; ``name`` is what messages call it."""
+    """Return the weights of a file's content; ``name`` is its name in messages."""
     try:
         weights: dict[str, NDArray[np.float32]] = load(content)
     except (SafetensorError, ValueError, KeyError, TypeError) as error:

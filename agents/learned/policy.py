@@ -1,6 +1,6 @@
-"""Learned: robots share out the frontiers of a map as tours, and a network chooses where each sets out.
+"""Learned: robots share out the frontiers of a map as tours, and a network chooses the first frontier of each.
 
-All but the choice is that of ``tour_frontier``: views, driving, what is given up. A network that corrects
+All but the choice is that of ``tour_frontier``: views, driving, frontiers given up. A network that corrects
 nothing makes the same decisions to the bit.
 """
 
@@ -24,17 +24,7 @@ RATE_S = 20.0
 
 
 class ChosenTours(TourFrontier):
-    """Explorers on tours of which a callable chooses the first leg.
-
-    Parameters
-    ----------
-    choose : callable
-        Gets a ``Decision``, returns the number of an option.
-    shares_map : bool
-        Whether robots explore on the team's map.
-    **settings
-        Any attribute of ``TourSettings``.
-    """
+    """Explorers on tours of which a callable chooses the first leg."""
 
     def __init__(self, choose: Chooser, shares_map: bool = True, **settings: float) -> None:
         super().__init__(shares_map, **settings)
@@ -48,7 +38,7 @@ class ChosenTours(TourFrontier):
     def pick(self, agents: list[str], options: TourOptions) -> list[int | None]:
         """Return which option each robot on one map drives to, robot after robot.
 
-        Each knows what those before it have picked; its options are ranked by the tours that are left.
+        Each knows the picks of those before it; its options are ranked by the tours that are left.
         """
         navigation = self.navigation(agents[0])
         reach = self.team.belief(agents[0]).lidar.range_max
@@ -67,8 +57,8 @@ class ChosenTours(TourFrontier):
     def _choose(self, scene: Scene, robot: int, decision: Decision, picks: Sequence[int | None]) -> int:
         """Return the option that is chosen.
 
-        It is the only one if there is but one, and what the robot drives to where tours go on to that: choices
-        that change with every plan of the team make robots turn between targets.
+        It is the only option if there is one, and the robot's goal if tours go on to that:
+        choices that change with every plan of the team make robots turn between targets.
         """
         if decision.mask.sum() == 1:
             return int(decision.mask.argmax())
@@ -95,22 +85,7 @@ class ChosenTours(TourFrontier):
 
 
 class Learned(ChosenTours):
-    """Explorers that were trained.
-
-    Parameters
-    ----------
-    weights : str or Path
-        A file of weights that a training has written; those that the package ships where empty.
-    shares_map : bool
-        Whether robots explore on the team's map.
-    **settings
-        Any attribute of ``TourSettings``; the weights were trained with their defaults.
-
-    Raises
-    ------
-    ValueError, FileNotFoundError
-        If the file is not there, or is none of weights for this network.
-    """
+    """Explorers that were trained."""
 
     def __init__(self, weights: str | Path = "", shares_map: bool = True, **settings: float) -> None:
         super().__init__(choose_classic, shares_map, **settings)

@@ -1,4 +1,4 @@
-"""Sparse frontier: robots explore what their depth cameras have not seen, by their own sparse maps.
+"""Sparse frontier: robots explore space unseen by their depth cameras, by their own sparse maps.
 
 A robot chooses a place and a heading from which it sees unknown ground, plans a route there on the graph of
 its sparse map, and follows it. It chooses again when most of that ground has been seen. What cannot be seen
@@ -46,26 +46,26 @@ OBSTACLE_S, OBSTACLE_M = 30.0, 0.1
 
 @dataclass(slots=True)
 class _Work:
-    """What a robot is at.
+    """State of a robot.
 
     Attributes
     ----------
     view, route : View, Route or None
-        What it is about to see, and how it comes there.
+        The discs that it is about to see, and its route.
     is_last : bool
-        Whether it only comes as near as it can, where it cannot come to see.
+        Whether it only comes as near as it can, if it cannot come to see.
     corrections : int
         How often its past had been corrected when the route was planned.
     moved_s, pose : float, (3,) float64
-        When it last moved, and where it was then [s, m, rad].
+        Time and pose of its last motion [s, m, rad].
     blocked_s : float
-        Since when its path is blocked [s]; inf where it is not.
+        Since when its path is blocked [s]; inf if it is not.
     waits : bool
         Whether something to see is out of reach only for now, or more is still to be tried.
     ignored : list of (3,) float64
         Unknown ground that it has given up: x, y and radius of discs [m].
     obstacles : list of (float, (2,) float64)
-        Where something is taken to stand, and until when [s, m].
+        Positions of assumed obstacles, and when each expires [s, m].
     """
 
     view: View | None = None
@@ -81,7 +81,7 @@ class _Work:
 
     @property
     def claimed(self) -> NDArray[np.float64]:
-        """What it is about to see, as discs (N, 3) [m]."""
+        """The discs (N, 3) that it is about to see [m]."""
         return np.empty((0, 3)) if self.view is None else discs_around(self.view.points, CLAIMED_M)
 
     def begin(self, view: View, now: float, pose: NDArray[np.float64]) -> None:
@@ -93,7 +93,7 @@ class _Work:
         self.view = self.route = None
 
     def watch(self, now: float, pose: NDArray[np.float64], state: DriveState) -> None:
-        """Take in where the robot is now, and what its driving is about."""
+        """Take in the robot's pose and the state of its driving."""
         turned = abs(math.remainder(float(pose[2] - self.pose[2]), 2.0 * math.pi))
         has_moved = math.dist(pose[:2], self.pose[:2]) > MOVED_M or turned > TURNED
         if has_moved or state is DriveState.GIVING_WAY:
@@ -105,18 +105,18 @@ class _Work:
         return now - self.moved_s > PATIENCE_S
 
     def is_stuck(self, now: float) -> bool:
-        """Whether something unknown must stand in the way."""
+        """Whether something unknown must block the way."""
         return now - min(self.blocked_s, now) > BLOCKED_S or now - self.moved_s > STUCK_S
 
     def take_to_stand(self, place: NDArray[np.float64], now: float) -> None:
-        """Take something unknown to stand at a place (2,) [m] for a while."""
+        """Assume an obstacle at a position (2,) [m] for a while."""
         self.obstacles.append((now + OBSTACLE_S, place))
         self.blocked_s = math.inf
 
     def obstacles_at(self, now: float) -> NDArray[np.float64]:
-        """Return where something is still taken to stand, (N, 2) [m]."""
+        """Return the positions of assumed obstacles, (N, 2) [m]."""
         self.obstacles = [entry for entry in self.obstacles if entry[0] > now]
-        return np.array([place for _, place in self.obstacles]).reshape(-1, 2)
+        return np.array([position for _, position in self.obstacles]).reshape(-1, 2)
 
 
 KEPT_SHARE = 0.5
@@ -138,7 +138,7 @@ class SparseFrontier(Policy):
     Parameters
     ----------
     shares_map : bool
-        Whether robots plan on what the whole team has seen, where it reaches them at once, or each on its own
+        Whether robots plan on the team's map, if it reaches them at once, or each on its own
         map.
     **settings
         Any attribute of ``ViewSettings``.
@@ -160,7 +160,7 @@ class SparseFrontier(Policy):
         self._sight = self.settings.sight_of(team.belief(team.agents[0]))
 
     def act(self, observations: Mapping[str, Observation]) -> dict[str, Action]:
-        """Send every robot to where it sees what is unknown, or to rest where it has nothing to see."""
+        """Send every robot to a view of unknown space, or to rest if there is none."""
         agents = list(observations)
         for agent in agents:
             self._review(agent)
@@ -173,35 +173,35 @@ class SparseFrontier(Policy):
 
     @property
     def given_up(self) -> list[GivenUp]:
-        """What is left unseen by now, and why; what was seen later from elsewhere is not."""
+        """The areas left unseen so far, with reasons, without those seen later from elsewhere."""
         known = {agent: self._known(agent) for agent in self._work}
         return [
             entry for entry in self._given_up if known[entry.agent].are_unknown(np.array([[entry.x, entry.y]])).any()
         ]
 
     def _known(self, agent: str) -> SparseBelief:
-        """Return what an agent knows."""
+        """Return the map of an agent."""
         belief = self.team.belief(agent)
         return belief.shared_sparse_map if self.shares_map else belief.sparse_map
 
     def _known_for_good(self, agent: str) -> SparseBelief:
-        """Return what an agent plans on, with the bodies of teammates that have ended."""
+        """Return the map that an agent plans on, with the bodies of teammates that have ended."""
         belief = self.team.belief(agent)
         ended = [each.pose[:2] for each in belief.teammates.values() if each.has_ended]
         return _amid_bodies(self._known(agent), ended, belief)
 
     def _known_now(self, agent: str) -> SparseBelief:
-        """Return what an agent plans on, with what stands in its way for now as well."""
+        """Return the map that an agent plans on, with the obstacles assumed for now as well."""
         work, belief = self._work[agent], self.team.belief(agent)
-        places = work.obstacles_at(self.team.time_s)
-        known = self._known_for_good(agent).amid(places, OBSTACLE_M, belief.robot.height)
+        positions = work.obstacles_at(self.team.time_s)
+        known = self._known_for_good(agent).amid(positions, OBSTACLE_M, belief.robot.height)
         if work.blocked_s == math.inf:
             # Who works moves aside where it stands in the way.
             return known
         return _amid_bodies(known, [each.pose[:2] for each in belief.teammates.values()], belief)
 
     def _review(self, agent: str) -> None:
-        """Drop what an agent has seen, cannot see or cannot reach, and plan its route again where need be."""
+        """Drop views that an agent has seen, cannot see or cannot reach, and replan its route if needed."""
         work = self._work[agent]
         if work.view is None:
             return
@@ -241,7 +241,7 @@ class SparseFrontier(Policy):
             work.drop()
 
     def _choose(self, agent: str) -> None:
-        """Choose what an agent sees next, and plan its route there."""
+        """Choose the next view of an agent, and plan its route there."""
         work, belief = self._work[agent], self.team.belief(agent)
         work.blocked_s = math.inf
         known = self._known_now(agent)
@@ -280,14 +280,14 @@ class SparseFrontier(Policy):
         return found.reason
 
     def _is_blocked_for_now(self, agent: str, view: View) -> bool:
-        """Whether there is a route to a view but for what stands in the way for now."""
+        """Whether there is a route to a view without the obstacles assumed for now."""
         start = self.team.belief(agent).pose[:2]
         return not self._known_for_good(agent).route(start, view.place).reason
 
     def _taken(self, agent: str) -> NDArray[np.float64]:
-        """Return what an agent leaves alone: what it has given up, as discs (N, 3) [m].
+        """Return the discs (N, 3) that an agent leaves alone, since it has given them up [m].
 
-        So it does with what teammates that share its map have given up or are about to see, as far as it
+        So it does with discs that teammates that share its map have given up or are about to see, as far as it
         hears of that at once.
         """
         taken = [*self._work[agent].ignored]
@@ -308,7 +308,7 @@ class SparseFrontier(Policy):
         self._given_up.append(GivenUp(agent, float(middle[0]), float(middle[1]), len(points) * cell_m, reason))
 
     def _reason(self, agent: str) -> str:
-        """Say why an agent has no work, and name what is left."""
+        """Report why an agent has no work, and the frontiers that are left."""
         borders = self._known(agent).unknown_ground(self.settings.minimum_size)
         if not borders:
             return "no_frontier"
@@ -318,7 +318,7 @@ class SparseFrontier(Policy):
 
 
 def _amid_bodies(known: SparseBelief, places: list[NDArray[np.float64]], belief: Belief) -> SparseBelief:
-    """Return what is known with the bodies of teammates at places (2,) [m]."""
+    """Return the known map with the bodies of teammates at positions (2,) [m]."""
     return known.amid(np.array(places).reshape(-1, 2), 0.9 * belief.radius, belief.robot.height)
 
 

@@ -1,4 +1,4 @@
-"""What views are worth to robots that explore by depth cameras, and which borders are left to them."""
+"""Values of views to robots that explore by depth cameras, and the borders that are left to them."""
 
 import math
 from dataclasses import dataclass
@@ -40,7 +40,7 @@ class ViewSettings:
         check_settings(self, "views")
 
     def sight_of(self, belief: Belief) -> Sight:
-        """Return how a robot sees, and what views are worth to it."""
+        """Return how a robot sees, and the values of views to it."""
         camera, robot = belief.sparse_map.camera, belief.robot
         # Towards its sides a camera sees the ground only from a little farther on.
         nearest = min(camera.nearest_m / math.cos(camera.half_angle), camera.farthest_m)
@@ -71,7 +71,7 @@ def _are_within(points: NDArray[np.float64], discs: NDArray[np.float64]) -> NDAr
 
 
 def apart_from(borders: list[NDArray[np.float64]], discs: NDArray[np.float64]) -> list[NDArray[np.float64]]:
-    """Return borders (N, 2) without what lies in one of discs (M, 3) [m]."""
+    """Return borders (N, 2) outside all discs (M, 3) [m]."""
     left = [border[~_are_within(border, discs)] for border in borders]
     return [border for border in left if len(border)]
 

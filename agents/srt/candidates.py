@@ -64,9 +64,9 @@ class Candidate:
     place : (2,) float64
         Where [m].
     opening : Opening or None
-        What for; None in the base algorithm, for the goal and for a frontier of the map.
+        Its opening; None in the base algorithm, for the goal and for a frontier of the map.
     focus : (2,) float64
-        What there is to observe [m].
+        Point to observe [m].
     is_frontier : bool
         Whether it is for a frontier of the map.
     """
@@ -88,12 +88,12 @@ class CandidateSource:
     body : float
         Radius of the robot with its margin [m].
     generator : numpy.random.Generator
-        Where all draws come from.
+        Source of all random draws.
 
     Attributes
     ----------
     intent : Intent
-        What the robot went for last.
+        Last goal of the robot.
     """
 
     def __init__(self, settings: SrtSettings, body: float, generator: np.random.Generator) -> None:
@@ -105,7 +105,7 @@ class CandidateSource:
     def note_tried(self, candidate: Candidate) -> None:
         """Remember that a robot was at a candidate.
 
-        What it was there to see is not approached from that place again.
+        Its goal is not approached from that position again.
         """
         self._tried.append((candidate.place, candidate.focus))
         if candidate.opening is not None:
@@ -132,7 +132,7 @@ class CandidateSource:
         return [candidate for candidate in candidates if candidate is not None]
 
     def beside(self, node: Node, memory: Memory) -> list[Candidate]:
-        """Return places before each opening of a node.
+        """Return positions before each opening of a node.
 
         They are on the side from which the opening was seen, whether or not a straight path leads
         there.
@@ -143,12 +143,14 @@ class CandidateSource:
             if len(points):
                 middle = int(points[len(points) // 2])
                 inwards = opening.points[middle] - opening.beyond[middle]
-                places = [opening.points[middle] + steps * inwards for steps in STANDS]
-                candidates += [Candidate(node.number, place, opening, opening.points[middle]) for place in places]
+                positions = [opening.points[middle] + steps * inwards for steps in STANDS]
+                candidates += [
+                    Candidate(node.number, position, opening, opening.points[middle]) for position in positions
+                ]
         return [candidate for candidate in candidates if not self._was_tried(candidate)]
 
     def is_open(self, candidate: Candidate, node: Node, memory: Memory) -> bool:
-        """Whether what a candidate is for is still open."""
+        """Whether a candidate's opening is still open."""
         if candidate.is_frontier:
             return memory.is_frontier(candidate.focus)
         return candidate.opening is None or bool(len(self._open(node, candidate.opening, memory)))
@@ -156,7 +158,7 @@ class CandidateSource:
     def may_drop(self, candidate: Candidate, departed: float, senses: Senses) -> bool:
         """Whether a robot that is so far from its last node [m] may drop a candidate that is seen through.
 
-        Every step sees a little more beyond free rays: a target there stands until the robot has got on; so
+        Every step sees a little more beyond free rays: a target there is kept until the robot has got on; so
         does one towards a goal.
         """
         is_along_rays = candidate.opening is not None and not candidate.opening.is_gap
@@ -230,8 +232,8 @@ class CandidateSource:
         """
         for _ in range(self._settings.tries):
             direction = int(self._generator.integers(DIRECTIONS))
-            place = node.place + self._settings.step_share * node.safe.radii[direction] * UNIT[direction]
-            candidate = Candidate(node.number, place, None, place)
+            position = node.place + self._settings.step_share * node.safe.radii[direction] * UNIT[direction]
+            candidate = Candidate(node.number, position, None, position)
             if self.is_valid(candidate, node, others):
                 return [candidate]
         return []
@@ -255,8 +257,8 @@ class CandidateSource:
 
     def _was_tried(self, candidate: Candidate) -> bool:
         return any(
-            math.dist(place, candidate.place) < TRIED_NEAR and math.dist(focus, candidate.focus) < 2.0 * TRIED_NEAR
-            for place, focus in self._tried
+            math.dist(position, candidate.place) < TRIED_NEAR and math.dist(focus, candidate.focus) < 2.0 * TRIED_NEAR
+            for position, focus in self._tried
         )
 
 

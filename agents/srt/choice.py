@@ -1,6 +1,8 @@
 """The choice of a robot's next path from a node.
 
 It leads to a goal in sight of a node, to the first frontier of a tour, through the cheapest opening, or home.
+
+Robots without a goal drive to the first frontier of the shortest tour of all frontiers that are left.
 """
 
 import math
@@ -47,7 +49,7 @@ def _first_on_tour(
     intent: Intent,
     of_teammates: Sequence[Place],
 ) -> tuple[Legs, Place] | None:
-    """Return the path to the tour's first frontier, and what to observe there.
+    """Return the path to the tour's first frontier, and the point to observe there.
 
     The tour is the shortest one.
 
@@ -57,21 +59,15 @@ def _first_on_tour(
     Parameters
     ----------
     memory : Memory
-        What the robot remembers.
+        Memory of the robot.
     senses, limits : Senses, Limits
-        Where it is, and how fast it drives and turns.
+        Its pose, and its speeds.
     least : float
         Frontiers shorter than this are left out [m].
     intent : Intent
-        What it went for last.
+        Its last goal.
     of_mates : sequence of (2,) float64
-        What teammates go for [m].
-
-    Returns
-    -------
-    tuple or None
-        The ends of the legs, and a place on the frontier; None where there is none in reach that is no
-        teammate's.
+        Goals of teammates [m].
     """
     frontiers = memory.frontiers(senses.pose[:2], least, MOST)
     if frontiers is None:
@@ -109,11 +105,11 @@ class Choice:
     Attributes
     ----------
     place : (2,) float64
-        Where it ends [m].
+        Its end [m].
     node : int or None
-        The node there; None where there is none yet.
+        The node there; None if there is none yet.
     candidate : Candidate or None
-        What the robot goes for there.
+        The robot's goal there.
     is_goal : bool
         Whether it is the goal.
     """
@@ -125,19 +121,7 @@ class Choice:
 
 
 class WayChooser:
-    """Chooses the ways of one robot.
-
-    Parameters
-    ----------
-    source : CandidateSource
-        Where candidates come from.
-    settings : SrtSettings
-        How the tree grows.
-    limits : Limits
-        What the robot can do.
-    generator : numpy.random.Generator
-        Where draws come from.
-    """
+    """Chooses the ways of one robot."""
 
     def __init__(
         self,
@@ -159,25 +143,10 @@ class WayChooser:
     ) -> list[Choice]:
         """Return the legs of the path to take from a node.
 
-        There are none where nothing is left to visit.
+        There are none if nothing is left to visit.
 
         Nodes are examined along the tree's paths, nearest first; with ``backtrack`` ``parent`` only the node
         itself is.
-
-        Parameters
-        ----------
-        node : Node
-            Where the robot is.
-        tree : Tree
-            The team's graph.
-        known : set of int
-            Nodes that the robot knows.
-        memory : Memory
-            What it remembers.
-        senses : Senses
-            What it senses.
-        targets : sequence of Candidate
-            Those of teammates in contact.
         """
         settings = self._settings
         lengths, before = tree.ways(node.number, known) if settings.backtrack == "open" else ({node.number: 0.0}, {})
@@ -213,7 +182,7 @@ class WayChooser:
         before: dict[int, int],
         senses: Senses,
     ) -> Candidate | None:
-        """Return the candidate to which the path costs least, None where there is none."""
+        """Return the candidate to which the path costs least, None if there is none."""
 
         def cost_of(candidate: Candidate) -> float:
             legs = [tree.nodes[number].place for number in way_to(candidate.node, before)]
@@ -230,7 +199,7 @@ class WayChooser:
         others: list[Node],
         targets: Sequence[Candidate],
     ) -> Candidate | None:
-        """Return a drawn candidate of the nearest node that has any, None where none has."""
+        """Return a drawn candidate of the nearest node that has any, None if none has."""
         for each in sorted(reached, key=lambda each: lengths[each.number]):
             found = _left_by(targets, self._source.of_node(each, memory, others))
             if found:
@@ -246,7 +215,7 @@ class WayChooser:
         memory: Memory,
         senses: Senses,
     ) -> list[Choice]:
-        """Return the path to a goal that is known to be in reach; none where it is not, or there is no goal.
+        """Return the path to a goal that is known to be in reach; empty if it is not, or there is no goal.
 
         ``lengths`` and ``before`` are those of the tree's paths to the nodes that are reached.
         """
@@ -255,7 +224,7 @@ class WayChooser:
             return []
         across = memory.way(senses.pose[:2], goal)
         if across is not None:
-            return [*(Choice(place, None) for place in across[:-1]), Choice(goal, None, is_goal=True)]
+            return [*(Choice(position, None) for position in across[:-1]), Choice(goal, None, is_goal=True)]
         in_sight = [each for each in reached if each.safe.contains(goal)]
         if not in_sight:
             return []
@@ -265,7 +234,7 @@ class WayChooser:
     def tour(self, node: Node, memory: Memory, senses: Senses, targets: Sequence[Candidate]) -> list[Choice]:
         """Return the path to the first frontier of the shortest tour.
 
-        The tour visits the frontiers of the map; there is no path where there is no tour.
+        The tour visits the frontiers of the map; there is no path if there is no tour.
 
         Only explorers plan tours: robots without a goal that go where what was seen is open, at the least
         cost.
@@ -290,7 +259,7 @@ class WayChooser:
             across = memory.way(senses.pose[:2], candidate.place)
             if across is not None:
                 return [
-                    *(Choice(place, None) for place in across[:-1]),
+                    *(Choice(position, None) for position in across[:-1]),
                     Choice(candidate.place, None, candidate),
                 ]
         return []
@@ -331,12 +300,12 @@ class WayChooser:
 def home_way(tree: Tree, start: int, root: int, known: set[int], senses: Senses, memory: Memory) -> list[Choice]:
     """Return the legs of the shortest path to the first node.
 
-    The path follows the tree or else crosses the map; there are no legs where there is no path.
+    The path follows the tree or else crosses the map; there are no legs if there is no path.
     """
     legs = _legs(tree, way_to(root, tree.ways(start, known)[1]))
     if not legs and start != root:
         across = memory.way(senses.pose[:2], tree.nodes[root].place)
-        legs = [*(Choice(place, None) for place in across[:-1]), *_legs(tree, [root])] if across else []
+        legs = [*(Choice(position, None) for position in across[:-1]), *_legs(tree, [root])] if across else []
     return legs
 
 
@@ -358,6 +327,6 @@ def _left_by(targets: Sequence[Candidate], found: list[Candidate]) -> list[Candi
 
 
 def _to_focus(node: Node, legs: list[NDArray[np.float64]], focus: NDArray[np.float64]) -> list[Choice]:
-    """Return a path across the map to where a frontier is observed."""
+    """Return a path across the map to a view of a frontier."""
     candidate = Candidate(node.number, legs[-1], None, focus, is_frontier=True)
-    return [*(Choice(place, None) for place in legs[:-1]), Choice(legs[-1], None, candidate)]
+    return [*(Choice(position, None) for position in legs[:-1]), Choice(legs[-1], None, candidate)]

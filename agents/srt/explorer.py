@@ -1,6 +1,6 @@
 """One robot that grows the tree.
 
-It observes, chooses, drives, comes back where nothing is open, and goes home in the end.
+It observes, chooses, drives, comes back if nothing is open, and goes home in the end.
 """
 
 import math
@@ -117,11 +117,13 @@ class _TreeGrowth:
     def _regions(
         self, pose: NDArray[np.float64], view: NDArray[np.float64]
     ) -> tuple[SafeRegion, SafeRegion, list[Opening]]:
-        """Return where the robot is safe, what it has seen, and the openings, of a view."""
-        settings, place = self._settings, np.array(pose[:2])
-        safe = safe_region(place, view, float(pose[2]), settings.shape, self._body, self.perception, settings.turn_room)
-        openings = openings_of(place, view, self.perception, self._body, with_blind=settings.memory == "map")
-        return safe, seen_region(place, view, self.perception), openings
+        """Return the safe region, the seen region and the openings of a view."""
+        settings, position = self._settings, np.array(pose[:2])
+        safe = safe_region(
+            position, view, float(pose[2]), settings.shape, self._body, self.perception, settings.turn_room
+        )
+        openings = openings_of(position, view, self.perception, self._body, with_blind=settings.memory == "map")
+        return safe, seen_region(position, view, self.perception), openings
 
 
 FINAL = ("budget", "goal_missed", "blocked")
@@ -139,21 +141,6 @@ NEAR_NODE = 0.5
 
 class Explorer:
     """One robot of the tree.
-
-    Parameters
-    ----------
-    agent : str
-        Its name.
-    tree : Tree
-        The team's graph.
-    settings : SrtSettings
-        How the tree grows.
-    robot : Robot
-        Its body and drive.
-    lidar : Lidar
-        Its laser.
-    generator : numpy.random.Generator
-        Where its draws come from.
 
     Attributes
     ----------
@@ -334,7 +321,7 @@ class Explorer:
         return command
 
     def _arrive(self, leg: Choice, senses: Senses, memory: Memory) -> None:
-        """Take note of where the robot has come."""
+        """Note the robot's progress."""
         self._travel.end_leg()
         if not self._travel.is_aside:
             self._blocks.failures = 0
@@ -345,8 +332,8 @@ class Explorer:
             self._growth.add_if_apart(senses, memory)
             self._go_home("goal_missed", senses, memory)
         else:
-            place = leg.place if self._settings.places_nodes_at_targets else senses.pose[:2]
-            self._growth.add(senses, self._growth.number, np.array([*place, senses.pose[2]]), memory)
+            position = leg.place if self._settings.places_nodes_at_targets else senses.pose[:2]
+            self._growth.add(senses, self._growth.number, np.array([*position, senses.pose[2]]), memory)
             if leg.candidate is not None:
                 self._source.note_tried(leg.candidate)
                 self._source.intent.settle()
@@ -396,8 +383,8 @@ class Explorer:
         self._travel.back_out(senses)
 
     def _step_aside(self, senses: Senses) -> None:
-        """Go to a drawn place in sight, where there is one, to step aside."""
-        place = self._travel.place_aside(senses, self._growth.perception, self._generator)
-        if place is not None:
-            candidate = Candidate(self._growth.number, place, None, place)
-            self._set_out([Choice(place, None, candidate)], senses, is_aside=True)
+        """Go to a drawn position in sight, if there is one, to step aside."""
+        position = self._travel.place_aside(senses, self._growth.perception, self._generator)
+        if position is not None:
+            candidate = Candidate(self._growth.number, position, None, position)
+            self._set_out([Choice(position, None, candidate)], senses, is_aside=True)

@@ -33,7 +33,7 @@ class _Frontiers:
     sizes : (n,) float64
         Their lengths [m].
     costs : (n,) float64
-        What the way to each costs [m], ascending.
+        Cost of the way to each [m], ascending.
     ahead : (n, 2) float64
         A place at the beginning of the way to each [m].
     between : callable
@@ -53,7 +53,7 @@ class _Frontiers:
 
 
 class Memory(Protocol):
-    """What a robot remembers.
+    """The memory of a robot.
 
     Places (..., 2) are in the frame of the map's first cell [m].
     """
@@ -72,19 +72,19 @@ class Memory(Protocol):
     def way(self, start: Place, end: Place) -> Legs | None:
         """Return the ends of the straight legs of a path across seen space.
 
-        The last end is ``end``; None where there is no path.
+        The last end is ``end``; None if there is no path.
         """
         ...
 
     def frontiers(self, start: Place, least: float, most: int) -> _Frontiers | None:
-        """Return the nearest frontiers of at least a length [m], so many at most.
+        """Return at most a number of the nearest frontiers of at least a length [m].
 
-        None where there is none.
+        None if there is none.
         """
         ...
 
     def is_frontier(self, focus: Place) -> bool:
-        """Whether what a frontier was gone to for is not seen yet."""
+        """Whether the space behind a visited frontier is still unseen."""
         ...
 
     def give_up(self, focus: Place) -> None:
@@ -160,7 +160,7 @@ class MapMemory:
     def frontiers(self, start: Place, least: float, most: int) -> _Frontiers | None:
         """Return the cheapest frontiers to reach, and the paths between them.
 
-        The paths join the places where the robot would stand.
+        The paths join the robot's positions at them.
         """
         rows, columns, is_inside = self._cells(start[None])
         at_least = max(math.ceil(least / self._map.resolution - 1e-9), 1)
@@ -243,7 +243,7 @@ class MapMemory:
         return int(rows[0]), int(columns[0])
 
     def _clearance(self, rows: NDArray[np.int64], columns: NDArray[np.int64]) -> NDArray[np.float64]:
-        """Return the distance of cells from what is occupied [m]."""
+        """Return the distance of cells from occupied ones [m]."""
         field = self._map.clearance
         return np.sqrt(field.limit - field.closeness[rows, columns].astype(np.float64)) * 0.5 * field.resolution
 
@@ -262,11 +262,6 @@ class RegionMemory:
     """Memory of nodes: space is seen where it lies in another node's safe region.
 
     A way is clear within one node's safe region.
-
-    Parameters
-    ----------
-    nodes : iterable of Node
-        The nodes that the robot knows.
     """
 
     def __init__(self, nodes: Iterable[Node]) -> None:

@@ -1,6 +1,6 @@
 """Driving to a place in sight: turn, advance, done.
 
-Or the best of a list of controls. Both stop before what the laser sees ahead.
+Or the best of a list of controls. Both stop before obstacles that the laser sees ahead.
 """
 
 import math
@@ -87,13 +87,13 @@ class Limits:
 
 
 def limits_of(robot: Robot, settings: SrtSettings) -> Limits:
-    """Return what a robot is driven with under the settings."""
+    """Return the control that the settings ask for."""
     speed, turn_rate = min(settings.speed, robot.cruise_speed), min(settings.turn_rate, robot.max_turn_rate)
     return Limits(speed, turn_rate, 0.5 * robot.max_acceleration, robot.radius)
 
 
 def free_way(scan: NDArray[np.float32], geometry: ScanGeometry, radius: float, heading: float = 0.0) -> float:
-    """Return how far the robot can go before it meets what the laser sees.
+    """Return how far the robot can go before it meets an obstacle that the laser sees.
 
     Parameters
     ----------
@@ -109,7 +109,7 @@ def free_way(scan: NDArray[np.float32], geometry: ScanGeometry, radius: float, h
     Returns
     -------
     float
-        Length of the way [m]; the laser's greatest range where nothing is met.
+        Length of the way [m]; the laser's maximum range if nothing is met.
     """
     ranges = np.asarray(scan, np.float64)
     is_hit = (ranges >= geometry.range_min) & (ranges < no_return(geometry))
@@ -145,11 +145,11 @@ def driven(
     drive : Drive
         The drive so far.
     pose : (3,) float64
-        Where the robot takes itself to be [m, rad].
+        Believed pose of the robot [m, rad].
     free : float
         How far the path ahead is free [m].
     limits : Limits
-        What it can do.
+        Its abilities.
     settings : SrtSettings
         ``turn_advance`` or ``controls``, and the angles between which it turns.
     arrived : float
@@ -179,20 +179,20 @@ def driven(
 def _best_control(
     pose: NDArray[np.float64], target: NDArray[np.float64], fastest: float, limits: Limits
 ) -> tuple[float, float]:
-    """Return the listed control whose predicted pose best suits a target.
+    """Return the listed control with the predicted pose that best suits a target.
 
     The control is a speed and a turn rate; the best pose is closest to the target and faces it.
 
     Parameters
     ----------
     pose : (3,) float64
-        Where the robot takes itself to be [m, rad].
+        Believed pose of the robot [m, rad].
     target : (2,) float64
-        Where it wants to be [m].
+        Its target [m].
     fastest : float
         Speed that the path ahead allows [m/s]; controls are no faster.
     limits : Limits
-        What the robot can do.
+        Abilities of the robot.
     """
     best, least = (0.0, 0.0), math.inf
     for speed_share in CONTROL_SPEEDS:
@@ -220,7 +220,7 @@ ASIDE_DISTANCES = 0.3, 1.2
 
 
 class Remedy(Enum):
-    """What a blocked robot does."""
+    """Behaviour of a blocked robot."""
 
     GIVE_GOAL_UP = "give_goal_up"
     STEP_ASIDE = "step_aside"
@@ -247,17 +247,7 @@ class Blocks:
         return self.failures > ASIDES
 
     def remedy(self, senses: Senses, here: int, *, is_goal: bool) -> Remedy:
-        """Return what to do now, and count.
-
-        Parameters
-        ----------
-        senses : Senses
-            What the robot senses.
-        here : int
-            How often in a row it was blocked at this place.
-        is_goal : bool
-            Whether it was on the last leg to the goal.
-        """
+        """Return the action now, and count."""
         self.failures += 1
         steps_aside = here % 3 == 2 or any(
             senses.distance_to(teammate) < TEAMMATE_NEAR for teammate in senses.teammates
@@ -281,7 +271,7 @@ def place_aside(
     perception: float,
     generator: np.random.Generator,
 ) -> NDArray[np.float64] | None:
-    """Return a drawn place in sight to step aside to (2,) [m], None where there is none.
+    """Return a drawn place in sight to step aside to (2,) [m], None if there is none.
 
     Of two robots that block each other, one thus lets the other pass. What is farther than ``perception``
     [m] counts as unseen.

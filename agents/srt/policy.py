@@ -20,18 +20,11 @@ from lidarium.envs.faces.parallel import Observation
 class SensorBasedRandomTree(Policy):
     """A policy that grows a tree of places with the safe regions seen there.
 
-    It grows towards the goal where there is one.
+    It grows towards the goal if there is one.
 
     Each robot drives by its own scans. Robots that know each other's starts and are in contact share one
-    graph, whose trees are joined by bridges, and leave each other what they go for. A robot without work goes
+    graph, whose trees are joined by bridges, and leave each other their goals. A robot without work goes
     home; all stop when none has work.
-
-    Parameters
-    ----------
-    mode : str
-        ``default``, or ``thesis`` for the printed form of the thesis.
-    **settings
-        Any attribute of ``SrtSettings``.
 
     Attributes
     ----------

@@ -1,9 +1,14 @@
-"""Safe regions: the space around a place in which the robot can stand.
+"""Safe regions: the space around a position that the robot can occupy.
 
-They follow from what was seen from there.
+They follow from the ranges seen from there.
 
 All that was seen from a place is kept as one *view*: a range for each of ``DIRECTIONS`` directions of the
 full circle, along the axes of the map frame, so that scans taken at several headings are one.
+
+Openings of the region seen from a position are arcs of free rays, gaps at edges that hide something, and the
+border of a blind sector. An opening is kept as points along it, each with a point just beyond. It stays open
+until enough of the space beyond was seen by any robot; so openings are found once, when their node is made,
+and are only looked up afterwards.
 """
 
 import math
@@ -50,12 +55,12 @@ def no_return(geometry: ScanGeometry) -> float:
 
 
 def view_of(scan: NDArray[np.float32], geometry: ScanGeometry, heading: float) -> NDArray[np.float64]:
-    """Return what a scan shows in each direction.
+    """Return the ranges of a scan in each direction.
 
     Parameters
     ----------
     scan : (beams,) float32
-        Ranges [m]; 0, nan or below the laser's least where invalid, its greatest range or inf where nothing
+        Ranges [m]; 0, nan or below the laser's least where invalid, its greatest range or inf if nothing
         was met.
     geometry : ScanGeometry
         The laser.
@@ -65,7 +70,7 @@ def view_of(scan: NDArray[np.float32], geometry: ScanGeometry, heading: float) -
     Returns
     -------
     (directions,) float64
-        Range of the nearest beam [m], inf where nothing was met, nan where there is no valid beam.
+        Range of the nearest beam [m], inf if nothing was met, nan if there is no valid beam.
     """
     ranges = np.asarray(scan, np.float64)
     with np.errstate(invalid="ignore"):
@@ -82,7 +87,7 @@ def view_of(scan: NDArray[np.float32], geometry: ScanGeometry, heading: float) -
 def joined_views(first: NDArray[np.float64], second: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the nearer of two views in each direction.
 
-    Where one view does not cover a direction, the other one counts.
+    If one view does not cover a direction, the other one counts.
     """
     return np.fmin(first, second)
 
@@ -108,7 +113,7 @@ class SafeRegion:
     place : (2,) float64
         The place [m].
     radii : (directions,) float64
-        How far the region reaches in each direction [m]; 0 where nothing is known.
+        How far the region reaches in each direction [m]; 0 if nothing is known.
     """
 
     place: NDArray[np.float64]
@@ -149,9 +154,9 @@ def safe_region(
     Parameters
     ----------
     place : (2,) float64
-        Where the view was taken [m].
+        Position of the view [m].
     view : (directions,) float64
-        What was seen [m].
+        Seen ranges [m].
     heading : float
         Heading of the laser regions [rad].
     shape : str
@@ -163,11 +168,6 @@ def safe_region(
         Rays count as far as this [m].
     turn_room : float
         A laser region with a return nearer than the disc and this is not safe [m]; 0 for off.
-
-    Raises
-    ------
-    ValueError
-        Where the shape is unknown.
     """
     if shape not in SHAPES:
         raise ValueError(f"shape of the safe region is {shape!r}; want one of {', '.join(SHAPES)}")
@@ -193,7 +193,7 @@ def _nearest_of_regions(
 ) -> NDArray[np.float64]:
     """Return the least range of each laser region, (regions,) [m].
 
-    Inf where nothing of it was seen.
+    Inf if nothing of it was seen.
     """
     nearest = np.full(REGIONS, np.inf)
     np.minimum.at(nearest, regions[seen], ranges[seen])
@@ -203,9 +203,9 @@ def _nearest_of_regions(
 def _radial(ranges: NDArray[np.float64], body: float) -> NDArray[np.float64]:
     """Return how far a disc can go along each direction, (directions,) [m].
 
-    0 where ``ranges`` are nan, which stop no other ray.
+    0 if ``ranges`` are nan, which stop no other ray.
 
-    Along a ray the disc meets the end of another one, at an angle off and a range, where it comes within its
+    Along a ray the disc meets the end of another one, at an angle off and a range, if it comes within its
     radius of it.
     """
     reach = np.nanmax(ranges, initial=0.0)
@@ -246,21 +246,21 @@ IsSeen = Callable[[NDArray[np.float64]], NDArray[np.bool_]]
 
 @dataclass(eq=False, slots=True)
 class Opening:
-    """A part of the border of what was seen from a node where more may be seen.
+    """A part of the border of the region seen from a node, beyond which more may be seen.
 
     Attributes
     ----------
     points, beyond : (n, 2) float64
         Places along it, and just outside of them [m].
     lengths : (n,) float64
-        How much of the border each point stands for [m].
+        Length of the border that each point represents [m].
     directions : (m,) int64
         Directions of a view in which a robot may go: to each point of a free arc; past the edge, ever wider
         of it, of a gap.
     reaches : (m,) float64
         How far it goes at most [m].
     is_gap : bool
-        Whether it is a gap beside an edge, and not an arc of free rays.
+        Whether it is a gap at an edge, and not an arc of free rays.
     width : float
         Angle that it takes up as seen from the node [rad].
     is_closed : bool
@@ -295,25 +295,20 @@ class Opening:
 def openings_of(
     place: NDArray[np.float64], view: NDArray[np.float64], perception: float, body: float, with_blind: bool
 ) -> list[Opening]:
-    """Return the openings of what is seen from a place.
+    """Return the openings of the region seen from a position.
 
     Parameters
     ----------
     place : (2,) float64
         The place [m].
     view : (directions,) float64
-        What is seen from it [m], inf where nothing was met, nan where nothing is known.
+        Ranges seen from it [m], inf if nothing was met, nan if nothing is known.
     perception : float
         A ray that is longer is free [m].
     body : float
         Radius of the robot with its margin [m]; openings shorter than twice that and 0.1 m are left out.
     with_blind : bool
         Whether the border of directions of which nothing is known is an opening.
-
-    Returns
-    -------
-    list of Opening
-        Free arcs by their first direction, then gaps.
     """
     ranges = np.minimum(np.where(np.isnan(view), 0.0, view), perception)
     least = least_opening(body)

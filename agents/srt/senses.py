@@ -1,6 +1,6 @@
 """The inputs of one robot's decision.
 
-They are pose, scan and goal in the frame of the team's graph, and what it remembers.
+They are pose, scan and goal in the frame of the team's graph, and its memory.
 """
 
 import math
@@ -23,22 +23,22 @@ CONTACT_AGE_S = 1.0
 
 @dataclass(frozen=True, slots=True)
 class Senses:
-    """What a robot has before it decides.
+    """Inputs of a robot's decision.
 
     Attributes
     ----------
     time_s : float
         Simulated time [s].
     pose : (3,) float64
-        Where it takes itself to be, in the frame of the map's first cell [m, rad].
+        Its believed pose, in the frame of the map's first cell [m, rad].
     scan : (beams,) float32
-        What the laser measures [m].
+        Ranges of the laser [m].
     is_pressed : bool
         Whether the bumper is pressed.
     goal : (2,) float64 or None
-        Where it has to go [m].
+        Its goal [m].
     teammates : list of (2,) float64
-        Where teammates are, of those that it heard from recently [m].
+        Positions of teammates that it heard from recently [m].
     """
 
     time_s: float
@@ -59,7 +59,7 @@ class Senses:
 
 
 def senses_of(time_s: float, observation: Observation, belief: Belief) -> Senses:
-    """Return what a robot has, of an observation and its belief."""
+    """Return the inputs of a robot's decision, from an observation and its belief."""
     origin = np.array(belief.map_origin)
     pose = np.asarray(belief.pose, np.float64)
     teammates = [
@@ -76,7 +76,7 @@ def senses_of(time_s: float, observation: Observation, belief: Belief) -> Senses
 
 
 def memory_of(belief: Belief, known: Iterable[Node], settings: SrtSettings) -> Memory:
-    """Return what a robot remembers.
+    """Return the memory of a robot.
 
     This is the map that reached it, or the nodes that it knows.
     """

@@ -47,7 +47,7 @@ class SrtSettings:
     shape : str
         Shape of the safe regions: ``ball``, ``star`` or ``radial``.
     algorithm : str
-        ``integrated`` goes where the border of what was seen is open; ``base`` goes in random directions,
+        ``integrated`` goes to open parts of the border of the seen region; ``base`` goes in random directions,
         wherever no other safe region lies.
     candidates : str
         Where to go next: ``goal`` (least way, and least distance to the goal where there is one), ``random``
@@ -56,7 +56,7 @@ class SrtSettings:
         Where to go from a node without openings: ``open`` (the cheapest node that has one, along the tree and
         its bridges) or ``parent``.
     memory : str
-        What shows which space was seen: ``map`` (the robot's map) or ``regions`` (the nodes' own scans).
+        The record of seen space: ``map`` (the robot's map) or ``regions`` (the nodes' own scans).
     drive : str
         ``turn_advance`` (turn, advance, done) or ``controls`` (the best of a list of controls).
     places_nodes_at_targets : bool
@@ -70,7 +70,7 @@ class SrtSettings:
         Share of random choices among those of least cost. The tree is complete without: frontiers of the map
         are gone to in the end.
     way_weight : float
-        What a metre of way counts against a metre of distance to the goal.
+        Weight of a metre of way against a metre of distance to the goal.
     least_step : float
         Candidates lie farther than this from their node [m].
     least_frontier : float
@@ -85,20 +85,20 @@ class SrtSettings:
     perception : float
         Rays count as far as this, and at most as the laser sees [m].
     margin : float
-        Safe radii end this far before what was met, beside the robot's radius [m].
+        Safe radii end this far before an obstacle, besides the robot's radius [m].
     turn_room : float
         A laser region with a return nearer than the robot's radius, the margin and this is not safe [m]; 0
         for off.
     passing_distance : float
         On its way a robot adds a node after this distance [m].
     looks_around : bool
-        Whether a robot turns to see what lies behind it, at its first node and at nodes that are left without
+        Whether a robot turns to see the space behind it, at its first node and at nodes that are left without
         openings.
     turning_starts, turning_ends : float
-        The robot turns on the spot where its heading is off by more than the first, until it is off by less
+        The robot turns on the spot if its heading is off by more than the first, until it is off by less
         than the second [rad].
     speed : float
-        Greatest speed [m/s]; the robot's cruise speed where that is lower.
+        Greatest speed [m/s]; the robot's cruise speed if that is lower.
     turn_rate : float
         Greatest turn rate [rad/s].
     arrived : float
@@ -170,20 +170,7 @@ Settings that are given themselves come first.
 
 
 def make_srt_settings(mode: str = "default", **settings: Any) -> SrtSettings:  # noqa: ANN401
-    """Return the settings of a mode, some of them given.
-
-    Parameters
-    ----------
-    mode : str
-        ``default``, or ``thesis`` for the printed form of the thesis.
-    **settings
-        Any attribute of ``SrtSettings``.
-
-    Raises
-    ------
-    ValueError, TypeError
-        Where the mode or a setting is unknown, or a value is no good.
-    """
+    """Return the settings of a mode, some of them given."""
     modes: dict[str, dict[str, Any]] = {"default": {}, "thesis": THESIS}
     if mode not in modes:
         raise ValueError(f"mode of the tree is {mode!r}; want one of {', '.join(modes)}")

@@ -32,7 +32,7 @@ SAME_PLACE = 0.5
 
 
 class _Progress:
-    """What a robot remembers of how it got on."""
+    """Memory of a robot's progress."""
 
     def __init__(self) -> None:
         self._since, self._at = 0.0, np.zeros(3)
@@ -60,7 +60,7 @@ class _Progress:
         return self._blocks
 
     def waits_for_sight(self, senses: Senses, lidar: Lidar) -> bool:
-        """Whether the laser measures nothing; until it does, the robot stands."""
+        """Whether the laser measures nothing; the robot waits until it does."""
         if not senses.is_blind(lidar):
             self._blind_since = -math.inf
             return False
@@ -74,7 +74,7 @@ class _Progress:
         return senses.time_s - self._blind_since >= BLIND_S
 
 
-MOST_TURNS = 8
+MAX_TURNS = 8
 """A laser that would need more turns than this does not turn around."""
 
 TURN_GAIN = 2.0
@@ -103,7 +103,7 @@ class _TurnPlan:
         """Plan the turns after which the robot has seen the whole circle."""
         field = lidar.field_of_view
         turns = math.ceil(2.0 * math.pi / field - 1e-9) - 1
-        if lidar.beams == 1 or turns > MOST_TURNS:
+        if lidar.beams == 1 or turns > MAX_TURNS:
             return
         heading = float(senses.pose[2])
         self._headings = [wrapped(heading + (2.0 * math.pi - field) * (turn + 1) / turns) for turn in range(turns)]
@@ -135,25 +135,16 @@ REST: Command = (0.0, 0.0)
 class Travel:
     """The travel of one robot.
 
-    Parameters
-    ----------
-    settings : SrtSettings
-        How it drives.
-    robot : Robot
-        Its body and drive.
-    lidar : Lidar
-        Its laser.
-
     Attributes
     ----------
     legs : list of Choice
-        What is left of its way.
+        The rest of its way.
     began_at : (2,) float64
-        Where it last set out [m].
+        Its last start [m].
     is_aside : bool
         Whether it steps aside.
     limits : Limits
-        What it is driven with.
+        Its control.
     turns : TurnPlan
         Turns on the spot that are left.
     progress : Progress
@@ -197,7 +188,7 @@ class Travel:
         return senses.time_s < self._backs_until
 
     def look_around(self, senses: Senses) -> None:
-        """Plan the turns that show the whole circle, where the robot looks around."""
+        """Plan the turns that show the whole circle, if the robot looks around."""
         if self._settings.looks_around:
             self.turns.plan_circle(senses, self._lidar)
 
@@ -210,7 +201,7 @@ class Travel:
         return None
 
     def begin_leg(self, senses: Senses, memory: Memory) -> None:
-        """Begin to drive, cutting corners where the map says that there is room."""
+        """Begin to drive, cutting corners if the map says that there is room."""
         if self._drive is None:
             self._cut_corner(senses, memory)
             self._drive = Drive(self.legs[0].place)
@@ -230,7 +221,7 @@ class Travel:
     def place_aside(
         self, senses: Senses, perception: float, generator: np.random.Generator
     ) -> NDArray[np.float64] | None:
-        """Return a drawn place in sight to step aside to (2,) [m], None where there is none."""
+        """Return a drawn place in sight to step aside to (2,) [m], None if there is none."""
         return place_aside(senses, self._lidar, self._settings, self.limits, perception, generator)
 
     def _cut_corner(self, senses: Senses, memory: Memory) -> None:

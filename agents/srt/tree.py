@@ -1,6 +1,6 @@
 """The tree of a team: nodes, parents, bridges and paths.
 
-Nodes hold what was seen from them; bridges join nodes, and paths lead along parents and bridges.
+Nodes hold the regions seen from them; bridges join nodes, and paths lead along parents and bridges.
 
 Robots that share a map share the graph; its places are in the frame of the map's first cell, which is common
 to all of them. A robot that hears of others only now and then knows the nodes that reached it.
@@ -19,7 +19,7 @@ from lidarium.agents.srt.safe_region import Opening, SafeRegion
 
 @dataclass(eq=False, slots=True)
 class Node:
-    """A place where a robot has been, and what it saw.
+    """A former position of a robot, and the region seen from it.
 
     Attributes
     ----------
@@ -30,19 +30,19 @@ class Node:
     pose : (3,) float64
         x, y, theta [m, rad].
     safe : SafeRegion
-        Where a robot is safe.
+        Safe region of a robot.
     seen : SafeRegion
-        What was seen.
+        Seen region.
     openings : list of Opening
-        Where more may be seen.
+        Openings beyond which more may be seen.
     parent : int or None
         The node from which the robot came; None for a robot's first one.
     neighbours : dict of int to float
         Nodes to which a straight way leads, with its length [m]: parent, children and bridges.
     has_turned : bool
-        Whether a robot turned there to see what lay behind it.
+        Whether a robot turned there to see the space behind it.
     view : (directions,) float64
-        What was seen, as ``view_of`` gives it.
+        Seen ranges, as from ``view_of``.
     """
 
     number: int
@@ -82,12 +82,7 @@ class Tree:
     def add(self, node: Node, joins: Callable[[Node, Node], bool] | None, known: Iterable[int]) -> None:
         """Add a node below its parent, with bridges to the nodes that it ``joins``.
 
-        Bridges go to ``known`` nodes only; there are none where ``joins`` is None.
-
-        Raises
-        ------
-        ValueError
-            Where the node's number is not the next one, or its parent is unknown.
+        Bridges go to ``known`` nodes only; there are none if ``joins`` is None.
         """
         if node.number != len(self.nodes):
             raise ValueError(f"number of the node is {node.number}; want the next one, {len(self.nodes)}")

@@ -1,6 +1,6 @@
 """Assignment of goals to many robots.
 
-It weighs what the paths cost and how little of a goal the others will see anyway.
+It weighs the costs of the paths and how little of a goal the others will see anyway.
 """
 
 import numpy as np
@@ -13,14 +13,14 @@ NOBODY = -1
 def best_goal(costs: NDArray[np.float64], utility: NDArray[np.float64], cost_weight: float) -> int:
     """Return the goal of most utility less cost for one robot.
 
-    It is -1 where none is in reach.
+    It is -1 if none is in reach.
 
     Parameters
     ----------
     costs : (goals,) float64
-        Costs of the ways [m], inf where there is none.
+        Costs of the ways [m], inf if there is none.
     utility : (goals,) float64
-        What the goals are worth; -inf for those that are not to be taken.
+        Values of the goals; -inf for those that are not to be taken.
     cost_weight : float
         Utility that a metre of way costs [1/m].
     """
@@ -37,7 +37,7 @@ def assign_by_cost(costs: NDArray[np.float64]) -> NDArray[np.int64]:
     Parameters
     ----------
     costs : (robots, goals) float64
-        Costs of the ways [m], inf where there is none.
+        Costs of the ways [m], inf if there is none.
 
     Returns
     -------
@@ -61,18 +61,18 @@ def assign_by_utility(
 ) -> NDArray[np.int64]:
     """Give robots goals, best pair of robot and goal first.
 
-    The worth of what is seen from a goal that is taken falls.
+    The value of goals in view of a taken goal falls.
 
     After Burgard, Moors, Stachniss, Schneider, Coordinated multi-robot exploration, IEEE T-RO 2005.
 
     Parameters
     ----------
     costs : (robots, goals) float64
-        Costs of the ways [m], inf where there is none.
+        Costs of the ways [m], inf if there is none.
     seen : (goals, goals) float64
         Share of each goal (second index) that a robot at another (first index) sees anyway, 1 at itself.
     utility : (goals,) float64
-        What the goals are worth at first.
+        Initial values of the goals.
     cost_weight : float
         Utility that a metre of way costs [1/m].
 
@@ -87,7 +87,7 @@ def assign_by_utility(
     waiting = np.ones(len(costs), np.bool_)
     for _ in range(min(costs.shape)):
         totals = np.where(waiting[:, None], values + worth, -np.inf)
-        robot, goal = (int(place) for place in np.unravel_index(np.argmax(totals), totals.shape))
+        robot, goal = (int(position) for position in np.unravel_index(np.argmax(totals), totals.shape))
         if not np.isfinite(totals[robot, goal]):
             break
         goals[robot], waiting[robot] = goal, False

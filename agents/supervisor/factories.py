@@ -9,20 +9,7 @@ from lidarium.agents.supervisor.policy import Supervised
 
 
 def supervised(explorer: str = "nearest_frontier", **options: Any) -> Supervised:  # noqa: ANN401
-    """Return explorers under a supervisor.
-
-    Parameters
-    ----------
-    explorer : str
-        Name of the policy that each robot explores by.
-    **options
-        Those of ``SupervisorSettings``.
-
-    Raises
-    ------
-    ValueError
-        Where there is no such policy, or it goes to no goals.
-    """
+    """Return explorers under a supervisor."""
     return Supervised(make_policy(explorer), **options)
 
 
@@ -32,20 +19,7 @@ def supervised_tours(**options: Any) -> Supervised:  # noqa: ANN401
 
 
 def supervised_learned(weights: str = "", **options: Any) -> Supervised:  # noqa: ANN401
-    """Return trained explorers under a supervisor.
-
-    Parameters
-    ----------
-    weights : str
-        A file of weights; those that the package ships where empty.
-    **options
-        Those of ``SupervisorSettings``.
-
-    Raises
-    ------
-    ValueError, FileNotFoundError
-        Where the file is not there, or is none of weights for this network.
-    """
+    """Return trained explorers under a supervisor."""
     return Supervised(make_policy("learned", weights=weights), **options)
 
 

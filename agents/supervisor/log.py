@@ -9,7 +9,7 @@ from lidarium.agents.supervisor.tree import RobotInputs
 
 @dataclass(frozen=True, slots=True)
 class Decision:
-    """What the tree decided about a robot.
+    """Decision of the tree about a robot.
 
     Attributes
     ----------
@@ -20,21 +20,21 @@ class Decision:
     group : tuple of str
         The robots that it is joined with, itself included.
     inputs : RobotInputs
-        What the tree knew of it.
+        Knowledge of the tree about it.
     rival : RobotInputs or None
         The same of the robot that has its goal, or that it would meet.
     answers : tuple of (str, bool)
         The questions on the way through the tree, and their answers.
     rule : int
-        The rule that decided, 0 where none applies.
+        The rule that decided, 0 if none applies.
     order : str or None
-        The order, None where the robot goes on.
+        The order, None if the robot goes on.
     why : str
         In words.
     place : (float, float)
-        Where it was, in its own map frame [m].
+        Its position, in its own map frame [m].
     goal : (float, float) or None
-        Where it is sent, in its own map frame [m].
+        Its goal, in its own map frame [m].
     """
 
     time_s: float
@@ -50,7 +50,7 @@ class Decision:
     goal: tuple[float, float] | None = None
 
     def as_dict(self) -> dict[str, Any]:
-        """Return what JSON can hold of it."""
+        """Return it as values for JSON."""
         return {
             "event": "decision",
             "time_s": round(self.time_s, 6),
@@ -91,7 +91,7 @@ class StationEvent:
     words: str = ""
 
     def as_dict(self) -> dict[str, Any]:
-        """Return what JSON can hold of it."""
+        """Return it as values for JSON."""
         return {
             "event": self.event,
             "time_s": round(self.time_s, 6),

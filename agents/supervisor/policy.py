@@ -1,4 +1,4 @@
-"""Supervised policies, and what they are compared with.
+"""Supervised policies, and the policies that they are compared with.
 
 A supervisor directs any policy that goes to goals.
 """
@@ -40,7 +40,7 @@ LOST_S = 2.0
 
 @dataclass(slots=True)
 class _Errand:
-    """Where a robot is sent by an order, and where it was when it last had moved."""
+    """Goal of a robot by an order, and its position after its last motion."""
 
     command: Command
     order: Order
@@ -51,13 +51,7 @@ class _Errand:
 
 
 class _Errands:
-    """The errands of a team's robots, by name.
-
-    Parameters
-    ----------
-    team : Team
-        The robots.
-    """
+    """The errands of a team's robots, by name."""
 
     def __init__(self, team: Team) -> None:
         self._team = team
@@ -164,11 +158,11 @@ class _LedTeam:
         return self._team.time_s
 
     def belief(self, agent: str) -> Belief:
-        """Return what an agent's onboard software knows."""
+        """Return the state of an agent's onboard software."""
         return self._team.belief(agent)
 
     def drive_state(self, agent: str) -> DriveState:
-        """Return the state of its driving; idle where it drives for the supervisor."""
+        """Return the state of its driving; idle while it drives for the supervisor."""
         return self._team.drive_state(agent) if agent in self._exploring else DriveState.IDLE
 
     def operating_state(self, agent: str) -> OperatingState:
@@ -176,7 +170,7 @@ class _LedTeam:
         return self._team.operating_state(agent)
 
     def report(self, agent: str) -> Report | None:
-        """Return what last reached the station."""
+        """Return the last report that reached the station."""
         return self._team.report(agent)
 
     def last_order(self, agent: str) -> Order | None:
@@ -184,11 +178,11 @@ class _LedTeam:
         return self._team.last_order(agent)
 
     def send_map(self, agent: str, others: FusedMap | None) -> bool:
-        """Send it what others know."""
+        """Send it the map of the others."""
         return self._team.send_map(agent, others)
 
     def forget_walls(self, agent: str, trail: NDArray[np.float64]) -> bool:
-        """Let it forget walls where another robot drove."""
+        """Let it forget walls on another robot's trail."""
         return self._team.forget_walls(agent, trail)
 
 
@@ -197,33 +191,18 @@ class Supervised(Policy):
 
     Robots explore by that policy, the station merges their maps, and the tree redirects and stops them.
 
-    Robots that are joined are sent what the others know, so the policy explores on the merged map where it
+    Joined robots are sent the maps of the others, so the policy explores on the merged map if it
     uses the shared one.
-
-    Parameters
-    ----------
-    policy : Policy
-        What each robot explores by, of level ``waypoint`` or ``frontier``.
-    settings : SupervisorSettings or None
-        How it is led; the defaults where None.
-    **options
-        Settings by name, in place of ``settings``.
 
     Attributes
     ----------
     has_begun : bool
-        Whether there was an episode; before it there is nothing of what follows.
+        Whether there was an episode; before it none of the following exists.
     decisions, events, joins : list
-        What was decided, what happened at the station, and how the robots' frames lie as it found.
+        The decisions, the events at the station, and the robots' frames as it found them.
     tick_seconds, merge_seconds : list of float
-        Wall time of each decision by the tree, its merge and what the robots are sent included, and of each
+        Wall time of each decision by the tree, including its merge and the messages to the robots, and of each
         merge between decisions [s].
-
-    Raises
-    ------
-    ValueError
-        Where the policy decides speeds, or a setting cannot be used; at the reset, where starts are to be
-        trusted that nobody knows.
     """
 
     def __init__(self, policy: Policy, settings: SupervisorSettings | None = None, **options: Any) -> None:  # noqa: ANN401
@@ -249,7 +228,7 @@ class Supervised(Policy):
 
     @property
     def events(self) -> list[StationEvent]:
-        """What happened at the station."""
+        """The events at the station."""
         return self._supervisor.station.events
 
     @property
@@ -259,7 +238,7 @@ class Supervised(Policy):
 
     @property
     def given_up(self) -> Sequence[GivenUp]:
-        """What the robots left unexplored."""
+        """Areas left unexplored by the robots."""
         return self.policy.given_up
 
     @property
@@ -268,7 +247,7 @@ class Supervised(Policy):
         return self.policy.decided_by
 
     def report(self) -> PolicyReport:
-        """Return what was left unexplored, with all that the station did."""
+        """Return the areas left unexplored, and the record of the station."""
         if not self.has_begun:
             return PolicyReport()
         log: list[LogEntry] = sorted([*self.events, *self.decisions], key=lambda entry: entry.time_s)
@@ -288,7 +267,7 @@ class Supervised(Policy):
         return self._supervisor.station.team_maps() if self.has_begun else None
 
     def _figures(self) -> dict[str, Any]:
-        """Return how much was decided, and of what kind."""
+        """Return the number of decisions of each type."""
         orders = [decision.order for decision in self.decisions]
         rules = sorted({decision.rule for decision in self.decisions})
         return {
@@ -355,7 +334,7 @@ class Supervised(Policy):
         return actions
 
     def _supervise(self) -> dict[str, Action]:
-        """Take in reports, merge and decide by the tree where it is time.
+        """Take in reports, merge and decide by the tree if it is time.
 
         Return the robots that stop.
         """
@@ -369,7 +348,7 @@ class Supervised(Policy):
         return stops
 
     def _tick(self, now: float, is_decision: bool) -> dict[str, Action]:
-        """Do what `_supervise` does when it is time."""
+        """Do the work of `_supervise` when it is time."""
         settings, station = self.settings, self._supervisor.station
         self._collect(now)
         self._merge_due = _next(now, settings.merge_period_s)
@@ -386,7 +365,7 @@ class Supervised(Policy):
         return stops
 
     def _collect(self, now: float) -> None:
-        """Take in what has reached the station."""
+        """Take in the reports that have reached the station."""
         station = self._supervisor.station
         for agent in station.agents:
             report = self._team.report(agent)
@@ -396,11 +375,11 @@ class Supervised(Policy):
                 and report is station.reports.get(agent)
                 and math.isclose(report.time_s, now, abs_tol=1e-6)
             ):
-                places = [(entry.x, entry.y) for entry in self.given_up if entry.agent == agent]
-                self._given_up[agent] = np.array(places, np.float64).reshape(-1, 2)
+                positions = [(entry.x, entry.y) for entry in self.given_up if entry.agent == agent]
+                self._given_up[agent] = np.array(positions, np.float64).reshape(-1, 2)
 
     def _inform(self) -> None:
-        """Tell each robot what the others of its group know.
+        """Send each robot the map of the others of its group.
 
         Take it back from one that is joined no more.
 
@@ -420,7 +399,7 @@ class Supervised(Policy):
                     (self._informed.add if others else self._informed.discard)(agent)
 
     def _obey(self, command: Command, stops: dict[str, Action]) -> None:
-        """Begin what a robot is ordered to do."""
+        """Begin a robot's order."""
         agent = command.agent
         if command.kind is OrderKind.STOP:
             self._errands.cancel(agent)

@@ -1,6 +1,6 @@
 """Settings of the supervisor.
 
-They are its periods, what the thesis leaves open, and what goes beyond it.
+They are its periods, choices that the thesis leaves open, and extensions of it.
 """
 
 from dataclasses import dataclass
@@ -27,7 +27,7 @@ class SupervisorSettings:
         For how many pairs of maps a merge searches at most; the others wait for their turn. With a decision
         there is no search: it has work of its own.
     merge_resolution_m : float
-        Maps are compared in cells of this side, or of theirs where that is more [m].
+        Maps are compared in cells of this side, or of theirs if that is more [m].
     confirmation_growth_m2 : float
         Two maps are joined only when they were found twice, the second time when they know so much more [m2].
     confirmation_own_m2 : float
@@ -50,7 +50,7 @@ class SupervisorSettings:
     cost_weight : float
         Utility of a goal that a metre of way costs [1/m].
     sensor_range_m : float
-        What a robot at its goal sees, and how far around the map there may be more of it [m].
+        Range of view of a robot at its goal, and how far around the map there may be more of it [m].
     assignment : str
         Who is given goals: ``pairs`` those robots alone that the rules redirect, one after the other;
         ``hungarian`` all robots of a group at each decision, by the least sum of costs; ``utility`` likewise,
@@ -65,10 +65,10 @@ class SupervisorSettings:
     returns_home : bool
         Whether the robots drive to where they began when the work is done.
     battery_margin : float
-        A robot turns back when what its battery holds is less than this many times what the way home costs; 0
+        A robot turns back when its battery's charge is less than this many times the cost of the way home; 0
         for never.
     resumes_paused : bool
-        Whether a robot that has paused by itself, and says what it has touched or what blocks it, is ordered
+        Whether a robot that has paused by itself, and reports a contact or an obstacle, is ordered
         to go on.
     pauses_idle : bool
         Whether a robot that has no goal of its own while its teammates work is paused by an order, and
@@ -80,7 +80,7 @@ class SupervisorSettings:
     Raises
     ------
     ValueError
-        Where a setting cannot be used; it is named.
+        If a setting cannot be used; it is named.
     """
 
     period_s: Period = 10.0

@@ -27,7 +27,7 @@ from lidarium.mapping.merging.settings import MergeSettings
 
 
 class _ReceivedReports:
-    """The reports of a team: the latest of each robot, and what earlier ones say.
+    """The reports of a team: the latest of each robot, and facts from earlier ones.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ class _ReceivedReports:
     resolution : float
         Side of a cell of the robots' maps [m].
     settings : SupervisorSettings
-        What counts as enclosed.
+        Definition of enclosed.
 
     Attributes
     ----------
@@ -60,7 +60,7 @@ class _ReceivedReports:
             track.popleft()
 
     def known_m2(self, agent: str) -> float:
-        """Return how much a robot's own map knows [m2], 0 where it never reported."""
+        """Return how much a robot's own map knows [m2], 0 if it never reported."""
         report = self.latest.get(agent)
         return 0.0 if report is None else float(np.count_nonzero(report.map.levels != UNKNOWN)) * self._resolution**2
 
@@ -73,12 +73,12 @@ class _ReceivedReports:
         return gain < self._settings.enclosed_gain_m2_per_m * way
 
     def place(self, agent: str) -> tuple[float, float]:
-        """Return where a robot was last, in its map frame [m]."""
+        """Return the last position of a robot, in its map frame [m]."""
         pose = self.latest[agent].pose
         return pose.x, pose.y
 
     def trail(self, agent: str) -> NDArray[np.float64]:
-        """Return where a robot has been, in its map frame, shape (N, 2) [m]."""
+        """Return the trail of a robot in its map frame, shape (N, 2) [m]."""
         return np.array(self._trails[agent], np.float64).reshape(-1, 2)
 
     def is_used(self, agent: str) -> bool:
@@ -98,7 +98,7 @@ Pair = tuple[str, str]
 
 
 class MergeStation:
-    """What is known where all reports come together; it knows nothing else.
+    """The knowledge of the station, from reports alone.
 
     Parameters
     ----------
@@ -113,16 +113,16 @@ class MergeStation:
     merge : MergeSettings or None
         How maps are merged; by default as `lidarium merge` does.
     confirmation : ValidationSettings or None
-        What must hold when maps are joined; `TEAM_CONFIRMATION` where neither this nor ``merge`` is given.
+        Conditions for joined maps; by default `TEAM_CONFIRMATION` if ``merge`` is not given either.
 
     Attributes
     ----------
     joins : list of Join
         All transforms that were found, in their order in time.
     events : list of StationEvent
-        What happened.
+        The events.
     left_behind : list of (str, (N, 2) float64)
-        Who is to be sent where a robot drove that has failed, and that trail in its map frame [m].
+        Robots that are to be sent the trail of a failed robot, and that trail in their map frames [m].
     """
 
     def __init__(
@@ -162,7 +162,7 @@ class MergeStation:
         return self._received.latest
 
     def known_m2(self, agent: str) -> float:
-        """Return how much a robot's own map knows [m2], 0 where it never reported."""
+        """Return how much a robot's own map knows [m2], 0 if it never reported."""
         return self._received.known_m2(agent)
 
     def is_enclosed(self, agent: str) -> bool:
@@ -196,7 +196,7 @@ class MergeStation:
     def merge(self, time_s: float, may_search: bool = True) -> None:
         """Merge the maps of all robots that have not failed.
 
-        What was found is verified alone where there is no time for searches.
+        What was found is verified alone if there is no time for searches.
         """
         used = {agent: self.reports[agent] for agent in self.agents if self._received.is_used(agent)}
         if self.settings.trusts_starts:
@@ -229,7 +229,7 @@ class MergeStation:
     def lookup(self, target: str, source: str) -> Transform | None:
         """Return the transform of a robot's map frame into that of another.
 
-        None where they are not joined.
+        None if they are not joined.
         """
         if target == source:
             return Transform()
@@ -239,7 +239,7 @@ class MergeStation:
     def fused(self, agents: list[str], into: str) -> FusedMap | None:
         """Return the map of some joined robots in the frame of one of their group.
 
-        None where nobody knows anything.
+        None if nobody knows anything.
         """
         frames = {
             agent: frame
@@ -249,8 +249,8 @@ class MergeStation:
         if not frames:
             return None
         maps = [self._map_without_bodies(agent) for agent in frames]
-        places = [frame @ placed(one.origin) for one, frame in zip(maps, frames.values(), strict=True)]
-        return fuse([one.levels for one in maps], places, self.resolution)
+        positions = [frame @ placed(one.origin) for one, frame in zip(maps, frames.values(), strict=True)]
+        return fuse([one.levels for one in maps], positions, self.resolution)
 
     def team_maps(self) -> TeamMaps:
         """Return how the maps of all robots lie, with the merged map of each group."""
@@ -284,12 +284,12 @@ class MergeStation:
     def _map_without_bodies(self, agent: str) -> GrowingMap:
         """Return a robot's map without the bodies of joined robots.
 
-        What it may have drawn of them is removed.
+        Marks of them in its map are removed.
         """
         return without_bodies(self.reports[agent].map, self._teammates_trails(agent), self._radius, self.resolution)
 
     def _teammates_trails(self, agent: str) -> list[NDArray[np.float64]]:
-        """Return where those have been that a robot is joined with, in its map frame [m]."""
+        """Return the trails of the robots that a robot is joined with, in its map frame [m]."""
         teammates = {
             teammate: frame
             for teammate in self.agents
@@ -298,7 +298,7 @@ class MergeStation:
         return [frame.apply(self._received.trail(teammate)) for teammate, frame in teammates.items()]
 
     def _middle(self, pair: Pair, result: PairResult) -> tuple[float, float]:
-        """Return the middle of what two maps both know [m].
+        """Return the middle of the area known to both maps [m].
 
         It is in the second robot's map frame.
         """

@@ -1,6 +1,6 @@
 """The evaluation of the decision tree for each robot.
 
-What the station knows becomes a case, the tree decides it, and orders to go get their goals.
+The station's knowledge becomes a case, the tree decides it, and orders to go get their goals.
 """
 
 import math
@@ -31,7 +31,7 @@ from lidarium.agents.supervisor.tree import (
 from lidarium.envs.onboard.radio.messages import OperatingState, OrderKind, Target
 from lidarium.mapping.planning.footprint import Footprint
 
-LEAST_WAY_M = 1.0
+MIN_WAY_M = 1.0
 """What a metre costs a battery is estimated after a path of this length [m]."""
 
 EXPLAINED_PAUSES = frozenset({"contact", "blocked"})
@@ -40,20 +40,20 @@ EXPLAINED_PAUSES = frozenset({"contact", "blocked"})
 
 @dataclass(slots=True)
 class _Judged:
-    """A case, what the tree said of it, and the goal that was chosen.
+    """A case, the decision of the tree, and the chosen goal.
 
     Attributes
     ----------
     case : Case
-        What is known of the robot.
+        Knowledge of the robot.
     leaf : Leaf
-        Where the tree has led.
+        Decision of the tree.
     answers : tuple of (str, bool)
         The questions on the way there, with their answers.
     goal : int
         The goal that the robot is to get, `NOBODY` for none.
     target : Target or None
-        Where it is sent, in its map frame.
+        Its goal, in its map frame.
     """
 
     case: Case
@@ -64,15 +64,7 @@ class _Judged:
 
 
 class _Judge:
-    """Puts the robots of a station before the tree.
-
-    Parameters
-    ----------
-    station : MergeStation
-        What is known.
-    standing_by : set of str
-        Robots that have no goal of their own while others of their group work; the supervisor's own set.
-    """
+    """Puts the robots of a station before the tree."""
 
     def __init__(self, station: MergeStation, standing_by: AbstractSet[str]) -> None:
         self._station, self._standing_by, self._settings = station, standing_by, station.settings
@@ -84,7 +76,7 @@ class _Judge:
         return self._decide(Case(self._inputs(agent, 0.0)))
 
     def is_held(self, agent: str) -> bool:
-        """Whether a robot stands by, paused by an order."""
+        """Whether a robot is paused by an order."""
         report = self._station.reports[agent]
         return agent in self._standing_by and report.pause_cause == "order"
 
@@ -96,19 +88,7 @@ class _Judge:
         survey: Survey,
         taken: Mapping[str, int],
     ) -> _Judged:
-        """Put a robot before the tree, and choose its goal where it is to get another.
-
-        Parameters
-        ----------
-        agent : str
-            The robot.
-        group, workers : list of str
-            The robots that are joined with it, itself included, and those of them that can get goals.
-        survey : Survey
-            Their merged map.
-        taken : mapping of str to int
-            The goals that robots have by now, `NOBODY` for none.
-        """
+        """Put a robot before the tree, and choose its goal where it is to get another."""
         inputs = self._inputs(agent, survey.known_area_m2)
         if agent not in workers:
             is_explained = self._station.reports[agent].pause_cause in EXPLAINED_PAUSES
@@ -158,7 +138,7 @@ class _Judge:
     def _rival(self, agent: str, workers: list[str], survey: Survey) -> RobotInputs | None:
         """Return the nearest other robot with the same goal.
 
-        To a robot that stands by, the nearest one that has any goal.
+        The nearest robot with a goal, to one that is paused.
         """
         is_waiting = agent in self._standing_by
         teammates = [
@@ -188,13 +168,13 @@ class _Judge:
     def _is_battery_low(self, agent: str, survey: Survey) -> bool:
         """Whether the battery left would soon not bring a robot home.
 
-        The estimate uses what metres have cost the robot until now.
+        The estimate uses the robot's cost per metre until now.
         """
         report = self._station.reports[agent]
         if report.energy_left_j is None:
             return False
         full = self._full_j.setdefault(agent, report.energy_left_j)
-        if report.travelled_m < LEAST_WAY_M:
+        if report.travelled_m < MIN_WAY_M:
             return False
         metre = (full - report.energy_left_j) / report.travelled_m
         way = survey.way_home_m(agent, report.start)
@@ -207,15 +187,15 @@ class _Judge:
 
 
 def _worth(others: list[str], survey: Survey, taken: Mapping[str, int]) -> NDArray[np.float64]:
-    """Return what each goal is worth to a robot, (K,).
+    """Return the value of each goal to a robot, (K,).
 
-    It is less where others see the goal, and -inf where it is taken or none.
+    It is less if others see the goal, and -inf where it is taken or none.
     """
     worth = np.where(survey.is_goal(), 1.0, -np.inf)
     for teammate in others:
-        place = survey.places[teammate]
-        if place is not None:
-            worth = worth - survey.seen_at(place)
+        position = survey.places[teammate]
+        if position is not None:
+            worth = worth - survey.seen_at(position)
         if taken[teammate] != NOBODY:
             worth[taken[teammate]] = -np.inf
     return worth
@@ -230,7 +210,7 @@ It applies where all robots get goals at once.
 
 @dataclass(frozen=True, slots=True)
 class Command:
-    """An order to a robot, and what it leads to.
+    """An order to a robot, and its result.
 
     Attributes
     ----------
@@ -243,11 +223,11 @@ class Command:
     why : str
         In words.
     target : Target or None
-        Where to go, in its map frame.
+        Its goal, in its map frame.
     observes : (float, float) or None
         The frontier to see from there, in its map frame [m].
     is_home : bool
-        Whether it ends where it gets to.
+        Whether it ends on arrival.
     """
 
     agent: str
@@ -261,13 +241,6 @@ class Command:
 
 class Supervisor:
     """Leads the robots of a station.
-
-    Parameters
-    ----------
-    station : MergeStation
-        What it knows.
-    footprint : Footprint
-        How the robots pass over a map.
 
     Attributes
     ----------
@@ -292,12 +265,7 @@ class Supervisor:
         time_s : float
             Now [s].
         given_up : mapping of str to (N, 2) float64
-            Where robots say that they gave frontiers up, in their map frames [m].
-
-        Returns
-        -------
-        list of Command
-            The orders that follow; a robot without one goes on.
+            Reported positions of frontiers given up, in the robots' map frames [m].
         """
         commands: list[Command] = []
         grouped = self.station.groups()
@@ -331,8 +299,10 @@ class Supervisor:
         frames = {agent: frame for agent in group if (frame := station.lookup(group[0], agent)) is not None}
         if fused is None:
             return []
-        places = [frames[agent].apply(given_up[agent]) for agent in group if agent in given_up and len(given_up[agent])]
-        all_given_up = np.concatenate(places) if places else np.zeros((0, 2))
+        positions = [
+            frames[agent].apply(given_up[agent]) for agent in group if agent in given_up and len(given_up[agent])
+        ]
+        all_given_up = np.concatenate(positions) if positions else np.zeros((0, 2))
         # Who is paused keeps its target, but goes nowhere.
         reports = {
             agent: replace(report, target=None) if agent in held else report

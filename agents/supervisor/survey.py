@@ -1,6 +1,6 @@
 """A group of joined robots on their merged map.
 
-It holds the goals on offer, what each robot's path there costs, and what the tree asks.
+It holds the goals on offer, the cost of each robot's path there, and the answers to the tree's questions.
 """
 
 import math
@@ -38,11 +38,11 @@ class _Goals:
     sizes : (K,) float64
         Lengths [m].
     areas : (K,) float64
-        What is unknown around each, within the range of the laser [m2].
+        Unknown area around each, within the range of the laser [m2].
     costs : (R, K) float64
-        Cost of each robot's way to where it sees the frontier [m], inf where there is none.
+        Cost of each robot's way to where it sees the frontier [m], inf if there is none.
     stands, observed : (R, K, 2) int64
-        Where it stands then, and the frontier cell that it observes.
+        Its cell there, and the frontier cell that it observes.
     """
 
     cells: NDArray[np.int64]
@@ -63,7 +63,7 @@ def _find_goals(
     reach: float,
     range_m: float,
 ) -> _Goals:
-    """Find the goals on a map, and what the way to each costs.
+    """Find the goals on a map, and the cost of the way to each.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ def _find_goals(
     origin : (x, y)
         Its lower left corner [m].
     cells : sequence of (row, column)
-        Where the robots are.
+        Cells of the robots.
     footprint : Footprint
         How they pass over the map.
     reach : float
@@ -118,7 +118,7 @@ def _unknown_around(
 ) -> NDArray[np.float64]:
     """Return the unknown area in the square around each cell [m2].
 
-    What lies beyond the map is unknown.
+    Cells beyond the map are unknown.
     """
     half = max(round(half_side_m / resolution), 1)
     sums = np.zeros((log_odds.shape[0] + 1, log_odds.shape[1] + 1), np.int64)
@@ -138,7 +138,7 @@ _MARGIN = 1
 
 
 class Survey:
-    """What the merged map of a group offers to its robots.
+    """Goals on the merged map of a group for its robots.
 
     All is in the frame of the map, that of the group's first robot.
 
@@ -149,15 +149,15 @@ class Survey:
     frames : mapping of str to Transform
         Of each robot's map frame in that of the map.
     reports : mapping of str to Report
-        What the robots have reported.
+        The robots' reports.
     workers : sequence of str
-        The robots that can get goals; rows of what ``goals`` has for each robot.
+        The robots that can get goals; rows of the arrays of ``goals``.
     given_up : (N, 2) float64
-        Where robots have given frontiers up [m].
+        Positions of frontiers given up [m].
     footprint : Footprint
         How the robots pass over a map.
     settings : SupervisorSettings
-        What is a goal.
+        Limits of goals.
     """
 
     def __init__(
@@ -197,12 +197,12 @@ class Survey:
             for agent, target in targets.items()
         }
         """Where each robot goes [m], None where it goes nowhere."""
-        self.going = {agent: self._goal_at(place) for agent, place in self.places.items()}
+        self.going = {agent: self._goal_at(position) for agent, position in self.places.items()}
         """The goal that this is, -1 for none."""
 
     @property
     def known_area_m2(self) -> float:
-        """Area of the box around what the map knows, widened on all sides [m2].
+        """Area of the box around the known cells of the map, widened on all sides [m2].
 
         The box is wider by the laser's range on each side.
         """
@@ -210,7 +210,7 @@ class Survey:
         return float((height + 2.0 * self._settings.sensor_range_m) * (width + 2.0 * self._settings.sensor_range_m))
 
     def has_frontier(self) -> bool:
-        """Whether any of the robots can reach what is left to explore."""
+        """Whether any of the robots can reach an unexplored frontier."""
         is_left = self.goals.sizes >= self._settings.least_left_m
         return bool(np.isfinite(self.goals.costs[:, is_left]).any())
 
@@ -255,17 +255,17 @@ class Survey:
         return self._seen_from(self._inside(place))
 
     def stand(self, agent: str, goal: int) -> tuple[float, float, float]:
-        """Return where a robot stands to see a goal, and its heading [m, rad].
+        """Return the pose from which a robot sees a goal [m, rad].
 
         Both are in its own map frame.
         """
         row = self.workers.index(agent)
-        place, cell = (
+        position, cell = (
             centres_of(cells[row, goal], self.origin, self.resolution)
             for cells in (self.goals.stands, self.goals.observed)
         )
         own = self.frames[agent].inverse()
-        x, y = own.apply(place).tolist()
+        x, y = own.apply(position).tolist()
         observed = own.apply(cell)
         return x, y, math.atan2(observed[1] - y, observed[0] - x)
 
@@ -286,7 +286,7 @@ class Survey:
     def way_home_m(self, agent: str, home: Transform) -> float:
         """Return the cost of a robot's path to a pose of its own map frame [m].
 
-        It is inf where there is no path.
+        It is inf if there is no path.
         """
         at = self.frames[agent] @ home
         found = search(
@@ -325,7 +325,7 @@ class Survey:
     def _inside(self, place: tuple[float, ...]) -> Cell:
         """Return the cell of a place [m].
 
-        It is the nearest one of the map where the place lies outside.
+        It is the nearest one of the map if the place lies outside.
         """
         cell = cells_of(np.asarray(place), self.origin, self.resolution)
         rows, columns = self._map.log_odds.shape

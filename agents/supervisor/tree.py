@@ -5,15 +5,15 @@ numbers:
 
 1. A robot that has failed is left out: its map is not used, it gets no order.
 2. The maps of all others are merged, but only robots that operate get orders: one that is paused or stopped
-   may stand against something that moves, and would draw that into its map and trap itself.
+   may touch something that moves, and would draw that into its map and trap itself.
 3. Of two robots with one goal the nearer one, by the length of its path, keeps it. The other one gets another
-   goal on the merged map, or is stopped where there is none. (In the thesis's reported run the nearer robot
+   goal on the merged map, or is stopped if there is none. (In the thesis's reported run the nearer robot
    was diverted; see the tests.)
 4. A robot that knows much less of the map than the others is sent where there is more to map. One that is
-   enclosed, having driven far for little, is stopped where there is no such way.
-5. Where the merged map has no frontier left the work is done, and all stop.
+   enclosed, having driven far for little, is stopped if there is no such way.
+5. If the merged map has no frontier left the work is done, and all stop.
 
-Beyond the thesis, each only where it is switched on: 6. all robots of a group get goals at once; 7. robots
+Beyond the thesis, each only if it is switched on: 6. all robots of a group get goals at once; 7. robots
 that would meet are separated; 8. robots drive home when the work is done; 9. a robot turns back before its
 battery is too low for that; 10. a robot that has paused by itself, and knows why, is ordered to go on; 11. a
 robot without a goal of its own is paused, and ordered to resume when there is one.
@@ -28,14 +28,14 @@ from lidarium.envs.onboard.radio.messages import OperatingState, OrderKind
 
 @dataclass(frozen=True, slots=True)
 class RobotInputs:
-    """What the tree knows of a robot.
+    """Knowledge of the tree about a robot.
 
     Attributes
     ----------
     agent : str
         Its name.
     remaining_m : float
-        What is left of its path, ``d_rest`` [m].
+        Rest of its path, ``d_rest`` [m].
     state : OperatingState
         Its state, ``rob_sta``.
     map_known : float
@@ -64,7 +64,7 @@ class Case:
     rival : RobotInputs or None
         The nearest other operating robot of its group with the same goal.
     opponent : RobotInputs or None
-        The one that it is about to meet, where such robots are separated.
+        The one that it is about to meet, if such robots are separated.
     has_frontier : bool
         Whether any robot of its group can reach a frontier of the merged map.
     has_other_goal : bool
@@ -78,7 +78,7 @@ class Case:
     is_battery_low : bool
         Whether its battery would soon not bring it home.
     is_pause_explained : bool
-        Whether it has paused by itself, and says what it has touched or what blocks it.
+        Whether it has paused by itself, and reports a contact or an obstacle.
     is_held : bool
         Whether the supervisor has paused it by an order.
     """
@@ -107,9 +107,9 @@ class _Question:
 
 @dataclass(frozen=True, slots=True)
 class Leaf:
-    """What follows: by which rule, the order or None, and why.
+    """A result: its rule, the order or None, and the reason.
 
-    ``aim`` says what an order to go leads to.
+    ``aim`` is the aim of an order to go.
     """
 
     rule: int
@@ -120,7 +120,7 @@ class Leaf:
 
 @dataclass(frozen=True, slots=True)
 class Node:
-    """A question and what follows from either answer."""
+    """A question and the results of either answer."""
 
     question: _Question
     yes: "Node | Leaf"
@@ -169,7 +169,7 @@ RESUMED = Leaf(11, OrderKind.RESUME, "there is a goal for it again", OTHER)
 
 
 def idle_leaf(rule: int, why: str, settings: SupervisorSettings) -> Leaf:
-    """Return what follows for a robot without a goal of its own: it stops, or is paused."""
+    """Return the result for a robot without a goal of its own: it stops, or is paused."""
     return Leaf(rule, OrderKind.PAUSE if settings.pauses_idle else OrderKind.STOP, why)
 
 
@@ -219,13 +219,13 @@ def decide(tree: Node, case: Case) -> tuple[Leaf, list[tuple[str, bool]]]:
     Answers are names of questions with yes or no.
     """
     answers: list[tuple[str, bool]] = []
-    place: Node | Leaf = tree
-    while isinstance(place, Node):
+    position: Node | Leaf = tree
+    while isinstance(position, Node):
         # What arrays answered is no bool that JSON can hold.
-        is_so = bool(place.question.holds(case))
-        answers.append((place.question.name, is_so))
-        place = place.yes if is_so else place.no
-    return place, answers
+        is_so = bool(position.question.holds(case))
+        answers.append((position.question.name, is_so))
+        position = position.yes if is_so else position.no
+    return position, answers
 
 
 def leaves(tree: Node | Leaf) -> Iterator[Leaf]:

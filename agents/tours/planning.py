@@ -1,4 +1,4 @@
-"""What robots on one map may drive to, the tours past all of it, and the first leg of each."""
+"""The options of robots on one map, the tours past all of them, and the first leg of each."""
 
 import math
 from collections.abc import Sequence
@@ -38,11 +38,11 @@ class TourSettings:
     least_gain : float
         So are those that show less than this [m2].
     most : int
-        Tours pass so many frontiers at most: each robot in turn takes its nearest.
+        Maximum number of frontiers on tours: each robot in turn takes its nearest.
     kept_share : float
-        A robot goes on to a frontier until less than this share of what it would show is left.
+        A robot goes on to a frontier until less than this share of the area that it would show is left.
     kept : float
-        What a robot drives to is left only for tours that are shorter by this [m].
+        A robot's goal is left only for tours that are shorter by this [m].
     turn_length : float
         Length of path that a radian of turning costs at the start [m/rad].
     total, waiting : float
@@ -51,7 +51,7 @@ class TourSettings:
     around, spacing : float
         Views lie within the first of their frontiers, and the second apart [m].
     reach, depth : float
-        Unknown space counts up to the first from a view, and up to the second behind what is known [m].
+        Unknown space counts up to the first from a view, and up to the second behind known space [m].
     view_share : float
         The view with the shortest path is taken among those that show this share of the best.
     """
@@ -79,7 +79,7 @@ class TourSettings:
 
     @property
     def weights(self) -> TourWeights:
-        """What the tours of a team are weighed by."""
+        """Weights of the tours of a team."""
         return TourWeights(1.0, self.total, self.waiting)
 
 
@@ -119,7 +119,7 @@ class Leg:
     Attributes
     ----------
     cell : (row, column)
-        Where it ends.
+        Its end.
     frontier_cell : (row, column)
         The nearest cell of the frontier that is observed from there.
     cells : (n, 2) int64
@@ -139,7 +139,7 @@ class Leg:
 
 @dataclass(frozen=True, slots=True)
 class TourOptions:
-    """What robots on one map may drive to: n views of its frontiers, and what getting there takes.
+    """The options of robots on one map: n views of its frontiers, and the costs of getting there.
 
     Attributes
     ----------
@@ -148,7 +148,7 @@ class TourOptions:
     clusters : Clusters
         The frontiers that may be visited.
     grid : CoarseGrid
-        Where the bodies may stand.
+        Cells free for the bodies.
     places : (n, 2) int64
         Coarse cells (row, column) of the views, the nearest to any robot first.
     numbers : (n,) int64
@@ -156,13 +156,13 @@ class TourOptions:
     gains : (n,) float64
         Unknown area in view [m2].
     lengths : (robots, n) float64
-        Lengths of the paths; ``NO_PATH`` where there is none [m].
+        Lengths of the paths; ``NO_PATH`` if there is none [m].
     turns : (robots, n) float64
         By how much each robot turns to set out [rad].
     is_kept : (robots, n) bool
-        What each robot drives to already.
+        The present goal of each robot.
     first : (robots, n) float64
-        What setting out costs, turns and what is kept included [m].
+        Cost of setting out, including turns and the bonus of kept goals [m].
     between : (n, n) float64
         Lengths of the paths from view to view [m].
     sequence : (n + robots - 1,) int64
@@ -188,7 +188,7 @@ class TourOptions:
 
     @property
     def is_reached(self) -> NDArray[np.bool_]:
-        """What each robot has a path to, (robots, n) bool."""
+        """Whether each robot has a path to each option, (robots, n) bool."""
         return self.lengths < NO_PATH
 
 
@@ -200,7 +200,7 @@ def tour_options(
     settings: TourSettings,
     rules: ViewRules,
 ) -> TourOptions | None:
-    """Return what robots on one map may drive to, None where nothing is left for any.
+    """Return the options of robots on one map, None if nothing is left for any.
 
     Parameters
     ----------
@@ -231,9 +231,9 @@ def tour_options(
     chosen = _nearest(reached, views.gains, settings)
     if not len(chosen):
         return None
-    places = views.cells[chosen]
-    paths = _metres(lengths[:, places[:, 0], places[:, 1]], grid)
-    among, fields = distances_among(grid, places, starts)
+    positions = views.cells[chosen]
+    paths = _metres(lengths[:, positions[:, 0], positions[:, 1]], grid)
+    among, fields = distances_among(grid, positions, starts)
     between = _metres(among, grid)
     turns = np.stack(
         [_turns(robot.pose, start, fields, grid, resolution) for robot, start in zip(robots, starts, strict=True)]
@@ -243,22 +243,24 @@ def tour_options(
     first = paths + settings.turn_length * turns - kept * is_kept
     gains = views.gains[chosen]
     sequence = team_tours(first, between, gains, settings.weights)
-    return TourOptions(robots, clusters, grid, places, chosen, gains, paths, turns, is_kept, first, between, sequence)
+    return TourOptions(
+        robots, clusters, grid, positions, chosen, gains, paths, turns, is_kept, first, between, sequence
+    )
 
 
 def first_options(options: TourOptions) -> list[int | None]:
-    """Return the option at which each robot's tour begins, None where there is none that it reaches."""
+    """Return the option at which each robot's tour begins, None if there is none that it reaches."""
     firsts = _first_places(options.sequence, len(options.numbers))
     return [number if number is not None and options.is_reached[k, number] else None for k, number in enumerate(firsts)]
 
 
 def _first_places(sequence: NDArray[np.int64], count: int) -> list[int | None]:
-    """Return the number of the first place of each robot's tour, None where it has none.
+    """Return the number of the first place of each robot's tour, None if it has none.
 
     Parameters
     ----------
     sequence : (count + robots - 1,) int64
-        What ``team_tours`` returns.
+        Result of ``team_tours``.
     count : int
         Number of places.
     """
@@ -318,7 +320,7 @@ def _turns(
 
 
 def _are_kept(robot: Tourist, clusters: Clusters, chosen: NDArray[np.int64], resolution: float) -> NDArray[np.bool_]:
-    """Return which of the chosen frontiers are what a robot drives to already."""
+    """Return which of the chosen frontiers a robot drives to already."""
     if robot.kept_cell is None:
         return np.zeros(len(chosen), np.bool_)
     at, reach = np.asarray(robot.kept_cell), SAME / resolution
@@ -326,20 +328,10 @@ def _are_kept(robot: Tourist, clusters: Clusters, chosen: NDArray[np.int64], res
 
 
 def leg_to(option: int, options: TourOptions, navigation: NavigationMap, rules: ViewRules) -> Leg:
-    """Return the leg that ends at an option.
-
-    Parameters
-    ----------
-    option : int
-        Its number, 0 to n - 1.
-    options : TourOptions
-        All of them.
-    navigation, rules
-        As in ``tour_options``.
-    """
-    log_odds, place = navigation.log_odds, options.places[option]
+    """Return the leg that ends at an option."""
+    log_odds, position = navigation.log_odds, options.places[option]
     cells = options.cells_of(option)
-    cell = place_in(options.grid, log_odds, navigation.clearance, (int(place[0]), int(place[1])))
+    cell = place_in(options.grid, log_odds, navigation.clearance, (int(position[0]), int(position[1])))
     nearest = cells[int(np.argmin(np.hypot(*(cells - np.asarray(cell)).T)))]
     gain, direction = gain_at(log_odds, navigation.resolution, cell, rules)
     return Leg(cell, (int(nearest[0]), int(nearest[1])), cells, gain, direction)

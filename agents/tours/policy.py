@@ -2,7 +2,7 @@
 
 Each frontier is observed from where much of what is unknown is in view, not from beside the corner behind
 which it hides. All frontiers are assigned and ordered at once, as tours of the team, planned again when a
-robot has seen what it drove to. Tours are short, the longest one most of all, and show much early. When
+robot has seen its goal. Tours are short, the longest one most of all, and show much early. When
 nothing of a size is left, robots go to the nearest frontiers, as near as they can come.
 
 References
@@ -52,20 +52,8 @@ ON_THE_SPOT = 0.2
 class TourFrontier(FrontierExplorer):
     """Explorers that share out all frontiers as tours.
 
-    Robots on one map are planned for together; where the radio is limited, each plans on its own map for
+    Robots on one map are planned for together; if the radio is limited, each plans on its own map for
     itself and for the teammates that it has heard of.
-
-    Parameters
-    ----------
-    shares_map : bool
-        Whether robots explore on the team's map.
-    **settings
-        Any attribute of ``TourSettings``.
-
-    Raises
-    ------
-    ValueError
-        Where there is no such setting, or it cannot have such a value.
     """
 
     decision_period_s = 0.5
@@ -95,7 +83,7 @@ class TourFrontier(FrontierExplorer):
         return self._decided_by
 
     def still_stands(self, navigation: NavigationMap, choice: Choice) -> bool:
-        """Whether much is left to see from where a choice leads."""
+        """Whether much is left to see from the end of a choice."""
         leg = self._legs.get(choice)
         if leg is None:
             return super().still_stands(navigation, choice)
@@ -116,7 +104,7 @@ class TourFrontier(FrontierExplorer):
         return chosen
 
     def _share_out(self, agents: list[str]) -> dict[str, Choice | None]:
-        """Return what each robot on one map drives to."""
+        """Return the goal of each robot on one map."""
         navigation = self.navigation(agents[0])
         least = max(math.ceil(self.settings.minimum_size / navigation.resolution - 1e-9), 1)
         clusters = self._without_vain(navigation, least)
@@ -132,15 +120,7 @@ class TourFrontier(FrontierExplorer):
         return {agent: self.current(agent) or self._nearest(agent) for agent in agents}
 
     def pick(self, agents: list[str], options: TourOptions) -> list[int | None]:
-        """Return which option each robot on one map drives to: the first of its tour.
-
-        Parameters
-        ----------
-        agents : list of str
-            The robots; they are the first ones of the options.
-        options : TourOptions
-            What they may drive to.
-        """
+        """Return which option each robot on one map drives to: the first of its tour."""
         return first_options(options)[: len(agents)]
 
     def _begun(self, agent: str, leg: Leg | None) -> Choice | None:
@@ -171,7 +151,7 @@ class TourFrontier(FrontierExplorer):
         ]
 
     def _nearest(self, agent: str) -> Choice | None:
-        """Return the nearest frontier of any size, to be observed from beside it."""
+        """Return the nearest frontier of any size, to be observed from next to it."""
         navigation, start = self.navigation(agent), self.start_cell(agent)
         if not len(navigation.frontiers):
             return None
@@ -196,14 +176,14 @@ class TourFrontier(FrontierExplorer):
             self._decided_by[self._sent_by[agent]] += 1
 
     def _without_vain(self, navigation: NavigationMap, least: int) -> Clusters:
-        """Return the frontiers of at least so many cells that were not observed in vain."""
+        """Return the frontiers of at least a number of cells that were not observed in vain."""
         clusters, vain = navigation.frontiers.clusters(minimum_cells=least), self._in_vain.get(id(navigation))
         return clusters if vain is None else clusters.without(vain, least)
 
     def _give_up_around(self, agent: str, choice: Choice, reason: str) -> None:
-        """Drop what a leg led to from the tours.
+        """Drop the end of a leg from the tours.
 
-        What was gone to by itself is given up for good.
+        Frontiers that were goals by themselves are given up for good.
         """
         leg = self._legs.get(choice)
         if leg is None:
@@ -219,7 +199,7 @@ class TourFrontier(FrontierExplorer):
         vain[cells[:, 0], cells[:, 1]] = True
 
     def _heading(self, agent: str, choice: Choice) -> float:
-        """Return the heading at which a robot sees what it came for.
+        """Return the heading at which a robot sees its goal.
 
         Of these it is the one nearest to the heading of arrival.
         """
@@ -227,8 +207,8 @@ class TourFrontier(FrontierExplorer):
         if leg is None:
             return super()._heading(agent, choice)
         belief = self.team.belief(agent)
-        place = centres_of(np.asarray(choice.cell), belief.map_origin, self.navigation(agent).resolution)
-        run, rise = place - belief.pose[:2]
+        position = centres_of(np.asarray(choice.cell), belief.map_origin, self.navigation(agent).resolution)
+        run, rise = position - belief.pose[:2]
         arrival = math.atan2(rise, run) if math.hypot(run, rise) > ON_THE_SPOT else float(belief.pose[2])
         room = max(0.5 * belief.lidar.field_of_view - SIGHT_MARGIN, 0.0)
         gap = wrapped(leg.direction - arrival)

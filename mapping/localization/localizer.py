@@ -1,4 +1,4 @@
-"""What a localizer is: it turns odometry and scans into a believed pose.
+"""The interface of localizers, which turn odometry and scans into a believed pose.
 
 A localizer works on arrays alone, so the same one runs inside a simulated robot and on recorded data. Its map
 frame is the frame of the pose that it is reset to.
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True, slots=True)
 class Sensing:
-    """What a robot senses at a time.
+    """Readings of a robot at one time.
 
     Attributes
     ----------
@@ -51,14 +51,14 @@ class KeyScans:
 
 
 class Localizer(Protocol):
-    """Tells where a robot is, from what it senses."""
+    """Estimates the pose of a robot from its sensors."""
 
     def reset(self, pose: NDArray[np.float64], seed: int) -> None:
         """Begin again at x, y, theta (3,) [m, rad]; whatever is drawn comes from ``seed``."""
         ...
 
     def localize(self, sensing: Sensing) -> NDArray[np.float64]:
-        """Take in what was sensed, later than all before.
+        """Take in sensor readings, later than all before.
 
         Return x, y, theta of the robot, shape (3,) [m, rad].
         """

@@ -67,7 +67,7 @@ def compounded(
     Parameters
     ----------
     pose, covariance : (3,) and (3, 3) float64
-        Where the motion began, and how well that is known.
+        Pose at the start of the motion, and its covariance.
     motion, growth : (3,) and (3, 3) float64
         The motion in the frame of the pose, and how well it is known in that frame.
     """

@@ -8,7 +8,7 @@ from lidarium.registry import Registry
 
 
 class LocalizerClass(Protocol):
-    """What is registered: a class of localizers.
+    """Type of the entries: a class of localizers.
 
     Attributes
     ----------
@@ -55,12 +55,12 @@ def make_localizer(name: str, geometry: ScanGeometry, settings: Any = None) -> L
     geometry : ScanGeometry
         The laser.
     settings : object or None
-        Its own settings, of the class ``Settings`` of the localizer; its defaults where None.
+        Its own settings, of the class ``Settings`` of the localizer; its defaults if None.
 
     Raises
     ------
     ValueError
-        Where the name is unknown.
+        If the name is unknown.
     """
     localizer = LOCALIZERS[name]
     return localizer(localizer.Settings() if settings is None else settings, geometry)

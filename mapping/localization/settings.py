@@ -39,14 +39,14 @@ class OdometryUncertainty:
     distance_floor, turn_floor : float
         Of any motion at all [m, rad].
     distance_noise, turn_noise, turn_noise_of_distance : float
-        What is different each time rather than the same, so that no one can learn it: of a distance from its
+        Errors that differ each time, so that they cannot be learned: of a distance from its
         root, of a turn from its root, and of a turn from the root of the distance [m^(1/2), rad^(1/2),
         rad/m^(1/2)].
     fading : float
         Share of what it has learned of its wheels that a robot forgets in each metre or radian: tyres lose
         air, and floors differ.
     most_deviations : float
-        By at most so many of the standard deviations above a robot corrects its odometry.
+        Maximum correction of odometry, in the standard deviations above.
     """
 
     distance_share: Positive = 0.1
@@ -93,33 +93,33 @@ class MatchingSettings:
     beam_interval_s : float
         Time between neighbouring beams; 0 for a scan taken at once [s].
     range_m : float
-        Longest range that counts; a return beyond it says that the way there is free [m].
+        Longest range that counts; beams with a return beyond it are free up to it [m].
     spacing_m : float
         Returns that are nearer to each other than this count as one [m].
     points : int
-        At most so many returns of a scan are matched.
+        Maximum number of matched returns of a scan.
     least_points : int
-        With fewer returns than this (or an eighth of the beams, if that is less) a scan says nothing of the
+        With fewer returns than this (or an eighth of the beams, if that is less) a scan does not measure the
         pose: they fit in many places.
     search_m, search_angle : float
-        What the search around odometry reaches beyond its standard deviation [m, rad].
+        Reach of the search around odometry beyond its standard deviation [m, rad].
     search_deviations : float
         How many standard deviations of odometry the search reaches.
     blind_m, blind_angle : float
-        What the search reaches where there is no odometry, or odometry leads nowhere [m, rad].
+        Reach of the search if there is no odometry, or odometry leads nowhere [m, rad].
     wide_share : float
-        A scan of fewer returns, as a share of the beams, is sought where odometry says it is and not beyond:
+        A scan of fewer returns, as a share of the beams, is sought at the pose by odometry and not beyond:
         it fits in many places.
     blind_overlap : float
-        Share of the returns near what the local map has observed below which a match does not count where
+        Share of the returns near observed cells of the local map below which a match does not count if
         odometry led nowhere.
     evaluations : int
-        At most so many placements, and blocks of them, are examined in such a search.
+        Maximum number of placements, and blocks of them, examined in such a search.
     explained_share : float
-        Agreement of all returns, as a share of what matches have had of late, below which the search goes in
+        Agreement of all returns, as a share of that of recent matches, below which the search goes in
         all directions, and a match is doubtful.
     lost_evaluations : int
-        The same of a search in all directions, where odometry explains too little of a scan.
+        The same of a search in all directions, if odometry explains too little of a scan.
     ambiguity : float
         A second place that agrees as well as this share of the best refutes what such a search finds.
     apart_m, apart_angle : float
@@ -133,24 +133,24 @@ class MatchingSettings:
         Returns of a surface so near to one give its direction there, across which the return is moved; 0
         for the nearest two [m].
     unseen : float
-        Square of the disagreement with which a return counts that lies in what the local map has not
+        Squared disagreement of a return that lies in cells that the local map has not
         observed.
     least_score, least_overlap : float
-        Agreement, and share of the returns near what the local map has observed, below which a match does not
+        Agreement, and share of the returns near observed cells of the local map, below which a match does not
         count.
     least_share : float
-        The same for agreement as a share of what matches have had of late.
+        The same for agreement as a share of that of recent matches.
     most_contradiction : float
         Share of the returns in free space of the local map above which a match does not count.
     convincing_share : float
-        Agreement, as a share of what matches have had of late, below which the search goes farther than
+        Agreement, as a share of that of recent matches, below which the search goes farther than
         odometry says.
     better_by : float
         By how much more a match that is found there has to agree.
     wide_after : int
-        After so many scans in a row that do not match, the search goes as far as where there is no odometry.
+        Number of scans in a row without a match after which the search goes as far as without odometry.
     lost_after : int
-        After so many scans in a row that do not match, a new local map is begun.
+        Number of scans in a row without a match after which a new local map is begun.
     lost_m, lost_angle : float
         Standard deviation of the motion into such a new local map [m, rad].
     """
@@ -216,7 +216,7 @@ class SubmapSettings:
     path_m : float
         Way driven, turns counted with a metre a radian, after which a local map is finished [m].
     least_scans : int
-        A local map holds at least so many scans.
+        Minimum number of scans of a local map.
     """
 
     resolution: Annotated[float, within(1e-3, 10.0)] = 0.035
@@ -238,23 +238,23 @@ class ClosureSettings:
     delay_s : float
         Time after which a closure acts [s].
     candidates : int
-        At most so many finished local maps are tried with a scan.
+        Maximum number of finished local maps that are tried with a scan.
     path_m : float
         Way driven since a local map was finished before it is tried [m].
     near_m : float
-        A local map is tried where one of its scans was taken as near as this, besides the uncertainty [m].
+        A local map is tried if one of its scans was taken as near as this, besides the uncertainty [m].
     search_m, search_angle : float
-        What the search reaches at least [m, rad].
+        Minimum reach of the search [m, rad].
     most_m, most_angle : float
-        What the search reaches at most [m, rad].
+        Maximum reach of the search [m, rad].
     deviations : float
         How many standard deviations of the pose the search reaches.
     evaluations : int
-        At most so many placements are examined in a search; one that is not over by then found nothing.
+        Maximum number of placements examined in a search; one that is not over by then found nothing.
     least_score, least_overlap : float
-        Agreement of a closure, and share of the returns near what the local map has observed.
+        Agreement of a closure, and share of the returns near observed cells of the local map.
     least_share : float
-        Agreement of a closure as a share of what matches with growing local maps have had of late.
+        Agreement of a closure as a share of that of recent matches with growing local maps.
     most_contradiction : float
         Share of returns that may lie in free space of the local map.
     as_good : float
@@ -334,7 +334,7 @@ class GraphSettings:
     waiting : int
         As many closures that wait are enough.
     iterations : int
-        At most so many steps of Gauss and Newton.
+        Maximum number of Gauss-Newton steps.
     """
 
     start_path_m: Positive = 7.0
@@ -386,10 +386,10 @@ class CompassSettings:
         check_settings(self, type(self).__name__)
 
 
-MOST_REACH_M = 200.0
+MAX_REACH_M = 200.0
 """No laser of a local map reaches farther [m]."""
 
-MOST_SUBMAP_CELLS = 8192
+MAX_SUBMAP_CELLS = 8192
 """Most cells of a local map to each side."""
 
 
@@ -400,7 +400,7 @@ class SlamSettings:
     Attributes
     ----------
     uses_odometry : bool
-        False where there is none: motion is then predicted to go on as before.
+        False if there is none: motion is then predicted to go on as before.
     uses_walls : bool
         Whether the directions of walls keep headings from drifting.
     odometry, matching, submaps, closures, graph, compass
@@ -418,10 +418,10 @@ class SlamSettings:
 
     def __post_init__(self) -> None:
         check_settings(self, type(self).__name__)
-        reach = min(self.matching.range_m, MOST_REACH_M) + 2.0 * self.submaps.path_m
-        if reach > MOST_SUBMAP_CELLS * self.submaps.resolution:
+        reach = min(self.matching.range_m, MAX_REACH_M) + 2.0 * self.submaps.path_m
+        if reach > MAX_SUBMAP_CELLS * self.submaps.resolution:
             raise ValueError(
                 f"a local map of {reach:g} m (matching.range_m and twice submaps.path_m) in cells of "
-                f"{self.submaps.resolution:g} m is too large; want at most {MOST_SUBMAP_CELLS:,} cells to "
+                f"{self.submaps.resolution:g} m is too large; want at most {MAX_SUBMAP_CELLS:,} cells to "
                 "each side: a coarser submaps.resolution or a shorter submaps.path_m"
             )

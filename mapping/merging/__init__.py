@@ -7,7 +7,7 @@ metres; `Transform` named ``a_from_b`` maps points of map b into map a.
 References
 ----------
 The corner detector, its polar descriptor and the disc test follow a master thesis on map merging for teams of
-robots; where its printed rules are kept beside ours, ``mode="thesis"`` chooses them. Corner maps aligned by
+robots; if its printed rules are kept beside ours, ``mode="thesis"`` chooses them. Corner maps aligned by
 polar descriptors: Blanco, Gonzalez-Jimenez, Fernandez-Madrigal, "A robust, multi-hypothesis approach to
 matching occupancy grid maps", Robotica 31, 2013. Agreement of overlaid maps as acceptance: Birk, Carpin,
 "Merging occupancy grid maps from multiple robots", Proc. IEEE 94, 2006.

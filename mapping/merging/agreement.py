@@ -1,9 +1,12 @@
 """Whether two overlaid maps show one place.
 
-The default test counts what both maps know: walls that lie on walls, and walls of one that stand where the
-other has observed and found nothing. A transform is refused where too little agrees, where enough
+The default test counts cells known to both maps: walls that lie on walls, and walls of one at cells where the
+other has observed and found nothing. A transform is refused where too little agrees, if enough
 contradicts, or where another transform explains the maps nearly as well. The disc test of the thesis compares
 cells around the inliers only, unknown ones included.
+
+Distinct walls are counted, too: two corners of one corridor agree over tens of metres of wall, and yet in
+four walls alone. Two maps of one room agree in as many walls as it has.
 """
 
 import math
@@ -30,7 +33,7 @@ def disc_agreement(
 
     The discs are around points [m of map b].
 
-    Unknown is a state as others are; what lies outside of map a is unknown. A cell in several discs counts
+    Unknown is a state as others are; cells outside of map a are unknown. A cell in several discs counts
     once.
     """
     if len(points) == 0:
@@ -47,7 +50,7 @@ def _pose_numbers(transform: Transform) -> tuple[float, float, float]:
 
 
 class WallField(NamedTuple):
-    """What walls of another map are compared with; see ``DescribedMap``.
+    """Arrays that walls of another map are compared with; see ``DescribedMap``.
 
     Attributes
     ----------
@@ -107,7 +110,7 @@ def count_walls(
 def _count_overlap(a: Array, b: Array, side: float, pose: tuple[float, float, float], found: Array) -> None:
     """Count the cells known in both maps, and find their centroid in b [m].
 
-    Every so many-th cell of every so many-th row is examined.
+    Step between examined cells, along rows and columns.
     """
     rows, columns = a.shape
     cosine, sine = math.cos(pose[2]), math.sin(pose[2])
@@ -172,7 +175,7 @@ class ValidationSettings:
     test : str
         ``walls``: over all that both maps know; ``discs``: cells around the inliers, of the thesis.
     hit_distance_m : float
-        A wall agrees where the other map has one within this distance [m], or within a cell and a half.
+        A wall agrees if the other map has one within this distance [m], or within a cell and a half.
     miss_distance_m : float
         A wall contradicts where it stands in the open of the other map, farther than this from any wall [m].
     least_overlap_m2 : float
@@ -197,12 +200,12 @@ class ValidationSettings:
     most_contradiction_m : float
         Length of contradicting walls that is excused [m].
     plenty_of_overlap_m2, plenty_of_wall_m, contradiction_share : float
-        Where both know so much [m2], of the walls beyond this length [m] this share may contradict too: maps
+        If both know this area [m2], this share of the walls beyond this length [m] may contradict too: maps
         of whole buildings drift.
     rival_distance_m, rival_angle : float
         A transform is another one where it differs by more than this [m, rad].
     rival_share : float
-        A rival that nothing contradicts makes the best transform ambiguous where the walls that agree under
+        A rival that nothing contradicts makes the best transform ambiguous if the walls that agree under
         it are longer than this share of those under the best.
     rival_lead : float
         A rival that is refused still speaks against the best transform where so many times more wall speaks
@@ -243,7 +246,7 @@ class ValidationSettings:
 
 @dataclass(frozen=True, slots=True)
 class Agreement:
-    """What two overlaid maps say of the transform.
+    """Evidence of two overlaid maps for and against the transform.
 
     Attributes
     ----------
@@ -254,7 +257,7 @@ class Agreement:
     agreeing_m : float
         Length of walls that lie on walls, mean of both maps [m].
     wall_m : float
-        Length of walls within what the other map knows, mean of both maps [m].
+        Length of walls in known cells of the other map, mean of both maps [m].
     across_m : float
         Length of walls that hold the maps in the direction in which they are held least: 0 for a straight
         wall, whatever its length [m].
@@ -287,22 +290,7 @@ class Agreement:
 
 
 def compare(a: DescribedMap, b: DescribedMap, a_from_b: Transform, settings: ValidationSettings) -> Agreement:
-    """Compare map b with map a under a transform.
-
-    Parameters
-    ----------
-    a, b : DescribedMap
-        Maps of one resolution.
-    a_from_b : Transform
-        Maps points of b into a.
-    settings : ValidationSettings
-        Which distances agree and contradict.
-
-    Returns
-    -------
-    Agreement
-        What agrees and what does not, whatever map is called a.
-    """
+    """Compare map b with map a under a transform."""
     side = a.resolution
     hit, miss = max(settings.hit_distance_m, 1.5 * side), max(settings.miss_distance_m, 2.5 * side)
     b_from_a = a_from_b.inverse()
@@ -345,7 +333,7 @@ def agreement_of(
 
 
 def why_refused(agreement: Agreement, settings: ValidationSettings) -> str | None:
-    """Return why a transform is refused, or None where there is no objection.
+    """Return why a transform is refused, or None if there is no objection.
 
     Rivals are not considered here.
     """
@@ -401,7 +389,7 @@ def _excused(agreement: Agreement, settings: ValidationSettings) -> float:
 DIRECTIONS = 16
 """Directions in which walls face."""
 
-APART_M, LEAST_M = 0.12, 0.3
+APART_M, MIN_M = 0.12, 0.3
 """Gap between two walls that face one direction, and least length of a wall that agrees [m]."""
 
 
@@ -432,7 +420,7 @@ def _distinct_walls(a: DescribedMap, b: DescribedMap, a_from_b: Transform, hit_d
         chosen = walls[facing == direction]
         distances = np.sort(chosen @ np.array([math.cos(angle), math.sin(angle)]))
         lengths = np.diff(np.flatnonzero(np.diff(distances) > APART_M), prepend=-1, append=len(distances) - 1)
-        count += int(np.count_nonzero(lengths * b.resolution >= LEAST_M - 1e-9))
+        count += int(np.count_nonzero(lengths * b.resolution >= MIN_M - 1e-9))
     return count
 
 
@@ -459,12 +447,12 @@ MANY_WALLS, EXCUSED_M = 12, 0.1
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Confirmation:
-    """What convinces whoever acts on a merge.
+    """Conditions for acting on a merge.
 
     Attributes
     ----------
     validation : ValidationSettings or None
-        What must hold of the agreement; nothing more than for every pair where None.
+        Conditions on the agreement; by default (None) those for every pair.
     own_m2 : float
         Each map knows so much that the other one does not [m2], or both know `PLENTY_M2`, or `MANY_WALLS`
         agree: of what a map knows beyond the overlap nothing has contradicted, though in rooms that merely
@@ -493,11 +481,11 @@ class Confirmation:
         maps : (DescribedMap, DescribedMap)
             Maps a and b.
         known_m2 : float
-            What the one knows that knows less [m2].
+            Known area of the smaller one [m2].
         a_from_b : Transform or None
             How b lies in a.
         agreement : Agreement
-            What they say of that.
+            Their evidence for that.
         """
         if a_from_b is None:
             return False

@@ -33,7 +33,7 @@ class AlignmentSettings:
         in cells from the corner of the map, differ by less than 8 % each (as it was printed: far from that
         corner a tolerance of half a metre, near it none).
     tolerance_m : float
-        Distance at which corners come together beside the match that proposes the transform [m].
+        Distance at which corners besides the match that proposes the transform coincide [m].
     angle_uncertainty : float
         Error of the proposed rotation [rad]; the tolerance grows with the distance by its tangent, and
         rotations of inliers differ by at most twice as much.

@@ -1,4 +1,4 @@
-"""The candidates for the transform that joins two maps, and what the maps say of each."""
+"""The candidates for the transform that joins two maps, and the evidence for each."""
 
 import math
 from dataclasses import dataclass, replace
@@ -32,7 +32,7 @@ _QUARTERS = np.arange(4) * (math.pi / 2.0)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Judged:
-    """A refined candidate and what the maps say of it.
+    """A refined candidate and its evidence.
 
     Attributes
     ----------
@@ -41,7 +41,7 @@ class Judged:
     agreement : Agreement
         How the maps agree under it.
     refusal : str or None
-        Why they are refused, None where they are not.
+        Why they are refused, None if they are not.
     """
 
     candidate: Candidate
@@ -117,20 +117,7 @@ def correlated(
 
 
 def region_candidates(a: DescribedMap, b: DescribedMap, settings: MergeSettings) -> list[Judged]:
-    """Judge the motions of regions and doors for which most walls speak.
-
-    Parameters
-    ----------
-    a, b : DescribedMap
-        Maps of one resolution with walls, described with their regions.
-    settings : MergeSettings
-        How.
-
-    Raises
-    ------
-    ValueError
-        Where a map was described without its regions.
-    """
+    """Judge the motions of regions and doors for which most walls speak."""
     if a.regions is None or b.regions is None:
         raise ValueError("a map is described without its regions; want both described by these settings")
     chosen, alignment = settings.regions, settings.alignment
@@ -158,7 +145,7 @@ def near(a: DescribedMap, b: DescribedMap, guess: Transform, settings: MergeSett
 
 
 def beside(a: DescribedMap, b: DescribedMap, judged: list[Judged], settings: MergeSettings) -> list[Judged]:
-    """Judge transforms beside the best refused ones, by a thin wall's thickness.
+    """Judge transforms near the best refused ones, a thin wall's thickness away.
 
     The refused ones may have aligned the two sides of a thin wall with each other.
     """
@@ -173,7 +160,7 @@ def beside(a: DescribedMap, b: DescribedMap, judged: list[Judged], settings: Mer
 
 
 def judge(a: DescribedMap, b: DescribedMap, candidate: Candidate, settings: MergeSettings) -> Judged:
-    """Return a candidate with what the maps say of it."""
+    """Return a candidate with its evidence."""
     agreement = compare(a, b, candidate.a_from_b, settings.validation)
     return Judged(candidate, agreement, why_refused(agreement, settings.validation))
 

@@ -25,7 +25,7 @@ from lidarium.mapping.kernels.compilation import Array, kernel
 def _orientation_table(rule: str = "table", neighbours: tuple[int, ...] = (4, 5, 6)) -> NDArray[np.uint8]:
     """Return the opening angle of each of the 256 codes plus one, shape (256,).
 
-    Angles are in units of ``STEP``; 0 where the code is no corner.
+    Angles are in units of ``STEP``; 0 if the code is no corner.
     """
     table = np.zeros(256, np.uint8)
     for code in range(256):
@@ -39,7 +39,7 @@ def _orientation_table(rule: str = "table", neighbours: tuple[int, ...] = (4, 5,
 def _opening(code: int) -> int | None:
     """Return the direction in which a code opens [STEP], None for no corner.
 
-    None where its free cells are not the single run that a corner has.
+    None if its free cells are not the single run that a corner has.
     """
     free = [i for i in range(8) if not code >> i & 1]
     if len(free) not in (1, 2, 3, 4):
@@ -107,9 +107,9 @@ class CornerSettings:
     separation_m : float
         Of corners nearer than this only the best is kept: 5 neighbours before 4, 6 and 7 [m]; 0 keeps all.
     limit : int
-        At most so many corners are kept, the best and among equals the most evenly spread; 0 keeps all.
+        Maximum number of corners, the best and among equals the most evenly spread; 0 keeps all.
     free_above, occupied_below : int
-        Greys of free and of occupied cells, exclusive; what lies between is unknown.
+        Greys of free and of occupied cells, exclusive; greys between are unknown.
     """
 
     neighbours: tuple[int, ...] = (4, 5, 6)
@@ -172,12 +172,6 @@ def detect_corners(levels: NDArray[np.uint8], resolution: float, settings: Corne
         Side of a cell [m].
     settings : CornerSettings or None
         Which neighbourhoods are corners.
-
-    Returns
-    -------
-    Corners
-        In order of rows and then columns. Cells at the border of the map have no eight neighbours and are
-        none.
     """
     settings = settings or CornerSettings()
     rows, columns = levels.shape
@@ -268,11 +262,11 @@ def _find_corners(words: Array, rows: int, columns: int, table: Array, found: Ar
                 _occupied_around(words, row, word),
                 _occupied_around(words, row + 1, word),
             )
-            for place in range(_WORD):
-                column = word * _WORD + place
-                if not is_free >> place & 1 or column == _WORD or column >= columns + _WORD - 1:
+            for position in range(_WORD):
+                column = word * _WORD + position
+                if not is_free >> position & 1 or column == _WORD or column >= columns + _WORD - 1:
                     continue
-                under, beside, over = below >> place & 7, here >> place & 7, above >> place & 7
+                under, beside, over = below >> position & 7, here >> position & 7, above >> position & 7
                 code = (
                     beside >> 2
                     | (over >> 2) << 1
@@ -318,7 +312,7 @@ def _keep_apart(points: Array, squared: float, order: Array, is_kept: Array) -> 
 
 
 def _limited(corners: Corners, limit: int) -> Corners:
-    """Return at most so many corners, by their rank.
+    """Return at most a number of corners, by their rank.
 
     From the last rank, which fits only in part, evenly spaced corners are kept.
     """

@@ -151,7 +151,7 @@ def _drawn(walls: NDArray[np.float64], weight: float, shape: tuple[int, ...]) ->
 
 
 def _clear(free: NDArray[np.float32], walls: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Return where space is free and no wall in the same cell or beside it."""
+    """Return the free cells without a wall in the same cell or next to it."""
     beside = cv2.dilate(walls, np.ones((3, 3), np.uint8))
     return np.asarray(np.where((free > 0.9) & (beside == 0.0), 1.0, 0.0), np.float32)
 

@@ -1,6 +1,15 @@
 """Which corners of one map may be which of another: four methods behind one call.
 
 Descriptors are compared under all rotations at once: a correlation along the angle is a product of spectra.
+
+Corners are alike by their descriptors, or by the corners around them: distances, triangles and clusters. A
+rigid motion keeps the latter, so they need no descriptors.
+
+References
+----------
+Methods a and b of the thesis on merging; clusters by radius replace its equations 3-10 and 3-11, of which only
+the idea is known: a corner's cluster are the corners within a radius, and two clusters are one if their
+distances are.
 """
 
 import math
@@ -16,7 +25,7 @@ from lidarium.mapping.geometry.rigid import wrapped
 from lidarium.mapping.merging.corners import Corners
 from lidarium.mapping.merging.descriptors import Descriptors
 
-LEAST_CLUSTER = 2
+MIN_CLUSTER = 2
 """Corners beside its own that a cluster needs."""
 
 
@@ -34,7 +43,7 @@ def _like_clusters(
 ) -> NDArray[np.float64]:
     """Return the share of common distances of each pair of corners within a radius, (n, m).
 
-    The share is that of the larger cluster; 0 where either has fewer than ``LEAST_CLUSTER`` corners beside
+    The share is that of the larger cluster; 0 if either has fewer than ``MIN_CLUSTER`` corners beside
     its own.
     """
     left, right = (_within(_distances(points), radius_m) for points in (first, second))
@@ -42,13 +51,13 @@ def _like_clusters(
     sizes = [np.count_nonzero(distances > 0.0, axis=1) for distances in (left, right)]
     larger = np.maximum(sizes[0][:, None], sizes[1][None])
     smaller = np.minimum(sizes[0][:, None], sizes[1][None])
-    return np.where(smaller >= LEAST_CLUSTER, common / np.maximum(larger, 1), 0.0)
+    return np.where(smaller >= MIN_CLUSTER, common / np.maximum(larger, 1), 0.0)
 
 
 def _like_triangles(first: NDArray[np.float64], second: NDArray[np.float64], tolerance: float) -> NDArray[np.float64]:
     """Return the similarity of the triangles of each pair of corners, (n, m).
 
-    Triangles are with the two nearest neighbours; 0 where they are not alike.
+    Triangles are with the two nearest neighbours; 0 if they are not alike.
     """
     if len(first) < 3 or len(second) < 3:
         return np.zeros((len(first), len(second)))
@@ -67,9 +76,11 @@ def _common(left: NDArray[np.float64], right: NDArray[np.float64], tolerance: fl
             continue
         # A length has a like one if the first not shorter than its lower bound is not longer than its upper
         # bound.
-        place = np.minimum(np.searchsorted(lengths, left * (1.0 - tolerance)), len(lengths) - 1)
+        position = np.minimum(np.searchsorted(lengths, left * (1.0 - tolerance)), len(lengths) - 1)
         votes[:, j] = (
-            (lengths[place] >= left * (1.0 - tolerance)) & (lengths[place] * (1.0 - tolerance) <= left) & (left > 0.0)
+            (lengths[position] >= left * (1.0 - tolerance))
+            & (lengths[position] * (1.0 - tolerance) <= left)
+            & (left > 0.0)
         ).sum(axis=1)
     return votes
 
@@ -121,7 +132,7 @@ class CorrespondenceSettings:
     margin : float
         A match is at most so much less similar than the best of its corner.
     per_corner : int
-        At most so many matches for a corner of the first map.
+        Maximum number of matches for a corner of the first map.
     shift_window : float
         How far the rotation may differ from the difference of the corners' angles [rad].
     is_known_only : bool
@@ -193,22 +204,7 @@ def match_corners(
     second_descriptors: Descriptors,
     settings: CorrespondenceSettings,
 ) -> Matches:
-    """Match the corners of map a with those of map b.
-
-    Parameters
-    ----------
-    first, second : Corners
-        Of map a and of map b.
-    first_descriptors, second_descriptors : Descriptors
-        Theirs, of the same settings.
-    settings : CorrespondenceSettings
-        The method.
-
-    Returns
-    -------
-    Matches
-        In order of the first map's corners.
-    """
+    """Match the corners of map a with those of map b."""
     if len(first) == 0 or len(second) == 0:
         return Matches(np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0), np.zeros(0))
     difference = first.angles[:, None] - second.angles[None, :]
@@ -289,7 +285,7 @@ def _compared_places(
 
 
 def _energy(first: NDArray[np.floating], second: NDArray[np.floating], measure: str) -> NDArray[np.floating]:
-    """Return what products of samples are divided by: their geometric mean square, or their mean square.
+    """Return the divisor of products of samples: their geometric mean square, or their mean square.
 
     The product over the mean square is 1 less half the square of the difference over it.
     """

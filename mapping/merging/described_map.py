@@ -47,16 +47,16 @@ class DescribedMap:
     descriptors : Descriptors
         Theirs.
     walls : (n, 2) float64
-        Centres of the occupied cells that border on a free one: what a laser has seen of walls [m].
+        Centres of the occupied cells that border on a free one: walls as seen by a laser [m].
     normals : (n, 2) float64
-        Normal of each of them: unit vectors towards the free space around it, zero where that has no
+        Normal of each of them: unit vectors towards the free space around it, zero if that has no
         side.
     distance : (rows, columns) float32
-        Distance to the nearest of these walls [m]; large where there is none.
+        Distance to the nearest of these walls [m]; large if there is none.
     is_open : (rows, columns) uint8
-        1 where all around a cell is free, so that no wall that is seen elsewhere can belong there.
+        1 if all around a cell is free, so that no wall that is seen elsewhere can belong there.
     regions : RegionGraph or None
-        Its regions of free space; None where they were not asked for.
+        Its regions of free space; None if they were not asked for.
     """
 
     levels: NDArray[np.uint8]
@@ -85,7 +85,7 @@ def describe_map(
     resolution : float
         Side of a cell [m].
     corner_settings, descriptor_settings : CornerSettings, DescriptorSettings or None
-        What is computed.
+        The computed features.
 
     Returns
     -------
@@ -95,7 +95,7 @@ def describe_map(
     Raises
     ------
     ValueError
-        Where the array is no map of one channel, is empty or huge, or the resolution is not positive.
+        If the array is no map of one channel, is empty or huge, or the resolution is not positive.
     """
     corner_settings = corner_settings or CornerSettings()
     three = three_levels_of(levels, corner_settings)
@@ -133,7 +133,7 @@ def three_levels_of(levels: ArrayLike, settings: CornerSettings) -> NDArray[np.u
 
 
 def check_resolution(resolution: float) -> None:
-    """Raise ValueError where a resolution is not a positive number."""
+    """Raise ValueError if a resolution is not a positive number."""
     if not (math.isfinite(resolution) and resolution > 0.0):
         raise ValueError(f"the resolution of a map is {resolution} m; want a positive number")
 
@@ -148,7 +148,7 @@ def _walls(levels: NDArray[np.uint8]) -> tuple[NDArray[np.int32], NDArray[np.flo
 
 
 def _open(levels: NDArray[np.uint8], resolution: float) -> NDArray[np.uint8]:
-    """Return 1 where a cell and all within `OPEN_DISTANCE_M` are free.
+    """Return 1 if a cell and all within `OPEN_DISTANCE_M` are free.
 
     The distance is along the axes, and at least a cell.
     """
@@ -170,7 +170,7 @@ def _distance(shape: tuple[int, ...], cells: NDArray[np.int32], resolution: floa
 
 @kernel
 def _find_walls(levels: Array, cells: Array) -> int:
-    """Write column and row of each occupied cell beside a free one.
+    """Write column and row of each occupied cell next to a free one.
 
     Returns their number.
     """
@@ -246,9 +246,9 @@ def resampled(levels: NDArray[np.uint8], resolution: float, wanted: float) -> ND
         np.minimum(((np.arange(side) + 0.5) * ratio).astype(np.int64), count - 1)
         for side, count in zip(levels.shape, (rows, columns), strict=True)
     )
-    place = (row[:, None] * columns + column[None, :]).ravel()
+    position = (row[:, None] * columns + column[None, :]).ravel()
     counts = {
-        level: np.bincount(place[(levels == level).ravel()], minlength=rows * columns)
+        level: np.bincount(position[(levels == level).ravel()], minlength=rows * columns)
         for level in (OCCUPIED, UNKNOWN, FREE)
     }
     coarse = np.where(counts[FREE] > counts[UNKNOWN], FREE, UNKNOWN)

@@ -20,7 +20,7 @@ from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.merging.corners import Corners
 
 VARIANTS = ("two_rings", "polar", "log_polar")
-MOST_RINGS = 1000
+MAX_RINGS = 1000
 """Rings of a band at most."""
 
 Worth = Annotated[float, within(-1e6, 1e6)]
@@ -28,7 +28,7 @@ Worth = Annotated[float, within(-1e6, 1e6)]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DescriptorSettings:
-    """What a descriptor samples.
+    """Samples of a descriptor.
 
     Attributes
     ----------
@@ -44,7 +44,7 @@ class DescriptorSettings:
     columns : int
         Samples around the corner.
     occupied, unknown, free : float
-        What a sample of each kind of cell is worth.
+        Value of a sample of each type of cell.
     """
 
     variant: str = "two_rings"
@@ -68,10 +68,10 @@ class DescriptorSettings:
             ("far", self.far_min, self.far_max, self.far_step),
         ]
         for name, low, high, step in bands:
-            if not (low < high and step <= high - low <= MOST_RINGS * step):
+            if not (low < high and step <= high - low <= MAX_RINGS * step):
                 raise ValueError(
                     f"{name}_min, _max and _step are {low}, {high} and {step} m; want 0 < min < max, 0 < "
-                    f"step <= max - min and at most {MOST_RINGS} rings"
+                    f"step <= max - min and at most {MAX_RINGS} rings"
                 )
 
 
@@ -81,7 +81,7 @@ class Descriptors(NamedTuple):
     Attributes
     ----------
     values : (n, rings, columns) float32
-        What was sampled.
+        Samples.
     known : (n, rings, columns) float32
         Share of each sample that is known.
     """
@@ -112,12 +112,7 @@ def describe_corners(
     corners : Corners
         Where.
     settings : DescriptorSettings or None
-        What is sampled.
-
-    Returns
-    -------
-    Descriptors
-        One for each corner; beyond the border all is unknown.
+        Samples.
     """
     settings = settings or DescriptorSettings()
     bands = _bands(resolution, settings)
@@ -125,7 +120,7 @@ def describe_corners(
     values = np.zeros((len(corners), rings, settings.columns), np.float32)
     known = np.zeros_like(values)
     occupied, free = _mask_of(levels, OCCUPIED), _mask_of(levels, FREE)
-    places = corners.cells + 0.5
+    positions = corners.cells + 0.5
     first = 0
     for band in bands:
         solid, open_ = _smoothed(occupied, band.smoothing), _smoothed(free, band.smoothing)
@@ -134,7 +129,7 @@ def describe_corners(
         _sample(
             solid,
             open_,
-            places,
+            positions,
             corners.angles,
             band.radii,
             worth,

@@ -31,7 +31,7 @@ class Edge(Generic[Name]):
     weight : float
         How much speaks for it; edges of more weight are kept before others.
     centre : (x, y)
-        Where the maps overlap, in map b [m]; distances around cycles are taken there.
+        Middle of the overlap, in map b [m]; distances around cycles are taken there.
     slack_m : float
         By how much more than others it may be off, as maps are bent [m].
     """
@@ -97,11 +97,6 @@ class FrameTree(Generic[Name]):
         """Add a transform between two maps.
 
         One between the same maps is replaced where the new one has more weight.
-
-        Raises
-        ------
-        ValueError
-            Where it joins a map with itself, or is not finite.
         """
         pair = self._admitted(edge)
         if pair not in self._edges or edge.weight > self._edges[pair].weight:
@@ -114,20 +109,6 @@ class FrameTree(Generic[Name]):
         """Put transforms in the place of all that there were.
 
         The world stays where it is for as long as its root is joined with any map.
-
-        Parameters
-        ----------
-        edges : iterable of Edge
-            At most one between two maps.
-        contradicts : callable or None
-            Asked of maps that are joined through others alone, with the transform of the second into the
-            first that this implies: whether the maps cannot lie over each other so. The weakest transform
-            between them is dropped then.
-
-        Raises
-        ------
-        ValueError
-            As `add_edge`.
         """
         self._edges = {self._admitted(edge): edge for edge in edges}
         self._rebuild(contradicts)
@@ -173,12 +154,7 @@ class FrameTree(Generic[Name]):
     def lookup(self, target: Name, source: Name) -> Transform | None:
         """Return the transform that maps points of one map into another.
 
-        None where they are not joined.
-
-        Raises
-        ------
-        ValueError
-            Where there is no such map.
+        None if they are not joined.
         """
         for name in (target, source):
             if name not in self._tree:
@@ -188,7 +164,7 @@ class FrameTree(Generic[Name]):
     def pose_in(self, target: Name, source: Name, pose: Transform) -> Transform | None:
         """Return a robot's pose, known in its own map, in another map.
 
-        None where they are not joined.
+        None if they are not joined.
         """
         transform = self.lookup(target, source)
         return None if transform is None else transform @ pose
@@ -207,7 +183,7 @@ class FrameTree(Generic[Name]):
     def _rebuild(self, contradicts: Callable[[Name, Name, Transform], bool] | None = None) -> None:
         """Build the forest of most weight.
 
-        Drop the weakest edge of what cannot be true, until nothing is left of that kind.
+        Drop the weakest edge of each contradiction until none is left.
         """
         self._dropped = []
         while True:
@@ -270,7 +246,7 @@ class FrameTree(Generic[Name]):
     def _misses(self, edge: Edge[Name]) -> float:
         """Return an edge's deviation from the path through the forest.
 
-        As a multiple of what is allowed.
+        As a multiple of the limit.
         """
         through = self._reached_from(edge.a)[edge.b]
         distance, angle = through.difference(edge.a_from_b, edge.centre)

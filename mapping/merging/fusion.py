@@ -20,7 +20,7 @@ OCCUPIED_LOG_ODDS, FREE_LOG_ODDS = 1.0, -0.6
 One map that reports occupied outweighs one that reports free, but not two.
 """
 
-MOST_MAPS = 64
+MAX_MAPS = 64
 MAX_CELLS = 400_000_000
 
 
@@ -64,16 +64,16 @@ def fuse(maps: Sequence[NDArray[np.uint8]], common_from_map: Sequence[Transform]
     Returns
     -------
     FusedMap
-        As large as what any of them knows.
+        As large as the known area of them all.
 
     Raises
     ------
     ValueError
-        Where there is no map, more than 64, none that knows anything, or the result would be huge.
+        If there is no map, more than 64, none that knows anything, or the result would be huge.
     """
-    if not 0 < len(maps) <= MOST_MAPS or len(maps) != len(common_from_map):
+    if not 0 < len(maps) <= MAX_MAPS or len(maps) != len(common_from_map):
         raise ValueError(
-            f"{len(maps)} maps with {len(common_from_map)} transforms are to be fused; want 1 to {MOST_MAPS} of each"
+            f"{len(maps)} maps with {len(common_from_map)} transforms are to be fused; want 1 to {MAX_MAPS} of each"
         )
     low, high = _bounds(maps, common_from_map, resolution)
     columns, rows = (high - low).tolist()
@@ -115,9 +115,9 @@ def _bounds(
 
 
 def overlay(log_odds: NDArray[np.int8], fused: FusedMap, origin: tuple[float, float]) -> None:
-    """Write what a fused map knows into a blank map of the same cells, in its units.
+    """Write the known cells of a fused map into a blank map of the same cells, in its units.
 
-    What lies beyond it is lost.
+    Cells beyond it are lost.
 
     Parameters
     ----------
@@ -134,7 +134,7 @@ def overlay(log_odds: NDArray[np.int8], fused: FusedMap, origin: tuple[float, fl
         round(OCCUPIED_LOG_ODDS / LOG_ODDS_UNIT),
         round(FREE_LOG_ODDS / LOG_ODDS_UNIT),
     )
-    left, low = (round((place - own) / fused.resolution) for place, own in zip(fused.origin, origin, strict=True))
+    left, low = (round((position - own) / fused.resolution) for position, own in zip(fused.origin, origin, strict=True))
     rows, columns = fused.levels.shape
     inside = log_odds[max(low, 0) : max(low + rows, 0), max(left, 0) : max(left + columns, 0)]
     first_row, first_column = max(-low, 0), max(-left, 0)
@@ -153,7 +153,7 @@ def _add(
     log_odds: Array,
     sources: Array,
 ) -> None:
-    """Add what a map says of each cell of the common grid."""
+    """Add a map to the cells of the common grid."""
     cosine, sine = math.cos(map_from_common[2]), math.sin(map_from_common[2])
     for row in range(log_odds.shape[0]):
         y = origin[1] / side + row + 0.5

@@ -31,7 +31,7 @@ def edge_levels(image: NDArray[np.uint8], least_share: float = EDGE_SHARE) -> ND
     Raises
     ------
     ValueError
-        Where the image has no rows and columns of one grey each, or the share is none.
+        If the image has no rows and columns of one grey each, or the share is none.
     """
     _check(image)
     if not 0.0 < least_share <= 1.0:
@@ -59,7 +59,7 @@ def trajkovic_corners(image: NDArray[np.uint8], first_threshold: float, second_t
     Raises
     ------
     ValueError
-        Where the image has no rows and columns of one grey each, or a threshold is negative.
+        If the image has no rows and columns of one grey each, or a threshold is negative.
     """
     _check(image)
     if first_threshold < 0.0 or second_threshold < 0.0:

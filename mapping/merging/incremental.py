@@ -1,6 +1,6 @@
 """Incremental merging of maps that grow.
 
-Only what has changed is described, and verified transforms are not searched for again.
+Only changed maps are described, and verified transforms are not searched for again.
 
 A robot's map keeps its frame while it grows: its origin is where the array's lower left corner lies in
 that frame. Two maps that know little can seem alike without being of one place. Who acts on a merge can ask
@@ -52,7 +52,7 @@ class _DescribedMaps:
     maps : dict of str to GrowingMap
         The maps themselves.
     features : dict of str to DescribedMap
-        What they are described by.
+        Settings of their descriptions.
     known_m2 : dict of str to float
         How much each knows [m2].
     changed_at : dict of str to int
@@ -77,11 +77,6 @@ class _DescribedMaps:
             How they are described.
         number : int
             Of the update.
-
-        Raises
-        ------
-        ValueError
-            Where one is no map; what was known is kept then.
         """
         changed = {name for name, one in maps.items() if not _is_same(self.maps.get(name), one)}
         fresh = {name: described(maps[name].levels, resolution, settings) for name in maps if name in changed}
@@ -98,16 +93,16 @@ def _is_same(before: GrowingMap | None, now: GrowingMap) -> bool:
 
 @dataclass(slots=True)
 class _TriedPair:
-    """What is known of a pair.
+    """Knowledge of a pair.
 
     Attributes
     ----------
     result : PairResult
-        What came of the last try.
+        Result of the last try.
     frames : Transform or None
         The robots' transform, if it is verified.
     known_m2 : float
-        What the maps knew when it was searched for [m2].
+        Known areas of the maps when it was searched for [m2].
     is_confirmed : bool
         Whether it has been found as often as is wanted.
     at : int
@@ -137,12 +132,12 @@ class IncrementalMerger:
     resolution : float
         Side of a cell of all maps [m].
     settings : MergeSettings or None
-        How; the defaults where None.
+        How; the defaults if None.
     search_growth_m2 : float
         A pair that was refused is searched for again when its maps together know so much more [m2].
     confirmation_growth_m2 : float or None
         A pair that was found joins its maps only when it is found once more, once they know so much more
-        [m2]; at once where None.
+        [m2]; at once if None.
     confirmation : Confirmation
         What the maps must say of a pair beside that when it joins them; by default what the settings ask of
         every pair.
@@ -190,17 +185,6 @@ class IncrementalMerger:
         may_search : bool
             Whether there is time for searches; otherwise they wait for the next update, and what was found is
             verified alone.
-
-        Returns
-        -------
-        Merged
-            Pairs, frames and fused maps; frames stay where they are while maps grow. Pairs that are accepted
-            and wait to be confirmed join nothing.
-
-        Raises
-        ------
-        ValueError
-            Where there are no maps, or one is no map; what was known is kept then.
         """
         if not maps:
             raise ValueError("there are no maps to merge; want at least one")
@@ -229,14 +213,14 @@ class IncrementalMerger:
         )
 
     def _due(self, pairs: list[tuple[str, str]]) -> list[tuple[str, str]]:
-        """Return the pairs whose turn it is to be verified or searched for."""
+        """Return the pairs that are to be verified or searched for next."""
         due = [pair for pair in pairs if self._has_grown(pair)]
         if self.searches_per_update is not None:
             due.sort(key=lambda pair: (not self._waits(pair), self._last_try(pair)))
         return due
 
     def _waits(self, pair: tuple[str, str]) -> bool:
-        """Whether what was found of a pair convinces, and is to be found once more."""
+        """Whether the result of a pair convinces, and is to be confirmed."""
         before = self._pairs.get(pair)
         return (
             before is not None
@@ -260,7 +244,7 @@ class IncrementalMerger:
         return before is None or self._known_of(pair) >= before.known_m2 + self.search_growth_m2
 
     def _implied(self, pair: tuple[str, str]) -> Transform | None:
-        """Return how the robots' frames lie by what joins them, None where nothing does."""
+        """Return how the robots' frames lie by what joins them, None if nothing does."""
         tree = self._tree
         return tree.lookup(*pair) if tree is not None and set(pair) <= set(tree.names) else None
 
@@ -289,7 +273,7 @@ class IncrementalMerger:
     def _tried(self, pair: tuple[str, str], before: _TriedPair | None, may_search: bool) -> _TriedPair | None:
         """Verify the transform of a pair.
 
-        Search where there is none, or it is refused by now. None where that has to wait.
+        Search where there is none, or it is refused by now. None if that has to wait.
         """
         first, second = (placed(self._described.maps[name].origin) for name in pair)
         known_m2 = self._known_of(pair)
@@ -316,7 +300,7 @@ class IncrementalMerger:
     def _verified(
         self, pair: tuple[str, str], before: _TriedPair, frames: Transform, may_search: bool
     ) -> _TriedPair | None:
-        """Verify what was found; None where it is searched for once more."""
+        """Verify the last transform; None if it is searched for once more."""
         a, b = (self._described.features[name] for name in pair)
         first, second = (placed(self._described.maps[name].origin) for name in pair)
         known_m2 = self._known_of(pair)
@@ -333,7 +317,7 @@ class IncrementalMerger:
         return _TriedPair(result, refined, before.known_m2, before.is_confirmed, at, first)
 
     def _may_be_better(self, pair: tuple[str, str], before: _TriedPair, result: PairResult, known_m2: float) -> bool:
-        """Whether a search may confirm what was found, or find what convinces where that does not."""
+        """Whether a search may confirm the last transform, or find a convincing one otherwise."""
         if self._convinces(pair, result):
             return known_m2 >= before.known_m2 + (self.confirmation_growth_m2 or 0.0)
         return known_m2 >= before.known_m2 + self.search_growth_m2
@@ -352,7 +336,7 @@ class IncrementalMerger:
     def _confirms(
         self, pair: tuple[str, str], before: _TriedPair | None, frames: Transform | None, result: PairResult
     ) -> bool:
-        """Whether what was searched for and found is believed from now on."""
+        """Whether the transform found by the search is accepted from now on."""
         if self.confirmation_growth_m2 is None:
             return self._convinces(pair, result)
         if (

@@ -19,7 +19,7 @@ from lidarium.mapping.merging.settings import MergeSettings
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Merged:
-    """What came of some maps.
+    """Result of merging maps.
 
     Attributes
     ----------
@@ -52,11 +52,6 @@ class Merged:
         """Return the map of a group in the frame of its first.
 
         Bit i of its sources is the group's map i.
-
-        Raises
-        ------
-        ValueError
-            Where the maps are not joined with one another, or as `fuse` raises.
         """
         return fuse(
             [self.levels[name] for name in group],
@@ -65,20 +60,7 @@ class Merged:
         )
 
     def deformed(self, group: list[str], settings: BendSettings | None = None) -> Deformed:
-        """Return the map of a group bent to agree, in the frame of its first map.
-
-        Parameters
-        ----------
-        group : list of str
-            Maps that are joined; the first is not bent.
-        settings : BendSettings or None
-            How much the others may be.
-
-        Raises
-        ------
-        ValueError
-            As `fused` does.
-        """
+        """Return the map of a group bent to agree, in the frame of its first map."""
         maps = [describe_map(self.levels[name], self.resolution) for name in group]
         transforms = [self._into(group[0], name) for name in group]
         return deform(maps, transforms, settings or BendSettings())
@@ -106,7 +88,7 @@ def joined_tree(
     origins: Mapping[str, tuple[float, float]] | None = None,
     tree: FrameTree[str] | None = None,
 ) -> FrameTree[str]:
-    """Join maps by what was accepted of their pairs.
+    """Join maps by their accepted pairs.
 
     Maps that are joined through others alone must not contradict each other either: else the weakest pair
     between them is dropped.
@@ -116,18 +98,13 @@ def joined_tree(
     features : mapping of str to DescribedMap
         The maps.
     pairs : mapping of (str, str) to PairResult
-        What came of each two, from lower left corner to lower left corner.
+        Result of each pair, from lower left corner to lower left corner.
     settings : MergeSettings
-        What contradicts.
+        Contradictions.
     origins : mapping of str to (x, y) or None
         Lower left corner of each map in its frame [m]; (0, 0) for all where None.
     tree : FrameTree or None
         Of an earlier call, whose world shall stay where it is; it is changed. A new one where None.
-
-    Returns
-    -------
-    FrameTree
-        The maps' frames.
     """
     tree = tree or FrameTree(settings.cycle_distance_m, settings.cycle_angle)
     for name in tree.names:

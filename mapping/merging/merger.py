@@ -22,7 +22,7 @@ from lidarium.mapping.merging.settings import TOLERANCES, MergeSettings
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Question:
-    """What is known of two maps beforehand, and what is asked of pairs.
+    """Prior knowledge of two maps, and the questions asked of pairs.
 
     Attributes
     ----------
@@ -102,7 +102,7 @@ def merge_maps(
 
 
 def _check_guess(a: DescribedMap, b: DescribedMap, guess: Transform) -> None:
-    """Raise ValueError where a guess lays nothing of one map on the other."""
+    """Raise ValueError if a guess lays nothing of one map on the other."""
     known = np.argwhere(b.levels != UNKNOWN)[:, ::-1] + 0.5
     cells = guess.apply(known * b.resolution) / a.resolution
     rows, columns = a.levels.shape
@@ -123,7 +123,7 @@ def _forced(result: PairResult) -> PairResult:
 
 
 def _all_pairs(features: Mapping[str, DescribedMap], settings: MergeSettings) -> dict[tuple[str, str], PairResult]:
-    """Return what comes of each two maps, in their order."""
+    """Return the result of each pair of maps, in their order."""
     every = list(itertools.combinations(features, 2))
     # What corners join spares the search of all rotations and translations, where there is one.
     # Maps are bent only where all are known that speak against it.
@@ -155,7 +155,7 @@ def _implied(
 ) -> PairResult | None:
     """Return the result of aligning two maps as other maps imply, or None.
 
-    None where the others imply no transform, or the maps do not agree under it.
+    None if the others imply no transform, or the maps do not agree under it.
     """
     # The thesis's test needs inliers, which only a search finds.
     if a_from_b is None or settings.validation.test == "discs":

@@ -45,20 +45,7 @@ SAMPLES = 2000
 
 
 def _exact_motion(a: DescribedMap, b: DescribedMap, a_from_b: Transform) -> Transform | None:
-    """Return the motion by whole cells and quarter turns near another one, if the maps share cells.
-
-    Parameters
-    ----------
-    a, b : DescribedMap
-        Maps of one resolution.
-    a_from_b : Transform
-        The motion that was found.
-
-    Returns
-    -------
-    Transform or None
-        The exact one; None where the maps do not share their cells.
-    """
+    """Return the motion by whole cells and quarter turns near another one, if the maps share cells."""
     quarters = round(a_from_b.theta / (0.5 * math.pi))
     if abs(a_from_b.theta - quarters * 0.5 * math.pi) > NEARLY or len(b.walls) == 0:
         return None
@@ -95,7 +82,7 @@ NO_POINTS: NDArray[np.float64] = np.zeros((0, 2))
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PairResult:
-    """What came of two maps.
+    """Result of two maps.
 
     Attributes
     ----------
@@ -110,10 +97,10 @@ class PairResult:
     score : float
         1 less the share of contradicting cells; the agreement in discs in the thesis's mode.
     agreement : Agreement
-        What the score is made of.
+        Parts of the score.
     found_by : str
-        ``corners``, ``regions``, ``correlation``, or ``verification`` of what was found before; ``bend``
-        where the maps agree only once they are bent; ``scale`` where one has grown.
+        ``corners``, ``regions``, ``correlation``, or ``verification`` of an earlier transform; ``bend``
+        where the maps agree only once they are bent; ``scale`` if one has grown.
     time_ms : float
         Processor time, descriptions of the maps not included [ms].
     joined : ((n, 2), (n, 2)) float64
@@ -121,7 +108,7 @@ class PairResult:
     tried : tuple of Transform
         All transforms that were refined and judged.
     ranked : tuple of Hypothesis
-        The most evident of them with the bend under each, the best first; empty where no bend was sought, see
+        The most evident of them with the bend under each, the best first; empty if no bend was sought, see
         `explained`.
     confidence : float
         That the best of these is right, by a model of strangers.
@@ -150,7 +137,7 @@ def explained(a: DescribedMap, b: DescribedMap, result: PairResult, settings: Me
     a, b : DescribedMap
         The maps.
     result : PairResult
-        What came of them.
+        Their results.
     settings : MergeSettings
         How much they may be bent.
     """
@@ -211,7 +198,7 @@ def merge_pair(a: DescribedMap, b: DescribedMap, settings: MergeSettings | None 
     Raises
     ------
     ValueError
-        Where the resolutions differ.
+        If the resolutions differ.
     """
     settings = settings or MergeSettings()
     if not math.isclose(a.resolution, b.resolution, rel_tol=1e-6):
@@ -240,7 +227,7 @@ def merge_near(a: DescribedMap, b: DescribedMap, guess: Transform, settings: Mer
     Returns
     -------
     PairResult
-        The transform, or the reason of the refusal. Only what is near the guess can be a rival.
+        The transform, or the reason of the refusal. Only transforms near the guess can be rivals.
     """
     settings = settings or MergeSettings()
     began = time.process_time()
@@ -287,7 +274,7 @@ def verify_pair(
     a, b : DescribedMap
         Maps of one resolution.
     a_from_b : Transform
-        What was found.
+        The result.
     settings : MergeSettings or None
         How it is judged.
 
@@ -317,7 +304,7 @@ def is_contradicted(a: DescribedMap, b: DescribedMap, a_from_b: Transform, setti
 
     The transform is implied by other maps; the maps contradict each other also once they have settled.
 
-    What was implied is a little off after some maps; but where walls hold the maps in one direction alone
+    The implied transform is a little off after some maps; but where walls hold the maps in one direction alone
     they may settle far away.
     """
     validation = settings.validation
@@ -358,7 +345,7 @@ def _merge_by_walls(a: DescribedMap, b: DescribedMap, matches: Matches, settings
 
 
 class _Search(NamedTuple):
-    """What was judged, the best of it and what has proposed that, and why corners proposed nothing."""
+    """The judged candidates, the best one and its source, and why corners proposed nothing."""
 
     judged: list[Judged]
     best: Judged | None
@@ -367,7 +354,7 @@ class _Search(NamedTuple):
 
 
 def _searched(a: DescribedMap, b: DescribedMap, matches: Matches, settings: MergeSettings) -> _Search:
-    """Judge what corners, regions and all rotations and translations propose, until something passes."""
+    """Judge the proposals of corners, regions and all rotations and translations, until one passes."""
     shortage, judged, best, found_by = None, list[Judged](), None, "corners"
     if settings.structure != "regions":
         candidates, shortage = corner_candidates(a, b, matches, settings)
@@ -400,7 +387,7 @@ def _rotations(a: DescribedMap, b: DescribedMap, settings: MergeSettings) -> NDA
 
 
 def _better(best: Judged | None, judged: list[Judged], by: tuple[str, str]) -> tuple[Judged | None, str]:
-    """Return the most evident candidate, and by what it was found: the first where it is still the best."""
+    """Return the most evident candidate, and its source: the first if it is still the best."""
     found = most_evident(judged)
     return found, by[0] if found is best else by[1]
 

@@ -2,6 +2,10 @@
 
 Evidence and contradiction are counted as for maps of one scale, once the grown map is bent. A rival is
 another place, or another scale of one place.
+
+Walls of most buildings run in two directions, so four rotations are left, and some near them if maps are
+bent. For each of these, and for each scale on a fine ladder, walls and regions of free space are correlated
+at all translations.
 """
 
 import math
@@ -48,7 +52,7 @@ from lidarium.mapping.merging.wall_alignment import rank_by_walls
 AXIS_STEP = math.radians(0.5)
 """Between the directions of walls that are tried [rad]."""
 
-MOST_WALLS = 4000
+MAX_WALLS = 4000
 """About so many wall cells show the direction of walls."""
 
 
@@ -126,7 +130,7 @@ def _wall_axis(described: DescribedMap) -> float:
     It is that across which walls fall into the fewest bins of a histogram: the sum of the squared counts,
     over both axes, is greatest.
     """
-    walls = described.walls[:: max(len(described.walls) // MOST_WALLS, 1)]
+    walls = described.walls[:: max(len(described.walls) // MAX_WALLS, 1)]
     if len(walls) == 0:
         return 0.0
     angles = np.arange(0.0, math.pi / 2.0, AXIS_STEP)
@@ -146,13 +150,6 @@ def _placements(a: DescribedMap, b: DescribedMap, settings: ScaleSettings) -> li
 
     They are ranked by the walls that agree, between what these measure in the one map and in the other: in
     metres of the first, small maps would never win, in metres of the second they would fit anywhere.
-
-    Parameters
-    ----------
-    a, b : DescribedMap
-        Maps of one resolution, as drawn.
-    settings : ScaleSettings
-        How.
     """
     slants = np.arange(-settings.slants, settings.slants + 1) * settings.slant
     quarters = np.arange(4) * (math.pi / 2.0)
@@ -191,28 +188,18 @@ _SAMPLES = 400
 def _region_placements(
     a: DescribedMap, b: DescribedMap, settings: RegionSettings, scaling: ScaleSettings
 ) -> list[_Placement]:
-    """Return the placements of map b under which regions meet, those for which most speaks first.
-
-    Parameters
-    ----------
-    a, b : DescribedMap
-        Maps of one resolution with walls, as drawn.
-    settings : RegionSettings
-        Which regions may be the same.
-    scaling : ScaleSettings
-        By how much map b may grow.
-    """
+    """Return the placements of map b under which regions meet, those for which most speaks first."""
     graphs = [find_regions(one.levels, one.resolution, settings) for one in (a, b)]
     found = by_growing_regions(graphs[0], graphs[1], settings, (scaling.least, scaling.most))
     # Between what walls measure in the one map and in the other, as of all scales.
     values = rank_by_walls(a, b, found, _SAMPLES, LOOSE.hit_distance_m) * np.sqrt(found[:, 3])
     # Where the middle of the grown map's walls comes to lie.
     middle = found[:, 3:] * b.walls.mean(axis=0)
-    places = found[:, :2] + turned(middle, found[:, 2])
+    positions = found[:, :2] + turned(middle, found[:, 2])
     order = np.argsort(-values, kind="stable")
     apart = (scaling.apart_m, scaling.slant)
     kept: list[_Placement] = []
-    for k in distinct(np.column_stack([places, found[:, 2]]), order, np.zeros(2), settings.candidates, apart):
+    for k in distinct(np.column_stack([positions, found[:, 2]]), order, np.zeros(2), settings.candidates, apart):
         x, y, theta, scale = found[k].tolist()
         kept.append(_Placement(scale, Transform(x, y, theta), float(values[k]) * a.resolution))
     return kept
@@ -221,7 +208,7 @@ def _region_placements(
 SAME_SCALE = 0.1
 """Scales whose logarithms differ by more are different ones."""
 
-MOST_GROWTH = 1.05
+MAX_GROWTH = 1.05
 """By so much a scale changes in a round at most."""
 
 SETTLED = 0.003
@@ -238,7 +225,7 @@ class _Grown(NamedTuple):
     described : DescribedMap
         The grown map.
     hypothesis : Hypothesis
-        How it lies and is bent, and what agrees.
+        Its transform and bend, and the agreement.
     """
 
     scale: float
@@ -253,7 +240,7 @@ class _Grown(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ScaledMerge:
-    """What came of two maps of unlike scales.
+    """Result of two maps of different scales.
 
     Attributes
     ----------
@@ -286,7 +273,7 @@ def merge_scaled(
     Raises
     ------
     ValueError
-        Where there are not two maps, or one is no map.
+        If there are not two maps, or one is no map.
     """
     settings, scaling = settings or MergeSettings(), scaling or ScaleSettings()
     if len(maps) != 2:
@@ -344,7 +331,7 @@ def _ranked(
 ) -> list[_Grown]:
     """Return hypotheses of how a map lies at some scale, the best first.
 
-    All scales are tried where regions are not asked, or propose nothing that is believed.
+    All scales are tried if regions are not asked, or propose nothing that is believed.
     """
     b = describe_map(_grown_levels(*grid, a.resolution), a.resolution)
     if len(a.walls) == 0 or len(b.walls) == 0:
@@ -381,7 +368,7 @@ def _refined(
         if len(b.walls) == 0:
             return None
         bend = estimate_bend(a, b, a_from_b, settings.bend)
-        growth = min(max(bend.scale, 1.0 / MOST_GROWTH), MOST_GROWTH)
+        growth = min(max(bend.scale, 1.0 / MAX_GROWTH), MAX_GROWTH)
         if rounds == 0 or abs(growth - 1.0) < SETTLED or not bend.is_held:
             return _Grown(scale, b, Hypothesis(bend, compare_bent(a, b, bend)))
         # The map grows about the middle of its walls.
@@ -402,7 +389,7 @@ def _is_rival(best: _Grown, other: _Grown) -> bool:
 
 
 def _confidence(a: DescribedMap, ranked: list[_Grown]) -> float:
-    """Return how sure it is that the best hypothesis is right, 0 where there is none."""
+    """Return how sure it is that the best hypothesis is right, 0 if there is none."""
     if not ranked:
         return 0.0
     best = ranked[0]
@@ -412,7 +399,7 @@ def _confidence(a: DescribedMap, ranked: list[_Grown]) -> float:
 
 
 def _result(best: _Grown | None, confidence: float, scaling: ScaleSettings) -> PairResult:
-    """Return what comes of the best hypothesis."""
+    """Return the result of the best hypothesis."""
     if best is None:
         return PairResult(False, NO_WALLS)
     reason = f"no sure scale: at {best.scale:.3f} the confidence is {confidence:.2f}, below {scaling.confidence:g}"

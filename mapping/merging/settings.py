@@ -32,7 +32,7 @@ class MergeSettings:
         Settings of each stage.
     structure : str
         One of `STRUCTURES`: ``corners``; ``regions`` of free space and the doors between them; ``all`` for
-        regions where corners give no transform that passes.
+        regions if corners give no transform that passes.
     regions : RegionSettings
         How regions are found and matched.
     bend : BendSettings
@@ -85,7 +85,7 @@ def merge_settings(mode: str = "default", resolution: float = 0.025) -> MergeSet
     Raises
     ------
     ValueError
-        Where there is no such mode.
+        If there is no such mode.
     """
     if mode == "default":
         return MergeSettings()

@@ -15,7 +15,7 @@ from lidarium.mapping.merging.described_map import FACING_DISTANCE_M, DescribedM
 
 
 def wall_sample(walls: int, count: int) -> NDArray[np.int64]:
-    """Return the indices of so many of a map's walls, spread over all of them.
+    """Return the indices of a number of a map's walls, spread over all of them.
 
     Of all where there are no more.
     """
@@ -99,7 +99,7 @@ def _settle(
     """Move a pose so that walls meet walls along their normals."""
     rounds = 10
     count = walls.shape[0]
-    places, facing, gaps = np.empty((count, 2)), np.empty((count, 2)), np.empty(count)
+    positions, facing, gaps = np.empty((count, 2)), np.empty((count, 2)), np.empty(count)
     for step in range(rounds):
         # Half of the rounds narrow the reach, the others settle.
         share = min(2.0 * step / rounds, 1.0)
@@ -115,7 +115,7 @@ def _settle(
             )
             gap = gap_to_wall(levels, distance, side, x, y, u, v, steps)
             if gap <= steps:
-                places[found, 0], places[found, 1] = x, y
+                positions[found, 0], positions[found, 1] = x, y
                 facing[found, 0], facing[found, 1] = u, v
                 gaps[found] = gap
                 found += 1
@@ -125,7 +125,7 @@ def _settle(
             return
         centre_x /= found
         centre_y /= found
-        move = _best_move(places[:found], facing[:found], gaps[:found], centre_x, centre_y)
+        move = _best_move(positions[:found], facing[:found], gaps[:found], centre_x, centre_y)
         cosine, sine = math.cos(move[2]), math.sin(move[2])
         x, y = pose[0] / side - centre_x, pose[1] / side - centre_y
         pose[0] = (centre_x + cosine * x - sine * y + move[0]) * side
@@ -168,7 +168,7 @@ def gap_to_wall(
 ) -> float:
     """Return the distance along the normal to the nearest wall [cells].
 
-    The wall faces the same direction; more than ``steps`` where there is none.
+    The wall faces the same direction; more than ``steps`` if there is none.
     """
     rows, columns = levels.shape
     column, row = int(math.floor(x)), int(math.floor(y))

@@ -1,9 +1,13 @@
 """Which curves are of one wall, and along which part of both.
 
 Rough step: curves some of whose control points are near each other are candidates. Fine step: from an end of
-the seen curve the nearest point of the known curve is looked up. Where that is an end of the known curve, the
+the seen curve the nearest point of the known curve is looked up. If that is an end of the known curve, the
 known curve ends first, and the overlap begins at the seen curve's point nearest to it; else it begins at the
 seen curve's own end. The same at the other end: four cases.
+
+Curves of one wall are joined as their weighted mean on their common part, and each of them alone elsewhere.
+They are joined as ways, points along them with weights. A weight is a number of observations with a standard
+deviation of 1 cm.
 """
 
 import math
@@ -69,7 +73,7 @@ def overlap_of(seen: Spline, known: Spline, settings: AssociationSettings | None
     Returns
     -------
     Overlap or None
-        None where they have no common part of the least length, lie too far apart, or run different ways.
+        None if they have no common part of the least length, lie too far apart, or run different ways.
     """
     settings = settings or AssociationSettings()
     seen_at, known_at = seen.sample_parameters(SAMPLE_SPACING), known.sample_parameters(SAMPLE_SPACING)
@@ -105,11 +109,11 @@ def _are_near(seen: Array, known: Array, distance: float) -> bool:
 
 @kernel
 def _closest_place(way: Array, x: float, y: float) -> tuple[float, float]:
-    """Return the nearest place on a polyline (n, 2) to a point, and its distance.
+    """Return the nearest position on a polyline (n, 2) to a point, and its distance.
 
-    The place is counted in points of the polyline, n >= 2; the distance is in metres [m].
+    The position is counted in points of the polyline, n >= 2; the distance is in metres [m].
     """
-    place, nearest = 0.0, math.inf
+    position, nearest = 0.0, math.inf
     for k in range(way.shape[0] - 1):
         ax, ay = way[k, 0], way[k, 1]
         dx, dy = way[k + 1, 0] - ax, way[k + 1, 1] - ay
@@ -118,8 +122,8 @@ def _closest_place(way: Array, x: float, y: float) -> tuple[float, float]:
         share = min(max(share, 0.0), 1.0)
         gap = (ax + share * dx - x) ** 2 + (ay + share * dy - y) ** 2
         if gap < nearest:
-            place, nearest = k + share, gap
-    return place, math.sqrt(nearest)
+            position, nearest = k + share, gap
+    return position, math.sqrt(nearest)
 
 
 @kernel
@@ -132,13 +136,13 @@ def mark_along(points: Array, way: Array, distance: float, is_along: Array) -> N
     """
     last = points.shape[0] - 1
     for k in range(points.shape[0]):
-        place, gap = _closest_place(way, points[k, 0], points[k, 1])
+        position, gap = _closest_place(way, points[k, 0], points[k, 1])
         if gap <= distance:
             x, y = (
                 points[min(k + 1, last), 0] - points[max(k - 1, 0), 0],
                 points[min(k + 1, last), 1] - points[max(k - 1, 0), 1],
             )
-            direction = _direction_of(way, place)
+            direction = _direction_of(way, position)
             if x * math.cos(direction) + y * math.sin(direction) >= 0.0:
                 is_along[k] = True
 
@@ -166,7 +170,7 @@ def _find_overlap(seen: Array, known: Array) -> tuple[float, float, float, float
     -------
     tuple
         Places where it begins and ends on the seen way and on the known one, counted in points; its length
-        along the seen way [m]; mean distance [m] and mean angle [rad]; 1 where the known way's end begins it,
+        along the seen way [m]; mean distance [m] and mean angle [rad]; 1 if the known way's end begins it,
         plus 2 where one ends it. A length of 0 for none.
     """
     ends = np.empty(4)
@@ -192,8 +196,8 @@ def _find_overlap(seen: Array, known: Array) -> tuple[float, float, float, float
         dx, dy = seen[k + 1, 0] - seen[k, 0], seen[k + 1, 1] - seen[k, 1]
         step = (high - low) * math.sqrt(dx * dx + dy * dy)
         x, y = _point_of(seen, (low + high) / 2.0)
-        place, gap = _closest_place(known, x, y)
-        angle = math.atan2(dy, dx) - _direction_of(known, place)
+        position, gap = _closest_place(known, x, y)
+        angle = math.atan2(dy, dx) - _direction_of(known, position)
         length += step
         distance += step * gap
         turn += step * abs(math.atan2(math.sin(angle), math.cos(angle)))
@@ -236,7 +240,7 @@ class Places:
 
 
 def common_places(seen: Way, known: Way, settings: AssociationSettings) -> Places | None:
-    """Return where two ways run together, None where they are not of one wall."""
+    """Return where two ways run together, None if they are not of one wall."""
     seen_from, seen_to, known_from, known_to, length, distance, turn, _ = _find_overlap(seen.points, known.points)
     if length < settings.least_overlap or distance > settings.mean_distance or turn > settings.mean_turn:
         return None
@@ -334,11 +338,11 @@ def _join(
     for k in range(known.shape[0]):
         points[count, 0], points[count, 1], weights[count] = known[k, 0], known[k, 1], known_weights[k]
         if known_from <= k <= known_to:
-            place, _ = _closest_place(seen, known[k, 0], known[k, 1])
+            position, _ = _closest_place(seen, known[k, 0], known[k, 1])
             # What lies beside an end of the seen way is not what it saw.
-            if 0.0 < place < last_seen or k in (known_from, known_to):
-                x, y = _point_of(seen, place)
-                weight = _weight_at(seen_weights, place)
+            if 0.0 < position < last_seen or k in (known_from, known_to):
+                x, y = _point_of(seen, position)
+                weight = _weight_at(seen_weights, position)
                 if known_from > 0.0:
                     weight *= _ramp(_length_between(known, known_from, float(k)), blend)
                 if known_to < last_known:

@@ -4,6 +4,9 @@ Points, derivatives, length, nearest points, and intersections with rays.
 
 Knots here are four-fold at both ends, so that curves begin and end in control points, and run along the curve
 in metres.
+
+A curve has ``n`` control points and ``n + 4`` knots that do not decrease; it is defined from knot 3 to knot
+n.
 """
 
 import math
@@ -30,11 +33,6 @@ def _basis_matrix(knots: ArrayLike, parameters: ArrayLike) -> NDArray[np.float64
         Not decreasing.
     parameters : (m,) float64
         From knot 3 to knot n; the last span is closed.
-
-    Raises
-    ------
-    ValueError
-        Where a parameter lies outside.
     """
     all_knots, wanted = np.asarray(knots, np.float64), np.atleast_1d(np.asarray(parameters, np.float64))
     count = len(all_knots) - ORDER
@@ -190,7 +188,7 @@ def _closest_point(knots: Array, control_points: Array, points: Array, parameter
     """
     count = control_points.shape[0]
     most = (count - ORDER + 1) * FINE_PIECES
-    places, widths, reaches, used = np.empty(most + 1), np.empty(most), np.empty(most), 0
+    positions, widths, reaches, used = np.empty(most + 1), np.empty(most), np.empty(most), 0
     for span in range(ORDER - 1, count):
         width = (knots[span + 1] - knots[span]) / FINE_PIECES
         if width > 0.0:
@@ -202,25 +200,27 @@ def _closest_point(knots: Array, control_points: Array, points: Array, parameter
                 )
                 fastest = max(fastest, (ORDER - 1) * gap / (knots[k + ORDER - 1] - knots[k]))
             for i in range(FINE_PIECES):
-                places[used], widths[used], reaches[used] = (
+                positions[used], widths[used], reaches[used] = (
                     knots[span] + width * i,
                     width,
                     0.5 * fastest * width,
                 )
                 used += 1
-    places[used] = knots[count]
+    positions[used] = knots[count]
     samples, values, apart = np.empty((used + 1, 2)), np.empty(ORDER), np.empty(used + 1)
     for i in range(used + 1):
-        samples[i, 0], samples[i, 1] = point_at(knots, control_points, places[i], 0, values)
+        samples[i, 0], samples[i, 1] = point_at(knots, control_points, positions[i], 0, values)
     for k in range(points.shape[0]):
         px, py = points[k, 0], points[k, 1]
         for i in range(used + 1):
             apart[i] = math.hypot(samples[i, 0] - px, samples[i, 1] - py)
-        nearest, chosen = apart.min(), places[apart.argmin()]
+        nearest, chosen = apart.min(), positions[apart.argmin()]
         for i in range(used):
             if min(apart[i], apart[i + 1]) - reaches[i] <= nearest:
-                middle = places[i] + 0.5 * widths[i]
-                parameter, squared = _descend(knots, control_points, px, py, places[i], middle, places[i + 1], values)
+                middle = positions[i] + 0.5 * widths[i]
+                parameter, squared = _descend(
+                    knots, control_points, px, py, positions[i], middle, positions[i + 1], values
+                )
                 if math.sqrt(squared) < nearest:
                     nearest, chosen = math.sqrt(squared), parameter
         parameters[k], distances[k] = chosen, nearest
@@ -241,7 +241,7 @@ def _descend(
 
     Near a given parameter, between two others.
 
-    Newton's method; where a step leads farther away, as it does beside cusps, half of it is tried.
+    Newton's method; if a step leads farther away, as it does near cusps, half of it is tried.
     """
     parameter = begin
     x, y = point_at(knots, control_points, parameter, 0, values)
@@ -274,7 +274,7 @@ def _descend(
 
 
 class _Ray(NamedTuple):
-    """Where a ray begins [m], and its direction."""
+    """Origin of a ray [m], and its direction."""
 
     x: float
     y: float
@@ -426,15 +426,15 @@ class Spline:
 
         The nearest points of the curve to points (m, 2).
         """
-        places = np.ascontiguousarray(np.reshape(np.asarray(points, np.float64), (-1, 2)))
-        parameters, distances = np.empty(len(places)), np.empty(len(places))
-        _closest_point(self.knots, self.control_points, places, parameters, distances)
+        positions = np.ascontiguousarray(np.reshape(np.asarray(points, np.float64), (-1, 2)))
+        parameters, distances = np.empty(len(positions)), np.empty(len(positions))
+        _closest_point(self.knots, self.control_points, positions, parameters, distances)
         return parameters, distances
 
     def ray(self, origin: ArrayLike, direction: float) -> float:
         """Return the distance at which a ray first meets the curve [m].
 
-        From a point (2,) along a direction [rad]; inf where it does not.
+        From a point (2,) along a direction [rad]; inf if it does not.
         """
         x, y = (float(value) for value in np.asarray(origin, np.float64))
         return float(_ray_crossing(self.knots, self.control_points, x, y, math.cos(direction), math.sin(direction)))

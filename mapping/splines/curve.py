@@ -1,6 +1,8 @@
 """A curve of the map.
 
 A spline, how well each part of it is known, and quantities derived from it once.
+
+A grid of cells around the robot holds the nearest piece of each cell, for fast lookup.
 """
 
 import math
@@ -24,7 +26,7 @@ Box = tuple[float, float, float, float]
 
 _END_WEIGHT = 4.0
 
-LEAST_LINE = 0.4
+MIN_LINE = 0.4
 """Shorter lines have no clear direction [m]."""
 
 
@@ -48,7 +50,7 @@ class Curve:
     box : (float, float, float, float)
         Least x, y and greatest x, y [m].
     line : (4,) float64 or None
-        Middle x, y, direction [rad] and half length [m], where the curve is a line.
+        Middle x, y, direction [rad] and half length [m], if the curve is a line.
     """
 
     spline: Spline
@@ -75,13 +77,7 @@ class Curve:
 
 
 def make_curve(spline: Spline, weights: NDArray[np.float64], count: int, last_seen: int, spacing: float) -> Curve:
-    """Return a curve whose way has points ``spacing`` apart [m].
-
-    Raises
-    ------
-    ValueError
-        Where there are not as many weights as control points.
-    """
+    """Return a curve with points of its way ``spacing`` apart [m]."""
     if np.shape(weights) != (len(spline.control_points),):
         raise ValueError(
             f"weights have shape {np.shape(weights)}; the curve has {len(spline.control_points)} control points"
@@ -123,7 +119,7 @@ def fit_curve(way: Way, count: int, last_seen: int, fit: FitSettings, settings: 
 
 
 def curves_in(curves: list[Curve], box: Box) -> list[int]:
-    """Return the numbers of the curves whose boxes meet a box."""
+    """Return the indices of the curves with boxes that meet a box."""
     low_x, low_y, high_x, high_y = box
     # A loop over some tens of curves takes less time than numpy needs to gather their boxes.
     return [
@@ -165,7 +161,7 @@ def _find_line(points: Array, line: Array) -> bool:
     for k in range(last + 1):
         aside = (x * (points[k, 1] - points[0, 1]) - y * (points[k, 0] - points[0, 0])) / length
         lowest, highest, total = min(lowest, aside), max(highest, aside), total + aside
-    if not (length >= LEAST_LINE and highest - lowest <= STRAIGHT):
+    if not (length >= MIN_LINE and highest - lowest <= STRAIGHT):
         return False
     mean = total / (last + 1)
     line[0] = (points[0, 0] + points[last, 0]) / 2.0 - mean * y / length
@@ -199,7 +195,7 @@ class CurveLookup:
     pieces : (n, 5) float64
         Middle x, y, unit vector along, half length [m].
     nearest : (cells, cells) int32
-        Nearest piece of each cell, -1 where there is none; row 0 at the lowest y.
+        Nearest piece of each cell, -1 if there is none; row 0 at the lowest y.
     frame : (3,) float64
         x, y of the lower left corner of cell (0, 0), and the distance up to which a piece counts [m].
     """
@@ -294,7 +290,7 @@ def _piece_distance(pieces: Array, piece: int, x: float, y: float) -> float:
 
 @kernel(forceinline=True)
 def _piece_at(nearest: Array, frame: Array, x: float, y: float) -> int:
-    """Return the nearest piece of a place, -1 where there is none."""
+    """Return the nearest piece of a place, -1 if there is none."""
     column, row = int((x - frame[0]) * (1.0 / CELL)), int((y - frame[1]) * (1.0 / CELL))
     if x < frame[0] or y < frame[1] or row >= nearest.shape[0] or column >= nearest.shape[1]:
         return -1

@@ -3,8 +3,10 @@
 Features are corners, free ends of walls (peaks) and straight lines.
 
 A corner is where two smooth pieces of one cluster meet. A peak is where a surface ends because it ends: the
-scan goes on farther away. Where it goes on nearer, something stands in front; where it does not go on, the
+scan goes on farther away. If it goes on nearer, something stands in front; if it does not go on, the
 laser's reach has ended; neither is a feature.
+
+The points of a scan are in the frame of the robot, each at the robot's pose at its own time.
 """
 
 import math
@@ -24,7 +26,7 @@ from lidarium.mapping.splines.settings import BREAKPOINT_TESTS, PointSettings, S
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _ScanPoints:
-    """Where the beams of a scan ended, in the frame of the robot at the last beam.
+    """Ends of the beams of a scan, in the frame of the robot at the last beam.
 
     Attributes
     ----------
@@ -37,7 +39,7 @@ class _ScanPoints:
     sigmas : (n,) float64
         Standard deviations of these [m].
     scan : (beams,) float64
-        The whole scan [m]; inf for no return, nan for what is invalid or out of the laser's reach.
+        The whole scan [m]; inf for no return, nan if invalid or out of the laser's reach.
     geometry : ScanGeometry
         Directions of the beams.
     """
@@ -62,8 +64,8 @@ def scan_points(
     Parameters
     ----------
     ranges : (beams,) float32
-        The scan [m]; inf for no return, nan for an invalid beam. What is nearer than the laser's least range
-        is invalid, what is farther than its greatest is no return.
+        The scan [m]; inf for no return, nan for an invalid beam. A range below the laser's minimum
+        is invalid, one above its maximum is no return.
     geometry : ScanGeometry
         The laser.
     settings : PointSettings or None
@@ -77,7 +79,7 @@ def scan_points(
     Raises
     ------
     ValueError
-        Where there are not as many ranges as beams.
+        If there are not as many ranges as beams.
     """
     settings = settings or PointSettings()
     measured = np.asarray(ranges, np.float64)
@@ -295,9 +297,9 @@ def curves_of(
         if last - first + 1 < settings.segmentation.least_points:
             continue
         sigmas = observation.points.sigmas[first : last + 1]
-        places = observation.points.points[first : last + 1]
-        if float(np.ptp(places, axis=0).max()) > 1e-6:
-            fitted.append((fit_bspline(places, settings.fit, sigmas).spline, sigmas))
+        positions = observation.points.points[first : last + 1]
+        if float(np.ptp(positions, axis=0).max()) > 1e-6:
+            fitted.append((fit_bspline(positions, settings.fit, sigmas).spline, sigmas))
     return fitted
 
 

@@ -1,4 +1,8 @@
-"""Least-squares fits of cubic B-splines to ordered points."""
+"""Least-squares fits of cubic B-splines to ordered points.
+
+The systems of equations are banded: a symmetric matrix is kept by its lower band, (n, 4), and row i holds
+columns i, i - 1, i - 2, i - 3.
+"""
 
 import math
 from dataclasses import dataclass
@@ -52,7 +56,7 @@ def _solve(factor: Array, right: Array) -> None:
 
 STEP_SIGMAS = 4.0
 
-MOST_BIAS = 3.5
+MAX_BIAS = 3.5
 
 
 class _Samples(NamedTuple):
@@ -61,7 +65,7 @@ class _Samples(NamedTuple):
     Attributes
     ----------
     points : (m, 2) float64
-        Where they lie [m].
+        Their positions [m].
     sigmas : (m,) float64
         Their standard deviations [m].
     parameters : (m,) float64
@@ -179,7 +183,7 @@ def _fit_curve(
             is_straight = False
             line = _fit_straight(points, sigmas)
             rms, bias = _misfit(samples, knots, line, closeness)
-            if rms <= wanted and bias <= MOST_BIAS:
+            if rms <= wanted and bias <= MAX_BIAS:
                 return line, knots, normal, rms
         factor = normal.copy()
         # With the stiffness there always is a solution; without, more control points than the points
@@ -187,7 +191,7 @@ def _fit_curve(
         if _factorize(factor):
             _solve(factor, control_points)
             rms, bias = _misfit(samples, knots, control_points, closeness)
-            if (rms <= wanted and bias <= MOST_BIAS) or count >= most:
+            if (rms <= wanted and bias <= MAX_BIAS) or count >= most:
                 return control_points, knots, normal, rms
             count = min(2 * count - ORDER + 1, most)
         else:
@@ -258,7 +262,7 @@ def _accumulate(samples: _Samples, knots: Array, stiffness: float, normal: Array
 
 @kernel
 def _misfit(samples: _Samples, knots: Array, control_points: Array, closeness: _Closeness) -> tuple[float, float]:
-    """Return how far points lie beside the curve at their parameters.
+    """Return the distances of points from the curve at their parameters.
 
     Along it, parameters are but estimates.
 
@@ -294,7 +298,7 @@ def _misfit(samples: _Samples, knots: Array, control_points: Array, closeness: _
 _SHORTEST = 1e-9
 
 
-_WINDOWS, _LEAST_WINDOW = 8, 6
+_WINDOWS, _MIN_WINDOW = 8, 6
 
 
 _FINE = 0.1
@@ -309,7 +313,7 @@ class Fit:
     spline : Spline
         The curve; its knots run along it in metres.
     rms : float
-        Root mean square of how far the points lie beside the curve [m].
+        Root mean square of the distances of the points from the curve [m].
     normal : (n, 4) float64
         The lower band of the weighted normal matrix, weights in 1 / m2.
     """
@@ -360,30 +364,30 @@ def fit_bspline(points: ArrayLike, settings: FitSettings | None = None, sigmas: 
     Raises
     ------
     ValueError
-        Where there are fewer than 4 points, or all are the same.
+        If there are fewer than 4 points, or all are the same.
     """
     settings = settings or FitSettings()
-    places = np.ascontiguousarray(points, np.float64)
-    if places.ndim != 2 or places.shape[1] != 2 or len(places) < ORDER:
-        raise ValueError(f"points have shape {places.shape}; want (m, 2) with m >= {ORDER}")
-    deviations = np.full(len(places), 0.01) if sigmas is None else np.ascontiguousarray(sigmas, np.float64)
-    if deviations.shape != (len(places),) or not deviations.min() > 0.0:
-        raise ValueError(f"sigmas have shape {deviations.shape} or are not positive; want ({len(places)},)")
-    parameters = np.empty(len(places))
-    noise = settings.explained * deviations if sigmas is not None else np.zeros(len(places))
-    length = float(_chord_lengths(places, noise, parameters))
+    positions = np.ascontiguousarray(points, np.float64)
+    if positions.ndim != 2 or positions.shape[1] != 2 or len(positions) < ORDER:
+        raise ValueError(f"points have shape {positions.shape}; want (m, 2) with m >= {ORDER}")
+    deviations = np.full(len(positions), 0.01) if sigmas is None else np.ascontiguousarray(sigmas, np.float64)
+    if deviations.shape != (len(positions),) or not deviations.min() > 0.0:
+        raise ValueError(f"sigmas have shape {deviations.shape} or are not positive; want ({len(positions)},)")
+    parameters = np.empty(len(positions))
+    noise = settings.explained * deviations if sigmas is not None else np.zeros(len(positions))
+    length = float(_chord_lengths(positions, noise, parameters))
     if not _SHORTEST < length < math.inf:
         raise ValueError("points are all the same, or not finite; want points along a curve")
     is_noisy = sigmas is not None and settings.explained > 0.0
     wanted = (
-        max(settings.rms, settings.explained * math.sqrt(float(deviations @ deviations) / len(places)))
+        max(settings.rms, settings.explained * math.sqrt(float(deviations @ deviations) / len(positions)))
         if is_noisy
         else settings.rms
     )
-    window = max(len(places) // _WINDOWS, _LEAST_WINDOW) if is_noisy else 1
-    scales = np.hypot(deviations, _FINE * settings.rms) if is_noisy else np.full(len(places), settings.rms)
+    window = max(len(positions) // _WINDOWS, _MIN_WINDOW) if is_noisy else 1
+    scales = np.hypot(deviations, _FINE * settings.rms) if is_noisy else np.full(len(positions), settings.rms)
     control_points, knots, normal, rms = _fit_curve(
-        _Samples(places, deviations, parameters),
+        _Samples(positions, deviations, parameters),
         length,
         _Closeness(wanted, scales, window),
         _ControlRule(settings.spacing, settings.finest_spacing, settings.is_sparse, settings.stiffness),
@@ -395,7 +399,7 @@ def fit_bspline(points: ArrayLike, settings: FitSettings | None = None, sigmas: 
 
 
 def _averaged_knots(parameters: ArrayLike, count: int) -> NDArray[np.float64]:
-    """Return knots (count + 4,) for so many control points.
+    """Return knots (count + 4,) for ``count`` control points.
 
     Every span has its share of the parameters (m,).
     """

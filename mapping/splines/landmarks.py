@@ -17,7 +17,7 @@ class Landmarks:
     Attributes
     ----------
     points : (n, 2) float64
-        Where they are [m].
+        Their positions [m].
     weights : (n,) float64
         How much is known of each, as a number of observations with a standard deviation of 1 cm.
     counts : (n,) int64

@@ -2,9 +2,9 @@
 
 Split, merge, and a comparison of the directions on both sides.
 
-Points are split where one lies too far from the line through the ends, again and again; neighbouring parts
-that fit one line are merged. What remains are straight leaves. Where the wall turns sharply between two of
-them, the cluster is cut, so that each curve is smooth; where it bends gently, as a round wall does, it is
+Points are split if one lies too far from the line through the ends, again and again; neighbouring parts
+that fit one line are merged. Straight leaves remain. If the wall turns sharply between two of
+them, the cluster is cut, so that each curve is smooth; if it bends gently, as a round wall does, it is
 not.
 """
 
@@ -155,7 +155,7 @@ class Cut:
         Of each leaf: middle x, y, direction [rad], half its length and the root mean square of the distances
         from it [m].
     corners : (p - 1, 2) float64
-        Where the lines on both sides of a corner meet [m].
+        Intersections of the lines on both sides of a corner [m].
     corner_points : (p - 1,) int64
         The points at which pieces are cut.
     """
@@ -179,9 +179,9 @@ def split_merge(
     points : (n, 2) float64
         In order, at least 2 [m].
     sigmas : (n,) float64 or None
-        Standard deviations of their noise [m]; none where None.
+        Standard deviations of their noise [m]; none if None.
     settings : SegmentationSettings or None
-        When points are split, and what a corner is.
+        When points are split, and the definition of a corner.
 
     Returns
     -------
@@ -191,16 +191,16 @@ def split_merge(
     Raises
     ------
     ValueError
-        Where there are fewer than 2 points.
+        If there are fewer than 2 points.
     """
     settings = settings or SegmentationSettings()
-    places = np.ascontiguousarray(points, np.float64)
-    if places.ndim != 2 or places.shape[1] != 2 or len(places) < 2:
-        raise ValueError(f"points of a cluster have shape {places.shape}; want (n, 2) with n >= 2")
-    noise = np.zeros(len(places)) if sigmas is None else np.ascontiguousarray(sigmas, np.float64)
-    ends = np.empty(len(places) + 1, np.int64)
-    lines, corners = np.empty((len(places), 5)), np.empty((len(places), 2))
-    is_corner = np.zeros(len(places) + 1, np.bool_)
+    positions = np.ascontiguousarray(points, np.float64)
+    if positions.ndim != 2 or positions.shape[1] != 2 or len(positions) < 2:
+        raise ValueError(f"points of a cluster have shape {positions.shape}; want (n, 2) with n >= 2")
+    noise = np.zeros(len(positions)) if sigmas is None else np.ascontiguousarray(sigmas, np.float64)
+    ends = np.empty(len(positions) + 1, np.int64)
+    lines, corners = np.empty((len(positions), 5)), np.empty((len(positions), 2))
+    is_corner = np.zeros(len(positions) + 1, np.bool_)
     rule = _CornerRule(
         settings.split_distance,
         settings.split_sigmas,
@@ -210,7 +210,7 @@ def split_merge(
         settings.least_points,
         CORNER_RULES.index(settings.corner_rule),
     )
-    count = _cut(places, noise, rule, ends, lines, corners, is_corner)
+    count = _cut(positions, noise, rule, ends, lines, corners, is_corner)
     inner = np.flatnonzero(is_corner[: count + 1])
     cut_at = ends[inner]
     is_corner[0] = is_corner[count] = True
@@ -265,7 +265,7 @@ def _is_round(points: Array, first: int, low: int, high: int, last: int, reach: 
 
 
 class _CornerRule(NamedTuple):
-    """When points are split, and what a corner is; see ``SegmentationSettings``."""
+    """When points are split, and the definition of a corner; see ``SegmentationSettings``."""
 
     split_distance: float
     split_sigmas: float

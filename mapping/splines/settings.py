@@ -52,7 +52,7 @@ class SegmentationSettings:
     Attributes
     ----------
     test : str
-        What shows that two neighbouring points lie on different surfaces. ``adaptive``: farther apart than on
+        Rule for neighbouring points on different surfaces. ``adaptive``: farther apart than on
         a wall at the grazing angle ``incidence`` and than noise explains; ``dietmayer``: farther apart than
         on a wall at right angles plus a constant, as in the thesis; ``pedraza``: the steps to both sides
         differ by more than ``step_ratio``, or the way turns by more than ``most_turn``.
@@ -67,9 +67,9 @@ class SegmentationSettings:
     least_points : int
         Smaller clusters are left out.
     split_distance : float
-        Points are split where one lies farther from the line through the ends [m].
+        Points are split if one lies farther from the line through the ends [m].
     split_sigmas : float
-        And farther than so many standard deviations of its noise.
+        And farther than this number of standard deviations of its noise.
     collinear_angle : float
         Neighbouring lines that differ by less are tried as one [rad].
     corner_angle : float
@@ -81,7 +81,7 @@ class SegmentationSettings:
         Length of wall on both sides on which directions are measured [m], or ten standard deviations of the
         noise.
     line_points : int
-        Straight pieces of at least so many points are features.
+        Minimum number of points of straight pieces that are features.
     """
 
     test: str = "adaptive"
@@ -119,13 +119,13 @@ class FitSettings:
     rms : float
         A curve follows where the root mean square of its distances is at most this [m].
     explained : float
-        It also follows where that is at most so many times the standard deviation of the points' noise, where
+        It also follows if that is at most this multiple of the standard deviation of the points' noise, if
         that is known.
     is_sparse : bool
         Whether a curve begins as a straight one, then with four free control points, however long, and gets
-        more only where it does not follow.
+        more only if it does not follow.
     stiffness : float
-        Weight of the second differences of control points; keeps what no point determines in line.
+        Weight of the second differences of control points; keeps undetermined ones in line.
     """
 
     spacing: Annotated[float, within(1e-3, 1000.0)] = 0.25
@@ -181,7 +181,7 @@ class AssociationSettings:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MapSettings:
-    """How the map keeps what was seen.
+    """How the map keeps seen walls.
 
     Attributes
     ----------
@@ -190,16 +190,16 @@ class MapSettings:
     rms : float
         Joined curves follow their points to this root mean square [m].
     most_weight : float
-        A place of a curve never weighs more than so many observations at a standard deviation of 1 cm, so
+        A point of a curve never weighs more than this number of observations at a standard deviation of 1 cm, so
         that the map can still learn.
     least_extension : float
-        What goes beyond the end of a curve by less is noise [m].
+        Extensions beyond the end of a curve by less are noise [m].
     blend_length : float
-        Over this length the joint of a curve with what extends it fades [m].
+        Over this length the joint of a curve with its extension fades [m].
     least_length : float
         Shorter curves do not begin a new wall [m].
     least_sigmas : float
-        Nor do curves shorter than so many standard deviations of their noise.
+        Nor do curves shorter than this number of standard deviations of their noise.
     explained_distance : float
         Nor do curves most of which lies nearer than this to curves of the map [m], or nearer than three
         standard deviations.
@@ -248,7 +248,7 @@ def spline_settings(mode: str = "default") -> SplineSettings:
     Raises
     ------
     ValueError
-        Where there is no such mode.
+        If there is no such mode.
     """
     _check_name(mode, "mode of spline maps", MODES)
     if mode == "default":

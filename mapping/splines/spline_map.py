@@ -28,7 +28,7 @@ class SplineMap:
     curves : list of Curve
         The walls; their free side is the one from which they were seen.
     corners, peaks : Landmarks
-        Where walls meet and where they end.
+        Corners of walls and their ends.
     updates : int
         How many scans were taken in.
     """
@@ -40,15 +40,7 @@ class SplineMap:
         self.updates = 0
 
     def update(self, observation: Observation, pose: Transform) -> None:
-        """Take in a scan that was seen from a pose of the robot.
-
-        Parameters
-        ----------
-        observation : Observation
-            The scan, in the frame of the robot.
-        pose : Transform
-            Where the robot is, ``map_from_robot``.
-        """
+        """Take in a scan that was seen from a pose of the robot."""
         self.updates += 1
         for spline, sigmas in curves_of(observation, self.settings):
             seen = Spline(spline.knots, pose.apply(spline.control_points))
@@ -60,15 +52,7 @@ class SplineMap:
         self.peaks = self.peaks.updated(features.peaks, features.peak_sigmas, *limits)
 
     def absorb(self, other: "SplineMap", pose: Transform) -> None:
-        """Join another map to this one.
-
-        Parameters
-        ----------
-        other : SplineMap
-            A map of neighbouring walls, which is left as it is.
-        pose : Transform
-            Where its frame lies in this map's, ``this_from_other``.
-        """
+        """Join another map to this one."""
         self.updates = max(self.updates, other.updates)
         for curve in other.curves:
             moved = curve.moved(pose)
@@ -78,7 +62,7 @@ class SplineMap:
         self.peaks = self.peaks.joined(other.peaks.moved(pose), distance, most_weight)
 
     def around(self, frame: Transform, reach: float) -> "SplineMap":
-        """Return a map of what lies near a frame, in that frame.
+        """Return the map near a frame, in that frame.
 
         Parameters
         ----------
@@ -116,7 +100,7 @@ class SplineMap:
     def ray(self, origin: NDArray[np.float64], direction: float) -> float:
         """Return the range that a laser at a point (2,) would measure [m].
 
-        Along a direction [rad]; inf where no curve is met.
+        Along a direction [rad]; inf if no curve is met.
         """
         return min((curve.spline.ray(origin, direction) for curve in self.curves), default=math.inf)
 
@@ -133,14 +117,14 @@ class SplineMap:
         ]
 
     def _way_of(self, spline: Spline, sigmas: NDArray[np.float64]) -> Way:
-        """Return points along a seen curve, whose points have standard deviations (m,) [m]."""
+        """Return points along a seen curve, with standard deviations (m,) of its points [m]."""
         parameters = spline.sample_parameters(self.settings.map.sample_spacing)
-        places = np.arange(len(parameters)) * ((len(sigmas) - 1) / (len(parameters) - 1))
-        noise = np.interp(places, np.arange(len(sigmas)), sigmas)
+        positions = np.arange(len(parameters)) * ((len(sigmas) - 1) / (len(parameters) - 1))
+        noise = np.interp(positions, np.arange(len(sigmas)), sigmas)
         return Way(spline.evaluate(parameters), (0.01 / noise) ** 2)
 
     def _take_in(self, way: Way, control_points: NDArray[np.float64], count: int) -> None:
-        """Join a curve that so many scans have seen with those along it, or add it as a new one."""
+        """Join a curve with those along it, or add it as a new one."""
         settings, seen = self.settings.map, count
         while (best := self._best_match(way, control_points)) is not None:
             known = self.curves.pop(best[0])
@@ -164,7 +148,7 @@ class SplineMap:
     def _is_new(self, way: Way) -> bool:
         """Return whether a polyline is long against its noise, and new to the map.
 
-        New means that it is not one more view of what the map holds.
+        New means that it is not one more view of a curve of the map.
         """
         settings = self.settings.map
         sigma = 0.01 / math.sqrt(float(way.weights.min()))
@@ -177,7 +161,7 @@ class SplineMap:
         return 2 * int(is_known.sum()) < len(is_known)
 
     def _near(self, way: Way, distance: float) -> list[int]:
-        """Return the curves whose boxes come within a distance of that of a way [m]."""
+        """Return the curves with boxes within a distance of that of a way [m]."""
         low_x, low_y, high_x, high_y = box_of(way.points)
         return curves_in(self.curves, (low_x - distance, low_y - distance, high_x + distance, high_y + distance))
 
@@ -193,13 +177,13 @@ class SplineMap:
                 or are_near(way.points, curve.way.points, settings.control_distance)
             ):
                 continue
-            places = common_places(way, curve.way, settings)
-            if places is not None and (best is None or places.length > best[1].length):
-                best = (index, places)
+            positions = common_places(way, curve.way, settings)
+            if positions is not None and (best is None or positions.length > best[1].length):
+                best = (index, positions)
         return best
 
     def _cut_at_corners(self, way: Way) -> list[Way]:
-        """Cut a way where it turns sharply."""
+        """Cut a way if it turns sharply."""
         cut = split_merge(way.points, 0.01 / np.sqrt(way.weights), self.settings.segmentation)
         if len(cut.pieces) == 1:
             return [way]

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from lidarium.agents.intent import KEPT, KEPT_NEAR, MOST_RETURNS, Intent
+from lidarium.agents.intent import KEPT, KEPT_NEAR, MAX_RETURNS, Intent
 
 LEFT, RIGHT = np.array([0.0, 0.0]), np.array([4.0, 0.0])
 
@@ -50,4 +50,4 @@ def test_the_gain_stays_a_number_however_often_a_robot_returns():
     for _ in range(1200):
         intent.go_for(LEFT)
         intent.go_for(RIGHT)
-    assert intent.kept == KEPT * 2.0**MOST_RETURNS
+    assert intent.kept == KEPT * 2.0**MAX_RETURNS

@@ -14,7 +14,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from lidarium.agents.learned.decision import CROP_SIDE, MOST_DETOUR, Decision
+from lidarium.agents.learned.decision import CROP_SIDE, MAX_DETOUR, Decision
 from lidarium.agents.learned.features import MOST, OPTION_FEATURES, SITUATION_FEATURES, TEAMMATE_FEATURES
 from lidarium.training.decisions import MOST_OPTIONS, MOST_TEAMMATES, Decisions, stacked
 from lidarium.training.places import Place
@@ -120,7 +120,7 @@ def boxes() -> dict[str, spaces.Space[Any]]:
     return {
         **{name: spaces.Box(-MOST, MOST, shape, np.float32) for name, shape in numbers.items()},
         "crops": spaces.Box(-1, 1, (MOST_OPTIONS, CROP_SIDE, CROP_SIDE), np.int8),
-        "scores": spaces.Box(-MOST_DETOUR, 0.0, (MOST_OPTIONS,), np.float32),
+        "scores": spaces.Box(-MAX_DETOUR, 0.0, (MOST_OPTIONS,), np.float32),
         "mask": spaces.Box(0, 1, (MOST_OPTIONS,), np.bool_),
         "counts": spaces.Box(np.zeros(2, np.int64), most, dtype=np.int64),
     }

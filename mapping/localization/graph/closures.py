@@ -1,6 +1,6 @@
 """Place recognition: matches of a scan with old local maps, and their checks.
 
-A closure counts where its scan agrees with the local map, does not lie in its free space, has no second place
+A closure counts if its scan agrees with the local map, does not lie in its free space, has no second place
 that agrees nearly as well, and where it would move the robot far, or farther than it can have erred since,
 only together with others that say the same.
 """
@@ -50,15 +50,7 @@ class _Remembered:
 
 
 class ClosureFinder:
-    """Finished local maps, and what scans have to do with them.
-
-    Parameters
-    ----------
-    settings : ClosureSettings
-        How places are recognised.
-    matching : MatchingSettings
-        How scans are matched with maps.
-    """
+    """Finished local maps, and their matches with scans."""
 
     def __init__(self, settings: ClosureSettings, matching: MatchingSettings) -> None:
         self._settings, self._matching = settings, matching
@@ -79,7 +71,7 @@ class ClosureFinder:
         path: float,
         usual_score: float,
     ) -> list[Closure]:
-        """Return what the last node's scan recognises.
+        """Return the places that the last node's scan recognises.
 
         Parameters
         ----------
@@ -209,7 +201,7 @@ class ClosureFinder:
         first_node : int
             The first one of its local map.
         closure : Closure
-            What was recognised.
+            The recognised places.
         poses : (nodes, 3) float64
             The graph's poses [m, rad].
         covariance : (3, 3) float64

@@ -30,7 +30,7 @@ class NodeGraph:
     Attributes
     ----------
     nodes : (nodes, 3) float64
-        Where they are now believed to be [m, rad].
+        Their believed poses now [m, rad].
     covariance : (3, 3) float64
         That of the last node against the first [m^2, m rad, rad^2].
     """
@@ -107,7 +107,7 @@ class NodeGraph:
         return self._waiting > 0
 
     def settle(self, newest: int) -> None:
-        """Bring all poses to agree; the last so many closures have not had their say yet."""
+        """Bring all poses to agree; the last closures (a given number) are new."""
         walls = self._compass.edges(self.nodes) if self._compass is not None else []
         numbers = np.arange(len(self._motions))
         motions = Edges(

@@ -6,9 +6,14 @@ Minimises the sum over the edges of ``rho(e^T W e)``, e the difference of the po
 what was measured, W its information; rho is the identity for motions, and Cauchy's for closures, of which one
 may be wrong.
 
+Steps solve sparse symmetric systems of 3 x 3 blocks, one row and column of blocks per pose, by a Cholesky
+factor. The order of elimination and the blocks that the factor fills depend only on which poses are joined;
+they are found once for all steps, by SuperLU's minimum degree. The factors are computed in kernels.
+
 References
 ----------
 Grisetti et al., A tutorial on graph-based SLAM (IEEE ITS Magazine 2010).
+Davis, Direct Methods for Sparse Linear Systems (SIAM 2006), chapter 4: the left-looking factorisation.
 """
 
 import math
@@ -23,18 +28,18 @@ from lidarium.mapping.kernels.compilation import Array, kernel
 
 
 class _Elimination(NamedTuple):
-    """Where the blocks of a factor are, column by column in the order of elimination.
+    """Layout of the blocks of a factor, column by column in the order of elimination.
 
     Attributes
     ----------
     turn : (poses,) int64
         When each pose is eliminated: its row and column.
     starts : (poses + 1,) int64
-        Where each column's blocks begin; the first of a column is the diagonal's.
+        Index of each column's first block, which is on the diagonal.
     rows : (blocks,) int64
         Row of each block, ascending within a column, none above the diagonal.
     row_starts : (poses + 1,) int64
-        Where each row begins in the two below.
+        Index of each row's first entry in the next two.
     row_blocks, row_columns : (blocks,) int64
         Number and column of each block, row by row; the last of a row is the diagonal's.
     """
@@ -63,8 +68,8 @@ def _elimination(count: int, a: NDArray[np.int64], b: NDArray[np.int64]) -> _Eli
     # has all blocks.
     poses, joins = np.arange(count), -np.ones(len(a))
     diagonal = np.bincount(a, minlength=count) + np.bincount(b, minlength=count) + 1.0
-    places = np.concatenate([a, b, poses]), np.concatenate([b, a, poses])
-    dominant = scipy.sparse.csc_matrix((np.concatenate([joins, joins, diagonal]), places), shape=(count, count))
+    positions = np.concatenate([a, b, poses]), np.concatenate([b, a, poses])
+    dominant = scipy.sparse.csc_matrix((np.concatenate([joins, joins, diagonal]), positions), shape=(count, count))
     factors = scipy.sparse.linalg.splu(
         dominant, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
     )
@@ -86,16 +91,10 @@ def _factorise(places: _Elimination, blocks: Array) -> bool:
     Parameters
     ----------
     places : Elimination
-        Where its blocks are.
+        Layout of its blocks.
     blocks : (blocks, 3, 3) float64
-        The blocks, zero where only the factor has any; changed. Of those on the diagonal only the lower
+        The blocks, zero if only the factor has any; changed. Of those on the diagonal only the lower
         triangle is read.
-
-    Returns
-    -------
-    bool
-        Whether there is a factor: the matrix is positive definite. Where there is none, the blocks are of no
-        use.
     """
     starts, rows = places.starts, places.rows
     count = len(starts) - 1
@@ -187,7 +186,7 @@ def _divide(block: Array, diagonal: Array, quotient: Array) -> None:
 
 
 class Edges(NamedTuple):
-    """What was measured between poses.
+    """Measurements between poses.
 
     Attributes
     ----------
@@ -218,16 +217,16 @@ def optimised(
     Parameters
     ----------
     poses : (poses, 3) float64
-        Where to begin: x, y, theta [m, rad]; every pose but the first is joined with the first by edges.
+        Initial poses: x, y, theta [m, rad]; every pose but the first is joined with the first by edges.
     edges : Edges
-        What was measured.
+        Measurements.
     robust_scale : float
         Residual, in standard deviations, from which on an edge that may be wrong counts less.
     iterations : int
-        At most so many steps for each scale, at least 1.
+        Maximum number of steps for each scale, at least 1.
     newest : int
-        So many of the last edges have not had their say yet. Where they pull hard, they count fully at first,
-        and what others contradict is let go little by little.
+        So many of the last edges have not had their say yet. If they pull hard, they count fully at first,
+        and measurements that others contradict lose weight gradually.
 
     Returns
     -------
@@ -240,18 +239,18 @@ def optimised(
         return poses.copy(), np.zeros((3, 3))
     # The first pose stays where it is: the unknowns are those of all others.
     is_free = (edges.a > 0) & (edges.b > 0)
-    places = _elimination(len(poses) - 1, edges.a[is_free] - 1, edges.b[is_free] - 1)
-    factor = np.empty((len(places.rows), 3, 3))
+    positions = _elimination(len(poses) - 1, edges.a[is_free] - 1, edges.b[is_free] - 1)
+    factor = np.empty((len(positions.rows), 3, 3))
     best = poses.copy()
     pull = _squares(best, edges)[len(edges.a) - newest :]
     scale = max(robust_scale, math.sqrt(float(pull.max())) if len(pull) else 0.0)
     while True:
-        best = _settled(best, edges, scale, iterations, places, factor)
+        best = _settled(best, edges, scale, iterations, positions, factor)
         if scale <= robust_scale:
             break
         scale = max(0.2 * scale, robust_scale)
     best[:, 2] = math.pi - (math.pi - best[:, 2]) % (2.0 * math.pi)
-    return best, _last_covariance(places, factor)
+    return best, _last_covariance(positions, factor)
 
 
 @kernel

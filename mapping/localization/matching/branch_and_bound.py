@@ -243,7 +243,7 @@ class Pyramid:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Placement:
-    """What a search found.
+    """Result of a search.
 
     Attributes
     ----------
@@ -298,18 +298,11 @@ def place(
     reach : (float, float)
         How far the window goes to each side [m, rad].
     least_score : float
-        What a placement has to reach, from 0 to 1.
+        Minimum score of a placement, from 0 to 1.
     evaluations : int
-        At most so many placements and blocks of them are examined.
+        Maximum number of examined placements and blocks of them.
     apart : ((3,) float64, float, float) or None
         A pose of which placements keep away: by the first distance [m], or by the second angle [rad].
-
-    Returns
-    -------
-    Placement or None
-        The best, or None where none reaches the score.
-    bool
-        Whether the search came to its end.
     """
     if len(points) == 0:
         return None, True

@@ -21,13 +21,6 @@ from lidarium.mapping.localization.settings import SlamSettings
 class _LocalMatcher:
     """Lays scans on a local map, and knows how well they have agreed of late.
 
-    Parameters
-    ----------
-    settings : SlamSettings
-        How.
-    geometry : ScanGeometry
-        Directions of the beams.
-
     Attributes
     ----------
     usual_score : float
@@ -59,11 +52,11 @@ class _LocalMatcher:
         uncertainty: NDArray[np.float64],
         failed: int,
     ) -> Match | None:
-        """Return where a scan lies on a local map; None where it does not match.
+        """Return where a scan lies on a local map; None if it does not match.
 
-        Near what odometry says it is searched first, weighing both. Where that does not convince, odometry
+        The search begins near the pose by odometry, weighing both. If that does not convince, odometry
         may be wrong (a wheel slips, the robot was pushed), and the search goes farther, without it, for scans
-        of enough returns; what is found there has to be clearly better. On new ground, and where a scan
+        of enough returns; a match there has to be clearly better. On new ground, and where a scan
         hardly has a return, nothing but odometry measures where the robot is.
 
         Parameters
@@ -73,7 +66,7 @@ class _LocalMatcher:
         points : (n, 2) float64
             Points in the robot's frame [m].
         predicted : (3,) float64
-            Where the robot should be, in the local map's frame [m, rad].
+            Expected pose of the robot, in the local map's frame [m, rad].
         moved : (3,) float64
             The motion since the last match that led there.
         uncertainty : (3, 3) float64
@@ -112,7 +105,7 @@ class _LocalMatcher:
         return None if found is None else self._noted(found)
 
     def _explains(self, match: Match | None) -> bool:
-        """Whether a match explains enough of a scan: points near what the map knows, and how they agree."""
+        """Whether a match explains enough of a scan: points near known cells, and their agreement."""
         least = self._matching.explained_share * self.usual_score
         return match is not None and match.score * match.overlap >= least
 
@@ -245,15 +238,8 @@ def _outweighs(far: Match, near: Match, better_by: float) -> bool:
 
     The match against odometry must be better than one with it by enough.
 
-    Where nearly all of a scan lies near known walls, and elsewhere only a part of it, that part may agree
+    If nearly all of a scan lies near known walls, and elsewhere only a part of it, that part may agree
     better by chance, as on the other side of a wall: all points together must not agree less.
-
-    Parameters
-    ----------
-    far, near : Match
-        The match against odometry, and that with it.
-    better_by : float
-        By how much more the points near what the map has observed have to agree.
     """
     return far.score > near.score + better_by and far.score * far.overlap >= near.score * near.overlap
 
@@ -265,7 +251,7 @@ class _Active:
     Attributes
     ----------
     submap : Submap
-        What it holds.
+        Its contents.
     node : int
         Node of the graph in whose frame it is.
     in_older : (3,) float64
@@ -273,7 +259,7 @@ class _Active:
     nodes : list of int
         That node, and those that were set since.
     places : list of (3,) float64
-        Where they lie in the local map's frame.
+        Their poses in the local map's frame.
     path : float
         Way driven since [m].
     """
@@ -293,7 +279,7 @@ class Finished:
     Attributes
     ----------
     grid : AgreementGrid
-        What it holds.
+        Its contents.
     nodes : (nodes,) int64
         Nodes of the graph that were set while it grew; in the frame of the first it is.
     places : (nodes, 3) float64
@@ -307,15 +293,7 @@ class Finished:
 
 
 class LocalMapper:
-    """Two growing local maps, of which the older one says where the robot is.
-
-    Parameters
-    ----------
-    settings : SlamSettings
-        How.
-    geometry : ScanGeometry
-        Directions of the beams.
-    """
+    """Two growing local maps; the older one gives the robot's pose."""
 
     def __init__(self, settings: SlamSettings, geometry: ScanGeometry) -> None:
         self._matching, self._submaps = settings.matching, settings.submaps
@@ -325,7 +303,7 @@ class LocalMapper:
 
     @property
     def node(self) -> int:
-        """Node in whose frame poses are now."""
+        """Node that defines the frame of poses now."""
         return self._active[0].node
 
     def begin(self, node: int, ranges: NDArray[np.float32]) -> list[Finished]:
@@ -387,11 +365,6 @@ class LocalMapper:
         """Insert a scan at x, y, theta (3,) in the older local map's frame.
 
         The robot has driven a given distance [m] since the last scan.
-
-        Returns
-        -------
-        bool
-            False where the robot has left what the local maps can hold; ``begin`` has to be called then.
         """
         for active in self._active:
             pose = pose if active is self._active[0] else relative(active.in_older, pose)
@@ -426,7 +399,7 @@ class LocalMapper:
     def hand_over(self, poses: NDArray[np.float64]) -> tuple[NDArray[np.float64], list[Finished]]:
         """End the older local map where it is full.
 
-        Return poses (n, 3) of its frame in that of the new older one, and what ended.
+        Return poses (n, 3) of its frame in that of the new older one, and the finished map.
         """
         oldest = self._active[0]
         is_full = oldest.submap.scans >= self._submaps.least_scans and oldest.path >= self._submaps.path_m

@@ -86,7 +86,7 @@ def _is_unseen(levels: Array, x: float, y: float) -> bool:
 def _extremes_around(levels: Array, column: int, row: int) -> tuple[int, int]:
     """Return the lowest and the highest level within three cells (kernel).
 
-    What lies outside of the map is not observed.
+    Cells outside of the map are unobserved.
     """
     rows, columns = levels.shape
     lowest, highest = FULL_LEVEL, UNSEEN
@@ -103,13 +103,13 @@ SURFACE_GAP = 0.3
 As a share of their distance, or in metres.
 """
 
-MOST_BEND = 0.15
+MAX_BEND = 0.15
 """Largest ratio of the points' variance across the surface to that along it.
 
 Above this there is a corner.
 """
 
-LEAST_POINTS = 3
+MIN_POINTS = 3
 """Fewer points have no axis of their own."""
 
 
@@ -126,7 +126,7 @@ def _find_normals(points: Array, reach: float, normals: Array) -> None:
 
     The surface at each point is that of the point and its neighbours; zero for a point alone.
 
-    Two neighbours give it where the surface bends; elsewhere all within reach do, since noise turns what lies
+    Two neighbours give it if the surface bends; elsewhere all within reach do, since noise turns what lies
     between two near points.
     """
     count = points.shape[0]
@@ -159,7 +159,7 @@ def _axis(points: Array) -> tuple[float, float, bool]:
     it, or are too few.
     """
     count = points.shape[0]
-    if count < LEAST_POINTS:
+    if count < MIN_POINTS:
         return 0.0, 0.0, True
     x, y = 0.0, 0.0
     for k in range(count):
@@ -172,7 +172,7 @@ def _axis(points: Array) -> tuple[float, float, bool]:
         yy += (points[k, 1] - y) * (points[k, 1] - y)
     half, middle = math.hypot(0.5 * (xx - yy), xy), 0.5 * (xx + yy)
     angle = 0.5 * math.atan2(2.0 * xy, xx - yy)
-    return math.cos(angle), math.sin(angle), middle - half > MOST_BEND * (middle + half)
+    return math.cos(angle), math.sin(angle), middle - half > MAX_BEND * (middle + half)
 
 
 FULL_AGREEMENT = 2.0 / 3.0
@@ -183,16 +183,16 @@ It occurs in the middle of a wall that lies along a row of cells.
 With less, points in the middle of such a wall would agree too well, and scans would come to lie beside it.
 """
 
-MOST_STEPS = 30
+MAX_STEPS = 30
 """Steps of the descent at most."""
 
-FIRST_DAMPING, MOST_DAMPING = 1e-3, 1e3
+FIRST_DAMPING, MAX_DAMPING = 1e-3, 1e3
 """Share by which curvature is raised: at first, and at most before giving up."""
 
 EASING, TIGHTENING = 0.3, 8.0
 """Factors of damping after a step that led down, and after one that did not."""
 
-LEAST_CURVATURE = 1e-9
+MIN_CURVATURE = 1e-9
 """Curvature that is added, so that equations can be solved [1/m^2, 1/rad^2]."""
 
 STILL_M, STILL_ANGLE = 1e-4, 1e-5
@@ -203,20 +203,20 @@ PROBES = 4
 
 
 class _Objective(NamedTuple):
-    """What the cost of a pose is made of.
+    """Terms of the cost of a pose.
 
     Attributes
     ----------
     grid : AgreementGrid
         The map.
     points, normals : (n, 2) float64
-        Points in the robot's frame [m], and unit normals of their surfaces; zero where there is none.
+        Points in the robot's frame [m], and unit normals of their surfaces; zero if there is none.
     prior, information : (3,), (3, 3) float64
-        Where odometry says the robot is, and how much that counts.
+        Pose by odometry, and its weight.
     weight : float
         How much full disagreement of one point counts.
     unseen : float
-        Square of the disagreement of a point in what the map has not observed.
+        Squared disagreement of a point in cells that the map has not observed.
     """
 
     grid: AgreementGrid
@@ -230,20 +230,20 @@ class _Objective(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Match:
-    """Where a scan lies on a local map.
+    """Pose of a scan on a local map.
 
     Attributes
     ----------
     pose : (3,) float64
         x, y, theta in the map's frame [m, rad].
     score : float
-        Mean agreement, from 0 to 1, of the points that lie near what the map has observed.
+        Mean agreement, from 0 to 1, of the points near observed cells of the map.
     overlap : float
         Share of the points that do.
     contradiction : float
-        Share of the points that lie in what the map knows to be free.
+        Share of the points that lie in free cells of the map.
     information, prior : (3, 3) float64
-        What the points alone say of the pose, and what was known before [1/m^2, 1/(m rad), 1/rad^2].
+        Information of the points alone on the pose, and prior information [1/m^2, 1/(m rad), 1/rad^2].
     """
 
     pose: NDArray[np.float64]
@@ -257,7 +257,7 @@ class Match:
     def covariance(self) -> NDArray[np.float64]:
         """Covariance of the pose, (3, 3) [m^2, m rad, rad^2].
 
-        A metre and a radian at most, for what nothing measures.
+        At most a metre and a radian, for unmeasured directions.
         """
         return np.asarray(np.linalg.inv(self.information + self.prior + np.eye(3)), np.float64)
 
@@ -275,7 +275,7 @@ def refine(
     """Return the pose near a start at which the points agree best with the map.
 
     Minimises ``weight / n sum (1 - agreement_k)^2 + d^T information d``, d the difference of the pose from a
-    prior one; a point in what the map has not observed counts as ``unseen``. Points move across the surfaces
+    prior one; a point in unobserved cells counts as ``unseen``. Points move across the surfaces
     that they lie on, not along: where a wall goes on beyond what the map has observed of it, the points there
     would draw the scan back to where the map ends, and a robot in a corridor with them.
 
@@ -286,14 +286,14 @@ def refine(
     points : (n, 2) float64
         Points in the robot's frame, in the order of the beams [m].
     start, prior : (3,) float64
-        Where to begin, and where odometry says the robot is: x, y, theta in the map's frame [m, rad].
+        Initial pose, and pose by odometry: x, y, theta in the map's frame [m, rad].
     information : (3, 3) float64
         How much that counts [1/m^2, 1/(m rad), 1/rad^2]; zero for not at all.
     weight : float
         How much full disagreement of all points counts: independent points / variance of the disagreement of
         one.
     unseen : float
-        Square of the disagreement of a point in what the map has not observed. As that of most points, it
+        Squared disagreement of a point in cells that the map has not observed. As that of most points, it
         speaks neither for nor against a pose; if it counted in full, a wall that goes on beyond where the map
         ends would hold the robot back to where the scan covers the known part of it, and in a bare corridor
         nothing else speaks.
@@ -316,7 +316,7 @@ def refine(
 def _refine(objective: _Objective, pose: Array, hessian: Array, judgement: Array) -> None:
     """Move a pose to where the cost is least.
 
-    Tell the Hessian and what ``_judge`` says.
+    Return the Hessian and the result of ``_judge``.
     """
     _descend(objective, pose, hessian)
     _curve_around(objective, pose, hessian)
@@ -332,10 +332,10 @@ def _descend(objective: _Objective, pose: Array, hessian: Array) -> None:
     away = pose - prior
     cost = weight * _normal_equations(objective, pose, hessian, gradient) + away @ information @ away
     damping = FIRST_DAMPING
-    for _ in range(MOST_STEPS):
+    for _ in range(MAX_STEPS):
         whole = weight * hessian + information
         for k in range(3):
-            whole[k, k] += damping * whole[k, k] + LEAST_CURVATURE
+            whole[k, k] += damping * whole[k, k] + MIN_CURVATURE
         move = np.linalg.solve(whole, weight * gradient - information @ away)
         trial[:] = pose + move
         trial_away = trial - prior
@@ -350,7 +350,7 @@ def _descend(objective: _Objective, pose: Array, hessian: Array) -> None:
                 break
         else:
             damping *= TIGHTENING
-            if damping > MOST_DAMPING:
+            if damping > MAX_DAMPING:
                 break
 
 

@@ -36,7 +36,7 @@ def at_last_beam(
     Returns
     -------
     (beams,) float32
-        For each beam what lies in its direction as seen from the pose at the last beam; nan where nothing was
+        For each beam the range in its direction as seen from the pose at the last beam; nan if nothing was
         seen there.
     """
     if beam_interval_s <= 0.0 or period_s <= 0.0 or not motion.any():
@@ -77,13 +77,13 @@ def _undo_motion(
         angle = first + beam * increment - turn
         x = reach * math.cos(angle) - (cosine * ahead + sine * aside)
         y = reach * math.sin(angle) - (cosine * aside - sine * ahead)
-        place = int(math.floor((math.atan2(y, x) - first) / increment + 0.5))
+        position = int(math.floor((math.atan2(y, x) - first) / increment + 0.5))
         if is_full_circle:
-            place %= beams
-        if 0 <= place < beams:
+            position %= beams
+        if 0 <= position < beams:
             distance = math.hypot(x, y) if math.isfinite(value) and value <= range_max else math.inf
-            if not (seen[place] <= distance):
-                seen[place] = distance
+            if not (seen[position] <= distance):
+                seen[position] = distance
 
 
 def scan_points(
@@ -112,7 +112,7 @@ def scan_points(
         Of returns between which the beams are nearer to each other than this at their range, one is taken
         [m].
     limit : int
-        At most so many points.
+        Maximum number of points.
     """
     beams = np.empty(len(ranges), np.int64)
     kept = beams[: _spaced(ranges, increment, longest, spacing, beams)]
@@ -125,7 +125,7 @@ def scan_points(
 def _spaced(ranges: Array, increment: float, longest: float, spacing: float, kept: Array) -> int:
     """Note the beams that stay; return their number.
 
-    What counts is the gap between beams, not between their ends: the first end that is far enough from the
+    The gap between beams counts, not that between their ends: the first end that is far enough from the
     last one would be one that noise has moved that way more often than not, and scans so thinned turn against
     the map.
     """

@@ -28,7 +28,7 @@ LEVELS = 1 << LEVEL_BITS
 FAR_SHARE = 0.9
 """Share of the points that lie nearer than those that set the step of an angle."""
 
-LEAST_STEP, DEFAULT_STEP, MOST_STEP = math.radians(0.25), math.radians(1.0), math.radians(2.0)
+MIN_STEP, DEFAULT_STEP, MAX_STEP = math.radians(0.25), math.radians(1.0), math.radians(2.0)
 """Step of an angle at least, where there are no points, and at most [rad]."""
 
 
@@ -72,7 +72,7 @@ def search(
     points : (n, 2) float64
         Points in the robot's frame [m].
     around : (3,) float64
-        Middle of the search, where odometry says the robot is: x, y, theta in the map's frame [m, rad].
+        Middle of the search, the pose by odometry: x, y, theta in the map's frame [m, rad].
     reach_m, reach_angle : float
         How far the search goes to each side [m, rad].
     information, weight, unseen
@@ -96,7 +96,7 @@ def angle_step(points: NDArray[np.float64], resolution: float) -> float:
     if len(points) == 0:
         return DEFAULT_STEP
     far = float(np.quantile(np.hypot(points[:, 0], points[:, 1]), FAR_SHARE))
-    return min(max(resolution / max(far, resolution), LEAST_STEP), MOST_STEP)
+    return min(max(resolution / max(far, resolution), MIN_STEP), MAX_STEP)
 
 
 @kernel

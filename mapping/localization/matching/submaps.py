@@ -1,4 +1,4 @@
-"""Local maps: what some neighbouring scans agree on, in a frame of their own.
+"""Local maps: the consensus of neighbouring scans, in a frame of their own.
 
 A cell's agreement is the mean, over the scans that observed it, of the weight with which a beam ended there:
 a beam's end is shared out among the four cells around it in the way of bilinear interpolation, so that the
@@ -6,7 +6,7 @@ middle of a wall is kept to a fraction of a cell; a scan that saw through counts
 fades. This is the counting model (Haehnel et al., IROS 2003) with shares in place of whole hits.
 
 What scans saw of a cell is whether a beam that came as far ended there. With noise that share grows towards
-the back of a wall, which hardly a beam passes: it is a hazard, and no density. Where a beam ended, known
+the back of a wall, which hardly a beam passes: it is a hazard, and no density. If a beam ended, known
 walls a little behind count as seen through, therefore; without that, they come to lie behind where they are,
 and a robot that goes by them runs ahead of itself.
 """
@@ -22,7 +22,7 @@ from lidarium.mapping.grids.scan_polygon import GRAZING, fill_scan_polygon, scan
 from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.localization.settings import SubmapSettings
 
-MOST_BETWEEN = 10
+MAX_BETWEEN = 10
 """Points of a surface between two ends of neighbouring beams.
 
 Ends farther apart [cells] are not joined.
@@ -30,7 +30,7 @@ Ends farther apart [cells] are not joined.
 
 
 class _Cells(NamedTuple):
-    """What a local map holds of its cells.
+    """Cells of a local map.
 
     Attributes
     ----------
@@ -107,7 +107,7 @@ def _surface_points(lengths: Array, ends: Array, is_hit: Array, increment: float
     Points lie a cell apart between neighbouring ends on one surface.
     """
     beams = lengths.shape[0]
-    points = np.empty((beams * (MOST_BETWEEN + 1), 2))
+    points = np.empty((beams * (MAX_BETWEEN + 1), 2))
     count = 0
     for beam in range(beams):
         if not is_hit[beam]:
@@ -125,7 +125,7 @@ def _surface_points(lengths: Array, ends: Array, is_hit: Array, increment: float
             continue
         gap_x, gap_y = ends[0, follower] - ends[0, beam], ends[1, follower] - ends[1, beam]
         between = int(math.sqrt(gap_x * gap_x + gap_y * gap_y))
-        if between > MOST_BETWEEN:
+        if between > MAX_BETWEEN:
             continue
         for k in range(1, between + 1):
             share = k / (between + 1.0)
@@ -186,7 +186,7 @@ def _count_ends(
 ) -> None:
     """Add to each cell the largest share that it has in a point of a surface, once.
 
-    Take its bit out of what was seen through.
+    Take its bit out of the cells that were seen through.
 
     ``shares`` is zero on entry and on return.
     """
@@ -281,7 +281,7 @@ class Submap:
     settings : SubmapSettings
         How.
     reach_m : float
-        How far from its origin what it holds may lie at most [m].
+        Maximum distance of its cells from its origin [m].
 
     Attributes
     ----------
@@ -327,11 +327,6 @@ class Submap:
             Directions of the beams.
         longest : float
             Longest range that counts [m]; a return beyond it says that the way there is free.
-
-        Returns
-        -------
-        bool
-            False where the scan does not fit in: nothing is changed then.
         """
         scale = 1.0 / self._resolution
         reach = min(longest, geometry.range_max) * scale
@@ -345,7 +340,7 @@ class Submap:
         return True
 
     def finished(self) -> AgreementGrid:
-        """Return the agreement for good, cropped to what was observed."""
+        """Return the final agreement, cropped to the observed cells."""
         low_row, high_row, low_column, high_column = (int(value) for value in self._cells.box)
         if low_row >= high_row:
             return AgreementGrid(np.zeros((1, 1), np.uint8), 0, 0, self._resolution)

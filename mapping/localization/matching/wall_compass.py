@@ -1,6 +1,17 @@
 """A compass from the directions of a building's walls.
 
 It keeps headings from drifting.
+
+In most buildings walls run in two directions, at right angles. Seen along either, all points of a wall
+coincide: of all pairs of axes at right angles, projections onto those of the walls have the least entropy.
+This measurement gives a heading, up to quarter turns, and does not drift. Points need not lie in rows, so
+distant ones, which noise separates, count as well.
+
+References
+----------
+Gallup, Frahm, Mordohai, Yang and Pollefeys, Real-time plane-sweeping stereo with multiple sweeping directions
+(CVPR 2007), section 3.2, for points of a camera; here with a search from coarse to fine, and with the
+information.
 """
 
 import math
@@ -15,7 +26,7 @@ from lidarium.mapping.localization.settings import CompassSettings
 QUARTER = 0.5 * math.pi
 """Turns by so much change nothing about the directions of walls [rad]."""
 
-LEAST_POINTS = 20
+MIN_POINTS = 20
 """Of fewer points nothing is estimated."""
 
 COARSE_POINTS = 600
@@ -27,7 +38,7 @@ COARSE_CELL_M, COARSE_STEPS = 0.05, 180
 Steps are the directions in which points are then counted.
 """
 
-LEAST_GAIN, APART = 0.2, math.radians(10.0)
+MIN_GAIN, APART = 0.2, math.radians(10.0)
 """Least gain in entropy along walls, and the least angle to rivals [nats, rad].
 
 Entropy has to be less by this than in all directions that differ from theirs by more than the angle.
@@ -44,7 +55,7 @@ In coarse cells two walls that run side by side, a few centimetres apart, would 
 FINE_STEPS = (math.radians(0.2), math.radians(0.1), math.radians(0.05))
 """The steps that go with them [rad]."""
 
-MOST_MOVES = 3
+MAX_MOVES = 3
 """At most so often a finer search follows its best direction."""
 
 DEPENDENCE = 3.0
@@ -74,11 +85,11 @@ def wall_direction(points: Array) -> tuple[float, float]:
     float
         The direction, in [-pi/4, pi/4), in the frame of the points [rad].
     float
-        Its information, 0 where there are no walls, or hardly any that agree on two directions at right
+        Its information, 0 if there are no walls, or hardly any that agree on two directions at right
         angles [1/rad^2].
     """
     count = len(points)
-    if count < LEAST_POINTS:
+    if count < MIN_POINTS:
         return 0.0, 0.0
     reach = 0.0
     for k in range(count):
@@ -92,7 +103,7 @@ def wall_direction(points: Array) -> tuple[float, float]:
         cell, step = FINE_CELLS_M[level], FINE_STEPS[level]
         for k in range(7):
             order[k] = _fine_order(points, direction + (k - 3) * step, cell, reach, counts)
-        for _ in range(MOST_MOVES):
+        for _ in range(MAX_MOVES):
             best = int(np.argmax(order))
             if best == 3:
                 break
@@ -149,7 +160,7 @@ def _coarse_direction(points: Array, reach: float, counts: Array) -> tuple[float
     for step in range(COARSE_STEPS):
         if abs(within_quarter((step - best) * QUARTER / COARSE_STEPS)) >= APART:
             beside = max(beside, order[step])
-    return best * QUARTER / COARSE_STEPS, order[best] - beside >= LEAST_GAIN
+    return best * QUARTER / COARSE_STEPS, order[best] - beside >= MIN_GAIN
 
 
 @kernel
@@ -165,9 +176,9 @@ def _fine_order(points: Array, direction: float, cell: float, reach: float, coun
     for _ in range(2):
         counts[: 2 * middle] = 0.0
         for k in range(len(points)):
-            place = cosine * points[k, 0] + sine * points[k, 1] + middle
-            first = int(place)
-            share = place - first
+            position = cosine * points[k, 0] + sine * points[k, 1] + middle
+            first = int(position)
+            share = position - first
             counts[first] += 1.0 - share
             counts[first + 1] += share
         for k in range(1, 2 * middle - 1):
@@ -180,7 +191,7 @@ def _fine_order(points: Array, direction: float, cell: float, reach: float, coun
 
 @dataclass(frozen=True, slots=True)
 class _Bearing:
-    """Where walls run, as seen from a node of the graph.
+    """Directions of walls, as seen from a node of the graph.
 
     Attributes
     ----------
@@ -202,14 +213,9 @@ class WallCompass:
 
     It collects directions of walls between nodes. The walls are those of the building.
 
-    Where walls run is surveyed once, over the first local map. From then on both are estimated together, by a
+    The directions of walls are surveyed once, over the first local map. From then on both are estimated together, by a
     Kalman filter: what the next nodes show says more of the building, what later ones show more of the
     headings.
-
-    Parameters
-    ----------
-    settings : CompassSettings
-        How.
 
     Attributes
     ----------
@@ -242,12 +248,7 @@ class WallCompass:
         node : int
             The node.
         heading : float
-            What is believed of it [rad].
-
-        Returns
-        -------
-        bool
-            Whether there are such walls.
+            Its believed direction [rad].
         """
         direction, information = wall_direction(points)
         if information == 0.0:
@@ -264,7 +265,7 @@ class WallCompass:
             self._points.append(points)
 
     def forget(self) -> None:
-        """Forget what was seen since the last node."""
+        """Forget everything seen since the last node."""
         self._points = []
 
     def turn(self, node: int, since: float, variance: float, heading: float) -> tuple[float, float]:
@@ -279,7 +280,7 @@ class WallCompass:
         since, variance : float
             Turn since the last one, and its variance [rad, rad^2].
         heading : float
-            What is believed of the new one [rad].
+            Believed direction of the new one [rad].
 
         Returns
         -------

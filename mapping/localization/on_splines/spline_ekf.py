@@ -1,11 +1,11 @@
 """The extended Kalman filter on a map of curves.
 
-One Gaussian over the pose, by what share wheels measure paths and turns too long or too short, and all
+One Gaussian over the pose, the scale errors of the wheels' paths and turns, and all
 corners and peaks that it trusts.
 
 A landmark enters when the map has seen it often enough, with the pose's uncertainty carried over; the cost of
 a correction grows with the square of their number. Curves are measured too: how far the ends of rays lie
-beside them. They hold the pose, and through it the landmarks.
+besides them. They hold the pose, and through it the landmarks.
 """
 
 import math
@@ -43,13 +43,13 @@ class SplineEkfSettings:
     Attributes
     ----------
     tracking : TrackingSettings
-        What is matched, and how the map is made.
+        Settings of matching and of the map.
     gate_sigmas : float
-        Measurements that miss what is expected by more standard deviations are left out.
+        Measurements that differ from their expectation by more standard deviations are left out.
     start_distance, start_turn : float
         Standard deviations of the first pose [m, rad].
     distance_bias, turn_bias : float
-        By what share odometry may measure paths and turns too long or too short all the time, as a standard
+        Constant scale errors of odometry's paths and turns, as a standard
         deviation.
     """
 
@@ -70,14 +70,14 @@ class SplineEkf(SplineTracker):
     Parameters
     ----------
     settings : SplineEkfSettings or None
-        The defaults where None.
+        The defaults if None.
     geometry : ScanGeometry or None
         The laser; the URG-04LX of the theses where None.
 
     Attributes
     ----------
     scales : (2,) float64
-        What a path and a turn are taken to be, of what odometry measures.
+        Scale factors of paths and turns against odometry.
     landmarks : (k, 2) float64
         Corners and peaks in the state, in the frame of the local map [m].
     state_covariance : (5 + 2 k, 5 + 2 k) float64
@@ -216,8 +216,8 @@ class SplineEkf(SplineTracker):
         for seen, sigma in zip(matches.points, matches.point_sigmas, strict=True):
             rotation = rotation_of(float(self.local[2]))
             lever = rotation @ seen
-            place = self.local[:2] + lever
-            if len(self.landmarks) and float(np.linalg.norm(self.landmarks - place, axis=1).min()) < distance:
+            position = self.local[:2] + lever
+            if len(self.landmarks) and float(np.linalg.norm(self.landmarks - position, axis=1).min()) < distance:
                 continue
             by_pose = np.column_stack([np.eye(2), TURNED @ lever])
             old = self.state_covariance
@@ -229,13 +229,13 @@ class SplineEkf(SplineTracker):
             variance = max(float(sigma), self.tracking.feature_sigma) ** 2
             grown[size:, size:] = by_pose @ old[:3, :3] @ by_pose.T + variance * np.eye(2)
             self.state_covariance = grown
-            self.landmarks = np.concatenate([self.landmarks, place[None]])
+            self.landmarks = np.concatenate([self.landmarks, position[None]])
 
 
 def _stacked(parts: list[Measured]) -> Measured:
     """Return several measurements as one.
 
-    What one part does not concern is nothing to it.
+    Each part ignores the rest.
     """
     columns = max(part.jacobian.shape[1] for part in parts)
     jacobians = [np.pad(part.jacobian, ((0, 0), (0, columns - part.jacobian.shape[1]))) for part in parts]

@@ -2,7 +2,7 @@
 
 Each particle is a pose, weighted by how well features and rays fit the map from there.
 
-A particle also has an opinion of the wheels: by what share they measure paths and turns too long or too
+A particle also has scale errors of the wheels: by how much they measure paths and turns too long or too
 short. What fits the walls survives, and carries the robot past where walls show nothing, as along a corridor.
 
 References
@@ -114,9 +114,9 @@ def _weigh_rays(
 
 
 _GATE_SIGMAS = 3.0
-_LEAST_MOTION = np.array([1e-4, 1e-4, 1e-4])
+_MIN_MOTION = np.array([1e-4, 1e-4, 1e-4])
 _RECOVERY_STEPS = 10
-_LEAST_BOX = 0.1
+_MIN_BOX = 0.1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -126,22 +126,22 @@ class SplineFilterSettings:
     Attributes
     ----------
     tracking : TrackingSettings
-        What is matched, and how the map is made.
+        Settings of matching and of the map.
     particles : int
         Number of particles.
     start_distance, start_turn : float
         Standard deviations of the particles around the first pose [m, rad].
     distance_bias, turn_bias : float
-        By what share odometry may measure paths and turns too long or too short all the time, as a standard
+        Constant scale errors of odometry's paths and turns, as a standard
         deviation: particles try how much, and those that fit the walls teach it.
     bias_wander : float
         Standard deviation by which that share is changed whenever particles are drawn again, so that they go
         on trying; at most the share itself. Without evidence it comes back to none.
     lost_likelihood : float
-        Where rays fit worse than this in the mean for ten corrections, some particles are drawn again; 0 for
+        If rays fit worse than this in the mean for ten corrections, some particles are drawn again; 0 for
         never.
     recovered_share, recovery_distance, recovery_turn : float
-        What share of particles, and half of the box around the pose from which they are drawn [m, rad]; then
+        Share of particles, and half of the box around the pose from which they are drawn [m, rad]; then
         from boxes of half the size each, down to a sixteenth.
     """
 
@@ -167,7 +167,7 @@ class SplineFilter(SplineTracker):
     Parameters
     ----------
     settings : SplineFilterSettings or None
-        The defaults where None.
+        The defaults if None.
     geometry : ScanGeometry or None
         The laser; the URG-04LX of the theses where None.
 
@@ -176,7 +176,7 @@ class SplineFilter(SplineTracker):
     particles : (n, 3) float64
         Poses x, y, theta in the frame of the local map [m, rad].
     scales : (n, 2) float64
-        What each takes a path and a turn to be, of what odometry measures.
+        Each particle's scale factors of paths and turns against odometry.
     weights : (n,) float64
         Their weights, which sum to one.
     resamplings : int
@@ -208,7 +208,7 @@ class SplineFilter(SplineTracker):
         self.resamplings, self._lost_steps, self._box = 0, 0, 0.0
         self._ray_table = _ray_likelihoods(self.tracking.curve_sigma)
         # Where odometry alone leads each particle from its last place, and the covariance of that motion.
-        self._expected, self._motion_covariance = self.particles.copy(), np.diag(_LEAST_MOTION**2)
+        self._expected, self._motion_covariance = self.particles.copy(), np.diag(_MIN_MOTION**2)
 
     def _change_frame(self, change: Transform, reach: float) -> None:
         self.particles = np.column_stack([change.apply(self.particles[:, :2]), self.particles[:, 2] + change.theta])
@@ -217,7 +217,7 @@ class SplineFilter(SplineTracker):
         first, distance, second = steps_of(motion)
         noise, tracking = self._generator.standard_normal((3, len(self.particles))), self.tracking
         if first == 0.0 and distance == 0.0 and second == 0.0:
-            self._expected, self._motion_covariance = self.particles.copy(), np.diag(_LEAST_MOTION**2)
+            self._expected, self._motion_covariance = self.particles.copy(), np.diag(_MIN_MOTION**2)
             return self.local
         turns = abs(first), abs(second)
         sway = tracking.turn_per_metre * abs(distance)
@@ -241,7 +241,7 @@ class SplineFilter(SplineTracker):
         heading = float(pose[2]) - second
         cosine, sine = math.cos(heading), math.sin(heading)
         by_steps = np.array([[-distance * sine, cosine, 0.0], [distance * cosine, sine, 0.0], [1.0, 0.0, 1.0]])
-        self._motion_covariance = (by_steps * spread**2) @ by_steps.T + np.diag(_LEAST_MOTION**2)
+        self._motion_covariance = (by_steps * spread**2) @ by_steps.T + np.diag(_MIN_MOTION**2)
         return pose
 
     def _correct(self, matches: Matches, observation: Observation) -> NDArray[np.float64]:
@@ -269,7 +269,7 @@ class SplineFilter(SplineTracker):
             logarithms,
             fits,
         )
-        if self._box <= _LEAST_BOX and float(self.weights @ fits) >= self.settings.lost_likelihood:
+        if self._box <= _MIN_BOX and float(self.weights @ fits) >= self.settings.lost_likelihood:
             logarithms = self._move_to_matches(matches)
         weights = self.weights * np.exp(logarithms - logarithms.max())
         self.weights = weights / weights.sum()
@@ -345,7 +345,7 @@ class SplineFilter(SplineTracker):
         """
         settings = self.settings
         is_lost = likelihood < settings.lost_likelihood
-        self._lost_steps = self._lost_steps + 1 if is_lost or self._box > _LEAST_BOX else 0
+        self._lost_steps = self._lost_steps + 1 if is_lost or self._box > _MIN_BOX else 0
         drawn = round(settings.recovered_share * len(self.particles))
         if self._lost_steps >= _RECOVERY_STEPS and drawn > 0:
             self._box = 1.0 if is_lost else 0.5 * self._box

@@ -21,7 +21,7 @@ from lidarium.mapping.splines.spline_map import SplineMap
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Matches:
-    """What is seen in the robot's frame, and what of the map it is.
+    """Features in the robot's frame, and their matches on the map.
 
     Attributes
     ----------
@@ -63,23 +63,7 @@ def match(
     stride: int,
     least_sightings: int,
 ) -> Matches:
-    """Match a scan to the map from about where it was taken.
-
-    Parameters
-    ----------
-    observation : Observation
-        The scan, in the frame of the robot.
-    spline_map : SplineMap
-        The map.
-    lookup : CurveLookup
-        Its curves around the pose.
-    pose : Transform
-        Where the robot about is, ``map_from_robot``.
-    stride : int
-        Every so many-th beam that returned is a ray.
-    least_sightings : int
-        Points of the map that fewer scans have seen are left out.
-    """
+    """Match a scan to the map from about where it was taken."""
     settings = spline_map.settings.association
     features, seen = observation.features, observation.features.moved(pose)
     matched = [
@@ -177,13 +161,13 @@ class TrackingSettings:
     curve_sigma : float
         Standard deviation of the distance between a ray's end and its curve [m].
     curve_distance : float
-        Rays that end farther from any curve see what is new, and say nothing of the pose [m].
+        Rays that end farther from any curve see new walls, and do not measure the pose [m].
     ray_stride : int
-        Every so many-th beam that returned counts.
+        Step between the returned beams that count.
     ray_share : float
-        What a ray counts, since neighbours are correlated.
+        Weight of a ray, since neighbours are correlated.
     least_sightings : int
-        Corners and peaks of the map count from so many scans on.
+        Minimum number of scans of corners and peaks that count.
     least_features, least_rays : int
         With fewer matches of both kinds the pose is predicted only.
     still_distance, still_turn : float
@@ -236,7 +220,7 @@ class Measured:
     variances: NDArray[np.float64]
 
     def within(self, sigmas: float) -> "Measured":
-        """Return those that miss by at most so many standard deviations."""
+        """Return those that miss by at most a number of standard deviations."""
         is_kept = self.misses**2 <= sigmas**2 * self.variances
         return Measured(self.misses[is_kept], self.jacobian[is_kept], self.variances[is_kept])
 
@@ -247,7 +231,7 @@ class Measured:
 
 
 def measured_points(matches: Matches, pose: NDArray[np.float64], tracking: TrackingSettings) -> Measured:
-    """Measure where corners and peaks lie beside those of the map, along both axes."""
+    """Measure the offsets of corners and peaks from those of the map, along both axes."""
     lever = matches.points @ rotation_of(float(pose[2])).T
     jacobian = np.zeros((len(lever), 2, 3))
     jacobian[:, 0, 0] = jacobian[:, 1, 1] = 1.0
@@ -258,7 +242,7 @@ def measured_points(matches: Matches, pose: NDArray[np.float64], tracking: Track
 
 
 def measured_lines(matches: Matches, pose: NDArray[np.float64], tracking: TrackingSettings) -> Measured:
-    """Measure how lines lie beside lines of the map and against their directions."""
+    """Measure the offsets of lines from lines of the map, and the angles between them."""
     count = len(matches.lines)
     lever = matches.lines[:, :2] @ rotation_of(float(pose[2])).T
     known = matches.known_lines
@@ -276,7 +260,7 @@ def measured_lines(matches: Matches, pose: NDArray[np.float64], tracking: Tracki
 
 
 def measured_rays(matches: Matches, pose: NDArray[np.float64], tracking: TrackingSettings) -> Measured:
-    """Measure how the ends of rays lie beside the curves."""
+    """Measure the offsets of the ends of rays from the curves."""
     lever, found = matches.rays @ rotation_of(float(pose[2])).T, matches.pieces
     normals = np.stack([-found[:, 3], found[:, 2]], axis=1)
     jacobian = np.empty((len(found), 3))

@@ -1,6 +1,6 @@
 """Common base of both localizers on spline maps.
 
-Odometry, the local maps that they build on the path, and what they match of a scan to them.
+Odometry, the local maps that they build on the path, and the matches of a scan with them.
 
 A filter knows where the robot is in the frame of a local map. The laser's path is a graph of nodes, as SLAM
 has it: local maps begin anew along it with the walls around the robot, places are recognised, and all nodes
@@ -30,13 +30,6 @@ class SplineTracker(ABC):
     """A localizer that makes a map of curves and keeps itself on it.
 
     How a pose is predicted and corrected, heirs say.
-
-    Parameters
-    ----------
-    settings : TrackingSettings
-        What both kinds of filter share.
-    geometry : ScanGeometry
-        The laser.
 
     Attributes
     ----------
@@ -77,15 +70,9 @@ class SplineTracker(ABC):
         self._begin(np.zeros(3), seed)
 
     def localize(self, sensing: Sensing) -> NDArray[np.float64]:
-        """Take in what was sensed, later than all before.
+        """Take in sensor readings, later than all before.
 
         Return x, y, theta of the robot, shape (3,) [m, rad].
-
-        Raises
-        ------
-        ValueError
-            Where time runs backwards, the odometry is not finite, or the scan has not as many ranges as the
-            laser beams.
         """
         if not sensing.time_s > self._time_s:
             raise ValueError(f"sensed at {sensing.time_s} s, not later than the last at {self._time_s} s")
@@ -157,18 +144,18 @@ class SplineTracker(ABC):
 
     @abstractmethod
     def _change_frame(self, change: Transform, reach: float) -> None:
-        """Bring what is kept to the frame of another local map, ``new_from_old``.
+        """Bring the map to the frame of another local map, ``new_from_old``.
 
-        What lies beyond a square of half the side ``reach`` around it is left behind [m].
+        Everything beyond a square of half the side ``reach`` around it is dropped [m].
         """
 
     @abstractmethod
     def _predict(self, motion: Transform) -> NDArray[np.float64]:
-        """Move as odometry says, ``before_from_now``; return the pose."""
+        """Move by odometry, ``before_from_now``; return the pose."""
 
     @abstractmethod
     def _correct(self, matches: Matches, observation: Observation) -> NDArray[np.float64]:
-        """Weigh what was matched; return the pose."""
+        """Weigh the matches; return the pose."""
 
     def _match(self, observation: Observation) -> Matches:
         """Match a scan to the local map from the pose as it is believed now."""
@@ -215,7 +202,7 @@ class SplineTracker(ABC):
         self._begin_local_map(Transform(*frame.tolist()))
 
     def _begin_local_map(self, frame: Transform) -> None:
-        """Go on in a new frame, ``old_from_new``, with what is known around the robot."""
+        """Go on in a new frame, ``old_from_new``, with the map around the robot."""
         self.local = relative(np.array([frame.x, frame.y, frame.theta]), self.local)
         reach = self.geometry.range_max + 1.0 + float(np.hypot(*self.local[:2]))
         self.local_map = self.local_map.around(frame, reach)
@@ -225,7 +212,7 @@ class SplineTracker(ABC):
     def _growth(self) -> NDArray[np.float64]:
         """Return how much less well the pose in the local map is known than at the last node, (3, 3).
 
-        Where it is known better since, nothing is added: what lies between the nodes is no better known.
+        If it is known better since, nothing is added: the space between the nodes is no better known.
         """
         moved = composed(self.local, self._mount)[:2] - self._path.at_node[:2]
         lever = np.array([[1.0, 0.0, -moved[1]], [0.0, 1.0, moved[0]], [0.0, 0.0, 1.0]])

@@ -50,14 +50,14 @@ robots err by more than walls are thick.
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Followed:
-    """What came of a log.
+    """Result of a log.
 
     Attributes
     ----------
     slam : Slam
-        The localizer at the end: its map, its graph, what it did.
+        The localizer at the end: its map, its graph, its counts.
     poses : (scans, 3) float64
-        Where the robot was at each scan, as is believed at the end; the first is (0, 0, 0) [m, rad].
+        Pose of the robot at each scan, as believed at the end; the first is (0, 0, 0) [m, rad].
     online : (scans, 3) float64
         The same as was believed at that time.
     scan_s : (scans,) float64
@@ -100,17 +100,17 @@ def follow(
     slam.reset(log.laser_pose, 0)
     scans = len(log.stamps)
     odometry = np.zeros((scans, 3)) if log.odometry is None else composed(log.odometry, log.laser_pose)
-    numbers, places = np.zeros(scans, np.int64), np.zeros((scans, 3))
+    numbers, positions = np.zeros(scans, np.int64), np.zeros((scans, 3))
     online, scan_s = np.zeros((scans, 3)), np.zeros(scans)
     for k in watch(range(scans)):
         began = clock()
         online[k] = slam.localize(Sensing(float(log.stamps[k]), odometry[k], log.ranges[k]))
         scan_s[k] = clock() - began
-        numbers[k], places[k] = slam.place
+        numbers[k], positions[k] = slam.place
     began = clock()
     slam.finish()
     finish_s = clock() - began
-    laser = composed(slam.nodes[numbers], places)
+    laser = composed(slam.nodes[numbers], positions)
     return Followed(slam, _of_robot(laser, log.laser_pose), _of_robot(online, log.laser_pose), scan_s, finish_s)
 
 

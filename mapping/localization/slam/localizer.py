@@ -76,7 +76,7 @@ class _Doubts:
 
 @dataclass(slots=True)
 class _SlamCounts:
-    """What a localizer has done so far."""
+    """Counts of a localizer so far."""
 
     scans: int = 0
     matches: int = 0
@@ -100,7 +100,7 @@ class Slam:
     Attributes
     ----------
     counts : SlamCounts
-        What was done so far.
+        Counts so far.
     doubts : Doubts
         Stretches in which it is not sure where the robot went.
     """
@@ -120,14 +120,9 @@ class Slam:
         self._failed, self._time_s = 0, 0.0
 
     def localize(self, sensing: Sensing) -> NDArray[np.float64]:
-        """Take in what was sensed, later than all before.
+        """Take in sensor readings, later than all before.
 
         Return x, y, theta of the robot, shape (3,) [m, rad].
-
-        Raises
-        ------
-        ValueError
-            Where the number of ranges is not that of the geometry.
         """
         if sensing.ranges.shape != (self._geometry.beams,):
             raise ValueError(f"ranges have shape {sensing.ranges.shape}; want ({self._geometry.beams},), one per beam")
@@ -234,7 +229,7 @@ class Slam:
         self.counts.corrections = path.corrections
 
     def _doubt(self, match: Match | None, points: int) -> str | None:
-        """Return why a scan of so many points is not sure to be where it was placed; None where it is."""
+        """Return why a scan of so many points is not sure to be where it was placed; None if it is."""
         if match is None:
             return NO_MATCH
         if self._path.mapper.recoveries > self.counts.recoveries:
@@ -278,6 +273,6 @@ class Slam:
             path.restart(ranges, covariance, self._time_s)
 
     def _correct(self, time_s: float) -> None:
-        """Let closures act whose time has come."""
+        """Let closures act that are due."""
         self._path.correct(time_s)
         self.counts.closures, self.counts.corrections = self._path.closures, self._path.corrections

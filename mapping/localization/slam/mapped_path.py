@@ -22,13 +22,7 @@ from lidarium.mapping.localization.settings import SlamSettings
 
 
 class _LoopClosing:
-    """Finds closures, and keeps them until their time has come.
-
-    Parameters
-    ----------
-    settings : SlamSettings
-        How places are recognised, and how long a closure takes to act.
-    """
+    """Finds closures, and keeps them until their time has come."""
 
     def __init__(self, settings: SlamSettings) -> None:
         self._delay_s = settings.closures.delay_s
@@ -48,7 +42,7 @@ class _LoopClosing:
     def find(
         self, graph: NodeGraph, points: NDArray[np.float64], path: float, usual_score: float, time_s: float
     ) -> None:
-        """Find what the last node's scan recognises.
+        """Find the places that the last node's scan recognises.
 
         Parameters
         ----------
@@ -69,7 +63,7 @@ class _LoopClosing:
             self._due.append((time_s + self._delay_s, closure))
 
     def take_due(self, time_s: float) -> list[Closure]:
-        """Return the closures whose time has come, once."""
+        """Return the closures that are due, once."""
         acting = [closure for due, closure in self._due if due <= time_s]
         if acting:
             self._due = [(due, closure) for due, closure in self._due if due > time_s]
@@ -126,15 +120,7 @@ class _ScanHistory:
 
 
 class _ScanSampling:
-    """Samples the points of scans, in the robot's frame.
-
-    Parameters
-    ----------
-    settings : SlamSettings
-        How far points are taken, and how dense.
-    geometry : ScanGeometry
-        Directions of the beams.
-    """
+    """Samples the points of scans, in the robot's frame."""
 
     def __init__(self, settings: SlamSettings, geometry: ScanGeometry) -> None:
         self._settings, self._geometry = settings, geometry
@@ -148,7 +134,7 @@ class _ScanSampling:
     def all_points(self, ranges: NDArray[np.float32]) -> NDArray[np.float64]:
         """Return nearly all points in which beams ended.
 
-        They serve what is found once per run and gains from each point, such as the direction of
+        They serve estimates that are made once per run and gain from each point, such as the direction of
         walls.
         """
         return self.points(ranges, self._settings.compass.spacing_m, self._geometry.beams)
@@ -157,17 +143,10 @@ class _ScanSampling:
 class _WallSurvey:
     """Surveys where walls run, and compares later scans with them.
 
-    Parameters
-    ----------
-    settings : SlamSettings
-        Whether walls are used, and after how much of a path they are surveyed.
-    sampling : ScanSampling
-        Samples the points of scans.
-
     Attributes
     ----------
     compass : WallCompass or None
-        Directions of walls; None where they are not used.
+        Directions of walls; None if they are not used.
     """
 
     def __init__(self, settings: SlamSettings, sampling: _ScanSampling) -> None:
@@ -189,7 +168,7 @@ class _WallSurvey:
     def survey(self, length_m: float, node: int, history: _ScanHistory, nodes: NDArray[np.float64]) -> None:
         """Survey where walls run in the local map of a node, if it is time to.
 
-        Where none do, survey again after as much of the path.
+        If none do, survey again after as much of the path.
         """
         if self.compass is None or self.compass.is_surveyed or length_m < self._due_m:
             return
@@ -205,7 +184,7 @@ class _WallSurvey:
 
 
 class MappedPath:
-    """The path so far, and what was seen on it.
+    """The path so far, and the scans on it.
 
     Parameters
     ----------
@@ -214,7 +193,7 @@ class MappedPath:
     geometry : ScanGeometry
         Directions of the beams.
     pose : (3,) float64
-        Where the path begins: x, y, theta [m, rad].
+        Start of the path: x, y, theta [m, rad].
 
     Attributes
     ----------
@@ -254,7 +233,7 @@ class MappedPath:
 
     @property
     def mapper_node(self) -> int:
-        """The node in whose frame the older local map is; the path's beginning before there is one."""
+        """The node of the older local map's frame; the path's beginning before there is one."""
         return self.mapper.node if self._has_begun else 0
 
     @property
@@ -320,7 +299,7 @@ class MappedPath:
     def restart(
         self, ranges: NDArray[np.float32], covariance: NDArray[np.float64], time_s: float
     ) -> NDArray[np.float64]:
-        """Begin new local maps where the robot is, as ``begin`` does; what it has learned is kept."""
+        """Begin new local maps where the robot is, as ``begin`` does; learned calibration is kept."""
         self._first = None
         self._walls.restart(self.length)
         frame = self._begin_maps(ranges, covariance)
@@ -340,7 +319,7 @@ class MappedPath:
         Parameters
         ----------
         pose, covariance : (3,) and (3, 3) float64
-            Where it was taken, in the frame of the older local map, and how well the motion there from the
+            Its pose, in the frame of the older local map, and how well the motion there from the
             last node is known [m, rad].
         ranges : (beams,) float32
             The scan [m].
@@ -373,7 +352,7 @@ class MappedPath:
         return relative(poses[3], np.zeros(3)) if poses[3].any() else None
 
     def correct(self, time_s: float) -> None:
-        """Let closures act whose time has come; all where that is inf."""
+        """Let closures act that are due; all if the time is inf."""
         acting = self._loops.take_due(time_s)
         if not acting and not (time_s == np.inf and self._graph.has_waiting):
             return

@@ -1,4 +1,15 @@
-"""The motion between sensings, by calibrated odometry or by the last motion."""
+"""The motion between sensings, by calibrated odometry or by the last motion.
+
+Wheels differ in size and spacing from their assumed values. Matches show the robot's true motion if walls
+show it; elsewhere, as along a bare corridor, calibrated odometry continues without them. The errors are the
+scales of distance and turn, and a turn for each metre; their estimate is that of recursive least squares (a
+Kalman filter without motion), and old matches fade.
+
+References
+----------
+The parameters are those of Censi, Franchi, Marchionni, Oriolo, Simultaneous calibration of odometry and
+sensor parameters for mobile robots (IEEE Transactions on Robotics 2013), to first order.
+"""
 
 import math
 
@@ -16,7 +27,7 @@ class OdometryCalibration:
     Parameters
     ----------
     settings : OdometryUncertainty
-        What is known before the robot drives.
+        Prior knowledge.
 
     Attributes
     ----------
@@ -68,13 +79,13 @@ class OdometryCalibration:
         Parameters
         ----------
         distance, turn : float
-            What odometry measured since the last match [m, rad].
+            Motion by odometry since the last match [m, rad].
         difference : (3,) float64
-            Where the match lies in the frame of where the robot was expected: x, y, theta [m, rad].
+            Pose of the match in the frame of the expected pose: x, y, theta [m, rad].
         information : (3, 3) float64
-            What the points of the scan alone measure of that, in the same frame [1/m^2, 1/(m rad), 1/rad^2].
+            Information of the points of the scan alone, in the same frame [1/m^2, 1/(m rad), 1/rad^2].
         prior : (3, 3) float64
-            What was known before, which the match has in it too.
+            Prior information, which is part of the match too.
         """
         settings = self._settings
         lever = _lever(distance, turn)
@@ -104,12 +115,7 @@ def _lever(distance: float, turn: float) -> NDArray[np.float64]:
 
 
 class OdometryMotion:
-    """What odometry measures between matches, and how well.
-
-    Parameters
-    ----------
-    settings : SlamSettings
-        How odometry is used and calibrated.
+    """Measurements of odometry between matches, and their covariance.
 
     Attributes
     ----------

@@ -1,6 +1,6 @@
-"""Maps of a group bent to agree: each onto what those before it know.
+"""Maps of a group bent to agree: each onto those before it.
 
-The first stays as it is. Where walls do not hold a map on the others, where it would have to be moved or
+The first stays as it is. If walls do not hold a map on the others, if it would have to be moved or
 stretched more than maps of one place are, or where it then agrees less, it is laid rigidly.
 """
 
@@ -14,21 +14,21 @@ from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.grids.occupancy import UNKNOWN
 from lidarium.mapping.merging.agreement import Agreement
 from lidarium.mapping.merging.bend.estimation import Bend, BendSettings, OffsetField, estimate_bend
-from lidarium.mapping.merging.bend.hypotheses import MOST_STRAIN, Hypothesis, compare_bent
+from lidarium.mapping.merging.bend.hypotheses import MAX_STRAIN, Hypothesis, compare_bent
 from lidarium.mapping.merging.described_map import DescribedMap, describe_map
 from lidarium.mapping.merging.fusion import FusedMap, fuse
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Deformed:
-    """What came of bending the maps of a group.
+    """Result of bending the maps of a group.
 
     Attributes
     ----------
     fused : FusedMap
         Their map, in the frame of the first.
     deformations : list of Deformation or None
-        How each map is bent; None where it is laid as it was joined.
+        How each map is bent; None if it is laid as it was joined.
     laid : list of Laid
         Each map as it is laid.
     """
@@ -56,9 +56,9 @@ class Deformation:
     moves : (n, 2) float64
         How far its walls are moved from where it was joined [m].
     agreement : Agreement
-        What agrees with the maps before it once it is bent.
+        Agreement with the maps before it once it is bent.
     common_from_under : Transform
-        Where the lower left corner of their fused map lies in the common frame.
+        Lower left corner of their fused map in the common frame.
     """
 
     bend: Bend
@@ -88,9 +88,9 @@ class Laid:
     Attributes
     ----------
     levels : (rows, columns) uint8
-        What it knows.
+        Its known cells.
     common_from_cells : Transform
-        Where the lower left corner of its cell (0, 0) lies.
+        Lower left corner of its cell (0, 0).
     """
 
     levels: NDArray[np.uint8]
@@ -102,17 +102,7 @@ def deform(
     common_from_map: Sequence[Transform],
     settings: BendSettings,
 ) -> Deformed:
-    """Bend maps that were joined until they agree.
-
-    Parameters
-    ----------
-    maps : sequence of DescribedMap
-        At least one, of one resolution.
-    common_from_map : sequence of Transform
-        From the lower left corner of each into the common frame, right to about the reach of the settings.
-    settings : BendSettings
-        How much a map may be bent; walls are moved by its reach at most.
-    """
+    """Bend maps that were joined until they agree."""
     resolution = maps[0].resolution
     laid = [Laid(maps[0].levels, common_from_map[0])]
     found: list[Deformation | None] = [None]
@@ -127,17 +117,7 @@ def deform(
 
 
 def _bent_map(one: DescribedMap, bend: Bend, corner: Transform) -> Laid:
-    """Return a bent map in cells along the axes of the map onto which it is bent.
-
-    Parameters
-    ----------
-    one : DescribedMap
-        The map.
-    bend : Bend
-        How it lies and is bent in the other map.
-    corner : Transform
-        Where the other map's lower left corner lies in the common frame.
-    """
+    """Return a bent map in cells along the axes of the map onto which it is bent."""
     side = one.resolution
     rows, columns = np.nonzero(one.levels != UNKNOWN)
     sides = (columns.min(), columns.max() + 1), (rows.min(), rows.max() + 1)
@@ -164,7 +144,7 @@ def _fused(laid: Sequence[Laid], resolution: float) -> FusedMap:
 def _held(
     a: DescribedMap, b: DescribedMap, frames: tuple[Transform, Transform], settings: BendSettings
 ) -> Deformation | None:
-    """Return how map b is bent against map a, None where it is better laid rigidly.
+    """Return how map b is bent against map a, None if it is better laid rigidly.
 
     The frames are those of both maps in the common one.
     """
@@ -174,7 +154,7 @@ def _held(
     bend = estimate_bend(a, b, a_from_b, settings)
     moves = bend.field.bent(bend.a_from_b, b.walls) - a_from_b.apply(b.walls)
     found = Deformation(bend, moves, compare_bent(a, b, bend), frames[0])
-    if not bend.is_held or bend.strain > MOST_STRAIN or found.most_m > settings.reach_m:
+    if not bend.is_held or bend.strain > MAX_STRAIN or found.most_m > settings.reach_m:
         return None
     rigid = replace(
         bend,

@@ -89,7 +89,7 @@ def _add_walls(
 
 @kernel
 def _add_springs(columns: int, strength: float, band: Array) -> None:
-    """Add springs between the neighbouring nodes of a grid of so many columns to a band."""
+    """Add springs between the neighbouring nodes of a grid to a band."""
     count = band.shape[1] // 2
     for node in range(count):
         for step in (1, columns):
@@ -148,8 +148,8 @@ def _bilinear(
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """Return the four nodes around each point and their weights, both (n, 4)."""
     rows, columns = shape
-    place = (points - corner) / spacing
-    x, y = np.clip(place[:, 0], 0.0, columns - 1.0), np.clip(place[:, 1], 0.0, rows - 1.0)
+    position = (points - corner) / spacing
+    x, y = np.clip(position[:, 0], 0.0, columns - 1.0), np.clip(position[:, 1], 0.0, rows - 1.0)
     left = np.minimum(x.astype(np.int64), max(columns - 2, 0))
     low = np.minimum(y.astype(np.int64), max(rows - 2, 0))
     u, v = x - left, y - low
@@ -180,7 +180,7 @@ def _interpolate(points: Array, corner: tuple[float, float], spacing: float, off
 INDEPENDENT_M = 0.5
 """Length of wall that errs alike [m]."""
 
-LEAST_SPREAD_M = 0.01
+MIN_SPREAD_M = 0.01
 """What maps without any bend still err by [m]."""
 
 ANCHOR = 1e-3
@@ -194,7 +194,7 @@ class BendSettings:
     Attributes
     ----------
     spacing_m : float
-        Between the nodes of the grid of offsets [m]; more where there would be more than ``most_nodes``.
+        Between the nodes of the grid of offsets [m]; more if there would be more than ``most_nodes``.
     most_nodes : int
         Along a side of the grid.
     reach_m : float
@@ -202,7 +202,7 @@ class BendSettings:
     last_reach_m : float
         How far at last [m].
     stiffness : float
-        Weight of the difference of two neighbouring offsets beside the gaps of the walls of a node.
+        Weight of the difference of two neighbouring offsets against the gaps of the walls of a node.
     rounds, samples : int
         Number of rounds, and of wall cells that are aligned.
     candidates : int
@@ -232,7 +232,7 @@ class Bend:
     a_from_b : Transform
         The rigid motion that comes nearest to it.
     field : OffsetField
-        What is left.
+        The rest.
     bend_m : float
         Root mean square of the offsets at the walls that agree [m].
     strain : float
@@ -260,17 +260,7 @@ class Bend:
 
 
 def estimate_bend(a: DescribedMap, b: DescribedMap, a_from_b: Transform, settings: BendSettings) -> Bend:
-    """Return how map b is bent against map a near a rigid motion.
-
-    Parameters
-    ----------
-    a, b : DescribedMap
-        Maps of one resolution with walls.
-    a_from_b : Transform
-        A rigid motion that is right to about the reach.
-    settings : BendSettings
-        How much it may be bent.
-    """
+    """Return how map b is bent against map a near a rigid motion."""
     sample = wall_sample(len(b.walls), settings.samples)
     walls = b.walls[sample]
     normals = _turned(a_from_b, b.normals[sample])
@@ -286,13 +276,13 @@ def estimate_bend(a: DescribedMap, b: DescribedMap, a_from_b: Transform, setting
         share = min(1.5 * step / settings.rounds, 1.0)
         reach = settings.reach_m * (settings.last_reach_m / settings.reach_m) ** share
         reach = max(reach, 2.0 * a.resolution)
-        places = start + (weights[..., None] * offsets[nodes]).sum(axis=1)
-        _find_gaps(a.levels, a.distance, a.resolution, places, normals, reach, gaps, found)
+        positions = start + (weights[..., None] * offsets[nodes]).sum(axis=1)
+        _find_gaps(a.levels, a.distance, a.resolution, positions, normals, reach, gaps, found)
         if found.sum() < 3:
             break
         offsets = _solved(nodes, weights, normals, offsets, (gaps, found, reach), (columns, settings.stiffness))
-    places = start + (weights[..., None] * offsets[nodes]).sum(axis=1)
-    _find_gaps(a.levels, a.distance, a.resolution, places, normals, settings.last_reach_m, gaps, found)
+    positions = start + (weights[..., None] * offsets[nodes]).sum(axis=1)
+    _find_gaps(a.levels, a.distance, a.resolution, positions, normals, settings.last_reach_m, gaps, found)
     field = OffsetField(corner, spacing, offsets.reshape(rows, columns, 2))
     wall_m = b.resolution * len(b.walls) / max(len(sample), 1)
     return _described(a_from_b, field, (walls, normals, gaps), found, wall_m)
@@ -334,7 +324,7 @@ def _described(
     found: NDArray[np.bool_],
     wall_m: float,
 ) -> Bend:
-    """Return what was found about the nearest rigid motion; a sampled cell stands for a length of wall."""
+    """Return the result for the nearest rigid motion; a sampled cell represents a length of wall."""
     walls, normals, gaps = seen
     if found.sum() < 3:
         return Bend(a_from_b, field, 0.0, 0.0, 0.0, 1.0, np.diag([np.inf] * 3))
@@ -343,14 +333,14 @@ def _described(
     nearest, scale = _nearest_motion(held, target)
     rows, columns, _ = field.offsets.shape
     grid = np.stack(np.meshgrid(np.arange(columns), np.arange(rows)), axis=-1).reshape(-1, 2)
-    places = np.asarray(field.corner) + grid * field.spacing_m
-    left = (field.bent(a_from_b, places) - nearest.apply(places)).reshape(rows, columns, 2)
+    positions = np.asarray(field.corner) + grid * field.spacing_m
+    left = (field.bent(a_from_b, positions) - nearest.apply(positions)).reshape(rows, columns, 2)
     rest = OffsetField(field.corner, field.spacing_m, left)
     steps = np.concatenate([np.diff(left, axis=0).reshape(-1, 2), np.diff(left, axis=1).reshape(-1, 2)])
     strain = float(np.sqrt((steps**2).sum(axis=1).mean())) / field.spacing_m if len(steps) else 0.0
     bend_m = float(np.sqrt((rest.at(held) ** 2).sum(axis=1).mean()))
     spread = math.sqrt(0.5 * math.pi) * float(np.abs(gaps[found]).mean())
-    variance = spread**2 + bend_m**2 + LEAST_SPREAD_M**2
+    variance = spread**2 + bend_m**2 + MIN_SPREAD_M**2
     covariance = _covariance(target - target.mean(axis=0), normals[found], variance, wall_m)
     return Bend(nearest, rest, bend_m, strain, spread, scale, covariance)
 

@@ -1,7 +1,7 @@
-"""What speaks for and against each transform once maps may be bent, and how sure the best one is.
+"""Evidence for and against each transform of bent maps, and the confidence of the best one.
 
 The confidence is that of a logistic model of maps of one place against strangers. It was fitted to maps of
-real buildings; the reference on merging says to which, and which were kept for the figures.
+real buildings; see the reference on merging for which, and for those kept for the figures.
 """
 
 import math
@@ -38,20 +38,7 @@ def _tolerance(bend: Bend, resolution: float) -> tuple[float, float]:
 
 
 def compare_bent(a: DescribedMap, b: DescribedMap, bend: Bend) -> Agreement:
-    """Lay map b over map a and bend it.
-
-    Parameters
-    ----------
-    a, b : DescribedMap
-        Maps of one resolution.
-    bend : Bend
-        How b lies and is bent.
-
-    Returns
-    -------
-    Agreement
-        What agrees and what does not, within the tolerance of the bend.
-    """
+    """Lay map b over map a and bend it."""
     hit, miss = _tolerance(bend, a.resolution)
     walls, facing = np.zeros((2, 3), np.int64), np.zeros((2, 3))
     turn = Transform(0.0, 0.0, bend.a_from_b.theta)
@@ -59,19 +46,19 @@ def compare_bent(a: DescribedMap, b: DescribedMap, bend: Bend) -> Agreement:
         (a, bend.field.bent(bend.a_from_b, b.walls), turn.apply(b.normals)),
         (b, bend.field.unbent(bend.a_from_b, a.walls), turn.inverse().apply(a.normals)),
     )
-    for k, (under, places, normals) in enumerate(laid):
+    for k, (under, positions, normals) in enumerate(laid):
         field = WallField(under.levels, under.distance, under.is_open, 1.0 / under.resolution, hit, miss)
-        count_walls(field, places, normals, (0.0, 0.0, 0.0), walls[k], facing[k])
+        count_walls(field, positions, normals, (0.0, 0.0, 0.0), walls[k], facing[k])
     return agreement_of(a, b, bend.a_from_b, walls, facing)
 
 
 LOOSE = ValidationSettings(hit_distance_m=0.3, miss_distance_m=0.6)
 """Tolerance with which transforms are chosen that are worth bending: bends of halls are not longer."""
 
-LEAST_OVERLAP_M2, LEAST_EVIDENCE_M, MOST_RIVAL_SHARE = 15.0, 4.0, 0.6
+MIN_OVERLAP_M2, MIN_EVIDENCE_M, MAX_RIVAL_SHARE = 15.0, 4.0, 0.6
 """Overlap of a room, which is like others [m2], least evidence [m], and most that a rival may have."""
 
-MOST_STRAIN = 0.05
+MAX_STRAIN = 0.05
 """Most that a map is stretched against another of the same place."""
 
 SHARP_SPREAD_M, FEW_ROOMS_M2, SHARP_QUALITY = 0.035, 60.0, 0.9
@@ -86,14 +73,14 @@ RIVAL_M, RIVAL_ANGLE = 1.0, math.radians(8.0)
 
 
 class Hypothesis(NamedTuple):
-    """A transform, how the map is bent under it, and what the maps say of it.
+    """A transform, the bend of the map under it, and the evidence of the maps.
 
     Attributes
     ----------
     bend : Bend
         Rigid motion and bend.
     agreement : Agreement
-        What agrees once the map is bent.
+        Agreement once the map is bent.
     """
 
     bend: Bend
@@ -112,17 +99,7 @@ class Hypothesis(NamedTuple):
 def ranked_hypotheses(
     a: DescribedMap, b: DescribedMap, transforms: list[Transform], settings: BendSettings
 ) -> list[Hypothesis]:
-    """Return the most promising transforms with the bend under each, that with most evidence first.
-
-    Parameters
-    ----------
-    a, b : DescribedMap
-        Maps of one resolution.
-    transforms : list of Transform
-        Candidates for ``a_from_b``.
-    settings : BendSettings
-        How much maps may be bent, and how many candidates are bent.
-    """
+    """Return the most promising transforms with the bend under each, that with most evidence first."""
     loose = [compare(a, b, transform, LOOSE).evidence_m for transform in transforms]
     order = np.argsort(-np.array(loose), kind="stable")[: settings.candidates].tolist()
     found = [_bent(a, b, transforms[k], settings) for k in order]
@@ -141,13 +118,13 @@ def _is_other(one: Hypothesis, other: Hypothesis) -> bool:
 
 
 def agrees_bent(a: DescribedMap, b: DescribedMap, a_from_b: Transform, settings: BendSettings) -> bool:
-    """Return whether maps that others join agree once they are bent, as most of what both know does."""
+    """Return whether maps that others join agree once they are bent, as most cells known to both do."""
     bent = _bent(a, b, a_from_b, settings)
     return bent.agreement.wall_m == 0.0 or bent.evidence_m > 0.0
 
 
 class _Signs(NamedTuple):
-    """What distinguishes maps of one place from strangers.
+    """Features that distinguish maps of one place from strangers.
 
     Attributes
     ----------
@@ -183,7 +160,7 @@ class _Signs(NamedTuple):
 
 
 def signs_of(a: DescribedMap, b: DescribedMap, ranked: list[Hypothesis]) -> _Signs:
-    """Return what distinguishes the best of ranked hypotheses from a chance."""
+    """Return the features that distinguish the best of ranked hypotheses from chance."""
     best = ranked[0]
     evidence = max(best.evidence_m, 0.0)
     rival = next((one.evidence_m for one in ranked[1:] if _is_other(best, one)), 0.0)
@@ -203,16 +180,16 @@ def signs_of(a: DescribedMap, b: DescribedMap, ranked: list[Hypothesis]) -> _Sig
 def confidence_of(signs: _Signs) -> float:
     """Return how sure it is that two maps are of one place, from 0 to 1.
 
-    It is 0 where an overlap is no larger than rooms that are alike, where another place explains the maps
-    nearly as well, where one map would have to be stretched more than robots' maps are, and where much
+    It is 0 if an overlap is no larger than rooms that are alike, if another place explains the maps
+    nearly as well, if one map would have to be stretched more than robots' maps are, and where much
     differs between sharp maps of a few rooms: in these, only furniture may.
     """
     is_sharp = signs.spread_m < SHARP_SPREAD_M and signs.overlap_m2 < FEW_ROOMS_M2
     if (
-        signs.overlap_m2 < LEAST_OVERLAP_M2
-        or signs.evidence_m < LEAST_EVIDENCE_M
-        or signs.rival_share > MOST_RIVAL_SHARE
-        or signs.strain > MOST_STRAIN
+        signs.overlap_m2 < MIN_OVERLAP_M2
+        or signs.evidence_m < MIN_EVIDENCE_M
+        or signs.rival_share > MAX_RIVAL_SHARE
+        or signs.strain > MAX_STRAIN
         or (is_sharp and signs.quality < SHARP_QUALITY)
     ):
         return 0.0

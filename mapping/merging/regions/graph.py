@@ -1,4 +1,10 @@
-"""The regions of a map, their shapes, and the doors between them."""
+"""The regions of a map, their shapes, and the doors between them.
+
+References
+----------
+Rotations by correlated directions of walls: Carpin, "Fast and accurate map merging for multi-robot systems",
+Autonomous Robots 25, 2008.
+"""
 
 import math
 from dataclasses import dataclass
@@ -23,7 +29,7 @@ QUARTER = math.pi / 2.0
 BINS = 90
 """Bins of a histogram of directions, over a quarter turn."""
 
-LEAST_CONTRAST = 1.3
+MIN_CONTRAST = 1.3
 """The likeliest rotation is so many times as likely as the mean, where walls have directions at all."""
 
 LIKELY = 0.4
@@ -34,14 +40,14 @@ _SMOOTH_CELLS, _SMOOTH_BINS = 2.0, 2.0
 
 
 class _Slopes(NamedTuple):
-    """Slopes of free space at the cells beside walls: directions (n,) [rad] and regions (n,) int32."""
+    """Slopes of free space at the cells next to walls: directions (n,) [rad] and regions (n,) int32."""
 
     directions: NDArray[np.float64]
     regions: NDArray[np.int32]
 
 
 def _wall_slopes(levels: NDArray[np.uint8], free: NDArray[np.uint8], labels: NDArray[np.int32]) -> _Slopes:
-    """Return across which directions walls run, at each cell of a region beside one.
+    """Return across which directions walls run, at each cell of a region next to one.
 
     Parameters
     ----------
@@ -80,17 +86,17 @@ def likely_rotations(a: NDArray[np.float64], b: NDArray[np.float64], count: int)
     a, b : (`BINS`,) float64
         Directions of the maps' walls.
     count : int
-        Of rotations around the circle; all of them where walls run in all directions.
+        Of rotations around the circle; all of them if walls run in all directions.
 
     Returns
     -------
     (n,) float64
-        At most so many rotations, the likeliest among them [rad].
+        Maximum number of rotations, the likeliest among them [rad].
     """
     alike = _circular(a, np.roll(b[::-1], 1))
     mean, most = float(alike.mean()), float(alike.max())
     every = np.arange(count, dtype=np.float64) * (2.0 * math.pi / count)
-    if most < LEAST_CONTRAST * mean or most == 0.0:
+    if most < MIN_CONTRAST * mean or most == 0.0:
         return every
     rotations = every + float(alike.argmax()) / BINS * QUARTER
     values = alike[np.rint(rotations % QUARTER / QUARTER * BINS).astype(np.int64) % BINS]
@@ -140,7 +146,7 @@ def _find_doors(met: Meetings, side: float) -> Doors:
     is_turned = met.regions[:, 0] > met.regions[:, 1]
     pairs = np.sort(met.regions, axis=1).astype(np.int64)
     steps = np.where(is_turned[:, None], -met.steps, met.steps)
-    regions, places, normals, widths = [], [], [], []
+    regions, positions, normals, widths = [], [], [], []
     for pair in np.unique(pairs, axis=0):
         chosen = np.flatnonzero((pairs == pair).all(axis=1))
         parts = _connected(met.places[chosen])
@@ -150,13 +156,13 @@ def _find_doors(met: Meetings, side: float) -> Doors:
             middle = met.places[edges[met.clearance[edges] >= _WIDE_PART * most]].mean(axis=0)
             through = steps[edges].sum(axis=0)
             regions.append(pair)
-            places.append(middle * side)
+            positions.append(middle * side)
             normals.append(np.arctan2(through[1], through[0]))
             # Clearance is that of a cell's middle: half a cell more or less on average.
             widths.append((2.0 * most - 0.5) * side)
     return Doors(
         np.array(regions, np.int64).reshape(-1, 2),
-        np.array(places).reshape(-1, 2),
+        np.array(positions).reshape(-1, 2),
         np.array(normals, np.float64),
         np.array(widths, np.float64),
     )
@@ -173,7 +179,7 @@ def _connected(places: NDArray[np.float64]) -> NDArray[np.int64]:
     return np.asarray(parts[rows, columns], np.int64) - 1
 
 
-_MOST_CELLS = 2000
+_MAX_CELLS = 2000
 """About so many cells of a region show its extents."""
 
 _RIM = 0.02
@@ -285,7 +291,7 @@ def find_regions(levels: NDArray[np.uint8], resolution: float, settings: RegionS
 
 
 def _cropped(levels: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], tuple[int, int]]:
-    """Return what a map knows of itself, and the column and row at which that begins."""
+    """Return the known part of a map, and the column and row at which it begins."""
     is_known = levels != UNKNOWN
     rows, columns = np.flatnonzero(is_known.any(axis=1)), np.flatnonzero(is_known.any(axis=0))
     if len(rows) == 0:
@@ -295,7 +301,7 @@ def _cropped(levels: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], tuple[int, i
 
 
 def _joined(levels: NDArray[np.uint8], count: int) -> NDArray[np.uint8]:
-    """Return a map in cells of so many rows and columns: as `resampled`, in whole cells."""
+    """Return a map in cells of a number of rows and columns: as `resampled`, in whole cells."""
     if count == 1:
         return levels
     rows, columns = (-(-side // count) for side in levels.shape)
@@ -319,9 +325,9 @@ def _boxes(
     ends = np.cumsum(np.bincount(labels.ravel()[cells], minlength=len(axes)))
     low, high = np.zeros((len(axes), 2)), np.zeros((len(axes), 2))
     for region, own in enumerate(np.split(order, ends[:-1]) if len(axes) else []):
-        chosen = own[:: max(len(own) // _MOST_CELLS, 1)]
-        places = np.column_stack([chosen % labels.shape[1], chosen // labels.shape[1]]) + 0.5
-        box = turned(places * side + origin, np.full(len(chosen), -axes[region]))
+        chosen = own[:: max(len(own) // _MAX_CELLS, 1)]
+        positions = np.column_stack([chosen % labels.shape[1], chosen // labels.shape[1]]) + 0.5
+        box = turned(positions * side + origin, np.full(len(chosen), -axes[region]))
         first, last = np.quantile(box, (_RIM, 1.0 - _RIM), axis=0)
         beyond = _RIM / (1.0 - 2.0 * _RIM) * (last - first)
         low[region], high[region] = first - beyond, last + beyond
@@ -329,7 +335,7 @@ def _boxes(
 
 
 def _snapped(doors: Doors, axes: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the directions of doors, across walls of their regions where they nearly are."""
+    """Return the directions of doors, across walls of their regions if they nearly are."""
     if len(doors.normals) == 0:
         return doors.normals
     quarter = math.pi / 2.0

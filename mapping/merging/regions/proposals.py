@@ -1,6 +1,6 @@
 """Motions under which a region or a door of one map meets one of another.
 
-Two regions of like extents lie on each other at four quarter turns, by their middles. Where they are alike
+Two regions of like extents lie on each other at four quarter turns, by their middles. If they are alike
 along one axis alone, as a room that one robot saw in part, the ends of the other axis are brought together.
 Two doors of like widths lie on each other in both directions.
 """

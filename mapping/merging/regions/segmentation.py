@@ -1,6 +1,6 @@
 """Free space of a map split into regions at doors: a watershed of the clearance.
 
-Cells are taken from the middles of rooms outwards. Where two basins meet, they stay apart if the passage is
+Cells are taken from the middles of rooms outwards. If two basins meet, they stay apart if the passage is
 as narrow as a door and narrower than either of them; else they become one.
 
 References
@@ -46,7 +46,7 @@ class RegionSettings:
     most_cells : int
         Maps that know more of such cells are split in larger ones: a bound of time.
     least_obstacle_m : float
-        What stands in free space and is smaller along both axes does not split it [m].
+        Obstacles in free space that are smaller along both axes do not split it [m].
     widest_door_m : float
         Widest gap that is a door [m].
     door_share : float
@@ -130,7 +130,7 @@ def find_meetings(labels: NDArray[np.int32], clearance: NDArray[np.float32]) -> 
     labels : (rows, columns) int32
         Region of each cell, or `NONE`.
     clearance : (rows, columns) float32
-        Distance to what is not free [cells].
+        Distance to the nearest cell that is not free [cells].
     """
     cells = np.empty((_count(labels), 3), np.int64)
     _collect(labels, cells)
@@ -171,7 +171,7 @@ def _collect(labels: Array, cells: Array) -> None:
 
 @kernel(forceinline=True)
 def _meets(labels: Array, row: int, column: int, down: int, right: int) -> bool:
-    """Whether a cell and that beside it are of two regions."""
+    """Whether a cell and its neighbour are of two regions."""
     if labels[row, column] == NONE or row + down >= labels.shape[0] or column + right >= labels.shape[1]:
         return False
     other = labels[row + down, column + right]
@@ -182,7 +182,7 @@ _LEVELS_A_CELL = 8
 
 
 class _SplitRule(NamedTuple):
-    """Where basins stay apart; lengths in cells.
+    """Conditions for basins to stay apart; lengths in cells.
 
     Half the width of the widest door, its share of the narrower region, radius of a region at least.
     """
@@ -193,7 +193,7 @@ class _SplitRule(NamedTuple):
 
 
 def free_space(levels: NDArray[np.uint8], least_obstacle: int) -> NDArray[np.uint8]:
-    """Return 1 where a map is free, or holds no more than a small obstacle.
+    """Return 1 if a map is free, or holds no more than a small obstacle.
 
     Parameters
     ----------
@@ -227,7 +227,7 @@ def split_regions(clearance: NDArray[np.float32], side: float, settings: RegionS
     Parameters
     ----------
     clearance : (rows, columns) float32
-        Distance to what is not free [cells], 0 there.
+        Distance to the nearest cell that is not free [cells], 0 there.
     side : float
         Side of a cell [m].
     settings : RegionSettings
@@ -268,7 +268,7 @@ def _sort(clearance: Array, ends: Array, order: Array) -> None:
 def _flood(clearance: Array, order: Array, rule: _SplitRule, basins: tuple[Array, Array, Array], labels: Array) -> int:
     """Label the cells by basins, with parent, peak and area of each; returns how many there are.
 
-    Each cell joins the basin from which the slope to it is steepest. Where it touches several, those merge
+    Each cell joins the basin from which the slope to it is steepest. If it touches several, those merge
     that no door keeps apart.
     """
     parent, peak, areas = basins
@@ -333,7 +333,7 @@ def _without_small(
 ) -> NDArray[np.int32]:
     """Return the labels numbered from 0, small regions in the neighbour with the widest passage.
 
-    What is small and has no neighbour is no region. Areas, peaks and the least of both are in cells.
+    Small basins without a neighbour are no regions. Areas, peaks and the least of both are in cells.
     """
     areas, peaks = basins
     passages, nowhere = _passages(labels, clearance), len(areas)

@@ -10,7 +10,7 @@ from srt_halls import hall, senses_at
 
 from lidarium.agents.srt.senses import Senses
 from lidarium.agents.srt.settings import SrtSettings
-from lidarium.agents.srt.travel import BACKING_S, MOST_TURNS, Travel, _Progress, _TurnPlan
+from lidarium.agents.srt.travel import BACKING_S, MAX_TURNS, Travel, _Progress, _TurnPlan
 from lidarium.envs.settings.lidar import Lidar
 from lidarium.envs.settings.robots import Robot
 
@@ -131,7 +131,7 @@ def test_after_all_turns_the_whole_circle_was_seen(degrees, heading):
 
 @pytest.mark.parametrize(
     "laser",
-    [lidar(360.0), lidar(360.0 / (MOST_TURNS + 2)), lidar(240.0, beams=1)],
+    [lidar(360.0), lidar(360.0 / (MAX_TURNS + 2)), lidar(240.0, beams=1)],
     ids=["full", "narrow", "beam"],
 )
 def test_a_laser_that_sees_all_or_hardly_anything_does_not_turn(laser):

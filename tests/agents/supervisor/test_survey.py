@@ -92,6 +92,10 @@ def test_robots_without_a_goal_or_with_goals_far_apart_do_not_meet():
     # Each goes to the other's place: the goals are nearer to each other than the robots, and still far apart.
     far = survey_of((WEST,), a=((0.5, 2.0), (1.0, 2.0)), b=((7.5, 2.0), (1.2 + limit, 2.0)))
     assert far.are_meeting("a", "b") is False
+    far.places.update(a=(1.0, 2.0), b=(1.0 + limit, 2.0))
+    assert far.are_meeting("a", "b") is False
+    far.places["b"] = (0.9 + limit, 2.0)
+    assert far.are_meeting("a", "b") is True
 
 
 def test_goals_see_each_other_less_the_farther_they_are_apart():

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from lidarium.mapping.localization.settings import (
-    MOST_REACH_M,
+    MAX_REACH_M,
     ClosureSettings,
     CompassSettings,
     GraphSettings,
@@ -25,7 +25,7 @@ def test_local_maps_too_large_for_memory_are_refused_with_the_cure():
 
 
 def test_a_range_beyond_any_laser_does_not_make_a_local_map_larger():
-    submaps = SubmapSettings(resolution=(MOST_REACH_M + 32.0) / 8192.0 * 1.001)
+    submaps = SubmapSettings(resolution=(MAX_REACH_M + 32.0) / 8192.0 * 1.001)
     assert SlamSettings(matching=MatchingSettings(range_m=900.0), submaps=submaps).matching.range_m == 900.0
 
 

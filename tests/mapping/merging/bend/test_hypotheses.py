@@ -12,9 +12,9 @@ from lidarium.mapping.merging.agreement import ValidationSettings, compare
 from lidarium.mapping.merging.bend.estimation import Bend, BendSettings, OffsetField
 from lidarium.mapping.merging.bend.hypotheses import (
     BLUNT_M,
-    LEAST_OVERLAP_M2,
-    MOST_RIVAL_SHARE,
-    MOST_STRAIN,
+    MAX_RIVAL_SHARE,
+    MAX_STRAIN,
+    MIN_OVERLAP_M2,
     SHARP_M,
     _Signs,
     _tolerance,
@@ -62,10 +62,10 @@ def test_each_sign_speaks_for_or_against_a_place(sign, worse):
 def test_small_overlaps_and_near_rivals_are_never_believed():
     sure = _Signs(500.0, 0.99, 900.0, 200.0, 0.0, 500.0, 0.0, 0.0, 0.01)
     assert confidence_of(sure) > 0.999
-    assert confidence_of(sure._replace(overlap_m2=0.99 * LEAST_OVERLAP_M2)) == 0.0
-    assert confidence_of(sure._replace(rival_share=MOST_RIVAL_SHARE + 0.01)) == 0.0
+    assert confidence_of(sure._replace(overlap_m2=0.99 * MIN_OVERLAP_M2)) == 0.0
+    assert confidence_of(sure._replace(rival_share=MAX_RIVAL_SHARE + 0.01)) == 0.0
     assert confidence_of(sure._replace(evidence_m=0.0)) == 0.0
-    assert confidence_of(sure._replace(strain=1.1 * MOST_STRAIN)) == 0.0
+    assert confidence_of(sure._replace(strain=1.1 * MAX_STRAIN)) == 0.0
 
 
 def test_sharp_maps_of_a_few_rooms_may_differ_by_furniture_alone():
