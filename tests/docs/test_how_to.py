@@ -7,7 +7,7 @@ import pytest
 
 from lidarium.registry import REGISTRIES, registry
 
-PAGES = sorted((Path(__file__).parents[2] / "docs" / "how_to").glob("*.md"))
+PAGES = sorted((Path(__file__).parents[2] / "docs" / "how_to").glob("add_*.md"))
 MOST_PLACES = {"add_a_sensor": 3}
 
 
