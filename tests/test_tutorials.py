@@ -80,23 +80,4 @@ def test_the_page_and_the_film_of_the_tutorial_are_written(tmp_path, monkeypatch
     monkeypatch.chdir(tmp_path)
     exec(compile(code_of("share_results.md"), "share_results.md", "exec"), {})
     assert "explore_lite on apartment, 2 robots, seed 0" in (tmp_path / "episode.html").read_text()
-    film = read_film(tmp_path / "episode.gif")
-    assert film.frames.shape[2] == 480
-    assert film.seconds == pytest.approx(30.0 / 10.0 + 0.1 + 1.5)
-
-
-def test_networks_of_the_tutorial_explore(capsys):
-    name = "train_a_team.md"
-    exec(compile(code_of(name), name, "exec"), {})
-    text = (TUTORIALS / name).read_text(encoding="utf-8")
-    shown = re.findall(r"```text\n(.*?)```", text, re.DOTALL)
-    assert capsys.readouterr().out == "".join(shown)
-
-
-def test_the_view_of_the_tutorial_is_served(capsys):
-    pytest.importorskip("viser", reason='viser is not installed: pip install "lidarium[viewer]"')
-    code = code_of("watch_a_run.md").replace("horizon_s=10.0", "horizon_s=1.0")
-    exec(compile(code, "watch_a_run.md", "exec"), {})
-    address, seen = capsys.readouterr().out.splitlines()
-    assert address.startswith("http://127.0.0.1:")
-    assert 0.0 < float(seen.split()[0]) < 100.0
+    assert 3.0 <= read_film(tmp_path / "episode.gif").seconds <= 6.0
