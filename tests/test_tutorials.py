@@ -14,9 +14,7 @@ TUTORIALS = Path(__file__).parents[1] / "docs" / "tutorials"
 
 def code_of(name):
     """Return all Python of a tutorial, in one piece."""
-    return "\n".join(
-        re.findall(r"```python\n(.*?)```", (TUTORIALS / name).read_text(encoding="utf-8"), re.DOTALL)
-    )
+    return "\n".join(re.findall(r"```python\n(.*?)```", (TUTORIALS / name).read_text(encoding="utf-8"), re.DOTALL))
 
 
 def test_the_policy_of_the_tutorial_explores_the_apartment(capsys):
@@ -45,9 +43,7 @@ def known_commands():
 def test_commands_of_tutorials_exist(name):
     text = (TUTORIALS / name).read_text(encoding="utf-8")
     named = set(
-        re.findall(
-            r"lidarium (?!-)([a-z][a-z-]+)", " ".join(re.findall(r"```bash\n(.*?)```", text, re.DOTALL))
-        )
+        re.findall(r"lidarium (?!-)([a-z][a-z-]+)", " ".join(re.findall(r"```bash\n(.*?)```", text, re.DOTALL)))
     )
     assert named <= known_commands()
 

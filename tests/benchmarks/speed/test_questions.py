@@ -26,9 +26,7 @@ def few_episodes(monkeypatch):
 
 
 def test_the_kernel_alone_takes_the_steps_of_the_whole(few_episodes):
-    whole, kernel = (
-        DrivenBatch(straight_floor(), 1, lidar="lidar_360_6m", resolution=0.05) for _ in range(2)
-    )
+    whole, kernel = (DrivenBatch(straight_floor(), 1, lidar="lidar_360_6m", resolution=0.05) for _ in range(2))
     for batch in (whole, kernel):
         batch.start(3)
     began = whole.poses.copy()
