@@ -14,9 +14,7 @@ TUTORIALS = Path(__file__).parents[1] / "docs" / "tutorials"
 
 def code_of(name):
     """Return all Python of a tutorial, in one piece."""
-    return "\n".join(
-        re.findall(r"```python\n(.*?)```", (TUTORIALS / name).read_text(encoding="utf-8"), re.DOTALL)
-    )
+    return "\n".join(re.findall(r"```python\n(.*?)```", (TUTORIALS / name).read_text(encoding="utf-8"), re.DOTALL))
 
 
 def test_the_policy_of_the_tutorial_explores_the_apartment(capsys):
@@ -45,9 +43,7 @@ def known_commands():
 def test_commands_of_tutorials_exist(name):
     text = (TUTORIALS / name).read_text(encoding="utf-8")
     named = set(
-        re.findall(
-            r"lidarium (?!-)([a-z][a-z-]+)", " ".join(re.findall(r"```bash\n(.*?)```", text, re.DOTALL))
-        )
+        re.findall(r"lidarium (?!-)([a-z][a-z-]+)", " ".join(re.findall(r"```bash\n(.*?)```", text, re.DOTALL)))
     )
     assert named <= known_commands()
 
@@ -80,23 +76,4 @@ def test_the_page_and_the_film_of_the_tutorial_are_written(tmp_path, monkeypatch
     monkeypatch.chdir(tmp_path)
     exec(compile(code_of("share_results.md"), "share_results.md", "exec"), {})
     assert "explore_lite on apartment, 2 robots, seed 0" in (tmp_path / "episode.html").read_text()
-    film = read_film(tmp_path / "episode.gif")
-    assert film.frames.shape[2] == 480
-    assert film.seconds == pytest.approx(30.0 / 10.0 + 0.1 + 1.5)
-
-
-def test_networks_of_the_tutorial_explore(capsys):
-    name = "train_a_team.md"
-    exec(compile(code_of(name), name, "exec"), {})
-    text = (TUTORIALS / name).read_text(encoding="utf-8")
-    shown = re.findall(r"```text\n(.*?)```", text, re.DOTALL)
-    assert capsys.readouterr().out == "".join(shown)
-
-
-def test_the_view_of_the_tutorial_is_served(capsys):
-    pytest.importorskip("viser", reason='viser is not installed: pip install "lidarium[viewer]"')
-    code = code_of("watch_a_run.md").replace("horizon_s=10.0", "horizon_s=1.0")
-    exec(compile(code, "watch_a_run.md", "exec"), {})
-    address, seen = capsys.readouterr().out.splitlines()
-    assert address.startswith("http://127.0.0.1:")
-    assert 0.0 < float(seen.split()[0]) < 100.0
+    assert 3.0 <= read_film(tmp_path / "episode.gif").seconds <= 6.0

@@ -307,7 +307,7 @@ def profile_page(
             "",
             *rates(profiles),
             "",
-            "What the parts are, and what limits them: [profiling](../profiling.md).",
+            "What the parts are, and what limits them: [profiling](profiling.md).",
             "",
         ]
     )

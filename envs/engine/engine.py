@@ -441,7 +441,11 @@ class Engine:
         """
         score = self.score
         rewards = score.rewards
-        earned = self._extra.earned() if self._has_extra else {}
+        earned: dict[str, NDArray[np.float64]] = {}
+        if self._has_extra:
+            # Terms may count the steps that they are asked for: a beginning is none.
+            nothing = dict.fromkeys(self._extra.names, np.zeros(self.rows))
+            earned = self._extra.earned() if acted.any() else nothing
         for amounts in earned.values():
             rewards += amounts
         if not is_plain:

@@ -133,8 +133,6 @@ class ExplorationEnv(ParallelEnv[str, Any, Any]):
         self._shows_itself = render_mode == "human" and self.world.show()
         self._rows = TeamRows(self.engine, conventions)
         self._named: dict[str, tuple[Any, list[Any]]] = {"state": (None, []), "order": (None, [])}
-        camera = self.simulation.camera
-        self._calibrations = [] if camera is None else [camera.camera.calibration] * self.settings.robots
         self._note_level()
 
     def use_level(self, name: str, shares_map: bool = True, decision_period_s: float | None = None) -> None:
@@ -326,12 +324,17 @@ class ExplorationEnv(ParallelEnv[str, Any, Any]):
                     listed = values.tolist()
                     self._named[name] = values, listed
             else:
-                listed = self._calibrations if name == "camera" and form == "full" else _listed(values)
+                listed = _listed(values) if name != "camera" or form != "full" else self._calibrations()
             mask = whole.get("_" + name, everyone)
             for info, row in pairs:
                 if mask is everyone or mask[row]:
                     info[name] = listed[row]
         return found
+
+    def _calibrations(self) -> list[dict[str, Any]]:
+        camera = self.simulation.camera
+        assert camera is not None
+        return [camera.camera.calibration for _ in self._index]
 
     def on_begin(self) -> None:
         """Do nothing, after an episode has begun; for subclasses that watch."""

@@ -19,11 +19,10 @@ from numpy.typing import NDArray
 
 from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.grids.occupancy import UNKNOWN
-from lidarium.mapping.merging import joining as joined_tree
 from lidarium.mapping.merging.agreement import Confirmation
 from lidarium.mapping.merging.described_map import DescribedMap
 from lidarium.mapping.merging.frame_tree import FrameTree
-from lidarium.mapping.merging.joining import Merged, placed
+from lidarium.mapping.merging.joining import Merged, joined_tree, placed
 from lidarium.mapping.merging.pair import PairResult, described, merge_pair, verify_pair
 from lidarium.mapping.merging.settings import MergeSettings
 

@@ -12,10 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.grids.occupancy import UNKNOWN
-from lidarium.mapping.merging import joining as joined_tree
 from lidarium.mapping.merging.described_map import DescribedMap, check_resolution, resampled, three_levels_of
 from lidarium.mapping.merging.frame_tree import FrameTree
-from lidarium.mapping.merging.joining import Merged, pair_edge
+from lidarium.mapping.merging.joining import Merged, joined_tree, pair_edge
 from lidarium.mapping.merging.pair import PairResult, described, explained, merge_near, merge_pair, verify_pair
 from lidarium.mapping.merging.settings import TOLERANCES, MergeSettings
 

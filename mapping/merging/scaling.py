@@ -21,7 +21,6 @@ from numpy.typing import ArrayLike, NDArray
 from lidarium.mapping.geometry.bounds import Angle, Count, Counted, above, check_settings, share, within
 from lidarium.mapping.geometry.rigid import Transform, wrapped
 from lidarium.mapping.grids.occupancy import UNKNOWN
-from lidarium.mapping.merging import joining as joined_tree
 from lidarium.mapping.merging.alignment import distinct
 from lidarium.mapping.merging.bend.estimation import estimate_bend
 from lidarium.mapping.merging.bend.hypotheses import (
@@ -41,7 +40,7 @@ from lidarium.mapping.merging.described_map import (
     resampled,
     three_levels_of,
 )
-from lidarium.mapping.merging.joining import Merged
+from lidarium.mapping.merging.joining import Merged, joined_tree
 from lidarium.mapping.merging.pair import NO_WALLS, PairResult
 from lidarium.mapping.merging.regions.graph import find_regions, turned
 from lidarium.mapping.merging.regions.proposals import by_growing_regions

@@ -47,7 +47,7 @@ if TYPE_CHECKING:
     from lidarium.envs.settings.rewards import RewardSettings
     from lidarium.envs.settings.robots import Robot
     from lidarium.envs.simulation.backends import simulation_of
-    from lidarium.evaluation.drawing import films as film
+    from lidarium.evaluation.drawing.films import film
     from lidarium.evaluation.episodes.runner import run_episode
     from lidarium.evaluation.metrics import metric
     from lidarium.evaluation.record.recorder import record

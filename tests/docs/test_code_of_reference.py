@@ -10,7 +10,7 @@ import lidarium
 REFERENCE = Path(__file__).parents[2] / "docs" / "reference"
 
 
-@pytest.mark.parametrize("name", ["bounds", "conventions", "environments", "floors"])
+@pytest.mark.parametrize("name", ["conventions", "depth_camera", "environments", "floors", "station"])
 def test_code_of_a_page_runs(name, capsys):
     text = (REFERENCE / f"{name}.md").read_text(encoding="utf-8")
     blocks = re.findall(r"^```(python|text)\n(.*?)^```", text, re.DOTALL | re.MULTILINE)

@@ -27,9 +27,6 @@ def blocks_of(page):
     return re.findall(r"^```(python|text)\n(.*?)^```", text, re.DOTALL | re.MULTILINE)
 
 
-
-
-
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
 def test_code_prints_what_the_page_shows(page, clean_registries, capsys):
     names = {"__name__": page.stem}

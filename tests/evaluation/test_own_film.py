@@ -6,15 +6,14 @@ import numpy as np
 import pytest
 from films_read import read_film
 
-from lidarium.evaluation.drawing import films as film
-from lidarium.evaluation.drawing.films import frames_of
+from lidarium.evaluation.drawing.films import film, frames_of
 from lidarium.registry import registry
 from lidarium.scripts.main import main
 
 MODULE = """
 import numpy as np
 
-from lidarium.evaluation.drawing import films as film
+from lidarium.evaluation.drawing.films import film
 
 
 @film("brightness", "A frame that is brighter the more is explored.")

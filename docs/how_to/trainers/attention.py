@@ -62,9 +62,7 @@ class Attention(Plan):
 
 def preferred_by(model: MaskablePPO) -> Callable[[dict[str, NDArray[Any]]], NDArray[Any]]:
     """Return what chooses as a model prefers."""
-    return lambda seen: np.asarray(
-        model.predict(seen, action_masks=seen["action_mask"], deterministic=True)[0]
-    )
+    return lambda seen: np.asarray(model.predict(seen, action_masks=seen["action_mask"], deterministic=True)[0])
 
 
 def learn(plan: Attention, seed: int, episodes: int = EPISODES) -> dict[str, Any]:

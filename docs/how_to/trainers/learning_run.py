@@ -135,9 +135,7 @@ def run(plan: Plan) -> dict[str, Any]:
     with ProcessPoolExecutor(plan.workers, get_context("spawn")) as pool:
         seeds = list(pool.map(partial(run_seed, plan), range(plan.seeds)))
         classic = dict(zip(CLASSIC, pool.map(partial(run_classic, plan), CLASSIC), strict=True))
-    networks = {
-        name: np.mean([seed[name] for seed in seeds], axis=0).tolist() for name in (UNTRAINED, LEARNED)
-    }
+    networks = {name: np.mean([seed[name] for seed in seeds], axis=0).tolist() for name in (UNTRAINED, LEARNED)}
     return {
         "curves": [seed["curve"] for seed in seeds],
         "by_seed": [float(np.mean(seed[LEARNED])) for seed in seeds],

@@ -79,8 +79,7 @@ def learn(plan: Plan, task: tuple[str, int]) -> list[float]:
         "reward": REWARDS[reward],
     }
     return [
-        report.coverage
-        for report, _ in train(options, replace(FAST, updates=plan.updates, seed=SEEDS_APART * seed))
+        report.coverage for report, _ in train(options, replace(FAST, updates=plan.updates, seed=SEEDS_APART * seed))
     ]
 
 

@@ -76,11 +76,12 @@ def test_a_batch_empties_batteries_as_single_environments_do(level):
 def test_a_batch_pauses_robots_as_single_environments_do(level):
     batch, alone = both(level, pauses_when_blocked=True)
     compared(batch, alone, level, 60 if level == "velocity" else 10)
-    states = batch.step(np.zeros((batch.num_envs, 2), np.float32))[4]["state"]
-    assert level != "velocity" or "paused" in states
+    if level == "velocity":
+        ahead = np.tile(np.array([1.0, 0.0], np.float32), (batch.num_envs, 1))
+        assert any("paused" in batch.step(ahead)[4]["state"] for _ in range(200))
 
 
-@pytest.mark.parametrize("radio", ["ideal", "line_of_sight"])
+@pytest.mark.parametrize("radio", ["all", "line_of_sight"])
 def test_a_batch_takes_orders_as_single_environments_do(radio):
     kinds = lidarium.OrderKind
     batch, alone = both("waypoint", radio=radio)

@@ -86,8 +86,3 @@ def test_rows_for_stable_baselines_take_the_forms():
                 assert env.observation_space.contains(info["terminal_observation"])
         assert rewards.dtype == np.float32
     assert ends
-
-
-def test_rows_of_ended_robots_stay_in_any_case():
-    with pytest.raises(ValueError, match="ended_agents is 'zeros'; leave it out"):
-        lidarium.vector_env(2, "scene_room", ended_agents="zeros")

@@ -82,7 +82,7 @@ def test_a_choice_drives_to_where_the_frontier_was_offered():
     place = env.unwrapped.world.poses[0, :2].copy()
     offered = observations["robot_0"]["frontiers"][0, :2].astype(float)
     env.step({"robot_0": 0})
-    path = env.waypoints.driver.path(0)
+    path = env.driver.path(0)
     assert (
         path[-1] + env.unwrapped.perception.poses.offset(0) == pytest.approx(place + offered, abs=0.08)
         or len(path) == 1

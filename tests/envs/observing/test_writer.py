@@ -47,7 +47,7 @@ def writer_of(env, offsets=None, goals=None, **options):
     return ObservationWriter(
         env.simulation,
         make_settings(env.settings, **options),
-        env._observations.offsets if offsets is None else offsets,
+        env.perception.offsets if offsets is None else offsets,
         goals,
     )
 
@@ -210,7 +210,7 @@ def test_arrays_that_do_not_fit_are_refused(change, words):
 
 def test_a_goal_is_in_the_frame_of_the_pose_and_zero_where_it_is_not_known():
     env, observations = driven(floor=GOAL_FLOOR, robots=2, observe=["pose"])
-    for agent, offset in zip(env.agents, env._observations.offsets, strict=True):
+    for agent, offset in zip(env.agents, env.perception.offsets, strict=True):
         assert np.array_equal(observations[agent]["goal"], (np.array([4.0, 3.0]) - offset).astype(np.float32))
     _, observations = driven(floor=GOAL_FLOOR, robots=2, observe=["pose"], known_starts=False)
     assert all(not observation["goal"].any() for observation in observations.values())

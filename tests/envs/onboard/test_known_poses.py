@@ -31,7 +31,7 @@ def test_the_origin_of_the_map_puts_its_cells_where_they_are_in_the_frame():
         place = (belief.pose[:2] - belief.map_origin) / belief.map.resolution
         assert belief.map.log_odds[int(place[1]), int(place[0])] < 0
         levels = three_levels(belief.map.log_odds)
-        seen = env._observations.of([agent])[agent]["map"][0]
+        seen = env.engine.observations["map"][row][0]
         i, j = int(place[1]), int(place[0])
         assert np.array_equal(seen[24:40, 24:40], levels[i - 8 : i + 8, j - 8 : j + 8])
         assert row < 3

@@ -138,9 +138,3 @@ def test_the_odometer_tells_what_wheels_tell_not_the_truth():
 def test_batteries_that_cannot_be_are_refused(values, message):
     with pytest.raises(ValueError, match=message):
         Battery(**values)
-
-
-def test_many_episodes_at_once_have_no_batteries_and_no_pauses():
-    for option in ({"battery": "kobuki"}, {"pauses_when_blocked": True}):
-        with pytest.raises(ValueError, match="many episodes at once have no batteries"):
-            lidarium.vector_env(2, "apartment", robots=1, **option)

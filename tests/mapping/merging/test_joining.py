@@ -6,12 +6,11 @@ from drawn_maps import RESOLUTION, apartment, blank, bowed, kept
 
 from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.grids.occupancy import UNKNOWN
-from lidarium.mapping.merging import joining as joined_tree
 from lidarium.mapping.merging.agreement import Agreement
 from lidarium.mapping.merging.bend.hypotheses import ranked_hypotheses
 from lidarium.mapping.merging.described_map import describe_map
 from lidarium.mapping.merging.frame_tree import Edge, FrameTree
-from lidarium.mapping.merging.joining import Merged, pair_edge, placed
+from lidarium.mapping.merging.joining import Merged, joined_tree, pair_edge, placed
 from lidarium.mapping.merging.pair import PairResult
 from lidarium.mapping.merging.settings import MergeSettings
 

@@ -13,8 +13,8 @@ from lidarium.evaluation.episodes.runner import run_episode
 from lidarium.mapping.files.map_files import FREE, UNKNOWN
 from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.grids.occupancy import three_levels
-from lidarium.mapping.merging import joining as joined_tree
 from lidarium.mapping.merging import merger
+from lidarium.mapping.merging.joining import joined_tree
 from lidarium.mapping.merging.merger import merge_maps
 from lidarium.mapping.merging.pair import described, merge_pair
 from lidarium.mapping.merging.settings import MergeSettings, merge_settings

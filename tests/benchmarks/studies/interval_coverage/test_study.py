@@ -5,8 +5,8 @@ from itertools import islice
 import pytest
 
 from lidarium.benchmarks.studies import STUDIES
-from lidarium.benchmarks.studies import interval_coverage as cases
 from lidarium.benchmarks.studies import interval_coverage as coverage
+from lidarium.benchmarks.studies.interval_coverage import cases
 
 FEW = 6
 

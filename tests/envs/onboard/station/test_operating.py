@@ -145,7 +145,7 @@ def test_at_the_level_of_frontiers_an_order_to_go_somewhere_is_driven_too():
     assert np.allclose(env.unwrapped.world.poses[0, :2], [6.0, 3.0], atol=0.1)
     env.order("robot_0", EXPLORE)
     drive(env, robot_0=0, robot_1=16)
-    assert env.waypoints.driver.target(0) != Target(3.0, 0.0)
+    assert env.driver.target(0) != Target(3.0, 0.0)
 
 
 def test_an_order_to_stop_ends_a_robot_with_its_reason():
