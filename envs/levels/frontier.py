@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from gymnasium import spaces
@@ -191,8 +191,6 @@ class FrontierLevel(WaypointLevel):
     ``given_up`` names it with the reason. Robots without a frontier in reach stay idle; if no robot has one, all end
     with ``no_frontier`` or ``frontier_unreachable``.
     """
-
-    takes_none: ClassVar[bool] = False
 
     def __init__(
         self,

@@ -381,7 +381,7 @@ def test_a_missing_file_is_not_found():
 
 
 def test_an_unknown_level_or_render_mode_is_refused_with_the_known_ones():
-    with pytest.raises(ValueError, match="velocity, waypoint or frontier"):
+    with pytest.raises(ValueError, match="known: velocity, waypoint, frontier"):
         make(level="fly")
     with pytest.raises(ValueError, match="human, rgb_array or None"):
         make(render_mode="ascii")
