@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.envs.engine.engine import NO_EPISODES
+from lidarium.envs.engine.engine import NO_EPISODES, Engine
+from lidarium.envs.faces.randomized import RandomizedRows
 from lidarium.envs.faces.requests import options_of, seeds_of
 from lidarium.envs.faces.team_rows import ACTIVE
 from lidarium.envs.faces.teams import make_rows
@@ -189,6 +190,13 @@ class ExplorationVecEnv(VecEnv):
                 "level='frontier'"
             )
         return masks
+
+    @property
+    def engine(self) -> Engine:
+        """The engine of all episodes; if settings are drawn, each has its own, see ``batch.parts``."""
+        if isinstance(self.batch, RandomizedRows):
+            raise AttributeError("episodes with drawn settings have an engine each; see batch.parts")
+        return self.batch.engine
 
     def get_attr(self, attr_name: str, indices: int | Iterable[int] | None = None) -> list[Any]:
         """Return an attribute of this environment once for each row."""

@@ -30,12 +30,15 @@ def make_team(
     randomize = others.pop("randomize", None)
     chosen = makers_settings(settings, others)
 
-    def make(settings: ExplorationSettings, episode: int | None = None) -> ExplorationEnv:
-        return ExplorationEnv(
-            floor, settings, render_mode, image_resolution, _taught(curriculum, episode), level, conventions
-        )
-
+    make = partial(_make_env, (floor, render_mode, image_resolution, curriculum, level, conventions))
     return make(chosen) if randomize is None else RandomizedTeam(make, chosen, randomize)
+
+
+def _make_env(options: tuple[Any, ...], settings: ExplorationSettings, episode: int | None = None) -> ExplorationEnv:
+    """Make the environment of an episode; a function of the module, so that environments can be pickled."""
+    floor, render_mode, image_resolution, curriculum, level, conventions = options
+    taught = _taught(curriculum, episode)
+    return ExplorationEnv(floor, settings, render_mode, image_resolution, taught, level, conventions)
 
 
 def make_rows(
@@ -58,14 +61,17 @@ def make_rows(
         others.setdefault("threads", available_threads())
     chosen = makers_settings(settings, others)
 
-    def make(settings: ExplorationSettings, episode: int) -> TeamRows:
-        taught = _taught(curriculum, episode)
-        engine = Engine(1, floor, settings, level, image_resolution, True, taught, reports)
-        return TeamRows(engine, conventions, merging)
-
     if randomize is not None:
+        make = partial(_make_episode, (floor, level, image_resolution, curriculum, reports, conventions, merging))
         return RandomizedRows(episodes, make, chosen, randomize)
     engine = Engine(episodes, floor, chosen, level, image_resolution, copy, curriculum, reports)
+    return TeamRows(engine, conventions, merging)
+
+
+def _make_episode(options: tuple[Any, ...], settings: ExplorationSettings, episode: int) -> TeamRows:
+    floor, level, image_resolution, curriculum, reports, conventions, merging = options
+    taught = _taught(curriculum, episode)
+    engine = Engine(1, floor, settings, level, image_resolution, True, taught, reports)
     return TeamRows(engine, conventions, merging)
 
 

@@ -121,12 +121,6 @@ def test_draws_that_change_the_spaces_are_refused():
         [env.reset(seed=seed) for seed in range(20)]
 
 
-def test_rows_of_stable_baselines_have_one_choice_of_settings():
-    pytest.importorskip("stable_baselines3")
-    with pytest.raises(ValueError, match=r"randomize is .*; leave it out: the episodes here"):
-        lidarium.sb3_vec_env(2, "scene_room", randomize={"reward.time": (0.0, 1.0)}, **SMALL)
-
-
 def test_the_size_of_the_team_is_drawn_for_each_episode():
     options = {**SMALL, "observe": ["bumper", "teammates"], "horizon_s": 3.0}
     env = lidarium.parallel_env("scene_room", randomize={"robots": (2, 4)}, **options)

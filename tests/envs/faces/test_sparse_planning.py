@@ -69,7 +69,7 @@ def test_spaces_are_those_of_the_environment_below():
     env = SparsePlanning(below)
     assert env.observation_space("robot_0") is below.observation_space("robot_0")
     assert env.action_space("robot_0") is below.action_space("robot_0")
-    assert env.metadata["name"] == "lidarium_frontier_exploration_sparse_v0"
+    assert env.metadata["name"] == "lidarium_frontier_exploration_sparse_v1"
     assert env.unwrapped is below.unwrapped
 
 

@@ -367,7 +367,7 @@ def test_a_closed_environment_and_one_without_reset_say_what_to_do():
         ({"episodes": -1}, "number of episodes is -1"),
         ({"episodes": 2.0}, "number of episodes is 2.0"),
         ({"episodes": True}, "number of episodes is True"),
-        ({"episodes": 2, "level": "joint"}, "level is 'joint'; want velocity, waypoint or frontier"),
+        ({"episodes": 2, "level": "joint"}, "unknown level 'joint'"),
         ({"episodes": 2, "render_mode": "human"}, "want rgb_array or None"),
         (
             {"episodes": 2, "floor": []},
