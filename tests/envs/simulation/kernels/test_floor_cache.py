@@ -268,7 +268,7 @@ def test_another_process_finds_what_this_one_made(own_store, tmp_path):
     fresh = floor_tables(load_floor("building:5"), *HEIGHTS)
     code = (
         "import sys, numpy as np\n"
-        "from lidarium.envs.floors import catalogue\n"
+        "from lidarium.envs.floors.catalogue import names as catalogue\n"
         "from lidarium.envs.simulation.kernels.floor_cache import floor_tables\n"
         "from lidarium.envs.simulation.kernels.floor_cache import FloorTables\n"
         "catalogue.generate_building = FloorTables.of_floor = None\n"
