@@ -64,7 +64,7 @@ class Drive:
     Attributes
     ----------
     target : (2,) float64
-        Where to [m].
+        Goal [m].
     phase : Phase
         The state.
     """

@@ -60,7 +60,7 @@ def view_of(scan: NDArray[np.float32], geometry: ScanGeometry, heading: float) -
     Parameters
     ----------
     scan : (beams,) float32
-        Ranges [m]; 0, nan or below the laser's least where invalid, its greatest range or inf if nothing
+        Ranges [m]; 0, nan or below the laser's minimum if invalid, its maximum range or inf if nothing
         was met.
     geometry : ScanGeometry
         The laser.

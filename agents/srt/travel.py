@@ -51,7 +51,7 @@ class _Progress:
         return senses.time_s - self._since > PATIENCE_S
 
     def note_block(self, senses: Senses) -> int:
-        """Note that the robot is blocked where it is.
+        """Note that the robot is blocked.
 
         Returns how often in a row it was blocked there, 1 the first time.
         """
@@ -109,7 +109,7 @@ class _TurnPlan:
         self._headings = [wrapped(heading + (2.0 * math.pi - field) * (turn + 1) / turns) for turn in range(turns)]
 
     def plan_frontier(self, focus: NDArray[np.float64], senses: Senses) -> None:
-        """Plan the turn to a frontier that is not seen through from where the robot came for it."""
+        """Plan the turn to a frontier that is not seen through from the robot's position at it."""
         gap = focus - senses.pose[:2]
         self._headings, self.focus = [math.atan2(gap[1], gap[0])], focus
 

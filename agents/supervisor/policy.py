@@ -111,7 +111,7 @@ class _Errands:
     def action(self, agent: str) -> Action:
         """Return the action of a robot on an errand.
 
-        It is its order at first, to end where it came home, else nothing.
+        It is its order at first, to end on arrival at home, else nothing.
         """
         errand, state = self._errands[agent], self._team.drive_state(agent)
         if errand.is_new:
@@ -383,7 +383,7 @@ class Supervised(Policy):
 
         Take it back from one that is joined no more.
 
-        Of one that has failed they learn where it drove: its images in their maps bar ways that are free, and
+        Of one that has failed they learn the trail: its images in their maps bar ways that are free, and
         hide frontiers.
         """
         station = self._supervisor.station

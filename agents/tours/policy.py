@@ -1,6 +1,6 @@
 """Tour frontier: robots share out the frontiers of a map, and each drives the first leg of its own tour.
 
-Each frontier is observed from where much of what is unknown is in view, not from beside the corner behind
+Each frontier is observed from a view of much unknown space, not from next to the corner behind
 which it hides. All frontiers are assigned and ordered at once, as tours of the team, planned again when a
 robot has seen its goal. Tours are short, the longest one most of all, and show much early. When
 nothing of a size is left, robots go to the nearest frontiers, as near as they can come.

@@ -36,7 +36,7 @@ class MergeSettings:
     regions : RegionSettings
         How regions are found and matched.
     bend : BendSettings
-        How much maps may be bent where no rigid motion is believed.
+        How much maps may be bent if no rigid motion is believed.
     confidence : float
         Confidence from which maps that agree once they are bent are joined; see `TOLERANCES`. Above 1 none
         are.

@@ -53,7 +53,7 @@ class _Elimination(NamedTuple):
 
 
 def _elimination(count: int, a: NDArray[np.int64], b: NDArray[np.int64]) -> _Elimination:
-    """Return the factor's blocks where poses are joined by pairs.
+    """Return the factor's blocks if poses are joined by pairs.
 
     The order of elimination fills few of them.
 
@@ -231,7 +231,7 @@ def optimised(
     Returns
     -------
     (poses, 3) float64
-        The poses; those given where no step makes them better.
+        The poses; those given if no step makes them better.
     (3, 3) float64
         Covariance of the last pose against the first [m^2, m rad, rad^2].
     """

@@ -235,11 +235,11 @@ class WallCompass:
 
     @property
     def is_surveyed(self) -> bool:
-        """Whether it is known where walls run."""
+        """Whether the directions of walls are known."""
         return self._walls is not None
 
     def survey(self, points: NDArray[np.float64], node: int, heading: float) -> bool:
-        """Find where walls run.
+        """Find the directions of walls.
 
         Parameters
         ----------

@@ -115,5 +115,5 @@ def follow(
 
 
 def _of_robot(laser: NDArray[np.float64], laser_pose: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the robot's poses where the laser's are known."""
+    """Return the robot's poses, given the laser's."""
     return composed(laser, relative(laser_pose, np.zeros(3)))
