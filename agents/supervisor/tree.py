@@ -219,13 +219,13 @@ def decide(tree: Node, case: Case) -> tuple[Leaf, list[tuple[str, bool]]]:
     Answers are names of questions with yes or no.
     """
     answers: list[tuple[str, bool]] = []
-    position: Node | Leaf = tree
-    while isinstance(position, Node):
+    node: Node | Leaf = tree
+    while isinstance(node, Node):
         # What arrays answered is no bool that JSON can hold.
-        is_so = bool(position.question.holds(case))
-        answers.append((position.question.name, is_so))
-        position = position.yes if is_so else position.no
-    return position, answers
+        is_so = bool(node.question.holds(case))
+        answers.append((node.question.name, is_so))
+        node = node.yes if is_so else node.no
+    return node, answers
 
 
 def leaves(tree: Node | Leaf) -> Iterator[Leaf]:
