@@ -32,7 +32,7 @@ It counts while the robot's target stands.
 
 
 MOVED = 0.15
-"""What counts as having moved [m]."""
+"""Minimum motion that counts [m]."""
 
 
 @dataclass(slots=True)

@@ -96,7 +96,7 @@ CLEAR_MARGIN = 0.02
 """Straight ways across the map keep the body this far from what is occupied [m]."""
 
 WALL = 0.08
-"""What is unknown this near to something occupied may well be its inside [m]."""
+"""Unknown cells this near to occupied ones may well be their inside [m]."""
 
 AHEAD = 0.5
 """The direction of a path is that of the place this far along it [m]."""

@@ -37,7 +37,7 @@ REGION_WIDTH = math.radians(48.0)
 """Width of the laser regions: five of them are 240 degrees [rad]."""
 
 REGION_FIRST = math.radians(-120.0)
-"""Where the first region begins, against the heading [rad]."""
+"""Start of the first region, against the heading [rad]."""
 
 REGIONS = 8
 """Number of laser regions of the full circle.

@@ -163,7 +163,7 @@ THESIS: dict[str, Any] = {
     "speed": 0.3,
     "turn_rate": 0.8,
 }
-"""What ``mode="thesis"`` stands for.
+"""Settings of ``mode="thesis"``.
 
 Settings that are given themselves come first.
 """

@@ -22,7 +22,7 @@ The robot has neither moved nor turned for this long.
 """
 
 MOVED, TURNED = 0.05, 0.1
-"""What counts as having moved [m] and turned [rad]."""
+"""Minimum motion [m] and turn [rad] that count."""
 
 BLIND_S = 10.0
 """A robot whose laser measures nothing for this long gives up [s]."""
@@ -201,7 +201,7 @@ class Travel:
         return None
 
     def begin_leg(self, senses: Senses, memory: Memory) -> None:
-        """Begin to drive, cutting corners if the map says that there is room."""
+        """Begin to drive, cutting corners if the map has room."""
         if self._drive is None:
             self._cut_corner(senses, memory)
             self._drive = Drive(self.legs[0].place)

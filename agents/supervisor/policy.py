@@ -32,7 +32,7 @@ PATIENCE_S = 20.0
 """Time without motion after which a sent robot explores by itself again [s]."""
 
 MOVED_M = 0.15
-"""What counts as having moved [m]."""
+"""Minimum motion that counts [m]."""
 
 LOST_S = 2.0
 """An order that a robot has not taken after this long has not reached it [s]."""

@@ -32,7 +32,7 @@ from lidarium.envs.onboard.radio.messages import OperatingState, OrderKind, Targ
 from lidarium.mapping.planning.footprint import Footprint
 
 MIN_WAY_M = 1.0
-"""What a metre costs a battery is estimated after a path of this length [m]."""
+"""The battery's cost per metre is estimated after a path of this length [m]."""
 
 EXPLAINED_PAUSES = frozenset({"contact", "blocked"})
 """Causes of pauses that a robot has seen or felt, and backs out of."""

@@ -158,7 +158,7 @@ MEETING = _Question(
 )
 
 OTHER, RICH, HOME = "other", "richer", "home"
-"""What orders to go lead to.
+"""Aims of orders to go.
 
 It is a goal that no other robot has, one with more to map, or the start.
 """

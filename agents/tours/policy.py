@@ -37,7 +37,7 @@ from lidarium.mapping.planning.grid_planning import centres_of
 from lidarium.registry import unknown
 
 SIGHT_MARGIN = 0.5
-"""What is this far within the edges of a laser's field of view is seen for certain [rad]."""
+"""Space this far within the edges of a laser's field of view is seen for certain [rad]."""
 
 FRESH_S = 60.0
 """Teammates of which a robot has not heard for this long have no part in its tours [s]."""

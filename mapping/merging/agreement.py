@@ -442,7 +442,7 @@ PLENTY_OF_STRUCTURE_M2 = 45.0
 """From this overlap on, it does not count how many walls agree [m2]."""
 
 MANY_WALLS, EXCUSED_M = 12, 0.1
-"""So many distinct walls are no chance; each beyond excuses so much contradiction [m]: bodies, doors."""
+"""Number of distinct walls that exclude chance; each further one excuses this contradiction [m]: bodies, doors."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

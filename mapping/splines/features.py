@@ -192,7 +192,7 @@ def _find_breaks(
 
 
 PEAK_JUMP = 0.3
-"""What follows a peak lies at least so much farther away [m]."""
+"""Minimum extra distance of the surface behind a peak [m]."""
 
 PEAK_INCIDENCE = math.radians(15.0)
 """Least angle of incidence at which a surface ends where its scan does.

@@ -229,7 +229,7 @@ class Slam:
         self.counts.corrections = path.corrections
 
     def _doubt(self, match: Match | None, points: int) -> str | None:
-        """Return why a scan of so many points has an uncertain pose; None if it is."""
+        """Return why a scan of a number of points has an uncertain pose; None if it has none."""
         if match is None:
             return NO_MATCH
         if self._path.mapper.recoveries > self.counts.recoveries:

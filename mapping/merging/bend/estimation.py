@@ -181,7 +181,7 @@ INDEPENDENT_M = 0.5
 """Length of wall that errs alike [m]."""
 
 MIN_SPREAD_M = 0.01
-"""What maps without any bend still err by [m]."""
+"""Error of maps without any bend [m]."""
 
 ANCHOR = 1e-3
 """Weight of offsets themselves beside the gaps of the walls of a node: they are zero where nothing holds."""

@@ -25,7 +25,7 @@ SHARP_M, BLUNT_M = 0.075, 0.15
 """Least and greatest distance at which walls agree [m]: half of a thin wall's thickness, and all of it."""
 
 SPREADS = 2.5
-"""So many standard deviations of the gaps that a bend leaves, walls agree."""
+"""Walls agree within this number of standard deviations of the gaps that a bend leaves."""
 
 
 def _tolerance(bend: Bend, resolution: float) -> tuple[float, float]:
