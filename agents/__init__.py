@@ -1,4 +1,4 @@
-"""Policies: they only decide."""
+"""Policies, which decide by observations and beliefs alone."""
 
 from lidarium.agents.catalogue import make_policy, policy_names, register_policy
 from lidarium.agents.policy import PerRobot, Policy, Stop, Team

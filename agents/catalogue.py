@@ -11,7 +11,7 @@ from lidarium.agents.policy import Policy
 from lidarium.registry import Registry, unknown
 
 POLICIES: Registry[Callable[..., Policy]] = Registry("policy")
-"""What makes a policy, by name; keyword arguments are its settings.
+"""Factories of policies by name; keyword arguments are the settings.
 
 A module is imported when it is first needed.
 """

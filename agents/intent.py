@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 KEPT = 1.0
-"""What a robot goes for is left only for a tour that is shorter by this [m]."""
+"""A robot's goal is left only for a tour that is shorter by this [m]."""
 
 KEPT_NEAR = 0.5
-"""What lies this near to what a robot goes for is still the same [m]."""
+"""Goals this near to a robot's goal are the same [m]."""
 
 MAX_RETURNS = 10
 """More returns than these change nothing: no tour is shorter by a kilometre."""

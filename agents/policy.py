@@ -35,7 +35,10 @@ Action = NDArray[np.float32] | Target | Route | int | Stop | Order | None
 
 
 class Team(Protocol):
-    """Queries of a policy about its team, never ground truth. Environments and `EpisodeTeam` provide it."""
+    """Queries of a policy about its team, never about ground truth.
+
+    `ExplorationEnv` satisfies it itself; `EpisodeTeam` is the team of one episode of a vector environment.
+    """
 
     @property
     def agents(self) -> list[str]:

@@ -32,7 +32,7 @@ It counts while the robot's target stands.
 
 
 MOVED = 0.15
-"""What counts as having moved [m]."""
+"""Minimum motion that counts [m]."""
 
 
 @dataclass(slots=True)
@@ -117,7 +117,7 @@ class FrontierExplorer(Policy):
         self._work[agent] = _Work(choice, self.team.time_s, (float(pose[0]), float(pose[1])), failed_at)
 
     def _review(self, agent: str) -> None:
-        """Drop a choice whose frontier is gone, and give up unusable ones.
+        """Drop choices of frontiers that are gone, and give up unusable ones.
 
         Frontiers that cannot be seen or reached are unusable.
         """

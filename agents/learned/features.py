@@ -17,7 +17,7 @@ NEAR_M, AROUND_M = 3.0, 6.0
 """Options within these paths of an option lie near and around it [m]."""
 
 FAR_REACH, FAR_DEPTH = 8.0, 6.0
-"""What is unknown counts up to the first from a view, and up to the second behind known space [m]."""
+"""Unknown space counts up to the first from a view, and up to the second behind known space [m]."""
 
 MOST = 4.0
 """No feature is greater than this, or less than the negative of it."""
@@ -49,7 +49,7 @@ OPTION_FEATURES: Mapping[str, float] = {
     "occupied": 0.25,  # share of its crop that is occupied
     "rim": 5.0,  # how far it lies within the box around all that is known [m]
 }
-"""What is seen of an option, and by what it is divided."""
+"""Features of an option, and their divisors."""
 
 TEAMMATE_FEATURES: Mapping[str, float] = {
     "ahead": 10.0,  # place along the robot's heading [m]
@@ -61,7 +61,7 @@ TEAMMATE_FEATURES: Mapping[str, float] = {
     "target_left": 10.0,  # and to its left [m]
     "has_picked": 1.0,  # whether it has decided just before
 }
-"""What is seen of a teammate, and by what it is divided."""
+"""Features of a teammate, and their divisors."""
 
 SITUATION_FEATURES: Mapping[str, float] = {
     "time": 300.0,  # since the start [s]
@@ -74,7 +74,7 @@ SITUATION_FEATURES: Mapping[str, float] = {
     "all_tours": 100.0,  # and of all tours [m]
     "picked": 4.0,  # robots that have decided just before
 }
-"""What is seen of the situation, and by what it is divided."""
+"""Features of the situation, and their divisors."""
 
 
 def option_features(

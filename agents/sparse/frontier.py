@@ -35,10 +35,10 @@ STUCK_S, BLOCKED_S = 10.0, 3.0
 """Time without motion, or of a blocked path, after which something unknown is taken to stand there [s]."""
 
 MOVED_M, TURNED = 0.1, 0.2
-"""What counts as having moved [m, rad]."""
+"""Minimum motion that counts [m, rad]."""
 
 CLAIMED_M = 1.0
-"""What is so near to what a robot is about to see is left to it [m]."""
+"""Space this near to a robot's next view is left to it [m]."""
 
 OBSTACLE_S, OBSTACLE_M = 30.0, 0.1
 """How long, and how far to each side, something unknown is taken to stand there [s, m]."""
@@ -123,7 +123,7 @@ KEPT_SHARE = 0.5
 """A robot keeps its choice as long as more of what it wants to see is unknown than this share."""
 
 IGNORED_M = 0.25
-"""What is so near to unknown ground that was given up is given up with it [m]."""
+"""Space this near to unknown ground that was given up is given up with it [m]."""
 
 LAST_M = 1.0
 """Borders of unknown ground that are as long get a last view from as near as a robot can come [m]."""

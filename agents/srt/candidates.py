@@ -48,7 +48,7 @@ They are for openings that no straight path leads to, and count from the opening
 ATTEMPTS, PATCH, ATTEMPT_REACH = 3, 0.3, 1.5
 """Attempts to see a patch, its side [m], and the reach of an attempt [m].
 
-A patch beyond openings counts as unseeable after so many attempts. An attempt counts this far from what the
+A patch beyond openings counts as unseeable after this number of attempts. An attempt counts this far from what the
 robot came for.
 """
 

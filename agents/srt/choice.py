@@ -23,7 +23,7 @@ from lidarium.mapping.geometry.rigid import wrapped
 from lidarium.mapping.planning.touring.tours import shortest_tour
 
 MOST = 14
-"""Tours go past so many frontiers at most, the nearest ones."""
+"""Maximum number of frontiers on a tour, the nearest ones."""
 
 WAY_OF_SIZE = 1.0
 """Extra distance that a metre of frontier length is worth [m].
@@ -38,7 +38,7 @@ The added cost is by how much nearer they are.
 """
 
 TEAMMATE_SAME = 1.0
-"""What lies this near to what a teammate goes for is the teammate's [m]."""
+"""Frontiers this near to a teammate's goal are the teammate's [m]."""
 
 
 def _first_on_tour(

@@ -68,7 +68,7 @@ class _TreeGrowth:
 
     @property
     def node(self) -> Node:
-        """The node where the robot is."""
+        """The robot's present node."""
         return self.tree.nodes[self.number]
 
     def plant(self, senses: Senses, memory: Memory) -> None:
@@ -76,19 +76,19 @@ class _TreeGrowth:
         self.root = self.add(senses, None, senses.pose, memory)
 
     def add(self, senses: Senses, parent: int | None, pose: NDArray[np.float64], memory: Memory) -> int:
-        """Add a node where the robot is, and return its number."""
+        """Add a node at the robot's position, and return its number."""
         view = view_of(senses.scan, self._lidar, float(senses.pose[2]))
         node = Node(len(self.tree.nodes), self._agent, np.array(pose), *self._regions(pose, view), parent, view)
         self._insert(node, memory)
         return node.number
 
     def add_if_apart(self, senses: Senses, memory: Memory) -> None:
-        """Add a node where the robot is, unless that is where its last one lies."""
+        """Add a node at the robot's position, unless its last one is there."""
         if senses.distance_to(self.node.place) >= NEW_NODE:
             self.add(senses, self.number, senses.pose, memory)
 
     def widen_view(self, senses: Senses) -> None:
-        """Let the node where the robot is know what its scan shows, too."""
+        """Add the present scan to the robot's present node."""
         node = self.node
         view = joined_views(node.view, view_of(senses.scan, self._lidar, float(senses.pose[2])))
         node.view = view
@@ -147,7 +147,7 @@ class Explorer:
     ending : str or None
         Why it goes home, or is there.
     is_home : bool
-        Whether it has ended its work and is back where it began, or as near as it gets.
+        Whether it has ended its work and is back at its start, or as near as it gets.
     """
 
     def __init__(
@@ -260,12 +260,12 @@ class Explorer:
                 self._set_out(way, senses)
 
     def _pause(self, senses: Senses, memory: Memory) -> None:
-        """Drop the way, with a node where the robot is, so that all ways begin at nodes."""
+        """Drop the way, with a node at the robot's position, so that all ways begin at nodes."""
         self._travel.drop()
         self._growth.add_if_apart(senses, memory)
 
     def _decide(self, senses: Senses, memory: Memory, targets: Sequence[Candidate]) -> None:
-        """Choose where to go next, or to go home."""
+        """Choose the next goal, or to go home."""
         if self._turns.focus is not None:
             memory.give_up(self._turns.focus)
             self._turns.focus = None
@@ -354,7 +354,7 @@ class Explorer:
     def _settle_block(self, senses: Senses, memory: Memory) -> None:
         """Back out, step aside, or give up the target.
 
-        What stops a robot far from its target seldom has to do with the target.
+        Obstacles far from the target seldom have to do with the target.
         """
         leg, target, is_there = self._travel.legs[0], self.target, len(self._travel.legs) == 1
         blocks = 1 if self._travel.is_aside else self._progress.note_block(senses)

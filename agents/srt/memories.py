@@ -1,4 +1,4 @@
-"""Knowledge of which space was seen and where a straight path is clear."""
+"""Knowledge of seen space and of clear straight paths."""
 
 import math
 from collections.abc import Callable, Iterable
@@ -27,7 +27,7 @@ class _Frontiers:
     Attributes
     ----------
     focuses : (n, 2) float64
-        A place on each that is in sight from where the robot would stand [m].
+        A point on each that is in sight from the robot's position there [m].
     cells : list of (m, 2) float64
         The cells of each [m].
     sizes : (n,) float64
@@ -61,7 +61,7 @@ class Memory(Protocol):
     def is_seen(self, points: NDArray[np.float64], of: Node) -> NDArray[np.bool_]:
         """Whether points (n, 2) beyond the border of a node were seen, shape (n,).
 
-        The border is that of what was seen from the node.
+        The border is that of the region seen from the node.
         """
         ...
 
@@ -96,7 +96,7 @@ CLEAR_MARGIN = 0.02
 """Straight ways across the map keep the body this far from what is occupied [m]."""
 
 WALL = 0.08
-"""What is unknown this near to something occupied may well be its inside [m]."""
+"""Unknown cells this near to occupied ones may well be their inside [m]."""
 
 AHEAD = 0.5
 """The direction of a path is that of the place this far along it [m]."""
@@ -105,7 +105,7 @@ AHEAD = 0.5
 class MapMemory:
     """A memory that relies on the map.
 
-    Space is seen where it is known, and a path is clear where all of it is free with room for the robot.
+    Known space is seen, and a path is clear if all of it is free with room for the robot.
 
     Parameters
     ----------
@@ -121,7 +121,7 @@ class MapMemory:
     def is_seen(self, points: NDArray[np.float64], of: Node) -> NDArray[np.bool_]:
         """Whether points (n, 2) lie in known cells.
 
-        Points outside of the map count, too, and those so near to what is occupied that they may lie
+        Points outside of the map count, too, and those so near to occupied cells that they may lie
         in it.
         """
         rows, columns, is_inside = self._cells(points)
@@ -259,7 +259,7 @@ class MapMemory:
 
 
 class RegionMemory:
-    """Memory of nodes: space is seen where it lies in another node's safe region.
+    """Memory of nodes: space in another node's safe region is seen.
 
     A way is clear within one node's safe region.
     """
@@ -268,7 +268,7 @@ class RegionMemory:
         self._nodes = list(nodes)
 
     def is_seen(self, points: NDArray[np.float64], of: Node) -> NDArray[np.bool_]:
-        """Whether points (n, 2) lie where another node is safe."""
+        """Whether points (n, 2) lie in the safe region of another node."""
         seen = np.zeros(len(points), np.bool_)
         for node in self._nodes:
             # A node made again at the same place sees what it saw before: its openings stay.

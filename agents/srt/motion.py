@@ -22,7 +22,7 @@ GAP = 0.03
 """The robot stops this far before what it sees ahead [m]."""
 
 SIDE = 0.01
-"""What lies within the robot's radius and this beside its way is ahead [m]."""
+"""Obstacles within the robot's radius plus this of its way are ahead [m]."""
 
 ALONG = 0.001
 """Advance allowed towards what is nearer beside the body than ``SIDE`` [m].
@@ -46,7 +46,7 @@ FORESIGHT_S = 0.2
 """Time for which the pose after a control is predicted [s]."""
 
 HEADING_WEIGHT = 0.3
-"""What a radian off the heading to the target counts in the list of controls [m]."""
+"""Cost of a radian off the heading to the target in the list of controls [m]."""
 
 
 class Phase(Enum):
@@ -64,7 +64,7 @@ class Drive:
     Attributes
     ----------
     target : (2,) float64
-        Where to [m].
+        Goal [m].
     phase : Phase
         The state.
     """

@@ -37,7 +37,7 @@ REGION_WIDTH = math.radians(48.0)
 """Width of the laser regions: five of them are 240 degrees [rad]."""
 
 REGION_FIRST = math.radians(-120.0)
-"""Where the first region begins, against the heading [rad]."""
+"""Start of the first region, against the heading [rad]."""
 
 REGIONS = 8
 """Number of laser regions of the full circle.
@@ -60,7 +60,7 @@ def view_of(scan: NDArray[np.float32], geometry: ScanGeometry, heading: float) -
     Parameters
     ----------
     scan : (beams,) float32
-        Ranges [m]; 0, nan or below the laser's least where invalid, its greatest range or inf if nothing
+        Ranges [m]; 0, nan or below the laser's minimum if invalid, its maximum range or inf if nothing
         was met.
     geometry : ScanGeometry
         The laser.

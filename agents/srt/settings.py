@@ -50,17 +50,17 @@ class SrtSettings:
         ``integrated`` goes to open parts of the border of the seen region; ``base`` goes in random directions,
         wherever no other safe region lies.
     candidates : str
-        Where to go next: ``goal`` (least way, and least distance to the goal where there is one), ``random``
+        The choice of the next goal: ``goal`` (least way, and least distance to the goal if there is one), ``random``
         (an opening by its angular width) or ``farthest`` (the longest ray of an opening).
     backtrack : str
-        Where to go from a node without openings: ``open`` (the cheapest node that has one, along the tree and
+        The choice from a node without openings: ``open`` (the cheapest node that has one, along the tree and
         its bridges) or ``parent``.
     memory : str
         The record of seen space: ``map`` (the robot's map) or ``regions`` (the nodes' own scans).
     drive : str
         ``turn_advance`` (turn, advance, done) or ``controls`` (the best of a list of controls).
     places_nodes_at_targets : bool
-        Whether a node is placed where the robot wanted to go, as printed in the thesis, and not where it
+        Whether a node is set at the robot's target, as printed in the thesis, and not where it
         takes itself to be.
     repeats_nodes : bool
         Whether a node is added again when the robot comes back to it, as printed in the thesis.
@@ -102,7 +102,7 @@ class SrtSettings:
     turn_rate : float
         Greatest turn rate [rad/s].
     arrived : float
-        Distance at which a robot is where it wanted to go [m].
+        Distance at which a robot has reached its target [m].
     """
 
     shape: str = "radial"
@@ -163,7 +163,7 @@ THESIS: dict[str, Any] = {
     "speed": 0.3,
     "turn_rate": 0.8,
 }
-"""What ``mode="thesis"`` stands for.
+"""Settings of ``mode="thesis"``.
 
 Settings that are given themselves come first.
 """

@@ -22,7 +22,7 @@ The robot has neither moved nor turned for this long.
 """
 
 MOVED, TURNED = 0.05, 0.1
-"""What counts as having moved [m] and turned [rad]."""
+"""Minimum motion [m] and turn [rad] that count."""
 
 BLIND_S = 10.0
 """A robot whose laser measures nothing for this long gives up [s]."""
@@ -51,7 +51,7 @@ class _Progress:
         return senses.time_s - self._since > PATIENCE_S
 
     def note_block(self, senses: Senses) -> int:
-        """Note that the robot is blocked where it is.
+        """Note that the robot is blocked.
 
         Returns how often in a row it was blocked there, 1 the first time.
         """
@@ -109,7 +109,7 @@ class _TurnPlan:
         self._headings = [wrapped(heading + (2.0 * math.pi - field) * (turn + 1) / turns) for turn in range(turns)]
 
     def plan_frontier(self, focus: NDArray[np.float64], senses: Senses) -> None:
-        """Plan the turn to a frontier that is not seen through from where the robot came for it."""
+        """Plan the turn to a frontier that is not seen through from the robot's position at it."""
         gap = focus - senses.pose[:2]
         self._headings, self.focus = [math.atan2(gap[1], gap[0])], focus
 
@@ -201,7 +201,7 @@ class Travel:
         return None
 
     def begin_leg(self, senses: Senses, memory: Memory) -> None:
-        """Begin to drive, cutting corners if the map says that there is room."""
+        """Begin to drive, cutting corners if the map has room."""
         if self._drive is None:
             self._cut_corner(senses, memory)
             self._drive = Drive(self.legs[0].place)

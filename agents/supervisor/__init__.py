@@ -1,4 +1,4 @@
 """A station that merges the maps of its robots, directing them by a tree of rules.
 
-A tree of rules decides who goes where and who has finished.
+A tree of rules decides on the robots' goals and on who has finished.
 """

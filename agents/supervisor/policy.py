@@ -32,7 +32,7 @@ PATIENCE_S = 20.0
 """Time without motion after which a sent robot explores by itself again [s]."""
 
 MOVED_M = 0.15
-"""What counts as having moved [m]."""
+"""Minimum motion that counts [m]."""
 
 LOST_S = 2.0
 """An order that a robot has not taken after this long has not reached it [s]."""
@@ -111,7 +111,7 @@ class _Errands:
     def action(self, agent: str) -> Action:
         """Return the action of a robot on an errand.
 
-        It is its order at first, to end where it came home, else nothing.
+        It is its order at first, to end on arrival at home, else nothing.
         """
         errand, state = self._errands[agent], self._team.drive_state(agent)
         if errand.is_new:
@@ -383,7 +383,7 @@ class Supervised(Policy):
 
         Take it back from one that is joined no more.
 
-        Of one that has failed they learn where it drove: its images in their maps bar ways that are free, and
+        Of one that has failed they learn the trail: its images in their maps bar ways that are free, and
         hide frontiers.
         """
         station = self._supervisor.station

@@ -42,7 +42,7 @@ class SupervisorSettings:
     least_left_m : float
         The work of a group is done when no frontier of this length is left on its map within reach [m].
     unbalanced_share : float
-        A robot whose share of the map is smaller than this part of its teammates' mean is sent where there is
+        A robot whose share of the map is smaller than this part of its teammates' mean is sent to where there is
         more to map.
     enclosed_way_m, enclosed_gain_m2_per_m : float
         A robot that has mapped less than this on each metre of its last way of this length is enclosed [m,
@@ -63,7 +63,7 @@ class SupervisorSettings:
     rendezvous_m : float
         How near such goals are [m].
     returns_home : bool
-        Whether the robots drive to where they began when the work is done.
+        Whether the robots drive to their starts when the work is done.
     battery_margin : float
         A robot turns back when its battery's charge is less than this many times the cost of the way home; 0
         for never.

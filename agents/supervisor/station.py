@@ -196,7 +196,7 @@ class MergeStation:
     def merge(self, time_s: float, may_search: bool = True) -> None:
         """Merge the maps of all robots that have not failed.
 
-        What was found is verified alone if there is no time for searches.
+        Known transforms are verified alone if there is no time for searches.
         """
         used = {agent: self.reports[agent] for agent in self.agents if self._received.is_used(agent)}
         if self.settings.trusts_starts:

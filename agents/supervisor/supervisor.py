@@ -32,7 +32,7 @@ from lidarium.envs.onboard.radio.messages import OperatingState, OrderKind, Targ
 from lidarium.mapping.planning.footprint import Footprint
 
 MIN_WAY_M = 1.0
-"""What a metre costs a battery is estimated after a path of this length [m]."""
+"""The battery's cost per metre is estimated after a path of this length [m]."""
 
 EXPLAINED_PAUSES = frozenset({"contact", "blocked"})
 """Causes of pauses that a robot has seen or felt, and backs out of."""
@@ -88,7 +88,7 @@ class _Judge:
         survey: Survey,
         taken: Mapping[str, int],
     ) -> _Judged:
-        """Put a robot before the tree, and choose its goal where it is to get another."""
+        """Put a robot before the tree, and choose its goal if it is to get another."""
         inputs = self._inputs(agent, survey.known_area_m2)
         if agent not in workers:
             is_explained = self._station.reports[agent].pause_cause in EXPLAINED_PAUSES
@@ -189,7 +189,7 @@ class _Judge:
 def _worth(others: list[str], survey: Survey, taken: Mapping[str, int]) -> NDArray[np.float64]:
     """Return the value of each goal to a robot, (K,).
 
-    It is less if others see the goal, and -inf where it is taken or none.
+    It is less if others see the goal, and -inf if it is taken or none.
     """
     worth = np.where(survey.is_goal(), 1.0, -np.inf)
     for teammate in others:

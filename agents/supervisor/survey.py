@@ -32,7 +32,7 @@ class _Goals:
     Attributes
     ----------
     cells, starts : (N, 2) int64, (K + 1,) int64
-        Cells (row, column) of all clusters, and where each begins.
+        Cells (row, column) of all clusters, and the index of each one's first.
     seen_from : (K, 2) int64
         The cell of each that is nearest to its middle.
     sizes : (K,) float64
@@ -40,7 +40,7 @@ class _Goals:
     areas : (K,) float64
         Unknown area around each, within the range of the laser [m2].
     costs : (R, K) float64
-        Cost of each robot's way to where it sees the frontier [m], inf if there is none.
+        Cost of each robot's way to its view of the frontier [m], inf if there is none.
     stands, observed : (R, K, 2) int64
         Its cell there, and the frontier cell that it observes.
     """

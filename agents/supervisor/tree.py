@@ -9,7 +9,7 @@ numbers:
 3. Of two robots with one goal the nearer one, by the length of its path, keeps it. The other one gets another
    goal on the merged map, or is stopped if there is none. (In the thesis's reported run the nearer robot
    was diverted; see the tests.)
-4. A robot that knows much less of the map than the others is sent where there is more to map. One that is
+4. A robot that knows much less of the map than the others is sent to unexplored space. One that is
    enclosed, having driven far for little, is stopped if there is no such way.
 5. If the merged map has no frontier left the work is done, and all stop.
 
@@ -70,7 +70,7 @@ class Case:
     has_other_goal : bool
         Whether the merged map offers it a goal that no other robot has.
     has_richer_goal : bool
-        Whether one of these has more to map than where it goes now.
+        Whether one of these has more to map than its present goal.
     is_behind : bool
         Whether its map is much smaller than those of its group.
     is_enclosed : bool
@@ -158,7 +158,7 @@ MEETING = _Question(
 )
 
 OTHER, RICH, HOME = "other", "richer", "home"
-"""What orders to go lead to.
+"""Aims of orders to go.
 
 It is a goal that no other robot has, one with more to map, or the start.
 """
@@ -219,13 +219,13 @@ def decide(tree: Node, case: Case) -> tuple[Leaf, list[tuple[str, bool]]]:
     Answers are names of questions with yes or no.
     """
     answers: list[tuple[str, bool]] = []
-    position: Node | Leaf = tree
-    while isinstance(position, Node):
+    node: Node | Leaf = tree
+    while isinstance(node, Node):
         # What arrays answered is no bool that JSON can hold.
-        is_so = bool(position.question.holds(case))
-        answers.append((position.question.name, is_so))
-        position = position.yes if is_so else position.no
-    return position, answers
+        is_so = bool(node.question.holds(case))
+        answers.append((node.question.name, is_so))
+        node = node.yes if is_so else node.no
+    return node, answers
 
 
 def leaves(tree: Node | Leaf) -> Iterator[Leaf]:

@@ -1,1 +1,1 @@
-"""Explorers whose tours pass all frontiers that are left."""
+"""Explorers with tours past all frontiers that are left."""

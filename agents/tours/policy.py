@@ -1,6 +1,6 @@
 """Tour frontier: robots share out the frontiers of a map, and each drives the first leg of its own tour.
 
-Each frontier is observed from where much of what is unknown is in view, not from beside the corner behind
+Each frontier is observed from a view of much unknown space, not from next to the corner behind
 which it hides. All frontiers are assigned and ordered at once, as tours of the team, planned again when a
 robot has seen its goal. Tours are short, the longest one most of all, and show much early. When
 nothing of a size is left, robots go to the nearest frontiers, as near as they can come.
@@ -37,7 +37,7 @@ from lidarium.mapping.planning.grid_planning import centres_of
 from lidarium.registry import unknown
 
 SIGHT_MARGIN = 0.5
-"""What is this far within the edges of a laser's field of view is seen for certain [rad]."""
+"""Space this far within the edges of a laser's field of view is seen for certain [rad]."""
 
 FRESH_S = 60.0
 """Teammates of which a robot has not heard for this long have no part in its tours [s]."""

@@ -68,7 +68,7 @@ class Localizer(Protocol):
     def covariance(self) -> NDArray[np.float64]:
         """Covariance of the last pose, shape (3, 3) [m^2, m rad, rad^2].
 
-        Zero where the localizer claims to know.
+        Zero if the localizer claims to be certain.
         """
         ...
 

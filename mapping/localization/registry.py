@@ -55,7 +55,7 @@ def make_localizer(name: str, geometry: ScanGeometry, settings: Any = None) -> L
     geometry : ScanGeometry
         The laser.
     settings : object or None
-        Its own settings, of the class ``Settings`` of the localizer; its defaults if None.
+        Its own settings, of the class ``Settings`` of the localizer; the defaults if None.
 
     Raises
     ------

@@ -195,7 +195,7 @@ class MatchingSettings:
         check_settings(self, type(self).__name__)
 
     def weight(self, points: int) -> float:
-        """Return how much full disagreement of all of so many points counts."""
+        """Return the weight of full disagreement of all of a number of points."""
         return min(self.independent_points, self.independent_share * points) / self.deviation**2
 
 
@@ -273,7 +273,7 @@ class ClosureSettings:
         So is one that would move it by more standard deviations of the way since; those have to be of at
         least two local maps.
     doubts_one_map : bool
-        Whether those have to be of at least two local maps also where the way since allows the move.
+        Whether those have to be of at least two local maps also if the way since allows the move.
     confirmations : int
         How many have to agree.
     agree_m, agree_angle : float
@@ -319,7 +319,7 @@ class GraphSettings:
     ----------
     start_path_m : float
         Way driven, turns counted with a metre a radian, after which the first scan is laid on the map that
-        has grown since, and where its walls run is surveyed [m].
+        has grown since, and the directions of its walls are surveyed [m].
     distance_m, angle : float
         Way and turn between nodes [m, rad].
     deviation_m, deviation_per_metre : float

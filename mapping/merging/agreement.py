@@ -1,8 +1,8 @@
 """Whether two overlaid maps show one place.
 
 The default test counts cells known to both maps: walls that lie on walls, and walls of one at cells where the
-other has observed and found nothing. A transform is refused where too little agrees, if enough
-contradicts, or where another transform explains the maps nearly as well. The disc test of the thesis compares
+other has observed and found nothing. A transform is refused if too little agrees, if enough
+contradicts, or if another transform explains the maps nearly as well. The disc test of the thesis compares
 cells around the inliers only, unknown ones included.
 
 Distinct walls are counted, too: two corners of one corridor agree over tens of metres of wall, and yet in
@@ -55,7 +55,7 @@ class WallField(NamedTuple):
     Attributes
     ----------
     levels, distance, is_open : (rows, columns) uint8, float32, uint8
-        Cells of the map, distances to its walls [m], and where all around is free.
+        Cells of the map, distances to its walls [m], and whether all around is free.
     scale : float
         Cells in a metre [1/m].
     hit, miss : float
@@ -177,7 +177,7 @@ class ValidationSettings:
     hit_distance_m : float
         A wall agrees if the other map has one within this distance [m], or within a cell and a half.
     miss_distance_m : float
-        A wall contradicts where it stands in the open of the other map, farther than this from any wall [m].
+        A wall contradicts if it is in the open of the other map, farther than this from any wall [m].
     least_overlap_m2 : float
         Least area that both know [m2].
     least_wall_m : float
@@ -203,12 +203,12 @@ class ValidationSettings:
         If both know this area [m2], this share of the walls beyond this length [m] may contradict too: maps
         of whole buildings drift.
     rival_distance_m, rival_angle : float
-        A transform is another one where it differs by more than this [m, rad].
+        A transform is another one if it differs by more than this [m, rad].
     rival_share : float
         A rival that nothing contradicts makes the best transform ambiguous if the walls that agree under
         it are longer than this share of those under the best.
     rival_lead : float
-        A rival that is refused still speaks against the best transform where so many times more wall speaks
+        A rival that is refused still speaks against the best transform if this multiple of wall speaks
         for it.
     disc_radius_cells : int
         Radius of the discs [cells].
@@ -442,7 +442,7 @@ PLENTY_OF_STRUCTURE_M2 = 45.0
 """From this overlap on, it does not count how many walls agree [m2]."""
 
 MANY_WALLS, EXCUSED_M = 12, 0.1
-"""So many distinct walls are no chance; each beyond excuses so much contradiction [m]: bodies, doors."""
+"""Number of distinct walls that exclude chance; each further one excuses this contradiction [m]: bodies, doors."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -83,7 +83,7 @@ class Candidate:
     a_from_b : Transform
         Maps points of map b into map a.
     inliers : (n,) int64
-        Indices of the matches that agree with it; none where it was not found by corners.
+        Indices of the matches that agree with it; none if it was not found by corners.
     """
 
     a_from_b: Transform

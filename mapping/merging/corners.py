@@ -245,7 +245,7 @@ def _find_corners(words: Array, rows: int, columns: int, table: Array, found: Ar
 
     ``words`` is the map in words of eight cells, with a border of one row and one word of columns. Of a
     cell's byte the lowest bit says whether it is occupied (0), the highest whether it is free (1). A corner
-    has four occupied neighbours or more, of which at most three lie in the next word: where a word and those
+    has four occupied neighbours or more, of which at most three lie in the next word: if a word and those
     above and below have none, no cell of it is a corner.
     """
     ones = np.uint64(0x0101010101010101)

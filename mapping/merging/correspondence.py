@@ -144,7 +144,7 @@ class CorrespondenceSettings:
         Whether the best shift refines a match's rotation; otherwise it is the difference of the corners'
         angles.
     length_tolerance : float
-        Two lengths are equal where they differ by at most this share of the longer one.
+        Two lengths are equal if they differ by at most this share of the longer one.
     cluster_radius_m : float
         Reach of the cluster of corners around a corner, with ``radius`` [m].
     """
@@ -236,9 +236,9 @@ def _compare_descriptors(
     Returns
     -------
     similarity : (n, m) float32
-        The largest normalised correlation within the window of shifts, -1 where too little is known in both.
+        The largest normalised correlation within the window of shifts, -1 if too little is known in both.
     shift : (n, m) float32
-        Where it is [rad]: the first corner sees at an angle what the second sees at that angle less the
+        Angle of it [rad]: the first corner sees at an angle what the second sees at that angle less the
         shift.
     """
     columns = first.values.shape[2]
@@ -275,7 +275,7 @@ def _compare_descriptors(
 def _compared_places(
     first: NDArray[np.float64], second: NDArray[np.float64], settings: CorrespondenceSettings
 ) -> NDArray[np.float64]:
-    """Return the similarity of corners (n, m) by where their neighbours are."""
+    """Return the similarity of corners (n, m) by the positions of their neighbours."""
     tolerance = settings.length_tolerance
     if settings.method == "distances":
         return _common_distances(first, second, tolerance)

@@ -211,7 +211,7 @@ def faces_away(levels: Array, column: float, row: float, ahead_x: float, ahead_y
 
     A given direction ahead leads into a wall of this map, and its free space lies behind.
 
-    Then it is the other side of a wall that is being compared, a wall's thickness away from where it belongs.
+    Then it is the other side of a wall that is being compared, a wall's thickness away from its position.
     """
     rows, columns = levels.shape
     x, y = int(math.floor(column - ahead_x)), int(math.floor(row - ahead_y))
@@ -224,7 +224,7 @@ def faces_away(levels: Array, column: float, row: float, ahead_x: float, ahead_y
 def resampled(levels: NDArray[np.uint8], resolution: float, wanted: float) -> NDArray[np.uint8]:
     """Return a map in coarser cells.
 
-    A cell with an occupied one in it is occupied, else free where most known ones are.
+    A cell with an occupied one in it is occupied, else free if most known ones are.
 
     Parameters
     ----------

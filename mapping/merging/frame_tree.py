@@ -96,7 +96,7 @@ class FrameTree(Generic[Name]):
     def add_edge(self, edge: Edge[Name]) -> None:
         """Add a transform between two maps.
 
-        One between the same maps is replaced where the new one has more weight.
+        One between the same maps is replaced if the new one has more weight.
         """
         pair = self._admitted(edge)
         if pair not in self._edges or edge.weight > self._edges[pair].weight:
@@ -214,7 +214,7 @@ class FrameTree(Generic[Name]):
         return None
 
     def _way(self, a: Name, b: Name) -> list[Edge[Name]]:
-        """Return the edges of the forest between two maps, none where they are not joined."""
+        """Return the edges of the forest between two maps, none if they are not joined."""
         ways: dict[Name, list[Edge[Name]]] = {a: []}
         waiting = [a]
         for name in waiting:
@@ -254,7 +254,7 @@ class FrameTree(Generic[Name]):
         return max(distance / (self.cycle_distance_m + slack_m), angle / (self.cycle_angle + slack_m / BEND_LENGTH_M))
 
     def _settle_roots(self) -> None:
-        """Keep the roots that there were, the oldest one where groups have become one.
+        """Keep the roots that there were, the oldest one if groups have become one.
 
         New groups get their first map.
         """

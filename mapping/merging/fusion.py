@@ -35,7 +35,7 @@ class FusedMap:
     log_odds : (rows, columns) float32
         Sum over the maps.
     sources : (rows, columns) uint64
-        Bit i is set where map i knew the cell.
+        Bit i is set if map i knew the cell.
     origin : (x, y)
         Lower left corner of cell (0, 0) in the common frame [m], a whole number of cells.
     resolution : float

@@ -46,7 +46,7 @@ def edge_levels(image: NDArray[np.uint8], least_share: float = EDGE_SHARE) -> ND
 def trajkovic_corners(image: NDArray[np.uint8], first_threshold: float, second_threshold: float) -> NDArray[np.int64]:
     """Return column and row of the corners of an image, (n, 2), by rows and then columns.
 
-    A pixel is a corner where the grey changes along every line through it. The four direct neighbours are
+    A pixel is a corner if the grey changes along every line through it. The four direct neighbours are
     examined, and lines between them are interpolated; of corners that touch only the strongest is kept.
 
     Parameters

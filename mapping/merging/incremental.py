@@ -142,7 +142,7 @@ class IncrementalMerger:
         every pair.
     searches_per_update : int or None
         Most pairs that an update searches for, those first that wait to be confirmed, then those whose turn
-        was longest ago; pairs that others join are only verified then. All where None. Verifying costs
+        was longest ago; pairs that others join are only verified then. All if None. Verifying costs
         little: whatever has changed is verified.
 
     Attributes
@@ -180,7 +180,7 @@ class IncrementalMerger:
             not copied.
         may_try : frozenset of (str, str) or None
             Pairs, in the order of the maps, whose robots can talk to each other now: the others keep what
-            they had found. All where None.
+            they had found. All if None.
         may_search : bool
             Whether there is time for searches; otherwise they wait for the next update, and what was found is
             verified alone.

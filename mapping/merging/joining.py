@@ -32,7 +32,7 @@ class Merged:
     tree : FrameTree
         The maps' frames. What is accepted as a pair and contradicts stronger pairs is among ``tree.dropped``.
     origins : dict of str to (x, y)
-        Lower left corner of cell (0, 0) of each map in its frame [m]; (0, 0) where a map is not named.
+        Lower left corner of cell (0, 0) of each map in its frame [m]; (0, 0) if a map is not named.
     """
 
     levels: dict[str, NDArray[np.uint8]]
@@ -102,9 +102,9 @@ def joined_tree(
     settings : MergeSettings
         Contradictions.
     origins : mapping of str to (x, y) or None
-        Lower left corner of each map in its frame [m]; (0, 0) for all where None.
+        Lower left corner of each map in its frame [m]; (0, 0) for all if None.
     tree : FrameTree or None
-        Of an earlier call, whose world shall stay where it is; it is changed. A new one where None.
+        Of an earlier call, whose world shall stay where it is; it is changed. A new one if None.
     """
     tree = tree or FrameTree(settings.cycle_distance_m, settings.cycle_angle)
     for name in tree.names:

@@ -30,7 +30,7 @@ class Question:
     is_forced : bool
         Whether two maps are joined by the best transform, whatever speaks against it.
     is_explained : bool
-        Whether of every pair the hypotheses are ranked, also where it joins at once.
+        Whether of every pair the hypotheses are ranked, also if it joins at once.
     """
 
     guess: Transform | None = None

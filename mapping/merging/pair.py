@@ -89,7 +89,7 @@ class PairResult:
     is_accepted : bool
         Whether they are one place.
     reason : str
-        Why they are refused; ``accepted`` where they are not.
+        Why they are refused; ``accepted`` if they are not.
     a_from_b : Transform or None
         The best transform that was found, also of a refused pair.
     matches, inliers : int
@@ -100,7 +100,7 @@ class PairResult:
         Parts of the score.
     found_by : str
         ``corners``, ``regions``, ``correlation``, or ``verification`` of an earlier transform; ``bend``
-        where the maps agree only once they are bent; ``scale`` if one has grown.
+        if the maps agree only once they are bent; ``scale`` if one has grown.
     time_ms : float
         Processor time, descriptions of the maps not included [ms].
     joined : ((n, 2), (n, 2)) float64
@@ -149,7 +149,7 @@ def explained(a: DescribedMap, b: DescribedMap, result: PairResult, settings: Me
 
 
 def _or_bent(a: DescribedMap, b: DescribedMap, result: PairResult, settings: MergeSettings) -> PairResult:
-    """Return a refused result, or that of the maps bent where they agree then."""
+    """Return a refused result, or that of the maps bent if they agree then."""
     if result.is_accepted or settings.confidence > 1.0 or settings.bend.candidates == 0:
         return result
     known = explained(a, b, result, settings)
@@ -252,7 +252,7 @@ def merge_near(a: DescribedMap, b: DescribedMap, guess: Transform, settings: Mer
 
 
 def _exactly(a: DescribedMap, b: DescribedMap, result: PairResult, settings: MergeSettings) -> PairResult:
-    """Return an accepted result with the exact motion where the maps share their cells."""
+    """Return an accepted result with the exact motion if the maps share their cells."""
     if not result.is_accepted or result.a_from_b is None:
         return result
     motion = _exact_motion(a, b, result.a_from_b)
@@ -304,7 +304,7 @@ def is_contradicted(a: DescribedMap, b: DescribedMap, a_from_b: Transform, setti
 
     The transform is implied by other maps; the maps contradict each other also once they have settled.
 
-    The implied transform is a little off after some maps; but where walls hold the maps in one direction alone
+    The implied transform is a little off after some maps; but if walls hold the maps in one direction alone
     they may settle far away.
     """
     validation = settings.validation
@@ -395,7 +395,7 @@ def _better(best: Judged | None, judged: list[Judged], by: tuple[str, str]) -> t
 def _merge_by_discs(a: DescribedMap, b: DescribedMap, matches: Matches, settings: MergeSettings) -> PairResult:
     """Merge by the thesis's rules.
 
-    The proposal with most inliers, refined, is accepted where the discs around its inliers agree.
+    The proposal with most inliers, refined, is accepted if the discs around its inliers agree.
     """
     candidates, shortage = corner_candidates(a, b, matches, settings)
     if not candidates:

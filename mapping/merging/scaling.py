@@ -78,7 +78,7 @@ class ScaleSettings:
     rounds : int
         How often the scale of each is refined by the bend that is left.
     cell_m : float
-        Side of the cells in which they are, or that of the coarser map where it is larger [m].
+        Side of the cells in which they are, or that of the coarser map if it is larger [m].
     confidence : float
         Confidence from which maps are joined: with another freedom, strangers agree by chance more often.
     """

@@ -16,7 +16,7 @@ from lidarium.mapping.merging.regions.segmentation import RegionSettings
 MODES = ("default", "thesis")
 
 STRUCTURES = ("corners", "regions", "all")
-"""What proposes transforms before all rotations and translations are tried."""
+"""Sources of transforms before all rotations and translations are tried."""
 
 TOLERANCES = {"strict": 2.0, "normal": 0.8, "drift": 0.6}
 """Confidence from which maps are joined that agree only once they are bent, by the name of the tolerance."""
@@ -36,7 +36,7 @@ class MergeSettings:
     regions : RegionSettings
         How regions are found and matched.
     bend : BendSettings
-        How much maps may be bent where no rigid motion is believed.
+        How much maps may be bent if no rigid motion is believed.
     confidence : float
         Confidence from which maps that agree once they are bent are joined; see `TOLERANCES`. Above 1 none
         are.

@@ -17,7 +17,7 @@ from lidarium.mapping.merging.described_map import FACING_DISTANCE_M, DescribedM
 def wall_sample(walls: int, count: int) -> NDArray[np.int64]:
     """Return the indices of a number of a map's walls, spread over all of them.
 
-    Of all where there are no more.
+    Of all if there are no more.
     """
     return np.linspace(0, walls - 1, min(walls, count)).astype(np.int64)
 
@@ -28,7 +28,7 @@ def rank_by_walls(
     """Return per proposal how many walls of b lie on those of a, less conflicts.
 
     Walls of map b that lie in the free space of map a are subtracted twice. A proposal is x, y [m], theta
-    [rad], and where there is a fourth column by how much map b grows.
+    [rad], and, if there is a fourth column, by how much map b grows.
     """
     scores = np.empty(len(proposals), np.int64)
     walls = b.walls[wall_sample(len(b.walls), samples)]

@@ -171,7 +171,7 @@ def _find_overlap(seen: Array, known: Array) -> tuple[float, float, float, float
     tuple
         Places where it begins and ends on the seen way and on the known one, counted in points; its length
         along the seen way [m]; mean distance [m] and mean angle [rad]; 1 if the known way's end begins it,
-        plus 2 where one ends it. A length of 0 for none.
+        plus 2 if one ends it. A length of 0 for none.
     """
     ends = np.empty(4)
     cases = 0
@@ -250,7 +250,7 @@ def common_places(seen: Way, known: Way, settings: AssociationSettings) -> Place
 def join(seen: Way, known: Way, places: Places, settings: MapSettings) -> tuple[Way, bool]:
     """Return the joint polyline of both, and whether it extends the known one.
 
-    It does where the seen one goes beyond an end of the known one.
+    It does if the seen one goes beyond an end of the known one.
     """
     most = len(seen.points) + len(known.points) + 4
     points, weights = np.empty((most, 2)), np.empty(most)

@@ -321,7 +321,7 @@ def _ray_crossing(knots: Array, control_points: Array, x: float, y: float, cosin
 def _crossing(knots: Array, control_points: Array, low: float, high: float, ray: _Ray, values: Array) -> float:
     """Return how far ahead the curve crosses the ray's line.
 
-    Between two parameters, by Newton's method, with bisection where it would leave them.
+    Between two parameters, by Newton's method, with bisection if it would leave them.
     """
     x, y, cosine, sine = ray
     px, py = point_at(knots, control_points, low, 0, values)
@@ -398,7 +398,7 @@ class Spline:
     def curvature(self, parameters: ArrayLike) -> NDArray[np.float64]:
         """Return the signed curvature at parameters (m,) [1/m].
 
-        Positive where the curve turns left.
+        Positive if the curve turns left.
         """
         first, second = self.derivative(parameters), self.derivative(parameters, 2)
         speed = np.maximum(np.linalg.norm(first, axis=1), 1e-12)

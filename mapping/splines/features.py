@@ -112,7 +112,7 @@ def _undo_motion(points: Array, shares: Array, x: float, y: float, theta: float)
 
 
 def clusters(points: _ScanPoints, settings: SegmentationSettings | None = None) -> NDArray[np.int64]:
-    """Cut the points of a scan where the surface ends.
+    """Cut the points of a scan at the ends of surfaces.
 
     A beam without a return, or an invalid one, always breaks. Dietmayer's test is printed with a difference
     of the ranges where their smaller one is meant, and with its sense turned round; it is used as meant.
@@ -192,7 +192,7 @@ def _find_breaks(
 
 
 PEAK_JUMP = 0.3
-"""What follows a peak lies at least so much farther away [m]."""
+"""Minimum extra distance of the surface behind a peak [m]."""
 
 PEAK_INCIDENCE = math.radians(15.0)
 """Least angle of incidence at which a surface ends where its scan does.

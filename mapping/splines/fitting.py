@@ -20,7 +20,7 @@ from lidarium.mapping.splines.settings import FitSettings
 def _factorize(band: Array) -> bool:
     """Replace a banded matrix by its Cholesky factor, band for band.
 
-    Return False where it is not positive definite.
+    Return False if it is not positive definite.
     """
     for i in range(band.shape[0]):
         for back in range(min(i, ORDER - 1), -1, -1):
@@ -354,7 +354,7 @@ def fit_bspline(points: ArrayLike, settings: FitSettings | None = None, sigmas: 
     settings : FitSettings or None
         How many control points.
     sigmas : (m,) or None
-        Standard deviation of each point across the curve [m]; 1 cm where None.
+        Standard deviation of each point across the curve [m]; 1 cm if None.
 
     Returns
     -------

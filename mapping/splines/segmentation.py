@@ -286,7 +286,7 @@ def _cut(
     corners: Array,
     is_corner: Array,
 ) -> int:
-    """Write leaves, their lines, and which of their ends are corners, and where.
+    """Write leaves, their lines, and which of their ends are corners, with positions.
 
     Return the number of leaves.
     """

@@ -47,7 +47,7 @@ class PointSettings:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SegmentationSettings:
-    """Where the points of a scan are cut.
+    """Settings of the cuts between points of a scan.
 
     Attributes
     ----------
@@ -73,7 +73,7 @@ class SegmentationSettings:
     collinear_angle : float
         Neighbouring lines that differ by less are tried as one [rad].
     corner_angle : float
-        A split is a corner where the directions before and after it differ by more [rad].
+        A split is a corner if the directions before and after it differ by more [rad].
     corner_rule : str
         ``angle`` between directions; ``slope``, difference of slopes as in the thesis, against the tangent of
         ``corner_angle``.
@@ -115,9 +115,9 @@ class FitSettings:
     spacing : float
         Usual distance of knots [m].
     finest_spacing : float
-        Knots are brought as close as this where the curve does not follow the points [m].
+        Minimum spacing of knots, if the curve does not follow the points [m].
     rms : float
-        A curve follows where the root mean square of its distances is at most this [m].
+        A curve follows if the root mean square of its distances is at most this [m].
     explained : float
         It also follows if that is at most this multiple of the standard deviation of the points' noise, if
         that is known.

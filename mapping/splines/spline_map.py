@@ -177,9 +177,9 @@ class SplineMap:
                 or are_near(way.points, curve.way.points, settings.control_distance)
             ):
                 continue
-            positions = common_places(way, curve.way, settings)
-            if positions is not None and (best is None or positions.length > best[1].length):
-                best = (index, positions)
+            overlap = common_places(way, curve.way, settings)
+            if overlap is not None and (best is None or overlap.length > best[1].length):
+                best = (index, overlap)
         return best
 
     def _cut_at_corners(self, way: Way) -> list[Way]:

@@ -1,4 +1,4 @@
-"""What a robot goes for, and how firmly."""
+"""The target of a robot, and how firmly it is kept."""
 
 import numpy as np
 

@@ -1,7 +1,7 @@
 """Place recognition: matches of a scan with old local maps, and their checks.
 
 A closure counts if its scan agrees with the local map, does not lie in its free space, has no second place
-that agrees nearly as well, and where it would move the robot far, or farther than it can have erred since,
+that agrees nearly as well, and if it would move the robot far, or farther than it can have erred since,
 only together with others that say the same.
 """
 
@@ -194,7 +194,7 @@ class ClosureFinder:
     ) -> list[Closure]:
         """Return the closure, and those that waited for it.
 
-        Nothing where it has to wait for others itself.
+        Nothing if it has to wait for others itself.
 
         Parameters
         ----------

@@ -53,7 +53,7 @@ class _Elimination(NamedTuple):
 
 
 def _elimination(count: int, a: NDArray[np.int64], b: NDArray[np.int64]) -> _Elimination:
-    """Return the factor's blocks where poses are joined by pairs.
+    """Return the factor's blocks if poses are joined by pairs.
 
     The order of elimination fills few of them.
 
@@ -225,13 +225,13 @@ def optimised(
     iterations : int
         Maximum number of steps for each scale, at least 1.
     newest : int
-        So many of the last edges have not had their say yet. If they pull hard, they count fully at first,
+        Number of the last edges, which have not been used yet. If they pull hard, they count fully at first,
         and measurements that others contradict lose weight gradually.
 
     Returns
     -------
     (poses, 3) float64
-        The poses; those given where no step makes them better.
+        The poses; those given if no step makes them better.
     (3, 3) float64
         Covariance of the last pose against the first [m^2, m rad, rad^2].
     """
@@ -239,18 +239,18 @@ def optimised(
         return poses.copy(), np.zeros((3, 3))
     # The first pose stays where it is: the unknowns are those of all others.
     is_free = (edges.a > 0) & (edges.b > 0)
-    positions = _elimination(len(poses) - 1, edges.a[is_free] - 1, edges.b[is_free] - 1)
-    factor = np.empty((len(positions.rows), 3, 3))
+    places = _elimination(len(poses) - 1, edges.a[is_free] - 1, edges.b[is_free] - 1)
+    factor = np.empty((len(places.rows), 3, 3))
     best = poses.copy()
     pull = _squares(best, edges)[len(edges.a) - newest :]
     scale = max(robust_scale, math.sqrt(float(pull.max())) if len(pull) else 0.0)
     while True:
-        best = _settled(best, edges, scale, iterations, positions, factor)
+        best = _settled(best, edges, scale, iterations, places, factor)
         if scale <= robust_scale:
             break
         scale = max(0.2 * scale, robust_scale)
     best[:, 2] = math.pi - (math.pi - best[:, 2]) % (2.0 * math.pi)
-    return best, _last_covariance(positions, factor)
+    return best, _last_covariance(places, factor)
 
 
 @kernel

@@ -100,7 +100,7 @@ def _find_placements(
     avoided: Array,
     found: Array,
 ) -> bool:
-    """Find the best placement whose sum is at least a given one.
+    """Find the best placement with at least a given sum.
 
     Notes its column, row, heading index and sum; returns whether all placements were decided.
     """
@@ -233,7 +233,7 @@ class Pyramid:
         All coarse maps one after the other: cell (i, j) of level h is the most in the 2 x 2 blocks of 2^h
         cells from block (i, j) on.
     shapes : (LEVELS + 1, 3) int64
-        Where each level begins in ``maxima``, its rows and its columns; level 0 is the map itself.
+        Index of each level's first in ``maxima``, its rows and its columns; level 0 is the map itself.
     """
 
     grid: AgreementGrid

@@ -26,7 +26,7 @@ class _LocalMatcher:
     usual_score : float
         Agreement of matches of late.
     contradiction : float
-        Share of the last scan's returns that lay, from where odometry led, in what the local map knows to be
+        Share of the last scan's returns that lay, from where odometry led, in cells that the local map knows to be
         free.
     recoveries : int
         Scans that were found in another direction or place than odometry said, as nothing there agreed.
@@ -52,12 +52,12 @@ class _LocalMatcher:
         uncertainty: NDArray[np.float64],
         failed: int,
     ) -> Match | None:
-        """Return where a scan lies on a local map; None if it does not match.
+        """Return the pose of a scan on a local map; None if it does not match.
 
         The search begins near the pose by odometry, weighing both. If that does not convince, odometry
         may be wrong (a wheel slips, the robot was pushed), and the search goes farther, without it, for scans
-        of enough returns; a match there has to be clearly better. On new ground, and where a scan
-        hardly has a return, nothing but odometry measures where the robot is.
+        of enough returns; a match there has to be clearly better. On new ground, and if a scan
+        hardly has a return, only odometry measures the robot's pose.
 
         Parameters
         ----------
@@ -160,7 +160,7 @@ class _LocalMatcher:
     def _is_new_ground(self, match: Match, points: int) -> bool:
         """Whether a scan sees hardly anything that the local map has observed.
 
-        Also true where it sees hardly anything at all.
+        Also true if it sees hardly anything at all.
         """
         settings = self._matching
         is_sparse = points < min(settings.least_points, self._geometry.beams // 8)
@@ -222,7 +222,7 @@ class _LocalMatcher:
             self._noted(match)
 
     def match_first(self, submap: Submap, points: NDArray[np.float64]) -> Match | None:
-        """Return where the first scan of a local map now lies on that map.
+        """Return the present pose of the first scan of a local map on that map.
 
         Its points are (n, 2) [m]. None if they do not match.
         """
@@ -344,7 +344,7 @@ class LocalMapper:
         uncertainty: NDArray[np.float64],
         failed: int,
     ) -> Match | None:
-        """Return where a scan lies on the older local map, see ``_LocalMatcher.match``."""
+        """Return the pose of a scan on the older local map, see ``_LocalMatcher.match``."""
         return self._matcher.match(self._active[0].submap, points, predicted, moved, uncertainty, failed)
 
     def judge(self, points: NDArray[np.float64], pose: NDArray[np.float64]) -> None:
@@ -355,7 +355,7 @@ class LocalMapper:
         self._matcher.judge(self._active[0].submap, points, pose)
 
     def rendered_again(self, points: NDArray[np.float64]) -> Match | None:
-        """Return where the older local map's first scan now lies on that map.
+        """Return the present pose of the older local map's first scan on that map.
 
         Its points are (n, 2) [m]. None if they do not match.
         """
@@ -397,7 +397,7 @@ class LocalMapper:
         self._add(node, pose, ranges)
 
     def hand_over(self, poses: NDArray[np.float64]) -> tuple[NDArray[np.float64], list[Finished]]:
-        """End the older local map where it is full.
+        """End the older local map if it is full.
 
         Return poses (n, 3) of its frame in that of the new older one, and the finished map.
         """

@@ -155,7 +155,7 @@ def _is_near(points: Array, k: int, m: int, reach: float) -> bool:
 def _axis(points: Array) -> tuple[float, float, bool]:
     """Return the axis of largest variance of points, and whether it is unclear.
 
-    The axis is of unit length, zero for fewer than three points. Unclear where points do not lie along
+    The axis is of unit length, zero for fewer than three points. Unclear if points do not lie along
     it, or are too few.
     """
     count = points.shape[0]
@@ -276,7 +276,7 @@ def refine(
 
     Minimises ``weight / n sum (1 - agreement_k)^2 + d^T information d``, d the difference of the pose from a
     prior one; a point in unobserved cells counts as ``unseen``. Points move across the surfaces
-    that they lie on, not along: where a wall goes on beyond what the map has observed of it, the points there
+    that they lie on, not along: if a wall goes on beyond the observed part, the points there
     would draw the scan back to where the map ends, and a robot in a corridor with them.
 
     Parameters
@@ -314,7 +314,7 @@ def refine(
 
 @kernel
 def _refine(objective: _Objective, pose: Array, hessian: Array, judgement: Array) -> None:
-    """Move a pose to where the cost is least.
+    """Move a pose to the minimum of the cost.
 
     Return the Hessian and the result of ``_judge``.
     """
@@ -325,7 +325,7 @@ def _refine(objective: _Objective, pose: Array, hessian: Array, judgement: Array
 
 @kernel
 def _descend(objective: _Objective, pose: Array, hessian: Array) -> None:
-    """Move a pose to where the cost is least (Levenberg and Marquardt)."""
+    """Move a pose to the minimum of the cost (Levenberg and Marquardt)."""
     prior, information, weight = objective.prior, objective.information, objective.weight
     gradient, trial_gradient, trial_hessian = np.empty(3), np.empty(3), np.empty((3, 3))
     trial = np.empty(3)

@@ -58,7 +58,7 @@ def _undo_motion(
 ) -> None:
     """Note each beam's end at the beam of that direction from the last pose.
 
-    The nearer one where two fall together.
+    The nearer one if two coincide.
     """
     first, increment, range_max = geometry
     beams = ranges.shape[0]

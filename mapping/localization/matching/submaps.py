@@ -5,7 +5,7 @@ a beam's end is shared out among the four cells around it in the way of bilinear
 middle of a wall is kept to a fraction of a cell; a scan that saw through counts as nothing. What moved,
 fades. This is the counting model (Haehnel et al., IROS 2003) with shares in place of whole hits.
 
-What scans saw of a cell is whether a beam that came as far ended there. With noise that share grows towards
+Scans record of a cell whether a beam that came as far ended there. With noise that share grows towards
 the back of a wall, which hardly a beam passes: it is a hazard, and no density. If a beam ended, known
 walls a little behind count as seen through, therefore; without that, they come to lie behind where they are,
 and a robot that goes by them runs ahead of itself.

@@ -30,7 +30,7 @@ MIN_POINTS = 20
 """Of fewer points nothing is estimated."""
 
 COARSE_POINTS = 600
-"""At most so many points are examined in all directions."""
+"""Maximum number of points examined in all directions."""
 
 COARSE_CELL_M, COARSE_STEPS = 0.05, 180
 """Side of the coarse counting cells [m], and steps per quarter turn.
@@ -56,7 +56,7 @@ FINE_STEPS = (math.radians(0.2), math.radians(0.1), math.radians(0.05))
 """The steps that go with them [rad]."""
 
 MAX_MOVES = 3
-"""At most so often a finer search follows its best direction."""
+"""Maximum number of finer searches of the best direction."""
 
 DEPENDENCE = 3.0
 """Factor by which the curvature of the entropy overstates the information.
@@ -235,11 +235,11 @@ class WallCompass:
 
     @property
     def is_surveyed(self) -> bool:
-        """Whether it is known where walls run."""
+        """Whether the directions of walls are known."""
         return self._walls is not None
 
     def survey(self, points: NDArray[np.float64], node: int, heading: float) -> bool:
-        """Find where walls run.
+        """Find the directions of walls.
 
         Parameters
         ----------

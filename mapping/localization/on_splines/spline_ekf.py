@@ -72,7 +72,7 @@ class SplineEkf(SplineTracker):
     settings : SplineEkfSettings or None
         The defaults if None.
     geometry : ScanGeometry or None
-        The laser; the URG-04LX of the theses where None.
+        The laser; the URG-04LX of the theses if None.
 
     Attributes
     ----------

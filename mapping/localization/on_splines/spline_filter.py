@@ -169,7 +169,7 @@ class SplineFilter(SplineTracker):
     settings : SplineFilterSettings or None
         The defaults if None.
     geometry : ScanGeometry or None
-        The laser; the URG-04LX of the theses where None.
+        The laser; the URG-04LX of the theses if None.
 
     Attributes
     ----------
@@ -281,7 +281,7 @@ class SplineFilter(SplineTracker):
         return pose
 
     def _move_to_matches(self, matches: Matches) -> NDArray[np.float64]:
-        """Draw each particle anew from where its motion and the matches together say it is.
+        """Draw each particle anew from the estimate by its motion and the matches together.
 
         Return the logarithms of the weights (particles,) by which matches fit the motions. Drawn by the
         motion alone, few particles would fit, and those that live on by chance would lose along a corridor
@@ -336,7 +336,7 @@ class SplineFilter(SplineTracker):
         return np.asarray(1.0 + kept * (scales - 1.0) + wander * drawn)
 
     def _recover(self, likelihood: float, pose: NDArray[np.float64]) -> None:
-        """Draw some particles around the pose where rays have not fitted for a while.
+        """Draw some particles around the pose if rays have not fitted for a while.
 
         Afterwards they are drawn in ever smaller boxes.
 

@@ -63,7 +63,7 @@ def match(
     stride: int,
     least_sightings: int,
 ) -> Matches:
-    """Match a scan to the map from about where it was taken."""
+    """Match a scan to the map from about its pose."""
     settings = spline_map.settings.association
     features, seen = observation.features, observation.features.moved(pose)
     matched = [

@@ -2,7 +2,7 @@
 
 Odometry, the local maps that they build on the path, and the matches of a scan with them.
 
-A filter knows where the robot is in the frame of a local map. The laser's path is a graph of nodes, as SLAM
+A filter estimates the robot's pose in the frame of a local map. The laser's path is a graph of nodes, as SLAM
 has it: local maps begin anew along it with the walls around the robot, places are recognised, and all nodes
 are brought to agree. How far a local map itself may be off grows with the path, and is added to what the
 filter knows.
@@ -127,7 +127,7 @@ class SplineTracker(ABC):
 
     @property
     def key_scans(self) -> KeyScans:
-        """All scans that local maps have taken in, at the poses where they are now believed taken."""
+        """All scans that local maps have taken in, at their poses as believed now."""
         return self._path.key_scans
 
     def take_correction(self) -> KeyScans | None:
@@ -183,7 +183,7 @@ class SplineTracker(ABC):
         self._lookup.renew(self.local_map.curves, self.local[:2])
 
     def _extend(self, ranges: NDArray[np.float32]) -> None:
-        """Take a scan into the path; begin another local map where it is time to."""
+        """Take a scan into the path; begin another local map if it is time to."""
         path, matching = self._path, self.tracking.path.matching
         path.local = composed(self.local, self._mount)
         node, last_node = path.mapper_node, path.last_node

@@ -152,5 +152,5 @@ def run_slam(log: LaserLog, settings: SlamSettings | None = None, range_m: float
 
 
 def _of_robot(laser: NDArray[np.float64], laser_pose: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the robot's poses where the laser's are known."""
+    """Return the robot's poses, given the laser's."""
     return composed(laser, relative(laser_pose, np.zeros(3)))

@@ -61,7 +61,7 @@ class _Doubts:
         self._is_open = False
 
     def note(self, time_s: float, reason: str | None) -> None:
-        """Take in that a scan was matched (None), or why it is not sure where it was taken."""
+        """Take in that a scan was matched (None), or why its pose is uncertain."""
         if reason is None:
             self._sure_s, self._is_open = time_s, False
             return
@@ -88,7 +88,7 @@ class _SlamCounts:
 
 
 class Slam:
-    """A localizer that makes a map to know where it is.
+    """A localizer that makes a map to localize on it.
 
     Parameters
     ----------
@@ -102,7 +102,7 @@ class Slam:
     counts : SlamCounts
         Counts so far.
     doubts : Doubts
-        Stretches in which it is not sure where the robot went.
+        Stretches of uncertain motion of the robot.
     """
 
     Settings = SlamSettings
@@ -187,7 +187,7 @@ class Slam:
 
     @property
     def key_scans(self) -> KeyScans:
-        """All matched scans at the poses where they are now believed to have been taken."""
+        """All matched scans at their poses as believed now."""
         return self._path.key_scans
 
     @property
@@ -229,7 +229,7 @@ class Slam:
         self.counts.corrections = path.corrections
 
     def _doubt(self, match: Match | None, points: int) -> str | None:
-        """Return why a scan of so many points is not sure to be where it was placed; None if it is."""
+        """Return why a scan of a number of points has an uncertain pose; None if it has none."""
         if match is None:
             return NO_MATCH
         if self._path.mapper.recoveries > self.counts.recoveries:

@@ -141,7 +141,7 @@ class _ScanSampling:
 
 
 class _WallSurvey:
-    """Surveys where walls run, and compares later scans with them.
+    """Surveys the directions of walls, and compares later scans with them.
 
     Attributes
     ----------
@@ -166,7 +166,7 @@ class _WallSurvey:
             self.compass.observe(Transform(*pose).apply(self._sampling.all_points(ranges)))
 
     def survey(self, length_m: float, node: int, history: _ScanHistory, nodes: NDArray[np.float64]) -> None:
-        """Survey where walls run in the local map of a node, if it is time to.
+        """Survey the directions of walls in the local map of a node, if it is time to.
 
         If none do, survey again after as much of the path.
         """
@@ -262,7 +262,7 @@ class MappedPath:
 
     @property
     def key_scans(self) -> KeyScans:
-        """All scans that were taken in, at the poses where they are now believed to have been taken."""
+        """All scans that were taken in, at their poses as believed now."""
         return self._history.scans(self._graph.nodes)
 
     @property
@@ -286,7 +286,7 @@ class MappedPath:
         return compounded(self._graph.nodes[node], self._graph.covariance, pose, spread)
 
     def begin(self, ranges: NDArray[np.float32], covariance: NDArray[np.float64], time_s: float) -> NDArray[np.float64]:
-        """Begin the first local map where the robot is, at a node of its own.
+        """Begin the first local map at the robot's pose, at a node of its own.
 
         The covariance (3, 3) of its motion from the path's beginning is given. Return the new local map's
         frame, (3,), as seen from the one before.
@@ -299,7 +299,7 @@ class MappedPath:
     def restart(
         self, ranges: NDArray[np.float32], covariance: NDArray[np.float64], time_s: float
     ) -> NDArray[np.float64]:
-        """Begin new local maps where the robot is, as ``begin`` does; learned calibration is kept."""
+        """Begin new local maps at the robot's pose, as ``begin`` does; learned calibration is kept."""
         self._first = None
         self._walls.restart(self.length)
         frame = self._begin_maps(ranges, covariance)
@@ -372,7 +372,7 @@ class MappedPath:
         return np.asarray(np.diag([along, along, graph.deviation_angle**2]) + turned @ matched @ turned.T)
 
     def note_key(self, ranges: NDArray[np.float32], time_s: float) -> None:
-        """Keep a scan for the map, where the robot is."""
+        """Keep a scan for the map, at the robot's pose."""
         node, pose = self.place
         self._history.append(node, pose, ranges, time_s)
 
@@ -383,7 +383,7 @@ class MappedPath:
         points: NDArray[np.float64],
         time_s: float,
     ) -> None:
-        """Set a node where the robot is, if it is far enough from the last one or a local map begins."""
+        """Set a node at the robot's pose, if it is far enough from the last one or a local map begins."""
         graph = self._settings.graph
         since = relative(self.at_node, self.local)
         wants_another = self.mapper.wants_another
@@ -406,7 +406,7 @@ class MappedPath:
         return frame
 
     def _add_node(self, since: NDArray[np.float64], covariance: NDArray[np.float64]) -> None:
-        """Set a node where the robot is, so far from the last one."""
+        """Set a node at the robot's pose, at a distance from the last one."""
         self._graph.add(since, covariance)
         self.at_node = self.local.copy()
         self.spread = np.zeros((3, 3))

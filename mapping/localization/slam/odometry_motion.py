@@ -120,7 +120,7 @@ class OdometryMotion:
     Attributes
     ----------
     velocity : (3,) float64
-        The last motion between matches, taken where odometry is not used [m, m, rad].
+        The last motion between matches, taken if odometry is not used [m, m, rad].
     """
 
     def __init__(self, settings: SlamSettings) -> None:

@@ -1,7 +1,7 @@
 """Maps of a group bent to agree: each onto those before it.
 
 The first stays as it is. If walls do not hold a map on the others, if it would have to be moved or
-stretched more than maps of one place are, or where it then agrees less, it is laid rigidly.
+stretched more than maps of one place are, or if it then agrees less, it is laid rigidly.
 """
 
 from collections.abc import Sequence
@@ -38,7 +38,7 @@ class Deformed:
     laid: "list[Laid]"
 
     def places(self, number: int, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return where points (n, 2) of a map, from its lower left corner, lie in the common frame [m]."""
+        """Return points (n, 2) of a map, from its lower left corner, in the common frame [m]."""
         deformation = self.deformations[number]
         if deformation is None:
             return np.asarray(self.laid[number].common_from_cells.apply(points))
@@ -54,7 +54,7 @@ class Deformation:
     bend : Bend
         In the cells of their fused map.
     moves : (n, 2) float64
-        How far its walls are moved from where it was joined [m].
+        Distance of its walls from their joined positions [m].
     agreement : Agreement
         Agreement with the maps before it once it is bent.
     common_from_under : Transform
@@ -67,7 +67,7 @@ class Deformation:
     common_from_under: Transform
 
     def places(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return where points (n, 2) of the bent map lie in the common frame [m]."""
+        """Return points (n, 2) of the bent map in the common frame [m]."""
         return np.asarray(self.common_from_under.apply(self.bend.field.bent(self.bend.a_from_b, points)))
 
     @property

@@ -2,7 +2,7 @@
 
 Each wall of map b seeks along its normal a wall of map a that faces the same direction. The offsets at
 the nodes of a coarse grid are those that bring walls onto walls, with springs between neighbouring nodes.
-They follow the walls where many agree, and stay with their neighbours elsewhere.
+They follow the walls if many agree, and stay with their neighbours otherwise.
 
 References
 ----------
@@ -105,7 +105,7 @@ def _add_springs(columns: int, strength: float, band: Array) -> None:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class OffsetField:
-    """Offsets of a map's points from where a rigid motion takes them.
+    """Offsets of a map's points from a rigid motion.
 
     Attributes
     ----------
@@ -128,11 +128,11 @@ class OffsetField:
         return found
 
     def bent(self, a_from_b: Transform, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return where points (n, 2) of the bent map b lie in map a [m]."""
+        """Return points (n, 2) of the bent map b in map a [m]."""
         return np.asarray(a_from_b.apply(points) + self.at(points))
 
     def unbent(self, a_from_b: Transform, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return where points (n, 2) of map a lie in the bent map b [m].
+        """Return points (n, 2) of map a in the bent map b [m].
 
         Offsets change by a small share of the distance, so that two steps are exact to a millimetre.
         """
@@ -181,7 +181,7 @@ INDEPENDENT_M = 0.5
 """Length of wall that errs alike [m]."""
 
 MIN_SPREAD_M = 0.01
-"""What maps without any bend still err by [m]."""
+"""Error of maps without any bend [m]."""
 
 ANCHOR = 1e-3
 """Weight of offsets themselves beside the gaps of the walls of a node: they are zero where nothing holds."""
@@ -206,7 +206,7 @@ class BendSettings:
     rounds, samples : int
         Number of rounds, and of wall cells that are aligned.
     candidates : int
-        Number of transforms that are tried with a bend where none is believed without; 0 for maps that are
+        Number of transforms that are tried with a bend if none is believed without; 0 for maps that are
         not bent.
     """
 

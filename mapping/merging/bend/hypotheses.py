@@ -25,7 +25,7 @@ SHARP_M, BLUNT_M = 0.075, 0.15
 """Least and greatest distance at which walls agree [m]: half of a thin wall's thickness, and all of it."""
 
 SPREADS = 2.5
-"""So many standard deviations of the gaps that a bend leaves, walls agree."""
+"""Walls agree within this number of standard deviations of the gaps that a bend leaves."""
 
 
 def _tolerance(bend: Bend, resolution: float) -> tuple[float, float]:
@@ -181,7 +181,7 @@ def confidence_of(signs: _Signs) -> float:
     """Return how sure it is that two maps are of one place, from 0 to 1.
 
     It is 0 if an overlap is no larger than rooms that are alike, if another place explains the maps
-    nearly as well, if one map would have to be stretched more than robots' maps are, and where much
+    nearly as well, if one map would have to be stretched more than robots' maps are, and if much
     differs between sharp maps of a few rooms: in these, only furniture may.
     """
     is_sharp = signs.spread_m < SHARP_SPREAD_M and signs.overlap_m2 < FEW_ROOMS_M2

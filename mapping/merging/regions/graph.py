@@ -52,7 +52,7 @@ def _wall_slopes(levels: NDArray[np.uint8], free: NDArray[np.uint8], labels: NDA
     Parameters
     ----------
     levels, free, labels : (rows, columns) uint8, uint8, int32
-        The three-level map, 1 where it is free, and its regions.
+        The three-level map, 1 if free, and its regions.
     """
     smooth = cv2.GaussianBlur(free.astype(np.float32), (0, 0), _SMOOTH_CELLS)
     is_wall = cv2.dilate((levels == OCCUPIED).astype(np.uint8), np.ones((3, 3), np.uint8))
@@ -62,7 +62,7 @@ def _wall_slopes(levels: NDArray[np.uint8], free: NDArray[np.uint8], labels: NDA
 
 
 def _region_axes(slopes: _Slopes, count: int) -> NDArray[np.float64]:
-    """Return the direction of each region's walls from 0 to a quarter turn, of all where it has none."""
+    """Return the direction of each region's walls from 0 to a quarter turn, of all if it has none."""
     # Fourfold angles are alike for all four directions of a rectangle's walls.
     around = np.exp(4j * slopes.directions)
     sums = np.bincount(slopes.regions, around.real, count) + 1j * np.bincount(slopes.regions, around.imag, count)
@@ -269,7 +269,7 @@ def find_regions(levels: NDArray[np.uint8], resolution: float, settings: RegionS
     resolution : float
         Side of its cells [m]; finer ones than the settings' are joined.
     settings : RegionSettings
-        Where regions are split.
+        Rules for splitting regions.
     """
     known, corner = _cropped(levels)
     origin = np.array(corner) * resolution

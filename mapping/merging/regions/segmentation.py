@@ -42,7 +42,7 @@ class RegionSettings:
     Attributes
     ----------
     cell_m : float
-        Side of the cells in which regions are found, or that of the map where it is larger [m].
+        Side of the cells in which regions are found, or that of the map if it is larger [m].
     most_cells : int
         Maps that know more of such cells are split in larger ones: a bound of time.
     least_obstacle_m : float
@@ -56,15 +56,15 @@ class RegionSettings:
     least_area_m2 : float
         Area of a region at least; smaller ones belong to a neighbour [m2].
     most_regions, most_doors : int
-        So many of the largest regions, and of the widest doors, are matched.
+        Number of the largest regions, and of the widest doors, that are matched.
     extent_m, extent_share : float
         By how much the extents of one region may differ between maps [m, share]: the larger of both.
     door_width_m : float
         By how much the widths of one door may differ [m].
     scale_share : float
-        By how much the ratio of a region's extents may differ where a scale is sought, as a share.
+        By how much the ratio of a region's extents may differ if a scale is sought, as a share.
     scale_steps : int
-        So many scales to each side of that of two regions are proposed too, 3 % apart.
+        Number of scales that are proposed on each side of that of two regions, 3 % apart.
     candidates : int
         Number of motions that are refined and judged.
     apart_m, apart_angle : float
@@ -231,7 +231,7 @@ def split_regions(clearance: NDArray[np.float32], side: float, settings: RegionS
     side : float
         Side of a cell [m].
     settings : RegionSettings
-        Where regions are split.
+        Rules for splitting regions.
     """
     rule = _SplitRule(0.5 * settings.widest_door_m / side, settings.door_share, settings.least_radius_m / side)
     labels = np.full(clearance.shape, NONE, np.int32)

@@ -1,4 +1,4 @@
-"""What the frontier policies choose."""
+"""The choices of the frontier policies."""
 
 import numpy as np
 import pytest

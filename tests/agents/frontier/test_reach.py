@@ -1,4 +1,4 @@
-"""What frontiers cost a robot, as far as a choice needs to know."""
+"""Costs of frontiers to a robot."""
 
 import math
 

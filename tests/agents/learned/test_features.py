@@ -1,4 +1,4 @@
-"""What a trained explorer sees, as numbers."""
+"""Features for a trained explorer."""
 
 import math
 

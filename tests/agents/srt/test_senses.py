@@ -1,4 +1,4 @@
-"""What a robot has before it decides, in the frame of its map's first cell."""
+"""Inputs of a robot's decision, in the frame of its map's first cell."""
 
 from types import SimpleNamespace
 

@@ -1,4 +1,4 @@
-"""What becomes of reports made by hand: goals, rivals, robots that know little, failed and silent ones,
+"""Results of reports made by hand: goals, rivals, robots that know little, failed and silent ones,
 and batteries."""
 
 import numpy as np

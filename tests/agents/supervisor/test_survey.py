@@ -1,4 +1,4 @@
-"""What the merged map of a group offers to its robots."""
+"""Goals on the merged map of a group for its robots."""
 
 import math
 

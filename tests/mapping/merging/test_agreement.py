@@ -1,4 +1,4 @@
-"""What two overlaid maps say for and against their transform."""
+"""Evidence of two overlaid maps for and against their transform."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""What is computed of a map before it is compared."""
+"""Features of a map that are computed before comparisons."""
 
 import math
 
