@@ -26,7 +26,7 @@ def without_own_trail(
     Parameters
     ----------
     trail : (N, 2) float64
-        Where the robot was, in its map frame [m].
+        Positions of the robot, in its map frame [m].
     radius, resolution : float
         Of its body, and side of a cell [m].
     """
@@ -38,12 +38,12 @@ def without_own_trail(
 def without_bodies(
     one: GrowingMap, trails: Iterable[NDArray[np.float64]], radius: float, resolution: float
 ) -> GrowingMap:
-    """Return a map without walls where other robots have been.
+    """Return a map without walls along the trails of other robots.
 
     Parameters
     ----------
     trails : iterable of (N, 2) float64
-        Where the others were, in the frame of the map [m].
+        Positions of the others, in the frame of the map [m].
     radius, resolution : float
         Of their bodies, and side of a cell [m].
     """
