@@ -26,7 +26,7 @@ REASONS = (
 )
 """Why a robot ended, by number; 0 where it has not.
 
-Of several of the first six the first counts; ``physics`` takes the place of ``failed`` where the world says
+Of several of the first six the first counts; ``physics`` takes the place of ``failed`` if the world reports
 `BROKEN_PHYSICS`.
 """
 
@@ -36,7 +36,7 @@ _, COVERED, FAILED, BATTERY, COLLISION, REACHED, HORIZON, NO_FRONTIER, FRONTIER_
 
 
 class Rules(NamedTuple):
-    """What ends the robots of all episodes.
+    """Rules that end the robots of all episodes.
 
     Attributes
     ----------

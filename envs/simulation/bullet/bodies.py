@@ -24,7 +24,7 @@ _STRAIGHT = 1e-6
 
 @dataclass(frozen=True, slots=True)
 class _Box:
-    """A box that stands upright.
+    """An upright box.
 
     Attributes
     ----------
@@ -41,7 +41,7 @@ class _Box:
 
 @dataclass(frozen=True, slots=True)
 class FloorShapes:
-    """What stands on a floor.
+    """The solids of a floor.
 
     Attributes
     ----------
@@ -88,7 +88,7 @@ class FloorShapes:
 
     @property
     def obj(self) -> str:
-        """The prisms as the text of an OBJ file, an object each; empty if there are none."""
+        """The prisms as the text of an OBJ file, an object each; empty without prisms."""
         lines, first = [], 1
         for number, (outline, low, high) in enumerate(self.prisms):
             count = len(outline)
@@ -111,7 +111,7 @@ def _outer_walls(floor: Floor) -> Iterator[_Box]:
 
 
 def _box_of(solid: Solid, low: float, high: float) -> _Box | None:
-    """Return the box that a solid is; None if it is none."""
+    """Return the box of a solid; None if the solid is not a box."""
     corners = solid.polygon
     if len(corners) != 4 or solid.holes:
         return None
@@ -152,7 +152,7 @@ _JOINTS = (LEFT, RIGHT)
 
 @dataclass(frozen=True, slots=True)
 class Motion:
-    """Where a body is and how it moves.
+    """Position and motion of a body.
 
     Attributes
     ----------

@@ -55,11 +55,11 @@ FALL = 0.05
 
 
 class BulletWorld(KinematicWorld):
-    """Robots whose bodies PyBullet moves, with sensors and faults of the kinematic world; a ``World``.
+    """Robots with bodies simulated by PyBullet, and the sensors and faults of the kinematic world; a ``World``.
 
-    Motors drive the wheels at what the limits of the drive make of commands. What the wheels did is what
-    encoders read, so a wheel that slips makes odometry differ from the truth. Scans are those of the
-    kinematic world at the body's pose; where a robot leans, rays of PyBullet look along its tilted plane.
+    Motors drive the wheels at the commanded speeds, within the limits of the drive. Encoders read the actual motion
+    of the wheels, so a wheel that slips makes odometry differ from the truth. Scans are those of the kinematic world
+    at the body's pose; if a robot leans, rays of PyBullet look along its tilted plane.
 
     Parameters
     ----------
@@ -145,7 +145,7 @@ class BulletWorld(KinematicWorld):
             bodies.close()
 
     def _move(self, episode: int, kidnapped: NDArray[np.bool_]) -> None:
-        """Move the bodies of an episode by what ``drive`` made of the commands."""
+        """Move the bodies of an episode by the wheel speeds from ``drive``."""
         first, bodies = episode * self.robots, self._physics[episode]
         rows = range(first, first + self.robots)
         was_in_contact = self.contacts[first : first + self.robots] != 0

@@ -1,4 +1,4 @@
-"""The depth cameras of a world: what they see, image by image."""
+"""The depth cameras of a world, image by image."""
 
 from typing import Any
 
@@ -26,7 +26,7 @@ class DepthSensor:
     Parameters
     ----------
     world : World
-        Whose robots; their poses and attitudes are read when an image is taken.
+        The world with the robots; their poses and attitudes are read when an image is taken.
     camera : DepthCamera
         The camera of every robot.
     time_step : float
@@ -95,7 +95,7 @@ class DepthSensor:
         self.taken_at[takes] = (np.repeat(steps, world.robots) + 1)[takes]
 
     def _point_at(self, episode: int) -> None:
-        """Note where the faces of an episode lie, for kernels."""
+        """Store the addresses of the faces of an episode, for kernels."""
         faces = self._faces[episode]
         if faces is not None:
             arrays = (faces.corners, faces.planes, faces.spheres)

@@ -24,7 +24,7 @@ RADIO_STREAM = 0x72616469
 OBSTACLE_UNIT = 0.1
 """Unit of the obstacle length in the path-loss formula [m].
 
-It is the length of wall that costs nothing beside the fixed loss of a wall.
+It is the length of wall that adds no loss to the fixed loss of a wall.
 """
 
 
@@ -83,13 +83,13 @@ def _wall_lengths(solid: Array, places: Array, lengths: Array) -> None:
 def path_loss(
     settings: RadioSettings, distance: NDArray[np.float64], walls: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Return the loss over a distance of which a part runs through what is solid [dB].
+    """Return the loss over a distance, part of which is through solids [dB].
 
     Parameters
     ----------
     distance, walls : (...) float64
-        Length of the whole way, and of what is solid of it [m]. Less than ``reference_distance`` of free way
-        loses no less than it does.
+        Length of the whole path, and of its part in solids [m]. A free path shorter than ``reference_distance`` has
+        the loss at that distance.
     """
     free = np.maximum(distance - walls, 0.0)
     loss = settings.reference_loss + 10.0 * settings.free_exponent * np.log10(
@@ -167,7 +167,7 @@ def links_to(
     Parameters
     ----------
     place : (2,) float64
-        Where the other end is [m].
+        Position of the other end [m].
     chance : (robots,) float64 or None
         Standard Gaussian draws for the shadowing; none if None.
     """

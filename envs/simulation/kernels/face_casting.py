@@ -3,7 +3,7 @@
 The nearest face that a beam meets is its range.
 
 Which beams a face can meet is found by a fast angle and rounded up to whole lanes of eight; whether each of
-them meets it, and where, is exact.
+them meets it, and at which distance, is exact.
 """
 
 import math
@@ -121,7 +121,7 @@ def _list_faces(
 def _find_spans(listed: Array, count: int, direction: int, beams: Beams, spans: Array) -> None:
     """Find the beams that may meet each of the listed faces.
 
-    These are the first, the last, and the last from 0 on where they go on there (or -1).
+    These are the first, the last, and the last of those that continue from beam 0 (or -1).
 
     The fast angle is good to a hundredth of a beam: one more beam on each side holds all that meet the face.
     """

@@ -1,4 +1,4 @@
-"""The scan of a robot in kernels: true ranges by ray casting, noise, what is invalid."""
+"""The scan of a robot in kernels: true ranges by ray casting, noise, invalid ranges."""
 
 from typing import NamedTuple
 
@@ -42,7 +42,7 @@ The end of a beam then lies in the cell that it met.
 
 
 class ScanScratch(NamedTuple):
-    """What a scan is worked out in; one serves robot after robot.
+    """Scratch arrays of a scan; one set serves robot after robot.
 
     Attributes
     ----------
