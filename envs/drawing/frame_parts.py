@@ -63,7 +63,7 @@ def team_colours(robots: int) -> list[Colour]:
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """What part of a raster a frame shows, and how large.
+    """The part of a raster that a frame shows, and its scale.
 
     Attributes
     ----------
@@ -105,7 +105,7 @@ def view_around(shown: NDArray[np.bool_], origin: tuple[float, float], resolutio
     Parameters
     ----------
     shown : (rows, columns) bool
-        What must be seen.
+        Cells that must be visible.
     origin : (x, y)
         Lower left corner of cell (0, 0) [m].
     resolution : float
@@ -188,7 +188,7 @@ def draw_robots(
 
 
 def pale(colour: Colour) -> Colour:
-    """Return a colour mixed with white, for what is free on the map of a robot of this colour."""
+    """Return a colour mixed with white, for free cells on the map of a robot of this colour."""
     red, green, blue = ((channel + 2 * 255) // 3 for channel in colour)
     return red, green, blue
 
@@ -249,7 +249,7 @@ def draw_bar(line: Frame, share: float) -> None:
 
 
 def _plain(text: str) -> str:
-    """Keep what OpenCV's fonts can write."""
+    """Keep the characters that OpenCV's fonts can write."""
     return text.encode("ascii", "replace").decode()
 
 

@@ -18,7 +18,7 @@ from lidarium.envs.simulation.depth.frames import image_of, place_camera
 from lidarium.envs.simulation.disturbances.odometry import HEIGHT, RADIUS, TICKS_PER_METRE
 
 CUT_M = 1.3
-"""Height at which walls are cut where a floor is seen from above [m]."""
+"""Height at which walls are cut in views from above [m]."""
 
 ABOVE_FIELD_OF_VIEW, BEHIND_FIELD_OF_VIEW = math.radians(35.0), math.radians(65.0)
 ABOVE_PITCH = math.radians(62.0)
@@ -35,7 +35,7 @@ class FloorViews:
     Parameters
     ----------
     floor : Floor
-        What stands there.
+        The floor to draw.
     radius, height : float
         Of the robots' bodies [m].
     colours : sequence of Colour
@@ -82,7 +82,7 @@ class FloorViews:
         camera: DepthCamera,
         size: tuple[int, int],
     ) -> Frame:
-        """Return what a robot's camera would see in colours."""
+        """Return the view of a robot's camera in colours."""
         axes, eye = np.empty((3, 3)), np.empty(3)
         place_camera(poses[robot], attitudes[robot], camera.mount, axes, eye)
         return self._picture(
@@ -133,9 +133,9 @@ def camera_panel(
     camera: DepthCamera,
     height: int,
 ) -> Frame:
-    """Return a column of three pictures of the first robot, to be put beside a frame.
+    """Return a column of three pictures of the first robot, to be put next to a frame.
 
-    From the top: from behind, what its camera sees in colours, its depth image.
+    From the top: from behind, the view of its camera in colours, its depth image.
 
     Parameters
     ----------

@@ -22,10 +22,10 @@ _asked = False
 
 
 def compile_first_reset() -> None:
-    """Compile what a reset calls in several processes, where next to nothing is compiled yet.
+    """Compile the kernels of a reset in several processes, if almost none are compiled yet.
 
-    It is looked at once in a process, and left out in processes of others, on one core, and where
-    ``LIDARIUM_FIRST_START`` is ``off``.
+    This is checked once per process, and skipped in child processes, on one core, and if ``LIDARIUM_FIRST_START`` is
+    ``off``.
     """
     global _asked  # once in a process
     if _asked:

@@ -10,7 +10,7 @@ from lidarium.envs.simulation.kernels.arrays import ENDED, FRAME_X, FRAME_Y
 from lidarium.envs.simulation.simulation import Simulation
 
 ROBOT_NUMBERS = ("x", "y", "cos", "sin", "speed", "turn_rate", "live")
-"""Numbers of each robot: place in the picture, heading, speeds as shares of the limits, 1 where live."""
+"""Numbers of each robot: position in the picture, heading, speeds as shares of the limits, 1 if live."""
 
 TEAM_NUMBERS = ("side", "coverage", "time_left")
 """Numbers of the team: side of the picture [100 m], share of F seen, share of the horizon left."""

@@ -20,7 +20,7 @@ KERNEL_SUMMARIES = {
     "egocentric_map": "turned crops of the map around the robot, (scales, C, C)",
     GAINS: "unknown area in view at each frontier on offer [m2], (F,); at the level of frontiers",
 }
-"""What each observable of the kernel is, in one line."""
+"""One-line description of each observable of the kernel."""
 
 
 KEYS = (*OBSERVABLES, "goal")

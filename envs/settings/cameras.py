@@ -37,7 +37,7 @@ class DepthCamera:
     height : float
         Height of the optical centre above the floor [m].
     forward, left : float
-        Where the optical centre is from the centre of the robot [m].
+        Position of the optical centre from the centre of the robot [m].
     pitch, pan : float
         Downward and leftward angle of the axis from the robot's heading [rad].
     rate_hz : float
@@ -83,7 +83,7 @@ class DepthCamera:
 
     @property
     def calibration(self) -> dict[str, Any]:
-        """What infos say of the camera: its ``intrinsics`` by name, and its ``mount``."""
+        """The camera's parameters for infos: its ``intrinsics`` by name, and its ``mount``."""
         pinhole = self.intrinsics
         intrinsics = {"fx": pinhole.fx, "fy": pinhole.fy, "cx": pinhole.cx, "cy": pinhole.cy}
         return {"intrinsics": intrinsics, "mount": self.mount}

@@ -20,7 +20,7 @@ WIDTH = Rule(float, bounds=above(0.0, 2.0 * math.pi))
 """How wide a blind sector may be [rad]."""
 
 PLACE = Rule(float, bounds=within(-1e6, 1e6))
-"""What a number of a place has to be [m, rad]."""
+"""Rule for a number of a position [m, rad]."""
 
 MOST_SCHEDULED = 10_000
 """Most faults of a schedule."""
@@ -49,7 +49,7 @@ class Fault:
     wheel : str
         Which wheel sticks: ``left`` or ``right``.
     place : (x, y, theta) or None
-        Where a kidnapped robot is put, in the floor's frame [m, rad]; drawn if None.
+        Pose to which a kidnapped robot is moved, in the floor's frame [m, rad]; drawn if None.
     """
 
     kind: str
@@ -78,7 +78,7 @@ class Fault:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FaultSettings:
-    """What goes wrong with a team.
+    """Faults of a team.
 
     Attributes
     ----------
@@ -121,7 +121,7 @@ class FaultSettings:
 
 
 def _place(place: Any) -> tuple[float, float, float]:  # noqa: ANN401
-    """Return where a kidnapped robot is put, checked."""
+    """Return the pose of a kidnapped robot, checked."""
     is_pose = isinstance(place, Sequence) and len(place) == 3
     if not is_pose or not all(PLACE.hold(value) for value in place):
         raise ValueError(

@@ -54,7 +54,7 @@ class OdometrySettings:
 
     @property
     def disturbs_drives(self) -> bool:
-        """Whether drives do not quite what they are commanded."""
+        """Whether drives deviate from their commands."""
         return self.speed_noise > 0.0 or self.turn_rate_noise > 0.0
 
     @property

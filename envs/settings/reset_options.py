@@ -29,7 +29,7 @@ OPTIONS = tuple(each.name for each in fields(ResetOptions))
 """Names of the options of ``reset``."""
 
 SIMILARITY = 0.8
-"""How alike an unknown option's name is to a known one where it is taken for a slip of the pen."""
+"""Minimum similarity of an unknown option's name to a known one for it to count as a typo."""
 
 
 def check_options(options: Any, known: Iterable[str] = OPTIONS) -> None:  # noqa: ANN401
