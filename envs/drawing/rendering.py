@@ -93,7 +93,7 @@ def draw_frame(
 ) -> Frame:
     """Draw an environment from above.
 
-    The truth: free floor is faint where unexplored and white if the team has sensed it, walls are dark where the
+    True state: free floor is faint if unexplored and white if the team has sensed it, walls are dark if the
     team has been near. On it the robots with their headings, their last scans as fans, and their ways of the last
     minute. If robots have cameras, the view of the first one is at its side.
 

@@ -45,7 +45,7 @@ class Draws:
     Raises
     ------
     ValueError
-        If there are none, or one is of no kind of `Distribution`.
+        If the mapping is empty, or a value is not a `Distribution`.
     """
 
     def __init__(self, settings: ExplorationSettings, distributions: Any) -> None:  # noqa: ANN401
@@ -130,8 +130,8 @@ class RandomizedTeam(TeamWrapper):
     Raises
     ------
     ValueError
-        If a name or a distribution is none, a draw is no value of its setting, or draws change the spaces of
-        observations or actions.
+        If a name or a distribution is not valid, a draw is not a valid value of its setting, or draws change the
+        spaces of observations or actions.
     """
 
     def __init__(

@@ -57,7 +57,7 @@ class EpisodeTeam:
         return self._first + self._index[agent]
 
     def belief(self, agent: str) -> Belief:
-        """Return the handle on what an agent's onboard software knows."""
+        """Return the handle on the belief of an agent's onboard software."""
         return Belief(self._engine.perception, self.row(agent))
 
     def drive_state(self, agent: str) -> DriveState:
@@ -85,7 +85,7 @@ class EpisodeTeam:
         self._engine.operating.stopping[row] = reason
 
     def report(self, agent: str) -> Report | None:
-        """Return the last report of an agent that reached the station, None if there is none."""
+        """Return the last report of an agent that reached the station, None if no report has."""
         robot = self.row(agent) - self._first
         return self._station.report(robot)
 

@@ -49,7 +49,7 @@ class TeamRows:
     space, action_space : Space
         Of the observations and actions of a row.
     columns : tuple
-        Where each key lies in the flat form; see ``flat_columns``.
+        Columns of each key in the flat form; see ``flat_columns``.
     rewards : (rows,) float64
         Rewards of the last step.
     terminated, truncated, active : (rows,) bool
@@ -213,7 +213,7 @@ class TeamRows:
         return self._form.of({name: array[row].copy() for name, array in self._with_more().items()})
 
     def _with_more(self) -> Mapping[str, NDArray[Any]]:
-        """Return the observations with what was exchanged."""
+        """Return the observations including exchanged data."""
         if self._board is None and self._merged is None:
             return self.engine.observations
         more: dict[str, NDArray[Any]] = {} if self._merged is None else dict(self._merged.arrays)

@@ -2,7 +2,7 @@
 
 A face is convex and has four corners; a triangle repeats one. Seen from the outside, its corners run
 counter-clockwise. Solids are prisms, so that their faces are sides, tops and undersides; bent outlines and
-holes are cut into trapezoids. Faces on the ground or at the ceiling are left out: nobody sees them.
+holes are cut into trapezoids. Faces on the ground or at the ceiling are left out: they are never visible.
 """
 
 from dataclasses import dataclass, replace
@@ -231,7 +231,7 @@ def _trapezoid(left: Points, right: Points, low: float, high: float) -> Points:
 
 
 def _x_at(edges: Points, y: float) -> Points:
-    """Return where edges (E, 4) are at a height y; their ends exactly."""
+    """Return x of edges (E, 4) at a height y; their ends exactly."""
     x1, y1, x2, y2 = edges.T
     between = x1 + (y - y1) / (y2 - y1) * (x2 - x1)
     return np.asarray(np.where(y == y1, x1, np.where(y == y2, x2, between)))

@@ -30,7 +30,7 @@ KEYS = (*OBSERVABLES, "goal")
 def observed_keys(settings: ExplorationSettings, has_goal: bool) -> tuple[str, ...]:
     """Return the keys of an observation that the writer writes.
 
-    They are what the settings choose but for functions, and the goal if there is one.
+    They are the keys that the settings choose, except functions, and the goal if the floor has one.
     """
     functions = computed(settings)
     chosen = tuple(name for name in settings.observe if name not in (*functions, *LEVEL_OBSERVABLES))

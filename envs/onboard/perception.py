@@ -3,7 +3,7 @@
 This includes data received from the other robots.
 
 With known starts and the ideal radio all robots of a team share one map, the sum of their log-odds. A robot
-that does not know its start can be sent what others know, overlaid on its own map. All maps come with what
+that does not know its start can be sent the map of others, overlaid on its own map. All maps come with the data that
 planning needs (clearance and frontiers), brought up to date only if the map has changed.
 """
 

@@ -24,7 +24,7 @@ REASONS = (
     "frontier_unreachable",
     "physics",
 )
-"""Why a robot ended, by number; 0 where it has not.
+"""Reasons of endings, by number; 0 if the robot has not ended.
 
 Of several of the first six the first counts; ``physics`` takes the place of ``failed`` if the world reports
 `BROKEN_PHYSICS`.

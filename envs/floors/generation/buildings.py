@@ -128,7 +128,7 @@ def _guilty(
 ) -> int:
     """Return the index of the last piece of furniture that obstructs the floor.
 
-    Such a piece is beside a part cut off or in a room that is not reached. Without one, the last piece is returned.
+    Such a piece is next to a part cut off or in a room that is not reached. Otherwise the last piece is returned.
     """
     reach = ROBOT_RADIUS + 3 * MARGIN
     corner = np.tile(origin, 2) + np.array([reach, reach, -reach, -reach])
@@ -198,7 +198,7 @@ class BuildingSettings:
         Share of the possible openings beyond those that join all rooms, 0 (a tree of rooms, but for ring
         corridors of offices) to 1. Drawn: 0 to 0.5.
     clutter : float or None
-        Share of that area under furniture, 0 to 0.3. What finds no place is left out, so that about 0.2 is
+        Share of that area under furniture, 0 to 0.3. Furniture without enough room is left out, so that about 0.2 is
         reached if more is asked for. Drawn: 0.08 to 0.24; 0 to 0.1 for corridors.
     door_width : float
         Clear width of doors [m], 0.8 to 1.0.

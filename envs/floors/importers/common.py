@@ -26,7 +26,7 @@ MAX_POINTS = 250_000
 
 Part = TypeVar("Part")
 
-# Where a drawing has walls without thickness [m].
+# Wall thickness for drawings that give none [m].
 WALL_THICKNESS = 0.1
 
 # Gaps in the outer wall of a drawing that are tried until it is closed [m], and the share of the largest area

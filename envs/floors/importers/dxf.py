@@ -24,7 +24,7 @@ from lidarium.envs.floors.importers.common import MAX_POINTS, MAX_TEXT_BYTES, fl
 from lidarium.mapping.files.guarded_reading import READING_ERRORS, read_bytes
 
 KINDS = frozenset(("LINE", "LWPOLYLINE", "POLYLINE", "ARC", "CIRCLE", "ELLIPSE", "SPLINE"))
-"""Entities that are walls; texts, dimensions, hatches and the like are none."""
+"""Entities that are walls; texts, dimensions, hatches and the like are not."""
 
 COMPOUND = frozenset(("INSERT", "MLINE"))
 """Entities that are made of others."""
@@ -258,7 +258,7 @@ def _document(path: Path, sifted: _Sifted) -> Any:  # noqa: ANN401
     except ImportError as error:
         raise ValueError('DXF drawings need ezdxf; pip install "lidarium[dxf]"') from error
     try:
-        # Repairs take twice as long as reading what is whole.
+        # Repairs take twice as long as reading an undamaged file.
         return ezdxf.read(io.StringIO(sifted.text))
     except (AssertionError, DXFError, *READING_ERRORS):
         pass
@@ -307,7 +307,7 @@ def _walls(
 def _flattened(path: Path, part: Any, error: float) -> NDArray[np.float64]:  # noqa: ANN401
     """Return points (n, 2) of a curve."""
     corners = np.array([tuple(point) for point in part.control_vertices()]).reshape(-1, 3)
-    # Where numbers are too coarse for it, parts of a curve never come near enough, and there is no end.
+    # If numbers are too coarse for it, parts of a curve never come near enough, and the loop does not end.
     farthest = MAX_COORDINATE_M / CURVE_ERROR_M * error
     if not (np.abs(corners) <= farthest).all():
         raise ValueError(f"{path} has a curve that reaches beyond {MAX_COORDINATE_M:,.0f} m; want a plan")

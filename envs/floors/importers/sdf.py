@@ -81,7 +81,7 @@ def _solids(path: Path, element: Element, around: Pose, depth: int) -> Iterator[
     """Yield the solids of an element and of its children."""
     if depth > _MAX_NESTED:
         raise ValueError(f"{path} has models nested more than {_MAX_NESTED} deep; want a world")
-    # A world that was saved while it ran says beside its models where they were then.
+    # A world saved while it ran lists the current poses of its models separately.
     saved = {model.get("name"): model for model in element.findall("state/model")}
     for child in element:
         if child.tag in ("world", "model", "link"):

@@ -35,7 +35,7 @@ _SHARES = np.arange(1, CURVE_PARTS + 1) / CURVE_PARTS
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _NUMBERS = re.compile(_NUMBER)
 _COMMANDS = re.compile(r"([MmZzLlHhVvCcSsQqTtAa])([^MmZzLlHhVvCcSsQqTtAa]*)")
-# Flags are single digits that may stand together with what follows.
+# Flags are single digits that may be joined with the following number.
 _ARCS = re.compile(
     rf"({_NUMBER})[\s,]*({_NUMBER})[\s,]*({_NUMBER})[\s,]*([01])[\s,]*([01])[\s,]*({_NUMBER})[\s,]*({_NUMBER})"
 )
@@ -104,7 +104,7 @@ def _commands(text: str) -> Iterator[tuple[str, list[float]]]:
             )
         yield command, given[:wants]
         for place in range(wants, len(given), wants):
-            # What follows a first point without a command of its own are lines.
+            # Coordinates after a first point without a command of their own are lines.
             yield {"M": "L", "m": "l"}.get(command, command), given[place : place + wants]
 
 

@@ -40,7 +40,7 @@ class TeamDriver:
 
     Positions inside are in the frames of the believed poses.
 
-    What most robots do most of the time, keeping to a path or planning one, runs in kernels over many
+    The usual work, following and planning paths, runs in kernels over many
     episodes. A robot that is blocked or has moved aside concerns its teammates: such episodes are settled one
     by one.
 

@@ -2,7 +2,7 @@
 
 Other robots may have mapped the robots themselves as walls.
 
-Robots that do not know where the others are draw their bodies into their maps. To a merger these are walls
+Robots that do not know the poses of the others draw their bodies into their maps. To a merger these are walls
 that contradict the free floor on which the other one drove, and on a merged map they bar the way.
 """
 

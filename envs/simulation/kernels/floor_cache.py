@@ -175,7 +175,7 @@ MADE_BY = (
     "mapping/files/output.py",
     "mapping/kernels",
 )
-"""Sources that determine what the store holds for a floor."""
+"""Sources that determine the stored data of a floor."""
 
 
 class TablesCache:
