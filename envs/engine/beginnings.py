@@ -100,7 +100,7 @@ def map_frames(beginning: EpisodeStart, settings: ExplorationSettings) -> NDArra
 def goal_of_robots(beginning: EpisodeStart, settings: ExplorationSettings) -> tuple[float, float]:
     """Return the goal as the robots know it, in the frame of their believed poses [m].
 
-    Nan if they know none.
+    nan if no goal is known.
 
     A robot that does not know its start does not know the goal either.
     """

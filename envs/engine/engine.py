@@ -437,7 +437,7 @@ class Engine:
     def _take_terms(self, acted: NDArray[np.bool_], is_plain: bool) -> dict[str, NDArray[np.float64]]:
         """Return the value of each term of the reward in the step; add those that are not kernels.
 
-        Rows that did not act have earned nothing; ``is_plain`` says that all did.
+        Rows that did not act have earned nothing; ``is_plain`` means that all did.
         """
         score = self.score
         rewards = score.rewards

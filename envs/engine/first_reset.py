@@ -16,7 +16,7 @@ LIST = Path(__file__).parent / "data" / "kernels_of_reset.json"
 
 MOST_PROCESSES = 4
 LOCK = "first_start.lock"
-"""File in the cache that says that another process compiles already."""
+"""File in the cache that marks that another process is compiling."""
 
 _asked = False
 

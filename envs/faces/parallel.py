@@ -395,7 +395,7 @@ class ExplorationEnv(ParallelEnv[str, Any, Any]):
         return self.operating.states[self._row(agent)]
 
     def last_order(self, agent: str) -> Order | None:
-        """Return the last order that an agent took, None if it took none."""
+        """Return the last order that an agent took, None if it took no order."""
         return self.operating.orders[self._row(agent)]
 
     def report(self, agent: str) -> Report | None:

@@ -70,7 +70,7 @@ class EpisodeTeam:
         return self._engine.operating.states[self.row(agent)]
 
     def last_order(self, agent: str) -> Order | None:
-        """Return the last order that an agent took, None if it took none."""
+        """Return the last order that an agent took, None if it took no order."""
         return self._engine.operating.orders[self.row(agent)]
 
     def order(self, agent: str, order: Order) -> None:

@@ -243,7 +243,7 @@ class TeamRows:
         return infos
 
     def _with_ended(self, infos: dict[str, Any], form: str) -> dict[str, Any]:
-        """Return infos in which robots that had ended say why, and keep their last numbers."""
+        """Return infos in which robots that had ended keep their reason and their last numbers."""
         kept = self._kept
         for row, word in self.engine.ended_because.items():
             if self.engine.reasons[row]:

@@ -184,7 +184,7 @@ class Choices(NamedTuple):
     targets, headings, cells : (rows, 2), (rows,), (rows, 2)
         As they were offered.
     tried : (rows, 2) int64
-        The frontier cell that the robot was last seen at work on, -1 for none.
+        Cell of the last frontier that the robot was driving to, -1 for none.
     places, since : (rows, 2), (rows,) float64
         Position [m] and time [s] of its last progress.
     """

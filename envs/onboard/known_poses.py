@@ -55,7 +55,7 @@ class KnownPoses:
     localizers : list of Localizer or None
         The localizer of each robot, by row; None if kernels localize.
     goals : list of tuple or None
-        The goal of each episode in the frame of the floor (x, y) [m]; None if it has none.
+        The goal of each episode in the frame of the floor (x, y) [m]; None without a goal.
     """
 
     def __init__(

@@ -64,7 +64,7 @@ class Perception:
     sparse_maps : SparseMaps
         The sparse maps that they make by their depth cameras, if these were asked for.
     meters : Meters or None
-        Odometers and battery gauges of the robots of a lone episode; None in batches, which have none.
+        Odometers and battery gauges of the robots of a lone episode; None in batches.
     """
 
     def __init__(

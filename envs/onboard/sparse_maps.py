@@ -151,7 +151,7 @@ class SparseMapper:
         pose : (3,) float64
             x, y, theta as the robot believes [m, rad].
         depth : (rows, columns) float32 or None
-            The image [m]; None if none was taken now.
+            The image [m]; None if the camera took no image in this step.
         bodies : (K, 3) float64
             x, y and radius of other robots, which are not mapped [m].
         """
@@ -321,7 +321,7 @@ class SparseMaps:
         return SparseBelief(replace(made[1], trail=own.trail), frame, own.ground.camera, own.corrections)
 
     def sense(self, runs: NDArray[np.bool_] | None = None) -> None:
-        """Take in the step that was taken, of all episodes or of those that ``runs`` (episodes,) says."""
+        """Process the last step, of all episodes or of those with ``runs`` (episodes,)."""
         for row, mapper in self._mappers.items():
             is_live = not self._simulation.world.flags[row] & ENDED
             if is_live and (runs is None or runs[row // self._settings.robots]):

@@ -61,7 +61,7 @@ class OdometrySettings:
     def numbers(self) -> NDArray[np.float64]:
         """Numbers of the odometry for the kernels, shape (7,).
 
-        Four are of encoder noise, one says whether there are ticks, two are of the drive's noise.
+        Four are of encoder noise, one selects ticks, two are of the drive's noise.
         """
         return np.array(
             [

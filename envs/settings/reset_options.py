@@ -81,7 +81,7 @@ def read_options(options: Mapping[str, Any] | None, robots: int) -> ResetOptions
 
 
 def _numbers(value: Any) -> NDArray[np.float64] | None:  # noqa: ANN401
-    """Return a value as an array, or None if it is not one of finite numbers."""
+    """Return a value as an array, or None if it is not an array of finite numbers."""
     try:
         array = np.asarray(value, np.float64)
     except (TypeError, ValueError):
@@ -90,7 +90,7 @@ def _numbers(value: Any) -> NDArray[np.float64] | None:  # noqa: ANN401
 
 
 def of_number(curriculum: Curriculum | None, number: int) -> Mapping[str, Any]:
-    """Return a curriculum's options for an episode; none without a curriculum."""
+    """Return a curriculum's options for an episode; empty without a curriculum."""
     return {} if curriculum is None else curriculum(number)
 
 

@@ -111,7 +111,7 @@ class World(Protocol):
         ...
 
     def show(self) -> bool:
-        """Show the bodies in a window of the world's own; returns False if it has none."""
+        """Show the bodies in a window of the world's own; returns False without a window."""
         ...
 
     def close(self) -> None:

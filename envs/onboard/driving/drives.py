@@ -40,7 +40,7 @@ class Drives(NamedTuple):
     has_path : (rows,) bool
         Whether there is a path to drive.
     is_given : (rows,) bool
-        Whether the path was given: then it is followed as it is, and none is planned.
+        Whether the path was given: if so, it is followed unchanged and not planned.
     paths, room : (rows, points, 2), (rows, points) float64
         Points x, y in the frame of the believed pose [m], and the room besides the body on the piece that
         leads to each [m].

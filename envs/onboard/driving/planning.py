@@ -248,7 +248,7 @@ def _path_is_clear(planning: Planning, drives: Drives, row: int) -> bool:
 def prepare_robot(planning: Planning, drives: Drives, row: int, piece: int) -> None:
     """Drop a robot's path that is not clear, and plan one if it has none.
 
-    The plan leads to its target; a path that was given is left as it is (kernel).
+    The plan leads to its target; a path that was given is kept (kernel).
     """
     if drives.passing[row] >= 0 or not drives.is_ordered[row] or drives.is_given[row]:
         return

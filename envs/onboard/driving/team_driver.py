@@ -156,7 +156,7 @@ class TeamDriver:
     def route_left(self, row: int) -> NDArray[np.float64] | None:
         """Return the rest of the route that a robot follows, from the last point that it has passed.
 
-        It is (P, 2) in its map frame [m]; None if it follows none.
+        It is (P, 2) in its map frame [m]; None without a route.
         """
         drives = self.drives
         if not (drives.is_given[row] and drives.has_path[row]):

@@ -239,7 +239,7 @@ class Exchange:
         The last pose of each robot that reached each other (receiver, source), and the step at which it was
         true.
     heard_ended : (robots, robots) bool
-        Whether the source said that it has ended.
+        Whether the source reported that it has ended.
     copies : list of list of (rows, columns) int8 arrays
         Copy of each map held by each robot and, last, the station (receiver, source); a robot's own map is not a
         copy.
@@ -391,7 +391,7 @@ class Exchange:
     def _best_sender(self, receiver: int, source: int) -> int | None:
         """Return which of the robots that reach a receiver holds the latest copy of a map.
 
-        None if none has a later one, or it is being sent.
+        None if no robot has a later one, or it is being sent.
         """
         if any(
             message.pose is None and (message.receiver, message.source) == (receiver, source)

@@ -51,7 +51,7 @@ class Target:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Route:
-    """A path that a robot should follow as it is, in its map frame.
+    """A path that a robot should follow unchanged, in its map frame.
 
     Attributes
     ----------
@@ -177,7 +177,7 @@ class Status:
     energy_left_j : float or None
         Energy left in its battery; None if it has no limit [J].
     pause_cause : str
-        Why it is paused: ``order``, ``contact`` or ``blocked``; empty if it is not.
+        Reason of a pause: ``order``, ``contact`` or ``blocked``; empty if the robot is not paused.
     """
 
     pose: Transform
@@ -196,7 +196,7 @@ class Orders(NamedTuple):
     Attributes
     ----------
     is_ordered : (rows,) bool
-        Whether the robot has a target; otherwise it stays if it is and gives way.
+        Whether the robot has a target; otherwise it keeps its position and gives way.
     targets : (rows, 2) float64
         Positions in the robots' map frames, finite if ordered [m].
     headings : (rows,) float64

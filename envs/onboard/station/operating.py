@@ -168,7 +168,7 @@ class Operating:
         return row in self._addressed
 
     def pause_cause(self, row: int) -> str:
-        """Return why a robot is paused, empty if it is not."""
+        """Return the reason of a robot's pause, empty if it is not paused."""
         return self._why_paused[row] if self.states[row] is OperatingState.PAUSED else ""
 
     def take_sent(self) -> dict[int, Target]:

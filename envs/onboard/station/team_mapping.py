@@ -80,7 +80,7 @@ class TeamMapping:
     episode : int
         Of which episode.
     confirms : bool
-        Whether maps are joined only as `joining` says; else by the first finding.
+        Whether maps are joined only by the criteria of `joining`; otherwise by the first match.
 
     Attributes
     ----------
@@ -174,7 +174,7 @@ class TeamMapping:
         return joined
 
     def _compared(self, agent: str, one: GrowingMap) -> GrowingMap:
-        """Return a robot's map as it is compared with others.
+        """Return a robot's map in the form that is compared with others.
 
         Cells at the robot's positions are left open: others may have drawn its body there.
         """

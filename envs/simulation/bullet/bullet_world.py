@@ -220,7 +220,7 @@ class BulletWorld(KinematicWorld):
 
 
 def _floor_of(tables: FloorTables) -> Floor:
-    """Return the floor of tables; that of the bodies' cells if they know none."""
+    """Return the floor of tables; by default the floor of the bodies' cells."""
     if tables.floor is not None:
         return tables.floor
     rows, columns = tables.body.solid.shape

@@ -41,7 +41,7 @@ class DepthSensor:
     frames : (rows, image rows, image columns) float32
         The last image of each robot [m]; 0 if nothing was measured.
     taken_at : (rows,) int64
-        After how many steps of its episode each was taken, -1 if none was yet.
+        Step of its episode in which each image was taken, -1 before the first.
     """
 
     def __init__(self, world: World, camera: DepthCamera, time_step: float, threads: int = 1) -> None:

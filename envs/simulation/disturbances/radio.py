@@ -133,14 +133,14 @@ def links(
     raster: Raster,
     chance: NDArray[np.float64] | None = None,
 ) -> NDArray[np.bool_]:
-    """Return which robots reach each other, (robots, robots), none itself.
+    """Return which robots reach each other, (robots, robots), False on the diagonal.
 
     Parameters
     ----------
     places : (robots, 2 or more) float64
         True places of the robots [m].
     chance : (robots, robots) float64 or None
-        Standard Gaussian draws for the shadowing, of which those above the diagonal count; none if None.
+        Standard Gaussian draws for the shadowing, used above the diagonal; None for no shadowing.
     """
     robots = len(places)
     distance = np.hypot(places[:, None, 0] - places[None, :, 0], places[:, None, 1] - places[None, :, 1])
@@ -169,7 +169,7 @@ def links_to(
     place : (2,) float64
         Position of the other end [m].
     chance : (robots,) float64 or None
-        Standard Gaussian draws for the shadowing; none if None.
+        Standard Gaussian draws for the shadowing; None for no shadowing.
     """
     distance = np.hypot(places[:, 0] - place[0], places[:, 1] - place[1])
     walls = np.zeros(len(places))

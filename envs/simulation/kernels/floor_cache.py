@@ -233,7 +233,7 @@ class _UsedLast(Generic[Value]):
         self._values: OrderedDict[str, tuple[Value, int]] = OrderedDict()
 
     def pop(self, key: str) -> Value | None:
-        """Take a value out, None if it is not there."""
+        """Remove and return a value, None if it is not stored."""
         value, size = self._values.pop(key, (None, 0))
         self.nbytes -= size
         return value

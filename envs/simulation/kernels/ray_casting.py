@@ -222,8 +222,8 @@ def cast_by_squares(squares: Array, rows: int, columns: int, beams: Beams, range
 FACES, FACES_PER_BEAM = 300, 1.4
 """Most faces in reach for which the face caster runs, alone and for each beam.
 
-The cost of a face is independent of the number of beams, the cost of travelling beams is not: the two casters took equal
-time at about 550 faces with 180 beams and at 1,300 with 720, over drawn, generated and real floors. Both give
+The cost of a face is independent of the number of beams, the cost of travelling beams is not: the two casters took
+equal time at about 550 faces with 180 beams and at 1,300 with 720, over drawn, generated and real floors. Both give
 the same ranges. """
 
 
