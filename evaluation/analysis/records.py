@@ -17,7 +17,7 @@ from lidarium.mapping.grids.speckle_filter import without_small_components
 FOLDER = "records"
 
 Key = str
-"""Where an episode's line says that its record is, in the directory.
+"""Path of an episode's record in the directory, as given in the episode's line.
 
 Empty for no record.
 """

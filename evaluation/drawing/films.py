@@ -96,7 +96,7 @@ FORMATS = {
 
 
 def format_of(path: Path) -> _FilmFormat:
-    """Return the format that the ending of a film's name stands for."""
+    """Return the format for the suffix of a film's name."""
     found = FORMATS.get(Path(path).suffix.lower())
     if found is None:
         raise ValueError(f"the film {path} has no ending of a film; want one of {', '.join(FORMATS)}")
@@ -242,7 +242,7 @@ def _write_with_palette(frames: Path, film: Path, encoded: _FilmFormat) -> bool:
 def _is_done(*arguments: str | Path) -> bool:
     """Run FFmpeg; return whether it succeeded.
 
-    It is in a group of its own: Ctrl-C is for us, who then end it.
+    It runs in a group of its own: Ctrl-C reaches only this process, which then ends it.
     """
     words = [str(word.absolute()) if isinstance(word, Path) else word for word in arguments]
     command = [imageio_ffmpeg.get_ffmpeg_exe(), "-y", "-v", "quiet", *words]

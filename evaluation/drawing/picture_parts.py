@@ -191,7 +191,7 @@ def draw_trajectories(axes: Axes, track: NDArray[np.float64], radius: float) -> 
 
 
 def draw_start(axes: Axes, number: int, x: float, y: float, colour: str) -> None:
-    """Draw where robot ``number`` starts."""
+    """Draw the start of robot ``number``."""
     axes.plot(
         [x],
         [y],

@@ -150,7 +150,7 @@ def _draw_maps(axes: Axes, episode: Episode) -> None:
     rows, columns = np.flatnonzero(solid.any(axis=1))[-1] + 1, np.flatnonzero(solid.any(axis=0))[-1] + 1
     levels = without_small_components(three_levels(log_odds))
     solid, counted, levels = solid[:rows, :columns], counted[:rows, :columns], levels[:rows, :columns]
-    # In the order of what shows if cells are drawn together.
+    # In order of priority if cells are drawn together.
     classes = np.zeros(solid.shape, np.uint8)
     classes[solid] = 1
     classes[counted] = 2

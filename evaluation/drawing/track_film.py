@@ -68,7 +68,7 @@ class _Tiles:
             (each.shape, *record.display.origin, record.display.resolution)
             for each, record in zip(known, records.values(), strict=True)
         }
-        # Maps of one grid are shown alike: what one has seen, all have room for.
+        # Maps of one grid have a common extent: all have room for the area that one has seen.
         shown = np.logical_or.reduce(known) if len(grids) == 1 else None
         self._frames = [TrackFrames(record, self._tile, shown=shown) for record in records.values()]
 

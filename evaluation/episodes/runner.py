@@ -144,7 +144,7 @@ def run_episode(
 
 
 def _note_merges(episode: Episode, merges: list[MergeEvent]) -> None:
-    """Take in which merges were used, and let who watches know."""
+    """Store the merges that were used, and notify the watchers."""
     env, episode.merges = episode.env, merges
     if isinstance(env, WatchedExploration):
         for merge in merges:
@@ -156,7 +156,7 @@ def _show_decision(
     policy: Policy,
     on_decision: Progress | None,
 ) -> None:
-    """Let who watches, and who is to be called, know of a decision that has been carried out."""
+    """Notify watchers and callbacks of a decision that has been carried out."""
     if isinstance(env, WatchedExploration):
         env.decided(None if env.driver is None else env.driver.orders(), policy.given_up)
     if on_decision is not None:

@@ -1,6 +1,6 @@
 """Communication of a team: connection, data sent, and delay of knowledge.
 
-The delay is how late each robot knows what the team knows.
+The delay is the time until each robot has the team's knowledge.
 
 References
 ----------

@@ -111,7 +111,7 @@ def seen_walls(edges: Edges, hits: Points, spacing: float = 0.02, reach: float =
 
 
 def hits_of_beams(edges: Edges, poses: Points, angles: NDArray[np.float64], range_max: float) -> Points:
-    """Return where the beams of scans from true poses end, before noise, (n, 2) [m].
+    """Return the end points of the beams of scans from true poses, before noise, (n, 2) [m].
 
     Parameters
     ----------

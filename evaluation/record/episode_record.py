@@ -127,7 +127,7 @@ class EpisodeRecord:
     Attributes
     ----------
     header : dict
-        Version, settings, what was drawn at the beginning, endings and the hash of the final state;
+        Version, settings, values drawn at the beginning, endings and the hash of the final state;
         docs/reference/files.md lists it all.
     commands : (steps, robots, 2) float64
         Speed and turn rate at which each robot was driven in each time step, to the bit [m/s, rad/s].

@@ -135,7 +135,7 @@ def grid_around(shown: Mask, resolution: float) -> Grid:
 
 
 def coarse(occupied: Mask, free: Mask, block: int) -> NDArray[np.uint8]:
-    """Return levels of blocks: occupied where any cell is, else free if any is, else unknown."""
+    """Return levels of blocks: occupied if any cell is, else free if any is, else unknown."""
     levels = occupied.view(np.uint8) * np.uint8(OCCUPIED)
     np.maximum(levels, free.view(np.uint8), out=levels)
     rows, columns = (side // block for side in levels.shape)

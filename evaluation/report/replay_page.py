@@ -54,7 +54,7 @@ class _Samples:
     team : Layer
         The sum of all maps.
     own : list of Layer
-        Maps of each robot's own scans; none if there is one robot, whose map is the team's.
+        Maps of each robot's own scans; empty for a single robot, which has the team's map.
     map_times, scan_times : list of float
         When samples were taken [s].
     scans : list of (robots, beams) float32
@@ -233,7 +233,7 @@ def _title(header: dict[str, Any]) -> str:
 
 
 def _plain(event: dict[str, Any]) -> dict[str, Any]:
-    """Return an event whose words can be shown; numbers that JSON does not have become null."""
+    """Return an event with printable words; numbers that JSON does not have become null."""
     shown: dict[str, Any] = {}
     for key, value in event.items():
         is_number = isinstance(value, int | float) and math.isfinite(value)
@@ -242,7 +242,7 @@ def _plain(event: dict[str, Any]) -> dict[str, Any]:
 
 
 def _track(record: EpisodeRecord) -> Streams:
-    """Return paths and coverage, whose differences are small numbers."""
+    """Return paths and coverage, coded as small differences."""
     display = record.display
     poses = display.poses.reshape(len(display.times), -1, 3).copy()
     poses[..., 2] = np.unwrap(poses[..., 2], axis=0)

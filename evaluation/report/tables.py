@@ -15,7 +15,7 @@ _WRITTEN = re.compile(r"`([^`]*)`|\\([\\`*\[\]<>|$~])|&amp;")
 
 
 def plain(text: str) -> str:
-    """Return text in which nothing stands for anything but itself, links and tables among it."""
+    """Return text without any Markdown meaning, such as links and tables."""
     return _SPECIAL.sub(r"\\\1", printable(text).replace("&", "&amp;"))
 
 

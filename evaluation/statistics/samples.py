@@ -8,7 +8,7 @@ References
 Efron and Tibshirani, An Introduction to the Bootstrap (1993), section 12.5. Hall, Theoretical comparison of
 bootstrap confidence intervals, Annals of Statistics 16 (1988): with equal tails the studentised interval
 follows skewness. Hall, On symmetric bootstrap confidence intervals, Journal of the Royal Statistical Society
-B 50 (1988): the symmetric form suits what is nearly symmetric.
+B 50 (1988): the symmetric form suits nearly symmetric distributions.
 """
 
 from collections.abc import Callable
@@ -29,7 +29,7 @@ See docs/results/interval_coverage.md.
 
 @dataclass(frozen=True, slots=True)
 class Interval:
-    """An estimate and where the truth may lie.
+    """An estimate and its confidence interval.
 
     Attributes
     ----------
@@ -53,7 +53,7 @@ class Interval:
     def is_nominal(self) -> bool:
         """Whether the sample is large enough for the interval to be nominal.
 
-        The interval then holds the truth as often as it says.
+        The interval then holds the truth with the stated probability.
         """
         return self.size >= FEWEST_FOR_NOMINAL
 

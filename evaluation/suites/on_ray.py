@@ -1,6 +1,6 @@
 """Episodes shared out among the machines of a Ray cluster, with results as they are ready.
 
-A task whose worker or machine is lost is done again elsewhere; its result comes once.
+A task with a lost worker or machine is repeated elsewhere; its result arrives once.
 """
 
 import logging

@@ -72,7 +72,7 @@ def check_trials(*lengths: int) -> None:
 
 
 def listed(content: Mapping[str, Any], name: str) -> tuple[Any, ...]:
-    """Return a list of a suite; a single name or number stands for a list of it."""
+    """Return a list of a suite; a single name or number counts as a list of one."""
     values = content[name]
     if isinstance(values, list | tuple):
         return tuple(values)
@@ -147,7 +147,7 @@ class Suite:
         Whether the seed draws starts also on floors that have starts of their own; these would be the same
         for every seed.
     bounds : bool
-        Whether each episode is set beside how soon a team that knew the floor could have seen it.
+        Whether each episode is compared with the time of a team that knows the floor. False by default.
     stop : dict or None
         Rule that ends episodes in addition to the settings, as ``StopRule``.
     image_resolution : float or None

@@ -144,7 +144,7 @@ MAPS_SHARE = 0.1
 """Most of the wall time that drawing maps takes."""
 
 LOW_WALLS_M = 0.4
-"""Height at which walls are cut at first if nobody looks at furniture [m]."""
+"""Height at which walls are cut by default if furniture is not shown [m]."""
 
 DEPTH_SIZE = 180, 240
 """Rows and columns of the depth image at the side [pixels]."""
@@ -215,7 +215,7 @@ class LiveView(Watcher):
             self._answer_controls()
 
     def _answer_controls(self) -> bool:
-        """Follow the controls; return whether nobody wants the run to end."""
+        """Follow the controls; return whether the run should continue."""
         layers = self._controls.layers
         self._scene.cut_walls(self._controls.wall_height)
         self._scene.show(layers)

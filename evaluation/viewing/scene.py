@@ -117,7 +117,7 @@ def boxes_mesh(boxes: NDArray[np.float64]) -> _Mesh:
 
 
 def segments(points: NDArray[np.float64], height: float) -> NDArray[np.float32]:
-    """Return the pieces of a path (P, 2) at a height, (P - 1, 2, 3); none of fewer than two points."""
+    """Return the pieces of a path (P, 2) at a height, (P - 1, 2, 3); empty for fewer than two points."""
     if len(points) < 2:
         return np.zeros((0, 2, 3), np.float32)
     lifted = np.column_stack([points, np.full(len(points), height)]).astype(np.float32)
@@ -177,7 +177,7 @@ class TeamMaps:
         return np.ascontiguousarray(picture[::-1])
 
     def frontiers(self, maps: Sequence[Levels]) -> NDArray[np.float64]:
-        """Return the middles of free cells beside unknown ones, of any of the maps, (N, 2) [m]."""
+        """Return the middles of free cells next to unknown ones, of any of the maps, (N, 2) [m]."""
         found = [self._frontier(levels) for levels in maps]
         if not found:
             return np.zeros((0, 2))
