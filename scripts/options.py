@@ -90,7 +90,7 @@ def supervisor_options(assignments: Iterable[str]) -> dict[str, Any]:
 
 
 def is_supervised(name: str) -> bool:
-    """Return whether a policy is led by a supervisor whose settings can be set."""
+    """Return whether a policy is led by a configurable supervisor."""
     from lidarium.agents import make_policy
     from lidarium.agents.supervisor.policy import Supervised
 
@@ -98,7 +98,7 @@ def is_supervised(name: str) -> bool:
 
 
 def check_supervised(name: str) -> None:
-    """Check that a policy is led by a supervisor whose settings can be set."""
+    """Check that a policy is led by a configurable supervisor."""
     from lidarium.agents import policy_names
 
     if not is_supervised(name):
@@ -137,7 +137,7 @@ class FilmOptions:
 
 @dataclass(frozen=True, kw_only=True)
 class FilmFiles(FilmOptions):
-    """Where films of records are written to."""
+    """Output files for films of records."""
 
     gif: Path | None = None
     """write a film as an animated picture; its name ends in .gif or .webp"""

@@ -62,7 +62,7 @@ def write_run(
 
 
 def _save_view(path: Path, episode: "Episode") -> None:
-    """Draw the floor from above, with the robots where they ended."""
+    """Draw the floor from above, with the robots at their final poses."""
     import imageio.v3 as imageio
 
     from lidarium.envs.drawing.views import views_of
@@ -206,7 +206,7 @@ class RunFilms:
 
     @contextmanager
     def kept(self) -> Iterator[None]:
-        """Write the films at the end, or none of them if that is an error."""
+        """Write the films at the end, or no films after an error."""
         with self._open:
             yield
             self._env.watchers[:] = [each for each in self._env.watchers if each not in self._films]

@@ -31,7 +31,7 @@ LEAST_SCALE = 0.01
 class _Merge(Command):
     """Merge maps into one; writes the fused map, transforms.json and a picture.
 
-    If maps do not join, it says why of each pair; transforms.json and the picture say more.
+    If maps do not join, the reason for each pair is printed; transforms.json and the picture say more.
     """
 
     compiles: ClassVar[bool] = True
@@ -60,7 +60,7 @@ class _Merge(Command):
     For two maps; right to 2 m and 20 degrees
     """
     force: bool = False
-    """join two maps by the best transform, whatever speaks against it"""
+    """join two maps by the best transform, even if the maps contradict it"""
     scale: str = "fixed"
     """fixed, auto, or a number by which the second of two maps has to grow.
 

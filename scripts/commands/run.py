@@ -82,7 +82,7 @@ class Run(FilmOptions, TeamCommand, ViewOptions):
     0.99 by default, and none on a floor with a goal or if the policy explores by camera
     """
     starts: str | None = None
-    """where the robots start: fixed, drawn, or x,y,theta of each.
+    """start poses of the robots: fixed, drawn, or x,y,theta of each.
 
     In metres and radians, separated by semicolons. Fixed starts are those of the floor, and the default but
     for sets of floors

@@ -29,7 +29,7 @@ class _Train(Command):
     """Train explorers as a TOML file says.
 
     A teacher that knows the floors rates each choice, a network is fitted to that, and goes on by rewards if
-    the file says so. Finished parts are kept, and the same command goes on where it stopped. The best weights
+    the file says so. Finished parts are kept, and the same command continues after the last one. The best weights
     and a card with all that made them are written to --out, runs/training by default.
     """
 
