@@ -19,7 +19,7 @@ SIZE = 960
 """Longer side of the floor in a frame by default [pixels]."""
 
 RECENT_S = 60.0
-"""How far back a robot's path is drawn [s]."""
+"""Time for which a robot's path is drawn [s]."""
 
 INK: Colour = (31, 41, 55)
 FAINT_INK: Colour = (107, 114, 128)
@@ -46,7 +46,7 @@ SHIFT = 4
 BORDER = 10
 
 LEAST_WIDTH = 360
-"""Of a frame with a header [pixels]."""
+"""Minimum width of a frame with a header [pixels]."""
 
 
 def team_colours(robots: int) -> list[Colour]:
@@ -98,7 +98,7 @@ class View:
 
 
 def view_around(shown: NDArray[np.bool_], origin: tuple[float, float], resolution: float, size: int) -> View:
-    """Return the view on the cells of a grid that are to be shown.
+    """Return the view on the cells of a grid that should be shown.
 
     It has a margin, and its longer side is ``size`` pixels.
 
@@ -153,7 +153,7 @@ def enlarged(picture: Frame, view: View) -> Frame:
 
 
 def draw_paths(frame: Frame, view: View, ways: NDArray[np.float64], colours: Sequence[Colour]) -> None:
-    """Draw the ways of robots, positions (times, robots, 2) [m]."""
+    """Draw the paths of robots, positions (times, robots, 2) [m]."""
     thickness = max(round(0.04 * view.scale), 2)
     for robot, colour in enumerate(colours):
         cv2.polylines(frame, [view.pixels(ways[:, robot])], False, colour, thickness, cv2.LINE_AA, SHIFT)

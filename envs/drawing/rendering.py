@@ -47,7 +47,7 @@ class Scene:
     Attributes
     ----------
     simulation : Simulation
-        Of one episode or many.
+        Simulation of one episode or many.
     settings : ExplorationSettings
         The team.
     name : str
@@ -94,7 +94,7 @@ def draw_frame(
     """Draw an environment from above.
 
     True state: free floor is faint if unexplored and white if the team has sensed it, walls are dark if the
-    team has been near. On it the robots with their headings, their last scans as fans, and their ways of the last
+    team has been near. On it the robots with their headings, their last scans as fans, and their paths of the last
     minute. If robots have cameras, the view of the first one is at its side.
 
     Returns

@@ -148,7 +148,7 @@ def shade(
     Parameters
     ----------
     size : (rows, columns)
-        Of the picture [pixels].
+        Size of the picture [pixels].
     bodies : (N, 5) float64
         x, y, height of the base, radius and height of upright cylinders [m].
     walls : (solids,) bool or (solids, 3) float64

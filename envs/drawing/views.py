@@ -26,7 +26,7 @@ BODY_NUMBERS = TICKS_PER_METRE + 1
 """Numbers of a body."""
 
 BEHIND_M, OVER_M = 1.7, 1.5
-"""How far behind a robot, and how far above its top, the eye is that follows it [m]."""
+"""Distance behind a robot, and above its top, of the eye that follows it [m]."""
 
 
 class FloorViews:
@@ -37,9 +37,9 @@ class FloorViews:
     floor : Floor
         The floor to draw.
     radius, height : float
-        Of the robots' bodies [m].
+        Radius and height of the robots' bodies [m].
     colours : sequence of Colour
-        Of the robots.
+        Colours of the robots.
     """
 
     def __init__(self, floor: Floor, radius: float, height: float, colours: Sequence[Colour]) -> None:
@@ -55,7 +55,7 @@ class FloorViews:
         poses : (robots, 3) float64
             x, y, theta [m, rad].
         size : (rows, columns)
-            Of the picture [pixels].
+            Size of the picture [pixels].
         """
         x_min, y_min, x_max, y_max = self.floor.bounds
         middle = np.array([(x_min + x_max) / 2.0, (y_min + y_max) / 2.0, 0.0])
@@ -140,7 +140,7 @@ def camera_panel(
     Parameters
     ----------
     poses, attitudes : (robots, 3) float64
-        Of the robots, see ``World``.
+        Poses and attitudes of the robots, see ``World``.
     depth : (rows, columns) float32
         The first robot's depth image [m].
 

@@ -1,4 +1,4 @@
-"""How episodes begin: floor, starts, seed and goal, drawn alike for one episode and for many."""
+"""Beginnings of episodes: floor, starts, seed and goal, drawn alike for one episode and for many."""
 
 import copy
 from collections.abc import Mapping, Sequence
@@ -115,7 +115,7 @@ class Beginnings:
     choice : FloorChoice
         The floor, or a set of which one is drawn.
     settings : ExplorationSettings
-        Of every episode.
+        Settings of every episode.
     episodes : int
         Number of these.
     curriculum : callable or None

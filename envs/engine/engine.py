@@ -70,7 +70,7 @@ class Engine:
     floor : Floors
         The floor, or floors of which each beginning draws one; see `FloorChoice`.
     settings : ExplorationSettings
-        Of every episode.
+        Settings of every episode.
     level : str, optional
         Type of an action: a name in the registry ``level``. ``velocity`` by default.
     image_resolution : float, optional
@@ -87,9 +87,9 @@ class Engine:
     rows : int
         Episodes x robots.
     observation_space, action_space : Space
-        Of one row.
+        Spaces of the observations and actions of one row.
     level : Level
-        How actions become motion.
+        The level, which converts actions to motion.
     operating : Operating
         The robots' operating states and orders.
     stations : list of Station
@@ -108,7 +108,7 @@ class Engine:
     floors : list of Floor
         The floor of each episode.
     starts : list of EpisodeStart
-        How each episode began.
+        Beginning of each episode.
 
     Raises
     ------

@@ -58,7 +58,7 @@ def _cores() -> int:
 
 
 def _shown(names: Iterable[str], total: int, processes: int) -> Iterable[str]:
-    """Pass names on, and show on standard error how many there were: a bar on a terminal, else a line."""
+    """Pass names on, and show their number on standard error: a bar on a terminal, otherwise a line."""
     about = f"lidarium: the first reset compiles kernels in {processes} processes; later ones find them"
     print(about, file=sys.stderr, flush=True)
     if not sys.stderr.isatty():

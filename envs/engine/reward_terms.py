@@ -1,4 +1,4 @@
-"""Terms of the reward besides those of the kernels: users register them."""
+"""Reward terms in addition to those of the kernels, registered by users."""
 
 from collections.abc import Callable
 from typing import Any, Protocol

@@ -31,7 +31,7 @@ class Run(NamedTuple):
     commands : (rows, 2) float64
         Speeds and turn rates of episodes that take one step; written in decisions [m/s, rad/s].
     longest : int
-        Most steps of a decision.
+        Maximum number of steps of a decision.
     waiting : (rows,) bool
         Scratch: robots whose targets were already done at the start of the decision.
     seen : (rows,) bool

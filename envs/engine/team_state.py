@@ -34,7 +34,7 @@ def team_state(
 
     Numbers of each robot (``ROBOT_NUMBERS``), then of the team (``TEAM_NUMBERS``), then two pictures of S x S
     cells, S = ``settings.state_cells``: the share of each cell that counts (F), and that the team has seen. A
-    picture's row 0 is at the lowest y; its cells are the least whole number of map cells with which the whole floor
+    picture's row 0 is at the lowest y; its cells are the smallest whole number of map cells with which the whole floor
     fits. Places are shares of its side from its lower left corner.
 
     Returns

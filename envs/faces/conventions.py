@@ -12,7 +12,7 @@ from lidarium.envs.simulation.endings import REASONS
 from lidarium.mapping.geometry.bounds import check_settings, share, shown, within
 
 MOST_FLOATS = 4096
-"""Most numbers of a message."""
+"""Maximum number of values of a message."""
 
 FORMS: dict[str, tuple[str, ...]] = {
     "observation": ("dict", "flat"),
@@ -192,7 +192,7 @@ def ending_number(reason: str | None) -> int:
 def flat_row_infos(infos: Mapping[str, Any], rows: int) -> dict[str, Any]:
     """Return the numbers among the infos of a batch, with names joined by a point, (rows,) float32 each.
 
-    Each has its mask besides it, as in Gymnasium's vector environments; all rows have all.
+    Each comes with its mask, as in Gymnasium's vector environments; all rows have all.
     """
     found = _rows(infos, "")
     reasons = infos.get("ended_because")
@@ -219,7 +219,7 @@ def _rows(values: Mapping[str, Any], prefix: str) -> dict[str, Any]:
 
 
 TEAM = "team"
-"""The term of the reward that the team's share brings, besides those that make up a robot's own."""
+"""The term of the reward due to the team's share, in addition to the terms of a robot's own reward."""
 
 
 def shared_rewards(

@@ -41,7 +41,7 @@ class MergedMaps(TeamWrapper):
     Attributes
     ----------
     events : list of MergeEvent
-        All of this episode, in their order.
+        All merges of this episode, in their order.
 
     Raises
     ------

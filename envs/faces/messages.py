@@ -47,7 +47,7 @@ class MessageBoard:
     Parameters
     ----------
     perception : Perception
-        Of all episodes, with their radio.
+        Onboard software of all episodes, with their radio.
     settings : ExplorationSettings
         The team of every episode.
     floats : int
@@ -73,7 +73,7 @@ class MessageBoard:
         self._heard = np.zeros((episodes, robots, robots, floats))
         self._heard_at = np.full((episodes, robots, robots), -1, np.int64)
         self._last = np.zeros(episodes, np.int64)
-        # Enough for the oldest that may still be on its way.
+        # Enough for the oldest message that may still arrive.
         on_the_way = round(settings.radio.latency_s / settings.time_step) + 2
         self._log: deque[_Sent] = deque(maxlen=on_the_way)
         high = np.concatenate([np.ones(floats), [OLDEST_S, 1.0]]).astype(np.float32)

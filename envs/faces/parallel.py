@@ -80,7 +80,7 @@ class ExplorationEnv(ParallelEnv[str, Any, Any]):
     scorer : Tally
         The true coverage over time.
     floor, goal, seed
-        Of the episode; ``seed`` is that of the noise.
+        Floor, goal and seed of the episode; ``seed`` is that of the noise.
 
     Raises
     ------
@@ -502,7 +502,7 @@ def _listed(values: Any) -> list[Any]:  # noqa: ANN401
 def _check_agents(actions: Any, agents: Collection[str]) -> None:  # noqa: ANN401
     """Check that actions are given by agent, and that there are such agents.
 
-    Those of agents that have ended are no error: trainers go on with them.
+    Actions of agents that have ended are not an error: trainers continue to send them.
 
     Raises
     ------

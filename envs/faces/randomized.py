@@ -17,10 +17,11 @@ from lidarium.envs.settings.reset_options import ResetOptions, checked_seed
 from lidarium.mapping.geometry.bounds import shown
 
 Distribution = Callable[[np.random.Generator], Any] | tuple[float, float] | list[Any]
-"""Of a setting: a callable of a generator; (low, high) for all between; a list of which each is as likely."""
+"""Distribution of a setting: a callable of a generator; (low, high) for a uniform one; a list of equally likely
+values."""
 
 Distributions = Mapping[str, Distribution]
-"""By the names of settings, such as ``lidar.noise_floor``."""
+"""Distributions by the names of settings, such as ``lidar.noise_floor``."""
 
 ROBOTS = "robots"
 """The setting by which teams differ in size."""
@@ -472,7 +473,7 @@ def check_spaces(
     made: tuple[spaces.Space[Any], spaces.Space[Any]],
     wanted: tuple[spaces.Space[Any], spaces.Space[Any]],
 ) -> None:
-    """Check that drawn settings leave the spaces of observations and actions as they are.
+    """Check that drawn settings leave the spaces of observations and actions unchanged.
 
     Raises
     ------

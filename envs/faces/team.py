@@ -32,7 +32,7 @@ class EpisodeTeam:
 
     @property
     def possible_agents(self) -> list[str]:
-        """All agents of the team."""
+        """Names of all agents of the team."""
         return list(self._index)
 
     @property

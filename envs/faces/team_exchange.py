@@ -50,7 +50,7 @@ def clusters_of(agents: Sequence[str], links: NDArray[np.bool_]) -> list[list[st
     Parameters
     ----------
     agents : sequence of str
-        All of them.
+        Names of all robots.
     links : (robots, robots) bool
         Which reach each other, see `check_links`.
     """
@@ -67,7 +67,7 @@ def clusters_of(agents: Sequence[str], links: NDArray[np.bool_]) -> list[list[st
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MergingSettings:
-    """How a team merges its maps.
+    """Settings by which a team merges its maps.
 
     Attributes
     ----------
@@ -76,10 +76,10 @@ class MergingSettings:
     known_starts : bool
         Whether the robots know how their frames lie, for comparison; nothing is searched for then.
     merge : MergeSettings
-        How maps are merged; by default as `lidarium merge` does.
+        Settings of map merging; by default those of `lidarium merge`.
     confirms : bool
         Whether two robots are joined only when their maps were found twice to be of one place and convince,
-        as a station joins them; else by the first finding.
+        as a station joins them; otherwise by the first match.
     """
 
     period_s: Annotated[float, above(0.0, 1e7)] = 1.0
@@ -102,7 +102,7 @@ class MergeEvent:
     a, b : str
         The robots.
     found, true : (x, y, theta)
-        Of b's map frame in that of a [m, rad].
+        Transform of b's map frame to that of a [m, rad].
     at : (x, y)
         Position at which errors are measured, the middle of the area known to both maps, in b's frame [m].
     is_direct : bool
@@ -124,9 +124,9 @@ class TeamExchange:
     Parameters
     ----------
     perception : Perception
-        Of all episodes.
+        Onboard software of all episodes.
     merging : MergingSettings
-        How.
+        Settings of merging.
     can_talk : (robots, robots) bool, callable or None
         Which robots reach each other, at all times or as a function (see `CanTalk`); if None, those that
         the radio joins.
@@ -138,7 +138,7 @@ class TeamExchange:
     team : TeamMapping
         Maps that the robots hold of each other.
     events : list of MergeEvent
-        All of this episode, in their order.
+        All merges of this episode, in their order.
 
     Raises
     ------
@@ -286,7 +286,7 @@ class MergedRows:
     engine : Engine
         The episodes.
     merging : MergingSettings
-        How.
+        Settings of merging.
 
     Attributes
     ----------
@@ -295,7 +295,7 @@ class MergedRows:
     arrays : dict of arrays
         The added observations of all rows, as of the last exchange; new arrays after each.
     teams : list of TeamExchange
-        Of each episode.
+        Exchange of each episode.
 
     Raises
     ------

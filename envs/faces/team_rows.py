@@ -42,12 +42,12 @@ class TeamRows:
     conventions : Conventions, optional
         The forms. Those of a plain environment by default.
     merging : MergingSettings, optional
-        How robots merge their maps. They do not by default.
+        Settings of map merging. No merging by default.
 
     Attributes
     ----------
     space, action_space : Space
-        Of the observations and actions of a row.
+        Spaces of the observations and actions of a row.
     columns : tuple
         Columns of each key in the flat form; see ``flat_columns``.
     rewards : (rows,) float64
@@ -125,7 +125,7 @@ class TeamRows:
         self.came_out(masked)
 
     def step_each(self, actions: Mapping[int, Any], names: list[str], after_step: AfterStep | None) -> None:
-        """Run all live episodes by actions of rows; robots without one go on with their last orders."""
+        """Run all live episodes by actions of rows; robots without one continue with their last orders."""
         engine = self.engine
         if self._board is not None:
             has_vectors = isinstance(engine.action_space, spaces.Box)

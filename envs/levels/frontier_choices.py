@@ -61,7 +61,7 @@ def expected_gain(log_odds: Array, row: int, column: int, rays: Array, reach: in
     rays : (rays, 2) float64
         See `ray_directions`.
     reach : int
-        How far the rays go [cells].
+        Range of the rays [cells].
     """
     rows, columns = log_odds.shape
     area = 0.0
@@ -110,7 +110,7 @@ def choose_offers(left: Array, sizes: Array, is_wanted: Array, by_size: int, ran
     left : (clusters,) array
         Rest of the budget at each cluster: more is cheaper.
     sizes : (clusters,) array
-        How long each is.
+        Size of each cluster.
     is_wanted : (clusters,) bool
         Which may be offered; overwritten.
     ranked : (offers,) int64
@@ -154,7 +154,7 @@ class Offers(NamedTuple):
         Position along the axes of the map frame from the robot's believed position, cost of the path and size [m] of
         each frontier, cheapest path first, zeros after the last.
     masks : (rows, offers + 1) int8
-        1 for allowed choices; the last is to stay.
+        1 for allowed choices; the last choice is to stay.
     counts : (rows,) int64
         Number of frontiers.
     targets, headings : (rows, offers, 2), (rows, offers) float64
@@ -182,7 +182,7 @@ class Choices(NamedTuple):
     is_chosen : (rows,) bool
         Whether the robot has chosen a frontier.
     targets, headings, cells : (rows, 2), (rows,), (rows, 2)
-        As they were offered.
+        Target and heading as they were offered.
     tried : (rows, 2) int64
         Cell of the last frontier that the robot was driving to, -1 for none.
     places, since : (rows, 2), (rows,) float64
@@ -212,11 +212,11 @@ class ViewReach(NamedTuple):
     least_size : float
         Shorter frontiers are offered only if there is no longer one [m].
     by_size : int
-        How many of the offers are the longest ones, the others are the cheapest.
+        Number of offers for the longest frontiers, the others are the cheapest.
     rays : (rays, 2) float64
         Directions by which gains are measured.
     range_cells : int
-        How far robots see [cells].
+        Range at which robots see [cells].
     """
 
     spans: NDArray[np.int64]
@@ -238,7 +238,7 @@ class Renewal(NamedTuple):
     reasons : (rows,) int8
         Result: why each robot's chosen frontier was given up, 0 if it was not.
     memory : (pieces, 5) int64
-        For the costs of paths, a piece for each thread, see ``SweepMemory``.
+        Scratch of the path costs, one for each thread, see ``SweepMemory``.
     """
 
     is_live: NDArray[np.bool_]

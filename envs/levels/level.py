@@ -35,11 +35,11 @@ class Turn(NamedTuple):
     acting : (rows,) bool
         Live robots of the episodes that run.
     given : (rows,) bool
-        Those of them that decide now; the others go on with their last orders.
+        Those of them that decide now; the others continue with their last orders.
     commands : (rows, 2) float64
         Speeds and turn rates for episodes that take one step [m/s, rad/s]; written by the level.
     modes : (episodes,) int8
-        How each episode runs: ``STEPS`` if it is to run, which the level may change to ``DECIDES``.
+        Mode of each episode: ``STEPS`` if it runs, which the level may change to ``DECIDES``.
     operating : Operating
         The operating states and orders of all robots.
     """
@@ -70,7 +70,7 @@ class Level(ABC):
     Attributes
     ----------
     action_space : Space
-        Of one robot.
+        Action space of one robot.
     boxes : dict
         Spaces of the observations that the level adds.
     period_s : float
@@ -126,7 +126,7 @@ class Level(ABC):
     def read(self, actions: Mapping[int, Any], names: list[str]) -> Any:  # noqa: ANN401
         """Decode actions by row; ``names`` are the agents of a team, for messages.
 
-        By default they are put into an array and given to `read_rows`.
+        By default they are combined in an array and passed to `read_rows`.
         """
         space, chosen = self.action_space, np.zeros(self.rows, np.bool_)
         values = np.zeros((self.rows, *(space.shape or ())), space.dtype)
@@ -192,7 +192,7 @@ def numbers_of(action: Any) -> NDArray[np.float64]:  # noqa: ANN401
 
 
 def add_info(infos: dict[str, Any], name: str, rows: Mask, values: list[Any]) -> None:
-    """Add an info for some rows, with the mask that Gymnasium's vector environments put besides it."""
+    """Add an info for some rows, with the mask that Gymnasium's vector environments add to it."""
     described = np.full(len(rows), None, object)
     for row, value in zip(np.flatnonzero(rows).tolist(), values, strict=True):
         described[row] = value

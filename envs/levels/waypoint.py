@@ -24,7 +24,7 @@ class Ways(NamedTuple):
     orders : Orders
         The target of each row.
     routes : dict of int to Route
-        Routes that are followed as they are, by row.
+        Routes that are followed unchanged, by row.
     """
 
     orders: Orders
@@ -105,7 +105,7 @@ class WaypointLevel(Level):
         return self.ways_to(positions + np.clip(shares, -1.0, 1.0) * self._half_side, live)
 
     def ways_to(self, targets: NDArray[np.float64], live: Mask) -> Ways:
-        """Return the ways of live rows to targets (rows, 2) in their map frames [m]."""
+        """Return the targets or routes of live rows to positions (rows, 2) in their map frames [m]."""
         return Ways(Orders(live.copy(), targets, np.full(self.rows, np.nan)), {})
 
     def _target(self, row: int, action: Any, name: str) -> Target:  # noqa: ANN401
@@ -122,7 +122,7 @@ class WaypointLevel(Level):
     def carry_out(self, decoded: Ways, turn: Turn) -> None:
         """Give robots their targets and plan; an episode in which a robot should end takes one step only.
 
-        A paused robot keeps its target, and an order of the station goes before the policy's choice.
+        A paused robot keeps its target, and an order of the station has priority over the policy's choice.
         """
         operating, modes = turn.operating, turn.modes
         is_assigned = turn.given & ~operating.held

@@ -24,7 +24,7 @@ class Rows:
     Parameters
     ----------
     simulation : Simulation
-        Of all episodes.
+        Simulation of all episodes.
     settings : ExplorationSettings
         The team of every episode.
     poses : KnownPoses or None

@@ -1,4 +1,4 @@
-"""Spaces of observations, with the actions besides them."""
+"""Spaces of observations, and of the actions that go with them."""
 
 import math
 
@@ -24,7 +24,7 @@ KERNEL_SUMMARIES = {
 
 
 KEYS = (*OBSERVABLES, "goal")
-"""All that the kernel writes, in the order in which it takes the arrays."""
+"""All keys that the kernel writes, in the order in which it takes the arrays."""
 
 
 def observed_keys(settings: ExplorationSettings, has_goal: bool) -> tuple[str, ...]:

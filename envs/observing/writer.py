@@ -27,7 +27,7 @@ class ObservationWriter:
     Parameters
     ----------
     simulation : Simulation
-        Of the robots.
+        Simulation of the robots.
     settings : ExplorationSettings
         Choice of observations; sizes, limits and threads.
     offsets : (rows, 2) float64

@@ -95,7 +95,7 @@ class KnownPoses:
     def table(self) -> NDArray[np.float64]:
         """Return the known state of all robots' teammates, (rows, robots - 1, 8), in a new array.
 
-        Of each of the others in their order: x, y [m], theta [rad]; x, y of its target [m], and 1 if it is
+        For each of the others in their order: x, y [m], theta [rad]; x, y of its target [m], and 1 if it is
         known; age of the pose [s], and 1 if that is known. Zeros if nothing is. All in the knowing robot's
         map frame. A target is known with a pose of this step.
         """
@@ -160,7 +160,7 @@ class KnownPoses:
     def teammates(self, row: int) -> dict[str, Teammate]:
         """Return the known state of a robot's teammates.
 
-        With known starts and the ideal radio these are their current poses, else the last reported ones.
+        With known starts and the ideal radio these are their current poses, otherwise the last reported ones.
         """
         if not self._settings.known_starts:
             return {}

@@ -26,7 +26,7 @@ class Meters:
     Attributes
     ----------
     is_active : bool
-        Whether anything has to be done in a step.
+        Whether a step changes anything.
     used_j : (rows,) float64
         Energy used since the beginning of the episode [J]; 0 if batteries have no limit.
     """

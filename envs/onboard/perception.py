@@ -52,7 +52,7 @@ class Perception:
     Attributes
     ----------
     memory : SearchMemory
-        For the searches of kernels, a piece for each thread.
+        Scratch of the searches in kernels, one for each thread.
     exchanges : list of Exchange
         The radio traffic of each episode; none if the radio is ideal.
     poses : KnownPoses

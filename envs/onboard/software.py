@@ -48,7 +48,7 @@ class Software:
     def start(self, episode: int, seed: int) -> None:
         """Begin an episode, after its robots were placed.
 
-        All draws use ``seed``.
+        All random draws use ``seed``.
         """
         robots = self._settings.robots
         if self._localizes:

@@ -15,7 +15,7 @@ from lidarium.mapping.sparse.exploring.views import Sight, View
 class SparseBelief:
     """A sparse map with its graph and the ground that was seen, ready to be planned on.
 
-    All places are x, y in the map frame of the robot [m].
+    All positions are x, y in the map frame of the robot [m].
 
     Attributes
     ----------
@@ -26,7 +26,7 @@ class SparseBelief:
     camera : GroundCamera
         The camera by which it was made.
     corrections : int
-        How often the localizer corrected the past, and the map with it.
+        Number of corrections of the past trajectory, and of the map with it.
     """
 
     navigation: SparseNavigation

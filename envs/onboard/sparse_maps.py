@@ -80,7 +80,7 @@ class SparseMapper:
     version : int
         Incremented when map or ground changes.
     corrections : int
-        How often poses of the past were corrected.
+        Number of corrections of past poses.
 
     Raises
     ------
@@ -176,7 +176,7 @@ class SparseMapper:
                 self.version += 1
 
     def correct(self, scans: KeyScans) -> None:
-        """Move all that was mapped with the poses of scans, as they are believed now.
+        """Move the map with the poses of the scans, as they are believed now.
 
         Each pose of the robot moves with the last scan before it.
         """

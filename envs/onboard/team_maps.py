@@ -103,7 +103,7 @@ class TeamMaps(NamedTuple):
     steps, fresh_at : (episodes,) int64
         The step of each episode, and the one at which its maps were last brought up to date.
     limit, stamp : int, (2 k + 1, 2 k + 1 and more) uint16
-        Of the clearance, see ``ClearanceField``.
+        Limit and stamp of the clearance, see ``ClearanceField``.
     """
 
     robots: int

@@ -33,7 +33,7 @@ class DepthCamera:
     field_of_view : float
         Horizontal angle that an image covers [rad]; pixels are square.
     depth_min, depth_max : float
-        Least and greatest depth that is measured [m].
+        Minimum and maximum depth that is measured [m].
     height : float
         Height of the optical centre above the floor [m].
     forward, left : float

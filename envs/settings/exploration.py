@@ -36,7 +36,7 @@ from lidarium.registry import REGISTRIES, registry
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SparseMapSettings:
-    """How a robot makes its sparse map; it does from when the map is first asked for.
+    """Parameters of a robot's sparse map, which it makes from the first request on.
 
     Attributes
     ----------
@@ -128,9 +128,9 @@ class ExplorationSettings:
     localizer : object or None
         Own settings of that localizer, of its class ``Settings``; None for its defaults.
     odometry : OdometrySettings
-        How well wheels measure the path.
+        Accuracy of the wheels' path measurement.
     radio : RadioSettings
-        How robots reach each other.
+        Radio links between the robots.
     faults : FaultSettings
         Faults of the robots.
     battery : Battery
@@ -162,9 +162,9 @@ class ExplorationSettings:
     pyramid_cells : int
         Side of each picture of the ``pyramid`` [cells of the picture], a multiple of 2.
     pyramid_levels : int
-        How many pictures the ``pyramid`` has.
+        Number of pictures of the ``pyramid``.
     frontiers : int
-        How many frontiers the level of frontiers offers at most.
+        Maximum number of frontiers that the level of frontiers offers.
     least_frontier : float
         Length of a frontier that is offered [m]; shorter ones are if there is no longer one.
     frontiers_by_size : float
@@ -175,7 +175,7 @@ class ExplorationSettings:
     raster_resolution : float
         Side of a cell of the world's raster [m]; the maps' cell is a whole multiple of it.
     decision_period_s : float
-        How long a waypoint or a frontier holds [s].
+        Maximum duration of a waypoint or a frontier [s].
     threads : int
         Threads of the kernels; the result does not depend on it.
     """

@@ -49,7 +49,7 @@ class _Product:
     of : callable
         The product, from the settings.
     most : float
-        How large it may be.
+        Maximum of the product.
     cure : str
         Which settings to change, and how.
     """

@@ -54,7 +54,7 @@ REALISM.register(
 
 
 CYCLES = Rule(int, bounds=within(1, 10**9))
-"""How many steps an episode may have."""
+"""Rule for the number of steps of an episode."""
 
 TIME_STEP = rules_of(ExplorationSettings)["time_step"]
 

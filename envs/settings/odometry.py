@@ -12,7 +12,7 @@ from lidarium.registry import Registry
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OdometrySettings:
-    """How well wheels measure the path.
+    """Accuracy of the wheels' path measurement.
 
     Attributes
     ----------
@@ -49,7 +49,7 @@ class OdometrySettings:
 
     @property
     def is_ideal(self) -> bool:
-        """Whether wheels measure exactly and drives do as they are commanded."""
+        """Whether wheels measure exactly and drives follow their commands exactly."""
         return self == OdometrySettings()
 
     @property

@@ -13,12 +13,12 @@ from lidarium.mapping.geometry.bounds import above, check_settings, share, withi
 from lidarium.registry import Registry
 
 RADIO_KINDS = ("all", "none", "range", "line_of_sight", "signal")
-"""How robots reach each other."""
+"""Types of radio links."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RadioSettings:
-    """How robots of a team reach each other.
+    """Radio links between the robots of a team.
 
     Attributes
     ----------

@@ -97,7 +97,7 @@ def of_number(curriculum: Curriculum | None, number: int) -> Mapping[str, Any]:
 def of_curriculum(
     curriculum: Curriculum | None, number: int, chosen: ResetOptions, robots: int
 ) -> ResetOptions:
-    """Return the options of an episode: the chosen ones, and those of a curriculum besides them."""
+    """Return the options of an episode: the chosen ones, and in addition those of a curriculum."""
     if curriculum is None:
         return chosen
     try:

@@ -249,10 +249,10 @@ ROBOTS.register(
 )
 
 LARGEST = ("radius", "height", "length", "width")
-"""Of a mixed team the largest counts."""
+"""Values for which a mixed team uses the maximum."""
 
 SMALLEST = ("cruise_speed", "max_speed", "max_turn_rate", "max_acceleration", "max_turn_acceleration")
-"""Of a mixed team the smallest counts."""
+"""Values for which a mixed team uses the minimum."""
 
 
 def kinds_of(names: Any) -> tuple[str, ...]:  # noqa: ANN401

@@ -132,7 +132,7 @@ class Beliefs:
         Of which teammates a robot knows the pose although not all are known, and these poses [m, rad]; the
         radio writes them.
     renderings : (rows,) int64
-        How often each map was rendered again.
+        Number of times that each map was rendered again.
     """
 
     def __init__(

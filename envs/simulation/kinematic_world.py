@@ -33,7 +33,7 @@ class KinematicWorld:
     episodes : int
         Number of episodes.
     odometry : OdometrySettings
-        How well wheels measure the path.
+        Accuracy of the wheels' path measurement.
     has_odometry : bool
         Whether dead reckoning is kept, even if wheels measure exactly.
     faults : FaultSettings

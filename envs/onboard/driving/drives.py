@@ -42,7 +42,7 @@ class Drives(NamedTuple):
     is_given : (rows,) bool
         Whether the path was given: if so, it is followed unchanged and not planned.
     paths, room : (rows, points, 2), (rows, points) float64
-        Points x, y in the frame of the believed pose [m], and the room besides the body on the piece that
+        Points x, y in the frame of the believed pose [m], and the room around the body on the piece that
         leads to each [m].
     cells : (rows, points, 2) int64
         The cells (row, column) of the points.
@@ -87,7 +87,7 @@ class Following(NamedTuple):
     unit_vectors : (2, beams) float64
         Directions of the beams.
     radii : (robots,) float64
-        Of the bodies [m].
+        Radius of the bodies [m].
     limits : (4,) float64
         Cruise speed, greatest turn rate, braking and length of a step [m/s, rad/s, m/s2, s].
     knows_teammates : bool

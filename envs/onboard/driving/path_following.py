@@ -26,7 +26,7 @@ IDLE, DRIVING, ARRIVED, BLOCKED = range(4)
 """States of a drive."""
 
 MAX_POINTS = MOST_POINTS
-"""Most points of a path."""
+"""Maximum number of points of a path."""
 
 LEAST_LOOKAHEAD, MOST_LOOKAHEAD = 0.08, 0.25
 """Distance ahead on its line at which a robot aims [m].
@@ -41,7 +41,7 @@ TURN_GAIN = 3.0
 """Turn rate per radian of heading error [1/s]."""
 
 TURN_IN_A_STEP = 0.5
-"""Most of a heading error that a robot turns away in one step, as a share."""
+"""Maximum share of a heading error that a robot corrects in one step."""
 
 PASSING_PER_ROOM, LEAST_PASSING, MOST_PASSING = 0.5, 0.015, 0.12
 """Distance at which a point of a path counts as passed.
@@ -92,7 +92,7 @@ class Courses(NamedTuple):
     Attributes
     ----------
     paths, margins : (robots, points, 2), (robots, points) float64
-        Points x, y [m], and the room besides the body on the piece that leads to each [m].
+        Points x, y [m], and the room around the body on the piece that leads to each [m].
     counts, places : (robots,) int64
         Number of points, and the point that each robot drives to now.
     headings : (robots,) float64

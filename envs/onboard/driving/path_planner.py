@@ -45,7 +45,7 @@ class PathPlanner:
     drives : Drives
         The drives of all robots; row = episode * robots + robot.
     footprint : Footprint
-        By which the robots plan.
+        Footprint by which the robots plan.
     shares_map : bool
         Whether robots plan on the team's map, if it reaches them.
 
@@ -69,7 +69,7 @@ class PathPlanner:
 
     @property
     def passage(self) -> Passage:
-        """How the robots pass over a map.
+        """Parameters of the robots' passage over a map.
 
         Read-only and shared, so not kept here: copies would be other types to kernels.
         """

@@ -33,7 +33,7 @@ class Planning(NamedTuple):
     contact, heard : (rows, robots) uint8, (rows, robots * 3) float64
         If not all poses are known: from which robots each heard lately, and their poses then [m, rad].
     radius : float
-        Of every body [m].
+        Radius of every body [m].
     resolution : float
         Side of a map cell [m].
     tight : float
@@ -41,11 +41,11 @@ class Planning(NamedTuple):
     farthest : float
         Clearance is measured up to this [m].
     limit, half_costs, roomy, least_clearance, preferred : as of ``Passage``
-        How a body passes over a map; written out, because loops on threads take no tuples within tuples.
+        Parameters of a body's passage over a map; written out, because loops on threads take no tuples within tuples.
     records, sharing : (maps, 10) int64 and int
         Records of the maps that the robots plan on, and how many rows share one.
     memory : (pieces, 6) int64
-        For searches, a piece for each thread.
+        Scratch of the searches, one for each thread.
     believed, origins, offsets : (rows, 3), (rows, 2), (rows, 2) float64
         Believed poses, lower left corners of the maps and origins of the map frames [m, rad].
     has_ended : (rows,) bool
@@ -86,7 +86,7 @@ class Destination(NamedTuple):
     heading : float
         Wanted heading at the end [rad], nan for any.
     maximum_cost : float
-        Most that the path may cost [m].
+        Maximum cost of the path [m].
     """
 
     row: int
@@ -124,7 +124,7 @@ def _place_along(first: int, last: int, step: int, steps: int, is_straight: bool
 
 @kernel
 def _room_before(cells: Array, k: int, closeness: Array, planning: Planning) -> float:
-    """Least room besides the body on the piece of a path that leads to its point k [m]."""
+    """Minimum room around the body on the piece of a path that leads to its point k [m]."""
     before = max(k - 1, 0)
     row, column, to_row, to_column = cells[before, 0], cells[before, 1], cells[k, 0], cells[k, 1]
     steps = max(abs(to_row - row), abs(to_column - column)) // 2 + 1

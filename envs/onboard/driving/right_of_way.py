@@ -19,7 +19,7 @@ from lidarium.mapping.planning.footprint import Footprint
 from lidarium.mapping.planning.grid_planning import Cell, Disc, Until, centres_of, discs_of, search
 
 FARTHEST_REFUGE = (3.0, 12.0, 40.0)
-"""How far a robot searches a place aside, in turn [m]."""
+"""Distances at which a robot searches a position aside, in this order [m]."""
 
 SAMPLE = 0.05
 """Distance between the points at which a path is compared with places [m]."""
@@ -61,7 +61,7 @@ def find_refuge(
     path : (N, 2) float64
         The path to keep off [m].
     distance : float
-        How far off [m].
+        Required distance [m].
 
     Returns
     -------
@@ -92,7 +92,7 @@ def find_refuge(
 
 
 DETOUR = 4.0
-"""Most extra cost at which a robot drives round a blocking teammate [m]."""
+"""Maximum extra cost at which a robot drives round a blocking teammate [m]."""
 
 NEAR = 0.6
 """Maximum gap to a teammate that may block a robot [m]."""
@@ -125,7 +125,7 @@ class RightOfWay:
         self._perception, self._settings, self._drives, self._planner = perception, settings, drives, planner
 
     def end_refuges(self, episode: int) -> None:
-        """Let robots of a team that gave way go on, if the others have passed."""
+        """Let robots of a team that gave way continue, if the others have passed."""
         for row in self._live(episode):
             self._end_refuge(row)
             if self._drives.passing[row] < 0 and self._drives.is_ordered[row]:
@@ -153,7 +153,7 @@ class RightOfWay:
         ]
 
     def _end_refuge(self, row: int) -> None:
-        """Let a robot that gave way go on.
+        """Let a robot that gave way continue.
 
         This is once the other has passed or enough time has gone by.
         """

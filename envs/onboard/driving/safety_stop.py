@@ -67,7 +67,7 @@ class Bodies(NamedTuple):
     unit_vectors : (2, beams) float64
         Directions of the beams.
     radii : (robots,) float64
-        Of the bodies [m].
+        Radius of the bodies [m].
     limits : (4,) float64
         Cruise speed, greatest turn rate, braking and length of a step [m/s, rad/s, m/s2, s].
     knows_teammates : bool
@@ -88,7 +88,7 @@ class Bodies(NamedTuple):
 
 @kernel(nrt=False)
 def _gap_in_scan(ranges: Array, unit_vectors: Array, radius: float) -> float:
-    """How far the disc can go straight ahead before it meets a return [m]."""
+    """Distance that the disc can move straight ahead before it meets a return [m]."""
     gap = np.inf
     for beam in range(ranges.shape[0]):
         distance = ranges[beam]

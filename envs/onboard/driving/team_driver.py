@@ -1,6 +1,6 @@
 """A driver of teams to their targets.
 
-It plans the robots' paths, keeps them while they are good, and settles who gives way.
+It plans the robots' paths, keeps them as long as they are clear, and decides which robot gives way.
 """
 
 import math
@@ -107,7 +107,7 @@ class TeamDriver:
     def assign(self, rows: NDArray[np.bool_], orders: Orders) -> None:
         """Give robots, those chosen by ``rows`` (rows,), their targets.
 
-        A robot that already has this target goes on with it.
+        A robot that already has this target continues.
         """
         drives = self.drives
         is_same_place = (drives.targets == orders.targets).all(axis=1)
@@ -132,7 +132,7 @@ class TeamDriver:
         )
 
     def follow(self, row: int, route: Route | None) -> None:
-        """Let a robot follow a route to its target unchanged; a robot that already follows it goes on.
+        """Let a robot follow a route to its target unchanged; a robot that already follows it continues.
 
         None leaves it without a path.
         """

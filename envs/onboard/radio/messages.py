@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from lidarium.mapping.geometry.rigid import Transform
 
 MOST_POINTS = 512
-"""Most points of a path."""
+"""Maximum number of points of a path."""
 
 
 class DriveState(Enum):
@@ -58,7 +58,7 @@ class Route:
     points : (P, 2) float64
         x, y from the robot's position to the target [m].
     room : (P,) float64
-        Room besides the body on the piece that leads to each point: if there is more of it, the robot cuts
+        Room around the body on the piece that leads to each point: if there is more of it, the robot cuts
         corners a little and drives faster through them [m].
     heading : float or None
         Heading to turn to at the end [rad]; None for any.
@@ -165,7 +165,7 @@ class Status:
     pose : Transform
         Believed pose.
     state : OperatingState
-        Whether it takes part in the work.
+        Its operating state.
     drive : DriveState
         State of its driving.
     target : Target or None
@@ -173,7 +173,7 @@ class Status:
     path_left_m : float
         Length of the rest of its path, 0 without one [m].
     travelled_m : float
-        How far it has come by its own odometry [m].
+        Length of its path by its own odometry [m].
     energy_left_j : float or None
         Energy left in its battery; None if it has no limit [J].
     pause_cause : str

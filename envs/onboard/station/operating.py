@@ -66,7 +66,7 @@ class OperatingEvent:
         the order; of a refused one the robot's state, ``no_driver`` (its level of decision knows no targets),
         ``outside`` or ``occupied`` (the target on its map).
     target : Target or None
-        Of an order to go somewhere, in the robot's map frame.
+        Target of an order to drive, in the robot's map frame.
     """
 
     time_s: float
@@ -92,7 +92,7 @@ class Operating:
     driver : TeamDriver or None
         Drives the robots to targets; None at the velocity level.
     states : list of OperatingState
-        Of each row.
+        State of each row.
     orders : list of Order or None
         The last order that each robot took.
     events : list of list of OperatingEvent
@@ -107,7 +107,7 @@ class Operating:
         Episodes in which a robot has paused by itself or got a late order since the last outcome, so that the basis
         of its decision has changed.
     is_active : bool
-        Whether anything has to be done in a step.
+        Whether a step changes anything.
     state_names, order_names : (rows,) object
         Names of states and last orders for infos; replaced, never changed.
     """
@@ -164,7 +164,7 @@ class Operating:
             driver.planner.held = self.held
 
     def is_addressed(self, row: int) -> bool:
-        """Whether a robot was ever given an order: it then goes on without actions of its policy."""
+        """Whether a robot was ever given an order: it then drives without actions of its policy."""
         return row in self._addressed
 
     def pause_cause(self, row: int) -> str:
@@ -316,7 +316,7 @@ class Operating:
         self.is_active = self._settings.pauses_when_blocked or is_busy
 
     def _rename(self, names: str, rows: slice | int, value: str) -> None:
-        """Replace names for infos: arrays that were handed out stay as they are."""
+        """Replace names for infos: arrays that were handed out do not change."""
         changed = getattr(self, names).copy()
         changed[rows] = value
         setattr(self, names, frozen(changed))

@@ -38,7 +38,7 @@ class Report(Status):
     start : Transform
         Start pose, in its map frame.
     frame : Transform or None
-        How its map frame lies in the floor's; None if it does not know: with unknown starts that are not
+        Transform of its map frame to the floor's; None if it does not know: with unknown starts that are not
         revealed to the station.
     """
 
@@ -105,7 +105,7 @@ class Station:
         self._first = episode * perception.settings.robots
         self._received: dict[int, Report] = {}
         if self._exchange is not None:
-            # A weak reference: else the maps of an environment that is dropped stay until garbage is collected.
+            # A weak reference: otherwise the maps of a discarded environment stay until garbage is collected.
             self._exchange.report_of = partial(_call, WeakMethod(self._status))
         self.start()
 

@@ -23,11 +23,11 @@ from lidarium.mapping.merging.joining import placed
 from lidarium.mapping.merging.settings import MergeSettings
 
 Frames = dict[tuple[str, str], Transform]
-"""By a robot and another: the transform of the other's map frame into its own."""
+"""Transforms by pairs of robots: from the second one's map frame to the first one's."""
 
 
 class _Joined(NamedTuple):
-    """How the frames of two robots lie.
+    """Relation between the frames of two robots.
 
     Attributes
     ----------
@@ -76,9 +76,9 @@ class TeamMapping:
     perception : Perception
         The onboard software with the robots' own maps and poses.
     settings : MergeSettings
-        How maps are merged.
+        Settings of map merging.
     episode : int
-        Of which episode.
+        Number of the episode.
     confirms : bool
         Whether maps are joined only by the criteria of `joining`; otherwise by the first match.
 

@@ -3,7 +3,7 @@
 Other robots may have mapped the robots themselves as walls.
 
 Robots that do not know the poses of the others draw their bodies into their maps. To a merger these are walls
-that contradict the free floor on which the other one drove, and on a merged map they bar the way.
+that contradict the free floor on which the other one drove, and on a merged map they block the path.
 """
 
 from collections.abc import Iterable
@@ -28,7 +28,7 @@ def without_own_trail(
     trail : (N, 2) float64
         Positions of the robot, in its map frame [m].
     radius, resolution : float
-        Of its body, and side of a cell [m].
+        Radius of its body, and side of a cell [m].
     """
     levels = one.levels.copy()
     levels[footprint_mask(one.levels.shape, one.origin, trail, radius, resolution)] = UNKNOWN
@@ -45,7 +45,7 @@ def without_bodies(
     trails : iterable of (N, 2) float64
         Positions of the others, in the frame of the map [m].
     radius, resolution : float
-        Of their bodies, and side of a cell [m].
+        Radius of their bodies, and side of a cell [m].
     """
     levels = one.levels.copy()
     for trail in trails:

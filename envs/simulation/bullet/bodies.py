@@ -19,7 +19,7 @@ OUTER_WALL = 1.0
 """Thickness of the walls around the bounds [m]."""
 
 _STRAIGHT = 1e-6
-"""By how much the corners of a box may be off [m]."""
+"""Tolerance of the corners of a box [m]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,7 +29,7 @@ class _Box:
     Attributes
     ----------
     centre, size : (3,) of float
-        Of the box [m].
+        Centre and size of the box [m].
     turn : float
         Direction of its first side [rad].
     """
@@ -142,7 +142,7 @@ SUBSTEP = 1.0 / 240.0
 """Length of a substep, at most [s]."""
 
 GRAVITY = 9.81
-"""Of the Earth [m/s2]."""
+"""Gravity of the Earth [m/s2]."""
 
 RAYS_AT_ONCE = 16_000
 """Rays of a call, of which PyBullet takes 16,384 at most."""
@@ -157,11 +157,11 @@ class Motion:
     Attributes
     ----------
     place : (3,) float64
-        Of its frame, which lies on the ground between its wheels [m].
+        Position of its frame, which lies on the ground between its wheels [m].
     axes : (3, 3) float64
         Its axes x, y, z in the columns.
     velocity, turning : (3,) of float
-        Of its centre of mass [m/s], and around the axes of the world [rad/s].
+        Velocity of its centre of mass [m/s], and angular velocity around the axes of the world [rad/s].
     """
 
     place: NDArray[np.float64]

@@ -27,7 +27,7 @@ LEAN = math.radians(2.0)
 """From this on a scan is taken along the tilted plane [rad]."""
 
 _OWN_BODY = 1e-3
-"""How far outside of its own body a ray begins [m]."""
+"""Distance outside its own body at which a ray begins [m]."""
 
 
 def scan_leaning(bodies: Bodies, robot: int, lidar: Lidar, ranges: NDArray[np.float32]) -> None:
@@ -170,7 +170,7 @@ class BulletWorld(KinematicWorld):
             self.collisions[row] += self.contacts[row] != 0 and not was_in_contact[robot]
 
     def _within_limits(self, row: int, robot: int) -> tuple[float, float]:
-        """Return speed and turn rate that the drive goes for in this step, as kernels have it."""
+        """Return the speed and turn rate that the drive aims at in this step, as kernels compute them."""
         body, wanted = self.team[robot], self.driven[row].tolist()
         limits, now = (body.max_speed, body.max_turn_rate), self.velocities[row].tolist()
         gains = (body.max_acceleration * self.time_step, body.max_turn_acceleration * self.time_step)

@@ -26,7 +26,7 @@ NEAR = 1e-3
 """Depth of the plane at which the rows of a face are bounded [m]."""
 
 OVERLAP = 1e-7
-"""By how much faces overlap beyond their edges, so that rounding leaves no gap between two [pixels]."""
+"""Overlap of faces beyond their edges, so that rounding leaves no gap between two [pixels]."""
 
 LEVEL = 1e-12
 """An edge whose line hardly changes along a row bounds rows, not columns."""

@@ -53,7 +53,7 @@ def plan_faults(
     time_step : float
         Length of a step [s].
     horizon_s : float or None
-        How long the episode lasts at most [s].
+        Maximum duration of the episode [s].
     places : (places, 2) float64
         Positions to which a robot may be kidnapped [m]; required if kidnapping is possible.
 

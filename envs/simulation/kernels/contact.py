@@ -65,7 +65,7 @@ class TeamBodies(NamedTuple):
     travelled : (robots,) float64
         Length of each robot's path [m].
     collisions : (robots,) int64
-        How often each robot came into contact.
+        Number of contacts of each robot.
     """
 
     bodies: Array

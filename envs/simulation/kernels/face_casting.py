@@ -65,7 +65,7 @@ def _draw_face(
 ) -> None:
     """Lower the ranges of the beams that meet a face.
 
-    The beams are those from ``first`` to ``last`` and some besides them. The face spans low to high along its run.
+    The beams are those from ``first`` to ``last`` and a few next to them. The face spans low to high along its run.
     """
     if first > last:
         return
@@ -94,7 +94,7 @@ def _list_faces(
 
     They face the laser. For each, distance, low and high end are listed.
 
-    Most branches on a single face could not be foreseen, so each is written down and counted if it is one.
+    A branch for each face would often be mispredicted, so every face is written, and counted only if it is in reach.
     """
     faces, starts, reach = table.faces, table.starts, beams.reach
     forward = direction & 1 == 0

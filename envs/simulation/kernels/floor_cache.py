@@ -194,7 +194,7 @@ class TablesCache:
     Attributes
     ----------
     nbytes : int
-        How much it keeps alive.
+        Maximum size of the kept values [bytes].
     """
 
     def __init__(self, max_bytes: int) -> None:
@@ -207,7 +207,7 @@ class TablesCache:
 
     @property
     def nbytes(self) -> int:
-        """How much the cache keeps alive."""
+        """Size of the kept values [bytes]."""
         return self._kept.nbytes + self._remembered.nbytes
 
     def get(self, key: str, make: Callable[[], FloorTables]) -> FloorTables:
@@ -256,7 +256,7 @@ def floor_tables(
 ) -> FloorTables:
     """Return the kernels' tables of a floor.
 
-    They are those of this process, else those of the store, else new ones.
+    They are those of this process, otherwise those of the store, otherwise new ones.
 
     Parameters
     ----------

@@ -7,7 +7,7 @@ long and straight. Which one runs is decided for each pose by the number of face
 on the pose and the floor alone.
 
 A ray ends as soon as it enters a solid cell. A ray that runs exactly through a corner of the lattice enters the
-cell besides it in x first.
+cell next to it in x first.
 """
 
 import math
@@ -220,7 +220,7 @@ def cast_by_squares(squares: Array, rows: int, columns: int, beams: Beams, range
 
 
 FACES, FACES_PER_BEAM = 300, 1.4
-"""Most faces in reach for which the face caster runs, alone and for each beam.
+"""Maximum number of faces in reach for which the face caster runs, alone and for each beam.
 
 The cost of a face is independent of the number of beams, the cost of travelling beams is not: the two casters took
 equal time at about 550 faces with 180 beams and at 1,300 with 720, over drawn, generated and real floors. Both give

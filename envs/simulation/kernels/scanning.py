@@ -28,7 +28,7 @@ from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.kernels.views import scratch_grid, scratch_vector
 
 RANGE_GAP = 1e-3
-"""Least difference between the range of a hit and the longest range [m].
+"""Minimum difference between the range of a hit and the maximum range [m].
 
 The longest range means no return in an observation.
 """
@@ -47,7 +47,7 @@ class ScanScratch(NamedTuple):
     Attributes
     ----------
     directions, lengths, ends : (4, beams), (beams,), (2, beams) float64
-        Of the beams, see ``beam_directions`` and ``scan_ends``.
+        Directions, lengths and ends of the beams, see ``beam_directions`` and ``scan_ends``.
     windows : (2, window rows, words) uint64
         Bits of the cells around the robot: those seen, and those in which beams ended.
     """
