@@ -184,7 +184,7 @@ def interrupts_held() -> Iterator[None]:
 def end_workers(grace_s: float = END_GRACE_S, *, are_ending: bool = False) -> None:
     """End all processes that this one has begun, and wait until they are gone.
 
-    A process that is stopped does not hear that it is to end; it is killed.
+    A stopped process does not receive the signal to end; it is killed.
     """
     processes = multiprocessing.active_children()
     if not are_ending:
@@ -209,7 +209,7 @@ def _kill_workers() -> None:
 def stopped_workers() -> list[int]:
     """Return the numbers of workers that are stopped (SIGSTOP, Ctrl-Z).
 
-    None if the system does not say.
+    None if the system does not provide it.
     """
     numbers = [process.pid for process in multiprocessing.active_children() if process.pid is not None]
     return [number for number in numbers if _state(number) in _STOPPED]

@@ -181,7 +181,7 @@ def counted(
 ) -> Iterator[T]:
     """Yield items and report how many there were.
 
-    A bar on a terminal, else a line every few seconds, on standard error.
+    A bar on a terminal, otherwise a line every few seconds, on standard error.
     """
     if not is_quiet and sys.stderr.isatty():
         from tqdm import tqdm
@@ -199,7 +199,7 @@ def counted(
 class Progress:
     """Report of an episode's progress.
 
-    A bar on a terminal, else a line every few seconds, on standard error.
+    A bar on a terminal, otherwise a line every few seconds, on standard error.
     """
 
     def __init__(self, is_quiet: bool, clock: Callable[[], float] = time.monotonic) -> None:

@@ -118,7 +118,7 @@ def _can_be_led(name: str) -> bool:
 
 @dataclass(frozen=True, kw_only=True)
 class FilmOptions:
-    """How films are made."""
+    """Options of films."""
 
     film_speed: Annotated[float, arg(aliases=["--video-speed"])] = 10.0
     """simulated seconds per second of a film"""
@@ -171,7 +171,7 @@ class ViewOptions:
     """Options of a view in the browser."""
 
     view: bool = False
-    """show the run in a browser while it goes (extra viewer); its address is printed"""
+    """show the run in a browser while it runs (extra viewer); its address is printed"""
     view_port: int = PORT
     """port of the page on this machine, 0 for any that is free"""
     view_stay: bool = False
@@ -188,7 +188,7 @@ def _check_view(options: ViewOptions) -> None:
 
 @contextmanager
 def opened_view(options: ViewOptions, policy: "Policy", name: str) -> Iterator["list[LiveView]"]:
-    """Serve a page while a run goes, and after it for as long as it is asked for."""
+    """Serve a page during a run, and afterwards as long as requested."""
     _check_view(options)
     if not options.view:
         yield []

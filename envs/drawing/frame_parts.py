@@ -130,7 +130,7 @@ def _span(is_used: NDArray[np.bool_], margin: int) -> slice:
 def blocks_of(levels: NDArray[np.uint8], view: View) -> NDArray[np.uint8]:
     """Return a map's three levels with blocks of cells as one.
 
-    That is if there are more cells than pixels; occupied cells show.
+    This is used if there are more cells than pixels; occupied cells show.
     """
     if view.block == 1:
         return levels

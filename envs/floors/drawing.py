@@ -93,7 +93,7 @@ def strip(segment: NDArray[np.float64], thickness: float, overhang: float = 0.0)
     thickness : float
         Width of the rectangle [m].
     overhang : float
-        How far it goes on beyond both ends [m].
+        Additional length beyond both ends [m].
 
     Returns
     -------

@@ -131,7 +131,7 @@ def convex_parts(solid: Solid) -> list[Points]:
     Returns
     -------
     list of (3 or more, 2) float64
-        Corners, counter-clockwise [m]: the outline itself if it is convex, else trapezoids.
+        Corners, counter-clockwise [m]: the outline itself if it is convex, otherwise trapezoids.
     """
     ring = _counter_clockwise(solid.polygon)
     if not solid.holes and _is_convex(ring):
@@ -213,7 +213,7 @@ def _trapezoids(edges: Points) -> list[Points]:
         crossing = np.flatnonzero((upward[:, 1] <= low) & (upward[:, 3] >= high))
         order = np.argsort(_x_at(upward[crossing], middle), kind="stable")
         pairs = crossing[order][: len(crossing) // 2 * 2].reshape(-1, 2).tolist()
-        # A trapezoid goes on while the same two edges bound it.
+        # A trapezoid continues while the same two edges bound it.
         here = {(left, right): begun.pop((left, right), low) for left, right in pairs}
         parts += [_trapezoid(upward[left], upward[right], base, low) for (left, right), base in begun.items()]
         begun = here

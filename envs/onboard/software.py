@@ -87,7 +87,7 @@ class Software:
         perception.sparse_maps.sense(runs)
 
     def _localize(self, episode: int) -> None:
-        """Let the robots of an episode find out if they are."""
+        """Localize the robots of an episode."""
         simulation, robots = self._perception.simulation, self._settings.robots
         world = simulation.world
         time_s = float(world.steps[episode]) * self._settings.time_step

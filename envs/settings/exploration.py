@@ -166,7 +166,7 @@ class ExplorationSettings:
     frontiers : int
         Maximum number of frontiers that the level of frontiers offers.
     least_frontier : float
-        Length of a frontier that is offered [m]; shorter ones are if there is no longer one.
+        Length of a frontier that is offered [m]; shorter ones are offered if no longer one exists.
     frontiers_by_size : float
         Share of the frontiers that are offered because they are the longest; the others are those with the
         cheapest way.

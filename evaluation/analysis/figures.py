@@ -78,13 +78,13 @@ class TimeFigure:
     Attributes
     ----------
     reached, size, cut : int
-        How many did, of how many, and how many were cut before the horizon without it.
+        Number of runs that did, of all runs, and of those cut before the horizon without it.
     success : Interval
         Share of the runs that did, up to the horizon.
     median : Interval
-        Of all runs; inf is later than the horizon.
+        Median time of all runs; inf is later than the horizon.
     restricted_mean : Interval or None
-        Of min(time, horizon); None if no run reached the share or if cuts leave it unknown.
+        Restricted mean, of min(time, horizon); None if no run reached the share or if cuts leave it unknown.
     """
 
     reached: int

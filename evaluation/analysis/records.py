@@ -97,7 +97,7 @@ def record_key(row: Row) -> Key:
 
 
 def read_track(entry: Entry) -> Track:
-    """Read ways and the last map of a record."""
+    """Read the paths and the last map of a record."""
     display = read_record(entry.path).display
     levels = without_small_components(display.map_at(float(display.times[-1])))
     return Track(

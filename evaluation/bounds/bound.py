@@ -1,4 +1,4 @@
-"""How soon a team that has the floor plan could have seen the floor.
+"""Bounds: the fastest exploration by a team that has the floor plan.
 
 The plan is feasible, so its time is an upper bound on the optimum; it is driven with the limits of the
 robots.
@@ -53,7 +53,7 @@ class Walk:
     points : (P, 2) float64
         x, y in the floor's frame, from the start on [m].
     room : (P,) float64
-        Room besides the body on the piece that leads to each [m].
+        Room around the body on the piece that leads to each [m].
     headings : (P,) float64
         Heading to turn to there [rad]; nan for none.
     """

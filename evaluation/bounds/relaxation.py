@@ -42,7 +42,7 @@ class _Relaxation:
     optimum_m : float
         Length of the shortest walks in all [m]; inf if it was not found.
     cuts : int
-        How many cuts were needed.
+        Number of cuts.
     """
 
     lower_m: float

@@ -37,7 +37,7 @@ class TourPlan:
     stops : list of list of int
         Places at which each robot's tour is anchored; it starts at the robot's start.
     walks : list of list of int
-        All places that each robot passes.
+        All positions that each robot passes.
     lengths : (robots,) float64
         Lengths of the tours [m].
     share : float
@@ -103,7 +103,7 @@ def cost_of(graph: ViewGraph, stops: Stops) -> float:
 def covered(graph: ViewGraph, stops: Stops, wanted: int) -> Stops:
     """Add stops to tours until that many points are seen.
 
-    It is each time the one that shows most for its way.
+    Each added stop shows the most points for its additional path.
     """
     tours = [list(tour) for tour in stops]
     by_robot = [graph.seen(walk_of(graph, robot, tour)) for robot, tour in enumerate(tours)]

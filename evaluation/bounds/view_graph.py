@@ -22,16 +22,16 @@ MOST_PLACES = 2500
 """Approximate maximum number of positions on a floor; it determines the size of the squares."""
 
 LEAST_SIDE = 0.3
-"""Least side of the squares [m]."""
+"""Minimum side of the squares [m]."""
 
 NARROW_M, NARROW_SIDE = 0.3, 0.15
-"""Passages with less room than this besides the body have positions this close to each other [m]."""
+"""Passages with less room than this around the body have positions this close to each other [m]."""
 
 TRIALS, FINER = 4, 0.75
 """Maximum number of finer lattices tried if positions are not connected, and the factor of their side."""
 
 SAMPLE_M = 0.1
-"""Distance of the points that are to be seen [m]."""
+"""Distance between the points to be seen [m]."""
 
 NEIGHBOURS = 2.9
 """Positions within this number of sides of a square are connected."""
@@ -46,7 +46,7 @@ class ViewGraph:
     places : (N, 2) float64
         x, y in the floor's frame [m]; the first ones are the start positions.
     room : (N,) float64
-        Room besides the body there [m].
+        Room around the body there [m].
     robots : int
         Number of start positions.
     links : (N, N) csr_array
@@ -58,7 +58,7 @@ class ViewGraph:
     views : (N, words) uint64
         Which points are seen from each place, a bit for each.
     points : (M, 2) int64
-        Cells (row, column) of the laser's raster that are to be seen.
+        Cells (row, column) of the laser's raster to be seen.
     laser : Raster
         Cells that lasers can see.
     """
@@ -118,7 +118,7 @@ def view_graph(
     starts : (robots, 2 or 3) float64
         Start positions [m].
     spacing : (float, float)
-        Least side of the squares of places, and distance of the points that are to be seen [m].
+        Minimum side of the squares of positions, and distance between the points to be seen [m].
     """
     if body.solid.shape != laser.solid.shape or body.origin != laser.origin:
         raise ValueError("the rasters of body and laser lie in different frames; want those of one floor")

@@ -217,7 +217,7 @@ def _united(extents: list[Extent]) -> Extent:
 def _panels(count: int, extent: Extent, bar: float) -> tuple[Figure, list[Axes]]:
     """Arrange equal panels of a floor's shape, with room for a colour bar [inch].
 
-    The colour bar is besides the panels.
+    The colour bar is at the side of the panels.
     """
     aspect = (extent[1] - extent[0]) / (extent[3] - extent[2])
     most = 3 if aspect < 2.2 else 2 if aspect < 4.0 else 1

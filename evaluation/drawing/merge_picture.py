@@ -28,7 +28,7 @@ from lidarium.mapping.merging.fusion import FusedMap, fuse
 from lidarium.mapping.merging.joining import Merged
 
 MOST_PANELS = 6
-"""Most panels of a picture."""
+"""Maximum number of panels of a picture."""
 
 MISS_M = 0.15
 """A wall contradicts if all within this distance is free [m]."""
@@ -45,7 +45,7 @@ class _Panel:
     names : list of str
         The maps; the drawing is in the frame of the first.
     layers : list of Laid
-        Each map as it is laid in the cells of that frame, bent if it was.
+        Each map as drawn in the cells of that frame, bent if it was.
     title : str
         Text below them.
     matched : list of (n, 2, 2) float64
@@ -59,7 +59,7 @@ class _Panel:
 
 
 def panels_of(merged: Merged, deformed: Sequence[Deformed] = ()) -> list[_Panel]:
-    """Return the panels: joined groups, and refused pairs of maps that join none, else the maps alone."""
+    """Return the panels: joined groups and refused pairs of maps outside them, otherwise the maps alone."""
     known = {name for name, levels in merged.levels.items() if (levels != UNKNOWN).any()}
     groups = [group for group in merged.groups() if len(group) > 1]
     if deformed:

@@ -169,7 +169,7 @@ def _draw_boxes(axes: Axes, samples: Sequence[NDArray[np.float64]]) -> None:
     A box is drawn if the sample is large enough for one.
     """
     chosen = colours(len(samples))
-    # Positions of dots say nothing; they come from a seed so that the picture is the same each time.
+    # Positions of dots have no meaning; they come from a seed so that the picture is reproducible.
     generator = np.random.default_rng(0)
     for place, (sample, colour) in enumerate(zip(samples, chosen, strict=True), 1):
         if len(sample) >= _FEWEST_FOR_BOX:

@@ -19,7 +19,7 @@ DrawOver = Callable[[ExplorationEnv, Frame, View], None]
 """Draws on a frame, given the environment and the view of the floor."""
 
 SHOWN_S = 4.0
-"""How long a film shows an order or a join [s]."""
+"""Time for which a film shows an order or a join [s]."""
 
 _JOIN_COLOUR = "#0f766e"
 

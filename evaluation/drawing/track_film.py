@@ -27,7 +27,7 @@ from lidarium.evaluation.drawing.record_frames import TrackFrames, known_at_end
 from lidarium.evaluation.record.episode_record import EpisodeRecord
 
 MOST_SIDE_BY_SIDE = 9
-"""Most records of one film."""
+"""Maximum number of records of one film."""
 
 GAP, LINE, BAR, TITLE = 6, 26, 6, 38
 """Between tiles; height of the line above a tile, of its bar, and of the line above all [pixels]."""

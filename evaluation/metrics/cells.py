@@ -215,6 +215,6 @@ def free_error_rate(believed_free: Mask, occupied: Mask) -> float:
     Parameters
     ----------
     believed_free, occupied : (rows, columns) bool
-        Cells that the map says are free, and the truth's occupied cells.
+        Free cells of the map, and occupied cells of the truth.
     """
     return share(believed_free & occupied, believed_free, empty=0.0)

@@ -223,7 +223,7 @@ def decision_percentiles(seconds: Sequence[float]) -> dict[str, float | None]:
 def peak_megabytes() -> float | None:
     """Return the most memory that this process has held so far [1e6 bytes].
 
-    None if the system does not say.
+    None if the system does not provide it.
     """
     try:
         import resource

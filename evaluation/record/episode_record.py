@@ -154,7 +154,7 @@ _SEED = Rule(int, bounds=within(0, math.inf))
 _ROBOTS = Rule(int, bounds=within(1, 64))
 
 MOST_MAP_WORDS = 1 << 22
-"""Most words of 64 cells of the map of a record."""
+"""Maximum number of words of 64 cells of the map of a record."""
 
 
 def _is_shape(value: Any) -> bool:  # noqa: ANN401

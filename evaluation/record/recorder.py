@@ -44,7 +44,7 @@ def made_with(backend: str) -> dict[str, str]:
 
 
 FAR = 1e5
-"""How far from a robot a map may have changed that was rendered again [m]."""
+"""Maximum distance from a robot at which a map that was rendered again may have changed [m]."""
 
 
 class MapSampler:
@@ -236,7 +236,7 @@ class Recorder(Watcher):
         self._events.append({"time_s": round(time_s, 6), "kind": kind, "agent": agent, **details})
 
     def finish(self, *, is_interrupted: bool = False) -> EpisodeRecord:
-        """Return the record of the episode so far; recording may go on."""
+        """Return the record of the episode so far; recording may continue."""
         env = self._env
         if env is None or env.floor is None:
             raise ValueError(

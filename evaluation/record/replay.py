@@ -46,7 +46,7 @@ _ARRAYS = (
 def state_sha256(env: ExplorationEnv) -> str:
     """Return a hash of the state of an environment's world, to the bit.
 
-    It covers the number of steps; true and believed poses, velocities, scans, bumpers and contacts; ways,
+    It covers the number of steps; true and believed poses, velocities, scans, bumpers and contacts; paths,
     collisions and counts of seen cells; the scorer's masks and the robots' maps; and why each robot ended. It does
     not cover derived data: observations, plans, clearance.
     """
@@ -176,7 +176,7 @@ def _settings_of(header: dict[str, Any]) -> ExplorationSettings:
 
 
 def find_floor(header: dict[str, Any], floor: str | Path | Floor | None = None) -> Floor:
-    """Return the floor of a record: the given one, else the one that the record names."""
+    """Return the floor of a record: the given one, by default the one that the record names."""
     names = (
         [floor]
         if floor is not None

@@ -32,13 +32,13 @@ from lidarium.mapping.files.guarded_reading import printable
 from lidarium.mapping.grids.occupancy import FREE, OCCUPIED, UNKNOWN
 
 MAP_PERIOD_S, SCAN_PERIOD_S = 1.0, 0.4
-"""Least time between samples of maps, and of scans [s]; that of scans is a multiple of that of poses."""
+"""Minimum time between samples of maps, and of scans [s]; that of scans is a multiple of that of poses."""
 
 MOST_MAPS, MOST_SCANS = 600, 1500
-"""Most samples of an episode: those of a longer one are further apart."""
+"""Maximum number of samples of an episode; those of a longer one are further apart."""
 
 MOST_BEAMS = 60
-"""Most beams of a scan of the page."""
+"""Maximum number of beams of a scan of the page."""
 
 
 @dataclass(slots=True)
@@ -127,7 +127,7 @@ class ReplaySampler(Watcher):
             samples.believed.append(believed_on_floor(env))
 
     def _places(self, env: ExplorationEnv) -> NDArray[np.float64]:
-        """Return if robots are and believe to be, (2 robots, 2) [m]."""
+        """Return the true and believed positions of the robots, (2 robots, 2) [m]."""
         return np.concatenate([env.world.poses[:, :2], believed_on_floor(env)[:, :2]])
 
     def _sample_maps(self, env: ExplorationEnv, *, is_whole: bool = False) -> None:
@@ -189,7 +189,7 @@ class Replay:
     text : str
         Output of `packed`.
     lacks : str
-        Why scans, the truth and own maps are not there; empty if they are.
+        Reason why scans, the truth and own maps are missing; empty if they are present.
     """
 
     title: str

@@ -24,7 +24,7 @@ from lidarium.evaluation.report.tables import code, plain
 from lidarium.mapping.files.output import check_writable, check_written, write_text
 
 REPLAYS = 30
-"""Most episodes that the page replays."""
+"""Maximum number of episodes that the page replays."""
 
 PAGE = "report.html"
 """The page that a browser shows."""

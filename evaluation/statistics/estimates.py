@@ -112,7 +112,7 @@ def mean_interval(
 def interquartile_mean(values: ArrayLike) -> float:
     """Return the mean of the middle half.
 
-    Of the values at its ends only the part that lies within counts.
+    Values at its ends count only in part.
     """
     ordered = np.sort(checked_values(values))
     return float(_middle_means(np.ones((1, len(ordered)), np.uint16), ordered)[0][0])

@@ -38,9 +38,9 @@ class Interval:
     low, high : float
         Ends of the interval, -inf or inf if the sample does not bound it.
     confidence : float
-        How often such an interval holds the truth.
+        Probability that such an interval holds the truth.
     size : int
-        How many values, pairs or runs it is made of.
+        Number of values, pairs or runs.
     """
 
     estimate: float
@@ -94,7 +94,7 @@ def checked_confidence(confidence: float) -> float:
 Counts = NDArray[np.uint16]
 
 RESAMPLES = 10_000
-"""Resamples of an interval unless something else is asked for."""
+"""Number of resamples of an interval by default."""
 
 FEWEST_RESAMPLES = 100
 MOST_VALUES = 65_535

@@ -21,10 +21,10 @@ MOST_SUITE_BYTES = 1 << 20
 """Longest file of a suite."""
 
 MOST_EACH = 1_000_000
-"""Most policies, floors, teams, seeds or variants."""
+"""Maximum number of policies, floors, teams, seeds or variants."""
 
 MOST_TRIALS = 10_000_000
-"""Most episodes of a suite."""
+"""Maximum number of episodes of a suite."""
 
 ROBOTS = Rule(int, bounds=within(1, 64))
 SEED = Rule(int, bounds=within(0, 2**63 - 1))
@@ -153,7 +153,7 @@ class Suite:
     image_resolution : float or None
         Metres per pixel, if floors are plain images.
     policy_settings : dict
-        By a name among the policies: options that the policy is made with, and ``policy``, which one it is,
+        By a name among the policies: options of the policy, and ``policy``, the policy itself,
         if the name is another.
     """
 

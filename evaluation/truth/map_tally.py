@@ -50,7 +50,7 @@ class CountedMaps(NamedTuple):
     bits : (robots + 1, rows, words, 2) uint64
         Cells that each robot's own map knows, and those of them that it has as free; the team's map comes last.
     disputed : (rows, words) uint64
-        Cells of F of which one map says that they are free, and another that they are not.
+        Cells of F that are free on one map, and not free on another.
     counts : (robots + 1, 3) int64
         Of the team, known cells within ``KNOWABLE`` and ``VALID``; free cells within ``COUNTED`` of the map
         that all robots share, else of each robot's.
@@ -351,7 +351,7 @@ class MapTally:
         self.shares = shares_one_map(env)
 
     def note_step(self, env: ExplorationEnv) -> None:
-        """Note if maps have changed; wanted after every step."""
+        """Record changes of the maps; call this after every step."""
         note_changes(env.beliefs.windows, self._last.changes)
 
     def take_in(self, env: ExplorationEnv) -> None:

@@ -93,7 +93,7 @@ class Controls:
 
     @property
     def speed(self) -> float:
-        """Simulated seconds per second, above 0; inf for as fast as it goes."""
+        """Simulated seconds per second, above 0; inf for the maximum speed."""
         return SPEEDS[str(self._speed.value)]
 
     @property

@@ -1,4 +1,4 @@
-"""The state of a run at one time that a page shows, besides maps: bodies, scans, paths, plans, boxes."""
+"""The state of a run at one time for a page, without maps: bodies, scans, paths, plans, boxes."""
 
 from dataclasses import dataclass
 
@@ -12,7 +12,7 @@ from lidarium.evaluation.episodes.watching import WatchedExploration
 from lidarium.evaluation.truth.beliefs import believed_on_floor
 
 MOST_TRAIL, MOST_BEAMS, MOST_POINTS = 1500, 360, 6000
-"""Most points of a path that was driven, of a scan, and of a depth image's cloud."""
+"""Maximum number of points of a driven path, of a scan, and of a depth image's cloud."""
 
 NO_POINTS = np.zeros((0, 2))
 NO_CLOUD = np.zeros((0, 3), np.float32)
@@ -140,7 +140,7 @@ def _on_floor(env: ExplorationEnv, row: int, points: NDArray[np.float64]) -> NDA
 
 
 def _trails(env: ExplorationEnv) -> NDArray[np.float64]:
-    """Return if the robots have been, (T, robots, 2), thinned out."""
+    """Return the past positions of the robots, (T, robots, 2), thinned out."""
     track = env.scorer.track
     shown = track[:: max(-(-len(track) // MOST_TRAIL), 1)]
     return np.stack([*(poses[:, :2] for _, poses in shown), env.world.poses[:, :2]])

@@ -140,7 +140,7 @@ class TeamMaps:
     corner : (x, y)
         Lower left corner of the grid in the floor's frame [m].
     size : (width, height)
-        Of the grid [m].
+        Size of the grid [m].
     """
 
     def __init__(self, env: ExplorationEnv) -> None:
@@ -223,7 +223,7 @@ class RobotNodes:
         scene.add_label(
             f"{root}/name", agent, position=(0.0, 0.0, robot.height + 0.25), anchor="bottom-center"
         )
-        # In the floor's frame: a slow browser shows an old scan if it was, not turned with the body.
+        # In the floor's frame: a slow browser shows an old scan at its own pose, not turned with the body.
         self._scans = scene.add_frame(f"/scans/{agent}", show_axes=False)
         self._scan = scene.add_frame(f"/scans/{agent}/last", show_axes=False)
         self._hits = self._points(f"/scans/{agent}/last/hits", colour, 0.035)
@@ -324,7 +324,7 @@ FIELD_OF_VIEW = math.radians(50.0)
 """Upright angle that a browser sees at first [rad]."""
 
 PANEL_SHARE = 0.13
-"""How far to the right of the floor a browser looks at first, as a share of its distance."""
+"""Distance to the right of the floor at which the camera looks at first, as a share of its own distance."""
 
 BACKGROUND: Colour = (246, 247, 249)
 

@@ -14,7 +14,7 @@ HOST = "127.0.0.1"
 """Address at which browsers reach it: this machine only."""
 
 LONGEST_STOP_S = 1.0
-"""How long the end of a server is waited for [s]."""
+"""Maximum wait for the end of a server [s]."""
 
 MISSING = 'a view needs the package viser; pip install "lidarium[viewer]"'
 
@@ -45,12 +45,12 @@ def view_server(port: int) -> Iterator["ViserServer"]:
         console.quiet = was_quiet
 
     try:
-        if port not in (0, server.get_port()):  # taken since; viser goes on to the next
+        if port not in (0, server.get_port()):  # taken since; viser continues with the next
             raise OSError(_unusable(port, "Address already in use"))
         yield server
     finally:
         # New connections are refused at once. Browsers keep spare connections open, and viser waits some seconds for
-        # their end: that goes on in the background, and ends with the process.
+        # their end: that continues in the background, and ends with the process.
         ending = threading.Thread(target=stop, daemon=True)
         ending.start()
         ending.join(LONGEST_STOP_S)

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 DEFAULT_FOLDER = Path("merged")
 
 LEAST_SCALE = 0.01
-"""Least scale that can be given, and one over the greatest."""
+"""Minimum scale that can be given, and one over the maximum."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,7 +67,7 @@ class _Merge(Command):
     auto seeks it, as for a drawn plan
     """
     deform: bool = False
-    """bend the maps of each group until they agree; the first of each stays as it is"""
+    """bend the maps of each group until they agree; the first of each is unchanged"""
 
     def __post_init__(self) -> None:
         Command.__post_init__(self)
@@ -85,7 +85,7 @@ class _Merge(Command):
 
     @property
     def factor(self) -> float | None:
-        """By how much the second map has to grow; None if that is sought."""
+        """Scale of the second map; None to search for it."""
         if self.scale in ("fixed", "auto"):
             return 1.0 if self.scale == "fixed" else None
         try:

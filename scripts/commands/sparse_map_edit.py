@@ -28,7 +28,7 @@ class _EditSparseMap(Command):
     compiles: ClassVar[bool] = True
 
     map: Positional[Path]
-    """the map, as `lidarium sparse-map` writes it; it is left as it is"""
+    """the map, as `lidarium sparse-map` writes it; it is not changed"""
     remove: UseAppendAction[tuple[str, ...]] = ()
     """x,y,z,x,y,z: low and high corner of a space to clear [m]; may be given again"""
     add: UseAppendAction[tuple[str, ...]] = ()

@@ -80,7 +80,7 @@ MARGIN = 0.05
 """Clearance beyond that radius [m]."""
 
 START_CLEARANCE = 0.5
-"""Least distance of a start from all obstacles [m]."""
+"""Minimum distance of a start from all obstacles [m]."""
 
 STARTS = 3
 """Number of starts a floor has."""
@@ -206,14 +206,14 @@ class BuildingSettings:
         Width of hall or corridors between the middles of their walls [m], 1.2 to 4. Drawn: 1.3 to 1.6 for an
         apartment, 1.7 to 2.3 for an office, 1.5 to 2.4 for corridors.
     wall_thickness : float
-        Of the walls between rooms [m], 0.05 to 0.3.
+        Thickness of the walls between rooms [m], 0.05 to 0.3.
     outer_wall_thickness : float
-        Of the walls around the floor [m], 0.1 to 1; rounded to 0.1.
+        Thickness of the walls around the floor [m], 0.1 to 1; rounded to 0.1.
     room_size : (float, float)
         Smallest and largest frontage of a usual room [m]; baths and kitchens of apartments are narrower. The
         smallest is at least 2, the largest at least 1.5 times that.
     rotation : float
-        By which the floor is turned counter-clockwise [rad].
+        Counter-clockwise rotation of the floor [rad].
     """
 
     kind: str = "any"

@@ -22,7 +22,7 @@ MAX_TEXT_BYTES = 32 << 20
 """Longest text of a floor, unpacked: parsed it takes some twenty times as much."""
 
 MAX_POINTS = 250_000
-"""Most points of a drawing."""
+"""Maximum number of points of a drawing."""
 
 Part = TypeVar("Part")
 

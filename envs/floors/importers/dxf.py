@@ -1,6 +1,6 @@
 """Reads DXF drawings as floors: lines, polylines and curves are walls.
 
-Inserted blocks are taken apart. The drawing's unit says how large it is.
+Inserted blocks are taken apart. The drawing's unit gives its scale.
 
 References
 ----------
@@ -130,7 +130,7 @@ def _sifted_entities(codes: list[str], values: list[str]) -> Iterator[_Entity]:
 
 
 def _wall(entities: list[_Entity], place: int) -> tuple[int, Polyline | None]:
-    """Return of how many entities one is made, and the wall that it is if it can be read here."""
+    """Return the number of entities that form one, and the wall that it is if it can be read here."""
     entity, count = entities[place], 1
     if entity.kind == "POLYLINE":
         while place + count < len(entities) and entities[place + count].kind in ("VERTEX", "SEQEND"):
@@ -174,13 +174,13 @@ def _polyline(x: list[float], y: list[float], flags: str, plain: tuple[int, ...]
 _READERS = {"LINE": _line, "LWPOLYLINE": _light_polyline, "POLYLINE": _heavy_polyline}
 
 
-logging.getLogger("ezdxf").addHandler(logging.NullHandler())  # else it writes each repair to the console
+logging.getLogger("ezdxf").addHandler(logging.NullHandler())  # otherwise it writes each repair to the console
 
 CURVE_ERROR_M = 0.01
-"""How far the straight parts of a curve may be off it [m]."""
+"""Maximum deviation of the straight parts from a curve [m]."""
 
 CURVE_SHARE = 1e-4
-"""How far they may be off at least, as a share of the size of the curve."""
+"""Minimum of that deviation, as a share of the size of the curve."""
 
 _METRES = {1: 0.0254, 2: 0.3048, 4: 0.001, 5: 0.01, 6: 1.0, 10: 0.9144, 14: 0.1}
 """Metres of a unit by the number that $INSUNITS has for it."""

@@ -39,7 +39,7 @@ Pose = NDArray[np.float64]
 def load(path: Path, resolution: float | None) -> Floor:
     """Read a world or a model.
 
-    Models whose collisions are meshes are refused, as are included models that are not besides the world.
+    Models whose collisions are meshes are refused, as are included models that are not next to the world file.
     """
     refuse_resolution(path, resolution)
     solids = [solid for solid in _solids(path, _root(path), np.eye(4), 0) if solid is not None]
@@ -103,7 +103,7 @@ def _model_name(include: Element) -> str:
 
 
 def _included(path: Path, include: Element) -> Path:
-    """Return the file of an included model, besides the world or in a folder ``models`` besides it."""
+    """Return the file of an included model, next to the world file or in a folder ``models`` next to it."""
     name = _model_name(include)
     for folder in (path.parent, path.parent / "models", path.parent.parent, path.parent.parent / "models"):
         for file in (folder / name / "model.sdf", folder / name):

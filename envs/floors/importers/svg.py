@@ -178,7 +178,7 @@ def _along(curve: PathSegment, shares: NDArray[np.float64]) -> list[complex]:
 
 RESOLUTION = 0.025
 MIN_WIDTH = 0.05
-"""Least width of a line [m]."""
+"""Minimum width of a line [m]."""
 
 _MARGIN = 0.5
 _FREE_ABOVE = 127 / 255
@@ -261,7 +261,7 @@ def load(path: Path, resolution: float | None) -> Floor:
             "a smaller --resolution"
         )
     solid, origin = np.zeros((rows, columns), np.uint8), (float(low[0]), float(low[1]))
-    # One over the other, as they are painted; those of one colour at once.
+    # One over the other, in the order of painting; those of one colour at once.
     for value, layers in itertools.groupby(itertools.chain.from_iterable(map(_layers, shapes)), _VALUE):
         _, insides, lines, widths = zip(*layers, strict=True)
         fill_shapes(solid, origin, RESOLUTION, [each for each in insides if each is not None], value)
@@ -319,7 +319,7 @@ def _kind(element: Element) -> str:
 def _style(element: Element, inherited: Style, classes: dict[str, Style]) -> Style:
     """Return the style of an element.
 
-    Its own goes before those of its classes, these before its attributes, these before inherited ones.
+    Its own style takes precedence over its classes, these over its attributes, these over inherited ones.
     """
     if not classes and _HAS_STYLE.isdisjoint(element.attrib):
         return inherited

@@ -145,7 +145,7 @@ class PathPlanner:
     def remaining(self, row: int) -> NDArray[np.float64]:
         """Return the rest of a robot's path, shape (N, 2) [m].
 
-        It begins if the robot is.
+        It begins at the robot's position.
         """
         place, count = int(self._drives.places[row]), int(self._drives.counts[row])
         here = self._perception.beliefs.believed[row : row + 1, :2]

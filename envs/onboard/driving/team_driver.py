@@ -233,7 +233,7 @@ class TeamDriver:
     def path(self, row: int) -> NDArray[np.float64]:
         """Return the rest of a robot's path, in its map frame, shape (N, 2) [m].
 
-        It begins if the robot is.
+        It begins at the robot's position.
         """
         return self.planner.remaining(row) - self._perception.poses.offset(row)
 

@@ -172,7 +172,7 @@ class Operating:
         return self._why_paused[row] if self.states[row] is OperatingState.PAUSED else ""
 
     def take_sent(self) -> dict[int, Target]:
-        """Return if robots have been ordered to go since the last call, by row."""
+        """Return the targets ordered since the last call, by row."""
         sent, self.sent = self.sent, {}
         return sent
 

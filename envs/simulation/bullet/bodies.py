@@ -262,7 +262,7 @@ class Bodies:
         return np.asarray(turned * self._wheel_radii / self._time_step)
 
     def motion(self, robot: int) -> Motion:
-        """Return if a robot is and how it moves."""
+        """Return the position and motion of a robot."""
         body, client = self._robots[robot], self.client
         centre, turn = client.call("getBasePositionAndOrientation", body)
         velocity, turning = client.call("getBaseVelocity", body)

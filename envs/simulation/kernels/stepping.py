@@ -234,7 +234,7 @@ def encode(table: Array, robots: int, velocities: Array, runs: Array) -> None:
 
 @kernel
 def sense(table: Array, robots: int, runs: Array) -> None:
-    """Take the scans of all robots that have not ended, if they are."""
+    """Take the scans of all robots that have not ended, at their current poses."""
     world = world_at(table)
     scratch = scan_scratch(world)
     for episode in range(runs.shape[0]):
