@@ -21,7 +21,10 @@ A goal is observed if the floor has one. Measurements of further sensors are in 
 """
 
 LEARNERS_SEE = ("scan", "velocity", "bumper", "map")
-"""Default observations of the makers of environments: with the absolute pose, policies may learn floors by heart."""
+"""Default observations of the makers of environments.
+
+The absolute pose is left out, because policies may learn floors by heart with it.
+"""
 
 GAINS = "frontier_gains"
 """Area expected to be newly seen at each frontier on offer."""
