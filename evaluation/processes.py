@@ -56,19 +56,19 @@ _entered: list["PatientInterrupt"] = []
 
 
 def is_end_asked() -> bool:
-    """Whether a ``PatientInterrupt`` that is entered has noted a signal: who waits within should not."""
+    """Whether an entered ``PatientInterrupt`` has received a signal; callers within it should then not wait."""
     return any(interrupt.is_asked for interrupt in _entered)
 
 
 class PatientInterrupt:
     """Context in which a first SIGINT is only noted, to be acted on between two steps.
 
-    So is a first SIGTERM, where a ``Termination`` handles it. A second one raises at once.
+    The same holds for a first SIGTERM if a ``Termination`` handles it. A second signal raises at once.
 
     An exception that is thrown into the middle of anything leaves it in the middle: a world half stepped, or
-    Numba with a loader that has died for good, after which no kernel can be called. Results that are kept
-    after an interrupt is therefore broken off if it is whole. Outside the main thread, and where an
-    application handles a signal in its own way, nothing is changed.
+    Numba with a loader that has died for good, after which no kernel can be called. Work with results that are kept
+    after an interrupt is therefore interrupted only between whole steps. Outside the main thread, or if an
+    application handles a signal in its own way, nothing changes.
     """
 
     def __init__(self, grace_s: float = 0.0) -> None:
@@ -114,7 +114,7 @@ class PatientInterrupt:
 def heard_termination() -> Iterator[Any]:
     """Let SIGTERM end the run as Ctrl-C does.
 
-    Nothing changes outside the main thread, and where an application handles the signal in its own way.
+    Nothing changes outside the main thread, or if an application handles the signal in its own way.
     """
     termination = Termination()
     is_ours = (
@@ -139,7 +139,7 @@ def leave_at_the_next(code: int) -> None:
         return
 
     def leave(number: int, frame: FrameType | None) -> None:
-        with suppress(BaseException):  # whatever was under way when the signal came
+        with suppress(BaseException):  # any operation that the signal interrupted
             _kill_workers()
         os._exit(code)
 
@@ -184,7 +184,7 @@ def interrupts_held() -> Iterator[None]:
 def end_workers(grace_s: float = END_GRACE_S, *, are_ending: bool = False) -> None:
     """End all processes that this one has begun, and wait until they are gone.
 
-    A process that is stopped does not hear that it is to end; it is killed.
+    A stopped process does not receive the signal to end; it is killed.
     """
     processes = multiprocessing.active_children()
     if not are_ending:
@@ -200,7 +200,7 @@ def end_workers(grace_s: float = END_GRACE_S, *, are_ending: bool = False) -> No
 
 
 def _kill_workers() -> None:
-    """End all processes that this one has begun, at once, whatever they do."""
+    """End all child processes of this one at once."""
     for process in multiprocessing.active_children():
         with suppress(OSError):
             process.kill()
@@ -209,7 +209,7 @@ def _kill_workers() -> None:
 def stopped_workers() -> list[int]:
     """Return the numbers of workers that are stopped (SIGSTOP, Ctrl-Z).
 
-    None if the system does not say.
+    None if the system does not provide it.
     """
     numbers = [process.pid for process in multiprocessing.active_children() if process.pid is not None]
     return [number for number in numbers if _state(number) in _STOPPED]
@@ -263,7 +263,7 @@ def shared_out(
     while True:
         lost = yield from _in_pool(work, pending, max(workers, 1))
         for suspect in lost:
-            # Who brought the others down does it again, alone.
+            # The task that broke the other workers runs again, alone.
             suspects = yield from _in_pool(work, iter([suspect]), 1)
             if suspects:
                 reason = "its process died, twice: out of memory, or killed from outside"
@@ -285,7 +285,7 @@ def _in_pool(
     # Linear algebra reads its number of threads when it is loaded.
     for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(name, "1")
-    # Raised where it comes, an interrupt may fall into a callback of the pool, and be lost there.
+    # Raised at once, an interrupt could fall into a callback of the pool, and be lost there.
     with PatientInterrupt(GRACE_S) as interrupt:
         pool = ProcessPoolExecutor(workers, mp_context=context, initializer=_begin_worker)
         is_whole, watch = False, _Watch()
@@ -348,7 +348,7 @@ class _Watch:
 def _attempted(work: Callable[[Task], Result], task: Task) -> Result | Exception:
     try:
         return _done(work, task)
-    except Exception as error:  # whatever it is, it is the task's result
+    except Exception as error:  # any error is the task's result
         if is_wrapped_interrupt(error):
             raise KeyboardInterrupt from error
         return error
@@ -382,7 +382,7 @@ def _begin_worker() -> None:
 def _leave_with_parent() -> None:
     """End this process when its parent is gone.
 
-    The parent may have been killed, which leaves nobody to take the results.
+    The parent may have been killed, so that the results are not read.
     """
     parent = multiprocessing.parent_process()
     if parent is not None:

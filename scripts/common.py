@@ -56,20 +56,20 @@ class TeamCommand(Command):
     realism: str = "ideal"
     """how real the world is: ideal, lab or field; the options below change parts of it"""
     backend: str | None = None
-    """what moves the bodies: kinematic or bullet; `lidarium show backends` lists them"""
+    """simulation of the bodies: kinematic or bullet; `lidarium show backends` lists them"""
     noise: str | None = None
     """noise of the laser's ranges: none, datasheet or thesis"""
     odometry: str | None = None
     """how well wheels measure the path: ideal, good, typical or poor"""
     localization: str | None = None
-    """who says where a robot is: truth, odometry or a localizer.
+    """source of the robots' poses: truth, odometry or a localizer.
 
     `lidarium show localizers` lists them
     """
     radio: str | None = None
     """how robots reach each other: all, none, range, line_of_sight or signal"""
     battery: str | None = None
-    """what energy the robots have: none (no limit) or kobuki.
+    """energy of the robots: none (no limit) or kobuki.
 
     `lidarium show batteries` lists them
     """
@@ -79,7 +79,7 @@ class TeamCommand(Command):
     They pause until they are commanded to resume.
     """
     unknown_starts: bool = False
-    """robots do not know where they start, nor if the others do"""
+    """robots do not know their start poses, nor those of the others"""
     map_resolution: float = 0.025
     """side of a cell of the maps, a whole multiple of 0.025 [m]"""
 
@@ -139,7 +139,7 @@ class Answer:
 def notify(message: str) -> None:
     """Print a message on standard error.
 
-    If nobody reads it any more the work goes on all the same.
+    If the reader closes it, the work continues.
     """
     with suppress(OSError, ValueError):  # ValueError: the stream is closed
         print(message, file=sys.stderr, flush=True)
@@ -181,7 +181,7 @@ def counted(
 ) -> Iterator[T]:
     """Yield items and report how many there were.
 
-    A bar on a terminal, else a line every few seconds, on standard error.
+    A bar on a terminal, otherwise a line every few seconds, on standard error.
     """
     if not is_quiet and sys.stderr.isatty():
         from tqdm import tqdm
@@ -199,7 +199,7 @@ def counted(
 class Progress:
     """Report of an episode's progress.
 
-    A bar on a terminal, else a line every few seconds, on standard error.
+    A bar on a terminal, otherwise a line every few seconds, on standard error.
     """
 
     def __init__(self, is_quiet: bool, clock: Callable[[], float] = time.monotonic) -> None:

@@ -23,7 +23,7 @@ POLL_S = 0.5
 
 
 def compile_first(is_quiet: bool) -> None:
-    """Compile the kernels of a run where most of them are not yet in the cache.
+    """Compile the kernels of a run if most of them are not yet in the cache.
 
     Each process takes the next kernel of the list and keeps it in the cache, if this process finds it. A kernel
     that cannot be compiled so is left to its first call.

@@ -70,7 +70,7 @@ def _ended(arguments: Sequence[str] | None) -> int:
         return DONE
     try:
         return _answered(list(sys.argv[1:] if arguments is None else arguments))
-    except SystemExit as leaving:  # tyro, having printed help (0) or what is wrong with the options (2)
+    except SystemExit as leaving:  # tyro, after it printed help (0) or an error in the options (2)
         return leaving.code if isinstance(leaving.code, int) else BAD_INPUT
     except (ValueError, OSError) as error:
         notify(f"lidarium: {_message(error)}")
@@ -143,7 +143,7 @@ def _options(execute: Callable[[Any], Answer], name: str, words: list[str]) -> C
     options: type[Command] = get_type_hints(execute)[parameter]
     try:
         return tyro.cli(options, prog=f"lidarium {name}", args=words, config=config)
-    except BrokenPipeError as error:  # nobody reads the help to its end
+    except BrokenPipeError as error:  # the reader of the help has ended
         _silence(sys.stdout)
         raise SystemExit(DONE) from error
 
@@ -157,7 +157,7 @@ def _message(error: Exception) -> str:
 def _open_closed_streams() -> None:
     """Give this process the standard streams that it was started without.
 
-    They lead to nowhere. A file opened later would take their numbers else, and whatever is printed would be
+    They lead to nowhere. Otherwise a file opened later would take their numbers, and all output would be
     written into it.
     """
     for number in range(3):

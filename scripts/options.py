@@ -90,7 +90,7 @@ def supervisor_options(assignments: Iterable[str]) -> dict[str, Any]:
 
 
 def is_supervised(name: str) -> bool:
-    """Return whether a policy is led by a supervisor whose settings can be set."""
+    """Return whether a policy is led by a configurable supervisor."""
     from lidarium.agents import make_policy
     from lidarium.agents.supervisor.policy import Supervised
 
@@ -98,7 +98,7 @@ def is_supervised(name: str) -> bool:
 
 
 def check_supervised(name: str) -> None:
-    """Check that a policy is led by a supervisor whose settings can be set."""
+    """Check that a policy is led by a configurable supervisor."""
     from lidarium.agents import policy_names
 
     if not is_supervised(name):
@@ -118,7 +118,7 @@ def _can_be_led(name: str) -> bool:
 
 @dataclass(frozen=True, kw_only=True)
 class FilmOptions:
-    """How films are made."""
+    """Options of films."""
 
     film_speed: Annotated[float, arg(aliases=["--video-speed"])] = 10.0
     """simulated seconds per second of a film"""
@@ -137,7 +137,7 @@ class FilmOptions:
 
 @dataclass(frozen=True, kw_only=True)
 class FilmFiles(FilmOptions):
-    """Where films of records are written to."""
+    """Output files for films of records."""
 
     gif: Path | None = None
     """write a film as an animated picture; its name ends in .gif or .webp"""
@@ -171,7 +171,7 @@ class ViewOptions:
     """Options of a view in the browser."""
 
     view: bool = False
-    """show the run in a browser while it goes (extra viewer); its address is printed"""
+    """show the run in a browser while it runs (extra viewer); its address is printed"""
     view_port: int = PORT
     """port of the page on this machine, 0 for any that is free"""
     view_stay: bool = False
@@ -188,7 +188,7 @@ def _check_view(options: ViewOptions) -> None:
 
 @contextmanager
 def opened_view(options: ViewOptions, policy: "Policy", name: str) -> Iterator["list[LiveView]"]:
-    """Serve a page while a run goes, and after it for as long as it is asked for."""
+    """Serve a page during a run, and afterwards as long as requested."""
     _check_view(options)
     if not options.view:
         yield []

@@ -62,7 +62,7 @@ def write_run(
 
 
 def _save_view(path: Path, episode: "Episode") -> None:
-    """Draw the floor from above, with the robots where they ended."""
+    """Draw the floor from above, with the robots at their final poses."""
     import imageio.v3 as imageio
 
     from lidarium.envs.drawing.views import views_of
@@ -137,7 +137,7 @@ def _write_own_map(folder: Path, env: "ExplorationEnv", robot: int) -> None:
 
 
 def _team_maps(episode: "Episode") -> "TeamMaps":
-    """Return how the robots' maps lie: as a station knows, else as the robots do."""
+    """Return the transforms between the robots' maps: of a station if it exists, otherwise of the robots."""
     from lidarium.agents.report import JoinedGroup, TeamMaps
     from lidarium.envs.faces.merged_maps import true_frames
     from lidarium.mapping.geometry.rigid import Transform
@@ -181,7 +181,7 @@ class RunFilms:
 
     @property
     def seconds(self) -> float:
-        """How long the longest film is so far [s]."""
+        """Length of the longest film so far [s]."""
         return max((made.writer.seconds for made in self._films), default=0.0)
 
     def begin(self, folder: Path) -> None:
@@ -206,20 +206,20 @@ class RunFilms:
 
     @contextmanager
     def kept(self) -> Iterator[None]:
-        """Write the films at the end, or none of them if that is an error."""
+        """Write the films at the end, or no films after an error."""
         with self._open:
             yield
             self._env.watchers[:] = [each for each in self._env.watchers if each not in self._films]
 
 
 NAMED_GIVEN_UP = 5
-"""How many of the frontiers given up are named in the summary.
+"""Maximum number of frontiers given up that are named in the summary.
 
 Result.json has all.
 """
 
 NAMED_JOINS = 10
-"""How many joins are listed in the summary."""
+"""Maximum number of joins that are listed in the summary."""
 
 
 def run_summary(

@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     from lidarium.mapping.merging.pair import PairResult
 
 MOST_ALTERNATIVES = 5
-"""Most hypotheses of a pair that are written."""
+"""Maximum number of hypotheses of a pair that are written."""
 
 CONTRADICTS, WAITS = "contradicts stronger pairs of the group", "accepted once, and waits to be confirmed"
 """Why a pair that was accepted is not used."""
@@ -26,7 +26,7 @@ class PlacedMaps:
     pairs : mapping of (str, str) to PairResult
         Result of each pair, between lower left corners.
     corners : mapping of str to Transform
-        Of the lower left corner of each map of a pair in its frame.
+        Transform of the lower left corner of each map of a pair in its frame.
     used, dropped : collection of (str, str)
         Pairs that join the maps, and those that contradict stronger ones.
     """

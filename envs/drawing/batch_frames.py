@@ -13,12 +13,12 @@ TILE_SIZE = 320
 
 
 def batch_frames(scenes: Sequence[Scene], size: int = TILE_SIZE) -> list[Frame]:
-    """Draw scenes into pictures of one size, whatever their floors.
+    """Draw scenes into pictures of one size, independent of the sizes of their floors.
 
     Returns
     -------
     list of (rows, columns, 3) uint8
-        A picture for each; what a floor leaves of it is white.
+        A picture for each; the area outside a floor is white.
     """
     shape = with_header(np.zeros((size, size, 3), np.uint8), "", 0.0, 0.0).shape
     return [_padded(draw_frame(scene, size), shape) for scene in scenes]

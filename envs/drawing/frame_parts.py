@@ -19,7 +19,7 @@ SIZE = 960
 """Longer side of the floor in a frame by default [pixels]."""
 
 RECENT_S = 60.0
-"""How far back a robot's path is drawn [s]."""
+"""Time for which a robot's path is drawn [s]."""
 
 INK: Colour = (31, 41, 55)
 FAINT_INK: Colour = (107, 114, 128)
@@ -46,7 +46,7 @@ SHIFT = 4
 BORDER = 10
 
 LEAST_WIDTH = 360
-"""Of a frame with a header [pixels]."""
+"""Minimum width of a frame with a header [pixels]."""
 
 
 def team_colours(robots: int) -> list[Colour]:
@@ -63,7 +63,7 @@ def team_colours(robots: int) -> list[Colour]:
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """What part of a raster a frame shows, and how large.
+    """The part of a raster that a frame shows, and its scale.
 
     Attributes
     ----------
@@ -98,14 +98,14 @@ class View:
 
 
 def view_around(shown: NDArray[np.bool_], origin: tuple[float, float], resolution: float, size: int) -> View:
-    """Return the view on the cells of a grid that are to be shown.
+    """Return the view on the cells of a grid that should be shown.
 
     It has a margin, and its longer side is ``size`` pixels.
 
     Parameters
     ----------
     shown : (rows, columns) bool
-        What must be seen.
+        Cells that must be visible.
     origin : (x, y)
         Lower left corner of cell (0, 0) [m].
     resolution : float
@@ -130,7 +130,7 @@ def _span(is_used: NDArray[np.bool_], margin: int) -> slice:
 def blocks_of(levels: NDArray[np.uint8], view: View) -> NDArray[np.uint8]:
     """Return a map's three levels with blocks of cells as one.
 
-    That is if there are more cells than pixels; occupied cells show.
+    This is used if there are more cells than pixels; occupied cells show.
     """
     if view.block == 1:
         return levels
@@ -153,7 +153,7 @@ def enlarged(picture: Frame, view: View) -> Frame:
 
 
 def draw_paths(frame: Frame, view: View, ways: NDArray[np.float64], colours: Sequence[Colour]) -> None:
-    """Draw the ways of robots, positions (times, robots, 2) [m]."""
+    """Draw the paths of robots, positions (times, robots, 2) [m]."""
     thickness = max(round(0.04 * view.scale), 2)
     for robot, colour in enumerate(colours):
         cv2.polylines(frame, [view.pixels(ways[:, robot])], False, colour, thickness, cv2.LINE_AA, SHIFT)
@@ -188,7 +188,7 @@ def draw_robots(
 
 
 def pale(colour: Colour) -> Colour:
-    """Return a colour mixed with white, for what is free on the map of a robot of this colour."""
+    """Return a colour mixed with white, for free cells on the map of a robot of this colour."""
     red, green, blue = ((channel + 2 * 255) // 3 for channel in colour)
     return red, green, blue
 
@@ -249,7 +249,7 @@ def draw_bar(line: Frame, share: float) -> None:
 
 
 def _plain(text: str) -> str:
-    """Keep what OpenCV's fonts can write."""
+    """Keep the characters that OpenCV's fonts can write."""
     return text.encode("ascii", "replace").decode()
 
 

@@ -9,7 +9,7 @@ from lidarium.envs.drawing.frame_parts import Frame
 class FrameWindow:
     """A window that shows frames.
 
-    If there is no display it says so once and does nothing.
+    Without a display it prints a message once and does nothing.
 
     Parameters
     ----------

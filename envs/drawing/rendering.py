@@ -1,6 +1,6 @@
 """Frames of the floor from above.
 
-They show what is explored, the robots and what their lasers see.
+They show the explored area, the robots and the range of their lasers.
 """
 
 from collections.abc import Callable
@@ -37,17 +37,17 @@ _NEAR = 0.125
 _FAN_OPACITY = 0.22
 _SOLID, _WALL, _UNEXPLORED, _NOT_COUNTED, _EXPLORED = range(5)
 PALETTE = np.array([BACKGROUND, WALL, UNEXPLORED, NOT_COUNTED, EXPLORED], np.uint8)
-"""Colours of what `classify` returns."""
+"""Colours of the classes of `classify`."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scene:
-    """What a frame shows.
+    """Content of a frame.
 
     Attributes
     ----------
     simulation : Simulation
-        Of one episode or many.
+        Simulation of one episode or many.
     settings : ExplorationSettings
         The team.
     name : str
@@ -93,9 +93,9 @@ def draw_frame(
 ) -> Frame:
     """Draw an environment from above.
 
-    The truth: free floor is faint where unexplored and white if the team has sensed it, walls are dark where the
-    team has been near. On it the robots with their headings, their last scans as fans, and their ways of the last
-    minute. Beside it, if robots have cameras, what the first one sees.
+    True state: free floor is faint if unexplored and white if the team has sensed it, walls are dark if the
+    team has been near. On it the robots with their headings, their last scans as fans, and their paths of the last
+    minute. If robots have cameras, the view of the first one is at its side.
 
     Returns
     -------
@@ -123,7 +123,7 @@ def draw_frame(
 
 
 def _with_panel(frame: Frame, scene: Scene, tables: FloorTables) -> Frame:
-    """Put what the first robot's camera sees beside a frame, if there is a camera."""
+    """Put the camera view of the first robot next to a frame, if it has a camera."""
     sensor, world = scene.simulation.camera, scene.simulation.world
     if sensor is None or tables.floor is None:
         return frame
@@ -177,7 +177,7 @@ def _shrunk(cells: NDArray[np.uint8], block: int) -> NDArray[np.uint8]:
 def classify(
     solid: NDArray[np.uint8], seen: NDArray[np.uint8], counted: NDArray[np.uint8], resolution: float
 ) -> NDArray[np.uint8]:
-    """Return what each cell is drawn as, an index into `PALETTE`.
+    """Return the class of each cell, an index into `PALETTE`.
 
     Parameters
     ----------
@@ -189,8 +189,8 @@ def classify(
     Returns
     -------
     (rows, columns) uint8
-        0 solid, 1 wall beside something sensed, 2 floor, 3 floor that does not count beside something sensed,
-        4 floor sensed.
+        0 solid, 1 wall next to a sensed cell, 2 floor, 3 floor that does not count next to a sensed cell, 4 sensed
+        floor.
     """
     side = 2 * max(round(_NEAR / resolution), 1) + 1
     near_seen = cv2.dilate(seen, np.ones((side, side), np.uint8))

@@ -54,7 +54,7 @@ class Viewpoint:
     Attributes
     ----------
     eye : (3,) float64
-        Where the eye is [m].
+        Position of the eye [m].
     axes : (3, 3) float64
         Directions to the right, down and ahead.
     field_of_view : float
@@ -148,7 +148,7 @@ def shade(
     Parameters
     ----------
     size : (rows, columns)
-        Of the picture [pixels].
+        Size of the picture [pixels].
     bodies : (N, 5) float64
         x, y, height of the base, radius and height of upright cylinders [m].
     walls : (solids,) bool or (solids, 3) float64
@@ -184,7 +184,7 @@ def shade(
 
 
 def _face_colours(faces: Faces, walls: NDArray[np.bool_] | NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the colour of each face (faces, 3): what it belongs to, lit from above on one side."""
+    """Return the colour of each face (faces, 3): the colour of its owner, lit from above on one side."""
     light = _LIGHT / np.linalg.norm(_LIGHT)
     brightness = 0.72 + 0.28 * np.abs(faces.planes[:, :3] @ light)
     brightness[faces.owners < 0] = np.where(faces.owners[faces.owners < 0] == SURROUNDINGS, 0.9, 1.0)
@@ -192,7 +192,7 @@ def _face_colours(faces: Faces, walls: NDArray[np.bool_] | NDArray[np.float64]) 
 
 
 def owner_colours(faces: Faces, walls: NDArray[np.bool_] | NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the colour of what each face belongs to, (faces, 3).
+    """Return the colour of the owner of each face, (faces, 3).
 
     ``walls`` is which solids are walls, (solids,), or the colours of the solids, (solids, 3).
     """

@@ -18,7 +18,7 @@ from lidarium.envs.simulation.depth.frames import image_of, place_camera
 from lidarium.envs.simulation.disturbances.odometry import HEIGHT, RADIUS, TICKS_PER_METRE
 
 CUT_M = 1.3
-"""Height at which walls are cut where a floor is seen from above [m]."""
+"""Height at which walls are cut in views from above [m]."""
 
 ABOVE_FIELD_OF_VIEW, BEHIND_FIELD_OF_VIEW = math.radians(35.0), math.radians(65.0)
 ABOVE_PITCH = math.radians(62.0)
@@ -26,7 +26,7 @@ BODY_NUMBERS = TICKS_PER_METRE + 1
 """Numbers of a body."""
 
 BEHIND_M, OVER_M = 1.7, 1.5
-"""How far behind a robot, and how far above its top, the eye is that follows it [m]."""
+"""Distance behind a robot, and above its top, of the eye that follows it [m]."""
 
 
 class FloorViews:
@@ -35,11 +35,11 @@ class FloorViews:
     Parameters
     ----------
     floor : Floor
-        What stands there.
+        The floor to draw.
     radius, height : float
-        Of the robots' bodies [m].
+        Radius and height of the robots' bodies [m].
     colours : sequence of Colour
-        Of the robots.
+        Colours of the robots.
     """
 
     def __init__(self, floor: Floor, radius: float, height: float, colours: Sequence[Colour]) -> None:
@@ -55,7 +55,7 @@ class FloorViews:
         poses : (robots, 3) float64
             x, y, theta [m, rad].
         size : (rows, columns)
-            Of the picture [pixels].
+            Size of the picture [pixels].
         """
         x_min, y_min, x_max, y_max = self.floor.bounds
         middle = np.array([(x_min + x_max) / 2.0, (y_min + y_max) / 2.0, 0.0])
@@ -82,7 +82,7 @@ class FloorViews:
         camera: DepthCamera,
         size: tuple[int, int],
     ) -> Frame:
-        """Return what a robot's camera would see in colours."""
+        """Return the view of a robot's camera in colours."""
         axes, eye = np.empty((3, 3)), np.empty(3)
         place_camera(poses[robot], attitudes[robot], camera.mount, axes, eye)
         return self._picture(
@@ -133,14 +133,14 @@ def camera_panel(
     camera: DepthCamera,
     height: int,
 ) -> Frame:
-    """Return a column of three pictures of the first robot, to be put beside a frame.
+    """Return a column of three pictures of the first robot, to be put next to a frame.
 
-    From the top: from behind, what its camera sees in colours, its depth image.
+    From the top: from behind, the view of its camera in colours, its depth image.
 
     Parameters
     ----------
     poses, attitudes : (robots, 3) float64
-        Of the robots, see ``World``.
+        Poses and attitudes of the robots, see ``World``.
     depth : (rows, columns) float32
         The first robot's depth image [m].
 

@@ -1,4 +1,4 @@
-"""How episodes begin: floor, starts, seed and goal, drawn alike for one episode and for many."""
+"""Beginnings of episodes: floor, starts, seed and goal, drawn alike for one episode and for many."""
 
 import copy
 from collections.abc import Mapping, Sequence
@@ -21,18 +21,18 @@ from lidarium.envs.simulation.simulation import Simulation
 
 @dataclass(frozen=True, slots=True, eq=False)
 class EpisodeStart:
-    """What an episode begins with.
+    """Initial state of an episode.
 
     Attributes
     ----------
     floor : Floor
-        Where it takes place.
+        The floor of the episode.
     tables : FloorTables
-        What kernels look up for the floor.
+        Lookup tables of the floor for kernels.
     starts : (robots, 3) float64
         x, y, theta of each robot in the floor's frame [m, rad].
     seed : int
-        Where the noise comes from.
+        Seed of the noise.
     goal : (x, y) or None
         In the floor's frame [m].
     """
@@ -100,9 +100,9 @@ def map_frames(beginning: EpisodeStart, settings: ExplorationSettings) -> NDArra
 def goal_of_robots(beginning: EpisodeStart, settings: ExplorationSettings) -> tuple[float, float]:
     """Return the goal as the robots know it, in the frame of their believed poses [m].
 
-    Nan if they know none.
+    nan if no goal is known.
 
-    A robot that does not know where it starts does not know where the goal is either.
+    A robot that does not know its start does not know the goal either.
     """
     return beginning.goal if beginning.goal is not None and settings.known_starts else (np.nan, np.nan)
 
@@ -115,7 +115,7 @@ class Beginnings:
     choice : FloorChoice
         The floor, or a set of which one is drawn.
     settings : ExplorationSettings
-        Of every episode.
+        Settings of every episode.
     episodes : int
         Number of these.
     curriculum : callable or None
@@ -150,7 +150,7 @@ class Beginnings:
         generators = self._generators.copy()
         for k, episode in enumerate(int(episode) for episode in beginning):
             seed = None if seeds is None else seeds[k]
-            # Drawn from a copy: where a later episode cannot begin, nothing has been drawn.
+            # Draw from a copy, so that nothing has been drawn if a later episode cannot begin.
             generator = copy.deepcopy(generators[episode])
             if seed is not None or generator is None:
                 generator = np.random.default_rng(seed)

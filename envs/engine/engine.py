@@ -70,9 +70,9 @@ class Engine:
     floor : Floors
         The floor, or floors of which each beginning draws one; see `FloorChoice`.
     settings : ExplorationSettings
-        Of every episode.
+        Settings of every episode.
     level : str, optional
-        What an action is: a name in the registry ``level``. ``velocity`` by default.
+        Type of an action: a name in the registry ``level``. ``velocity`` by default.
     image_resolution : float, optional
         Side of a pixel [m] if the floor is a plain image.
     copy : bool, optional
@@ -87,9 +87,9 @@ class Engine:
     rows : int
         Episodes x robots.
     observation_space, action_space : Space
-        Of one row.
+        Spaces of the observations and actions of one row.
     level : Level
-        How actions become motion.
+        The level, which converts actions to motion.
     operating : Operating
         The robots' operating states and orders.
     stations : list of Station
@@ -102,13 +102,13 @@ class Engine:
     is_whole, has_endings : bool
         Whether all robots of all episodes are live, and whether one ended in the last step.
     infos : dict
-        What the last step reports besides, in arrays over rows.
+        Further results of the last step, in arrays over rows.
     observations : dict of arrays
         The observations of the last step, one a row; rows that were not observed repeat their last one.
     floors : list of Floor
         The floor of each episode.
     starts : list of EpisodeStart
-        How each episode began.
+        Beginning of each episode.
 
     Raises
     ------
@@ -204,7 +204,7 @@ class Engine:
 
     @property
     def rewards(self) -> NDArray[np.float64]:
-        """What each row has earned in the last step, (rows,)."""
+        """Reward of each row in the last step, (rows,)."""
         return self.score.rewards
 
     @property
@@ -337,7 +337,7 @@ class Engine:
             self.level.observe(acted, live, seen, self.observations, self.infos)
 
     def _place(self, episode: int, start: EpisodeStart) -> None:
-        """Put the robots of an episode where they begin."""
+        """Put the robots of an episode at their start poses."""
         rows = slice(episode * self.robots, (episode + 1) * self.robots)
         self.simulation.place(episode, start.tables, start.starts, start.seed, self.settings.known_starts)
         self.floors[episode] = start.floor
@@ -378,8 +378,8 @@ class Engine:
     ) -> None:
         """Run episodes by the kernel alone, without beginnings, endings and infos.
 
-        ``modes`` (episodes,) int8 say what each episode does, ``commands`` (rows, 2) are the speeds of those that take
-        one step, ``seen`` (rows,) bool are the rows that are observed.
+        ``modes`` (episodes,) int8 are the modes of the episodes, ``commands`` (rows, 2) are the speeds of those that
+        take one step, ``seen`` (rows,) bool are the rows that are observed.
         """
         threads = self.simulation.use_threads()
         # To and fro: the maps of the episodes that ran last are still in the caches.
@@ -435,9 +435,9 @@ class Engine:
             after_step(commands)
 
     def _take_terms(self, acted: NDArray[np.bool_], is_plain: bool) -> dict[str, NDArray[np.float64]]:
-        """Return what each term of the reward brought in the step; add up those that are no kernels.
+        """Return the value of each term of the reward in the step; add those that are not kernels.
 
-        Rows that did not act have earned nothing; ``is_plain`` says that all did.
+        Rows that did not act have earned nothing; ``is_plain`` means that all did.
         """
         score = self.score
         rewards = score.rewards
@@ -455,10 +455,10 @@ class Engine:
         return {**dict(zip(TERMS, score.reward_terms.T.copy(), strict=True)), **earned}
 
     def _note_endings(self, acted: NDArray[np.bool_]) -> None:
-        """Note why robots that took part in the step end, and let them stand.
+        """Record why robots that took part in the step end, and stop them.
 
-        What happens to them counts before reasons of their own. An empty battery takes the sensors and the radio of a
-        robot as well.
+        Events in the world take precedence over reasons of their own. An empty battery takes the sensors and the
+        radio of a robot as well.
         """
         if self._tables is None:
             self._tables = self.simulation.table, table_of(self._rules)
@@ -549,7 +549,7 @@ class Engine:
     def _turn_buffers(self, seen: NDArray[np.bool_] | None, is_same_step: bool) -> None:
         """Choose the arrays for the observations of this step; rows that are not seen repeat their last one.
 
-        ``seen`` is None if all rows are.
+        By default (None) all rows are seen.
         """
         before = self.observations
         if self._copies:
@@ -562,7 +562,7 @@ class Engine:
                 array[~seen] = before[name][~seen]
 
     def scenes(self) -> list["Scene"]:
-        """Return what a picture of each episode shows.
+        """Return the content of a picture of each episode.
 
         Raises
         ------

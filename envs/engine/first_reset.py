@@ -16,16 +16,16 @@ LIST = Path(__file__).parent / "data" / "kernels_of_reset.json"
 
 MOST_PROCESSES = 4
 LOCK = "first_start.lock"
-"""File in the cache that says that another process compiles already."""
+"""File in the cache that marks that another process is compiling."""
 
 _asked = False
 
 
 def compile_first_reset() -> None:
-    """Compile what a reset calls in several processes, where next to nothing is compiled yet.
+    """Compile the kernels of a reset in several processes, if almost none are compiled yet.
 
-    It is looked at once in a process, and left out in processes of others, on one core, and where
-    ``LIDARIUM_FIRST_START`` is ``off``.
+    This is checked once per process, and skipped in child processes, on one core, and if ``LIDARIUM_FIRST_START`` is
+    ``off``.
     """
     global _asked  # once in a process
     if _asked:
@@ -58,7 +58,7 @@ def _cores() -> int:
 
 
 def _shown(names: Iterable[str], total: int, processes: int) -> Iterable[str]:
-    """Pass names on, and show on standard error how many there were: a bar on a terminal, else a line."""
+    """Pass names on, and show their number on standard error: a bar on a terminal, otherwise a line."""
     about = f"lidarium: the first reset compiles kernels in {processes} processes; later ones find them"
     print(about, file=sys.stderr, flush=True)
     if not sys.stderr.isatty():

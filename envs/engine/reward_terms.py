@@ -1,4 +1,4 @@
-"""Terms of the reward besides those of the kernels: users register them."""
+"""Reward terms in addition to those of the kernels, registered by users."""
 
 from collections.abc import Callable
 from typing import Any, Protocol
@@ -23,7 +23,7 @@ class _RewardTerm(Protocol):
 
 
 REWARD_TERMS: Registry[Callable[[], _RewardTerm]] = Registry("reward term")
-"""Terms that ``settings.reward.more`` can weigh, by name: what makes one."""
+"""Terms that ``settings.reward.more`` can weigh, by name: functions that make one."""
 
 
 def _rows_of(rows: Rows, episode: int) -> slice:
@@ -47,7 +47,7 @@ class _FunctionTerm:
         """Start an episode."""
 
     def amounts(self, rows: Rows) -> NDArray[np.float64]:
-        """Return what the function does."""
+        """Return the values of the function."""
         amounts = np.asarray(self._function(rows), np.float64)
         wanted = (rows.robots * rows.episodes,)
         if amounts.shape != wanted:
@@ -124,7 +124,7 @@ class _Failing:
         self._failed = np.zeros(0, np.bool_)
 
     def start(self, rows: Rows, episode: int) -> None:
-        """Start an episode with nobody failed."""
+        """Start an episode in which no robot has failed."""
         if self._failed.shape != rows.failed.shape:
             self._failed = np.zeros_like(rows.failed)
         self._failed[_rows_of(rows, episode)] = 0
@@ -137,16 +137,16 @@ class _Failing:
 
 
 class _FloorShare:
-    """Amount: the robot's part of what the team has seen anew, as a share of F; at most 1 over an episode.
+    """Amount: the robot's part of the area newly seen by the team, as a share of F; at most 1 over an episode.
 
-    What the first scans see is not paid. Robots get equal parts.
+    Area of the first scans is not rewarded. Robots get equal parts.
     """
 
     def __init__(self) -> None:
         self._coverage = np.zeros(0)
 
     def start(self, rows: Rows, episode: int) -> None:
-        """Start an episode at what has been seen."""
+        """Start an episode at the current coverage."""
         if self._coverage.shape != rows.live.shape:
             self._coverage = np.zeros(len(rows.live))
         own = _rows_of(rows, episode)
@@ -192,7 +192,7 @@ class _FirstView:
         self._seen[own] = rows.seen_m2[own]
 
     def amounts(self, rows: Rows) -> NDArray[np.float64]:
-        """Return what was seen before the first step, once."""
+        """Return the area seen before the first step, once."""
         begins = rows.time_s <= 0.0
         paid = np.where(begins, 0.0, self._seen)
         self._seen = np.where(begins, rows.seen_m2, 0.0)
@@ -214,7 +214,7 @@ class ExtraTerms:
     weights : tuple of (str, float)
         ``settings.reward.more``.
     rows : Rows
-        What they are computed from.
+        Input of the terms.
     """
 
     def __init__(self, weights: tuple[tuple[str, float], ...], rows: Rows) -> None:
@@ -237,5 +237,5 @@ class ExtraTerms:
             term.start(self._rows, episode)
 
     def earned(self) -> dict[str, NDArray[np.float64]]:
-        """Return what each term has brought each robot since the last call, by name, (rows,) each."""
+        """Return the amount of each term for each robot since the last call, by name, (rows,) each."""
         return {name: weight * term.amounts(self._rows) for name, (weight, term) in self._terms.items()}

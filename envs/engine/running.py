@@ -18,7 +18,7 @@ from lidarium.mapping.kernels.work_queue import Work, take_next
 
 
 class Run(NamedTuple):
-    """A call of a batch: what each episode does, and whose observations are written.
+    """A call of a batch: the mode of each episode, and the rows to observe.
 
     Attributes
     ----------
@@ -27,17 +27,17 @@ class Run(NamedTuple):
     robots : int
         Size of a team.
     modes : (episodes,) int8
-        What each episode does.
+        Mode of each episode.
     commands : (rows, 2) float64
         Speeds and turn rates of episodes that take one step; written in decisions [m/s, rad/s].
     longest : int
-        Most steps of a decision.
+        Maximum number of steps of a decision.
     waiting : (rows,) bool
-        Scratch: whose orders were done when the decision began.
+        Scratch: robots whose targets were already done at the start of the decision.
     seen : (rows,) bool
-        Whose observations are written.
+        Rows to observe.
     sources : (arrays, 3) int64
-        What they are written from, see ``write_row``.
+        Sources of the observations, see ``write_row``.
     """
 
     table: Array
@@ -92,7 +92,7 @@ def follow_some(
 
 @kernel
 def note_ends(modes: Array, robots: int, table: Array, drives: Drives, rules: Rules, waiting: Array) -> None:
-    """Let the episodes wait whose run ends with the step that was just taken."""
+    """Mark the episodes as waiting that end their run with the last step."""
     world = world_at(table)
     for episode in range(modes.shape[0]):
         if modes[episode] != WAITS and _ends(

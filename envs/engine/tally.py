@@ -14,12 +14,12 @@ TRACK_PERIOD_S = 0.2
 
 
 class Tally:
-    """The tally of one episode; it sees the truth, as only `evaluation` does besides.
+    """The tally of one episode; apart from `evaluation`, only it has access to the true state.
 
     Parameters
     ----------
     simulation : Simulation
-        Of the one episode.
+        Simulation of the one episode.
     settings : ExplorationSettings
         The length of a step.
 

@@ -10,7 +10,7 @@ from lidarium.envs.simulation.kernels.arrays import ENDED, FRAME_X, FRAME_Y
 from lidarium.envs.simulation.simulation import Simulation
 
 ROBOT_NUMBERS = ("x", "y", "cos", "sin", "speed", "turn_rate", "live")
-"""Numbers of each robot: place in the picture, heading, speeds as shares of the limits, 1 where live."""
+"""Numbers of each robot: position in the picture, heading, speeds as shares of the limits, 1 if live."""
 
 TEAM_NUMBERS = ("side", "coverage", "time_left")
 """Numbers of the team: side of the picture [100 m], share of F seen, share of the horizon left."""
@@ -34,7 +34,7 @@ def team_state(
 
     Numbers of each robot (``ROBOT_NUMBERS``), then of the team (``TEAM_NUMBERS``), then two pictures of S x S
     cells, S = ``settings.state_cells``: the share of each cell that counts (F), and that the team has seen. A
-    picture's row 0 is at the lowest y; its cells are the least whole number of map cells with which the whole floor
+    picture's row 0 is at the lowest y; its cells are the smallest whole number of map cells with which the whole floor
     fits. Places are shares of its side from its lower left corner.
 
     Returns

@@ -12,7 +12,7 @@ from lidarium.envs.simulation.endings import REASONS
 from lidarium.mapping.geometry.bounds import check_settings, share, shown, within
 
 MOST_FLOATS = 4096
-"""Most numbers of a message."""
+"""Maximum number of values of a message."""
 
 FORMS: dict[str, tuple[str, ...]] = {
     "observation": ("dict", "flat"),
@@ -20,31 +20,29 @@ FORMS: dict[str, tuple[str, ...]] = {
     "infos": ("full", "flat", "none"),
     "ended_agents": ("leave", "zeros"),
 }
-"""What each convention may be; the first is the default."""
+"""Possible values of each convention; the first is the default."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Conventions:
-    """The forms of what ``reset`` and ``step`` return.
+    """The forms of the results of ``reset`` and ``step``.
 
     Attributes
     ----------
     observation : str
-        ``dict``, or ``flat``: one float32 vector, with the keys in the order of the alphabet; see
-        `flat_columns`.
+        ``dict`` (default), or ``flat``: one float32 vector, with the keys in alphabetical order; see `flat_columns`.
     action_mask : str
-        Where the mask of actions is: ``inside`` the observation; ``beside`` it, as in ``{"observation": ...,
-        "action_mask": ...}``; or in ``infos`` of any form, as ``"action_mask"``. Only at the level of
-        frontiers.
+        Location of the action mask: ``inside`` the observation (default); ``beside`` it, as in ``{"observation": ...,
+        "action_mask": ...}``; or in ``infos`` of any form, as ``"action_mask"``. Only at the level of frontiers.
     infos : str
-        ``full``; ``flat``, numbers alone with the same keys at each step; or ``none``.
+        ``full`` (default); ``flat``, numbers alone with the same keys at each step; or ``none``.
     ended_agents : str
-        What becomes of an agent that ends before its team: it may ``leave``, or it stays with observations of
-        ``zeros``, rewards of 0, and ends with the last one.
+        An agent that ends before its team may ``leave`` (default), or with ``zeros`` stay with observations of zeros
+        and rewards of 0, and end with the last one.
     team_reward : float
-        Share of the reward that is the team's: the mean of all that took part in the step.
+        Share of the reward that is the team's: the mean over all robots that took part in the step. 0 by default.
     comm : int
-        How many numbers each robot sends the others with its action, over their radio; 0 for none.
+        Number of values that each robot sends the others with its action, over their radio; 0 (default) for none.
     """
 
     observation: str = "dict"
@@ -85,32 +83,32 @@ def split_options(options: Mapping[str, Any]) -> tuple[Conventions, dict[str, An
 
 
 MASK, REST = "action_mask", "observation"
-"""Keys where the mask is beside the observation."""
+"""Keys if the mask is next to the observation."""
 
 
 class ObservationForm:
-    """Puts observations of one robot, or those of many rows, into the form of a convention.
+    """Converts observations of one robot, or those of many rows, into the form of a convention.
 
     Parameters
     ----------
     space : Dict
-        Of the observations of one robot as they are.
+        Unconverted observations of one robot.
     conventions : Conventions
         The form.
 
     Attributes
     ----------
     space : Space
-        Of one robot's observations in this form.
+        One robot's observations in this form.
     has_mask_apart : bool
         Whether the mask is in infos.
     is_plain : bool
-        Whether observations are as they are.
+        Whether observations are left unchanged.
 
     Raises
     ------
     ValueError
-        If a mask is to be beside or apart from observations that have none, or nothing else is observed.
+        If the mask should be separate but does not exist, or nothing else is observed.
     """
 
     def __init__(self, space: spaces.Space[Any], conventions: Conventions) -> None:
@@ -165,7 +163,7 @@ def flat_box(boxes: Mapping[str, spaces.Box]) -> spaces.Box:
 
 
 def flat_columns(boxes: Mapping[str, spaces.Box]) -> tuple[tuple[str, int, int], ...]:
-    """Return where each key lies in the flat form: its name, its first column, and the one behind its last.
+    """Return the columns of each key in the flat form: its name, its first column, and the one after its last.
 
     Arrays lie in the order of C: the last axis first.
     """
@@ -178,7 +176,7 @@ def flat_columns(boxes: Mapping[str, spaces.Box]) -> tuple[tuple[str, int, int],
 
 
 ENDED = "ended"
-"""Why a robot ended, by number in ``endings.REASONS``; 0 where it has not.
+"""Number of a robot's ending in ``endings.REASONS``; 0 if it has not ended.
 
 A policy's own words have the number after the last one.
 """
@@ -194,7 +192,7 @@ def ending_number(reason: str | None) -> int:
 def flat_row_infos(infos: Mapping[str, Any], rows: int) -> dict[str, Any]:
     """Return the numbers among the infos of a batch, with names joined by a point, (rows,) float32 each.
 
-    Each has its mask besides it, as in Gymnasium's vector environments; all rows have all.
+    Each comes with its mask, as in Gymnasium's vector environments; all rows have all.
     """
     found = _rows(infos, "")
     reasons = infos.get("ended_because")
@@ -221,7 +219,7 @@ def _rows(values: Mapping[str, Any], prefix: str) -> dict[str, Any]:
 
 
 TEAM = "team"
-"""The term of the reward that the team's share brings, besides those that make up a robot's own."""
+"""The term of the reward due to the team's share, in addition to the terms of a robot's own reward."""
 
 
 def shared_rewards(

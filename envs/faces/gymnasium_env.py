@@ -20,15 +20,15 @@ class SoloExploration(gymnasium.Env[Observation, Any]):
 
     Parameters
     ----------
-    floor : Floors
+    floor : Floors, optional
         As for ``lidarium.parallel_env``.
-    level : str
-        What an action is: ``velocity``, ``waypoint`` or ``frontier``.
-    render_mode : str or None
-        ``human``, ``rgb_array`` or None.
-    image_resolution : float or None
+    level : str, optional
+        Type of an action: ``velocity`` by default, ``waypoint`` or ``frontier``.
+    render_mode : str, optional
+        ``human`` or ``rgb_array``. Nothing is drawn by default.
+    image_resolution : float, optional
         Side of a pixel [m] if the floor is a plain image.
-    curriculum : callable or None
+    curriculum : callable, optional
         As for ``lidarium.parallel_env``.
     **options
         As for ``lidarium.parallel_env``, without ``robots``.
@@ -36,7 +36,7 @@ class SoloExploration(gymnasium.Env[Observation, Any]):
     Raises
     ------
     ValueError
-        If an option has a bad value, or more than one robot is asked for.
+        If an option has a bad value, or the options ask for more than one robot.
     """
 
     metadata: dict[str, Any] = {"render_modes": ["human", "rgb_array"], "render_fps": 10}  # noqa: RUF012

@@ -33,10 +33,10 @@ def parallel_env(
         A catalogue name (``apartment`` by default), ``building:SEED``, ``set:NAME``, a file that the importers know, or
         a floor; many of them as a list, a folder, a mapping to weights, or a callable of a generator.
     level : str, optional
-        What an action is: ``velocity`` (shares of the maximum speed and turn rate, the default), ``waypoint`` (a point
+        Type of an action: ``velocity`` (shares of the maximum speed and turn rate, the default), ``waypoint`` (a point
         of the observed map), ``frontier`` (one of the frontiers in reach), or a level of your own.
     settings : ExplorationSettings, optional
-        The settings from which the options start.
+        The settings that the options modify. The defaults of `ExplorationSettings` by default.
     render_mode : str, optional
         ``human`` or ``rgb_array``. Nothing is drawn by default.
     image_resolution : float, optional

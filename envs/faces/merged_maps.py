@@ -19,28 +19,29 @@ from lidarium.envs.onboard.station.team_mapping import Frames, TeamMapping
 
 
 class MergedMaps(TeamWrapper):
-    """Gives each robot the map made by all robots that it is joined with, and their poses.
+    """Adds to each robot's observation the map merged from all robots joined with it, and their poses.
 
-    Observations have, besides those of the environment below, ``team_map`` uint8 (1, M, M) like ``map``, as of the
-    last exchange; its own map is part of it. ``teammates`` float32 (robots - 1, 5) has one row for each of the others
-    in their order: x, y [m], theta [rad] in the robot's own map frame, the age of what was received [s] and whether
-    there is any; zeros if there is none. ``infos[agent]["merges"]`` lists the robots with which it was joined in this
-    step, ``infos[agent]["truth"]["merges"]`` the `MergeEvent` of each. In a batch: ``vector_env(merging=...)``.
+    In addition to those of the environment below, observations have ``team_map`` uint8 (1, M, M) like ``map``, as of
+    the last exchange; it includes the robot's own map. ``teammates`` float32 (robots - 1, 5) has one row for each of
+    the others in their order: x, y [m], theta [rad] in the robot's own map frame, the age of the received data [s]
+    and 1 if data have been received; zeros otherwise. ``infos[agent]["merges"]`` lists the robots with which it was
+    joined in this step, ``infos[agent]["truth"]["merges"]`` the `MergeEvent` of each. In a batch:
+    ``vector_env(merging=...)``.
 
     Parameters
     ----------
     env : ParallelEnv
         The environment of a team of two robots or more, at any level of decision.
     settings : MergingSettings, optional
-        How maps are merged.
+        Settings of map merging. The defaults of `MergingSettings` by default.
     can_talk : (robots, robots) bool or callable, optional
         Which robots reach each other, at all times or as a function (see `CanTalk`). By default those that the
-        environment's radio joins. News are passed on.
+        environment's radio connects. Data received from others are passed on.
 
     Attributes
     ----------
     events : list of MergeEvent
-        All of this episode, in their order.
+        All merges of this episode, in their order.
 
     Raises
     ------

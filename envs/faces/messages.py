@@ -12,7 +12,7 @@ from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.mapping.geometry.bounds import shown
 
 MESSAGES = "messages"
-"""Key of what was heard in observations."""
+"""Key of the received messages in observations."""
 
 ACTION, MESSAGE = "action", "message"
 """Keys of an action that is no vector."""
@@ -22,14 +22,14 @@ OLDEST_S = 3600.0
 
 
 class _Sent(NamedTuple):
-    """What was sent with the actions of a step or decision.
+    """Messages sent with the actions of a step or decision.
 
     Attributes
     ----------
     first, last : (episodes,) int64
         It was sent in the steps behind the first one, to the last one.
     messages, acted : (episodes, 1, robots, floats) float64, (episodes, 1, robots) bool
-        The messages, and who sent one.
+        The messages, and the robots that sent one.
     """
 
     first: NDArray[np.int64]
@@ -39,15 +39,15 @@ class _Sent(NamedTuple):
 
 
 class MessageBoard:
-    """What the robots of all episodes have heard of each other.
+    """The messages that the robots of all episodes have received from each other.
 
-    A message goes with the poses that its sender reports in the steps of its action: over the links that
-    stand then, with their loss and latency. The last one is remembered, with its age.
+    A message goes with the poses that its sender reports in the steps of its action: over the links that work then,
+    with their loss and latency. The last one is remembered, with its age.
 
     Parameters
     ----------
     perception : Perception
-        Of all episodes, with their radio.
+        Onboard software of all episodes, with their radio.
     settings : ExplorationSettings
         The team of every episode.
     floats : int
@@ -56,8 +56,8 @@ class MessageBoard:
     Attributes
     ----------
     box : Box
-        The space of what a robot has heard, (robots - 1, floats + 2): of each of the others, in their order,
-        the numbers within [-1, 1], their age [s], and 1 if there are any.
+        The space of the received messages of a robot, (robots - 1, floats + 2): from each of the others, in their
+        order, the numbers within [-1, 1], their age [s], and 1 if a message has been received.
 
     Raises
     ------
@@ -73,7 +73,7 @@ class MessageBoard:
         self._heard = np.zeros((episodes, robots, robots, floats))
         self._heard_at = np.full((episodes, robots, robots), -1, np.int64)
         self._last = np.zeros(episodes, np.int64)
-        # Enough for the oldest that may still be on its way.
+        # Enough for the oldest message that may still arrive.
         on_the_way = round(settings.radio.latency_s / settings.time_step) + 2
         self._log: deque[_Sent] = deque(maxlen=on_the_way)
         high = np.concatenate([np.ones(floats), [OLDEST_S, 1.0]]).astype(np.float32)
@@ -82,7 +82,7 @@ class MessageBoard:
         self.box = spaces.Box(np.tile(low, rows), np.tile(high, rows), dtype=np.float32)
 
     def start(self, episodes: NDArray[np.int64]) -> None:
-        """Begin episodes in which nobody has heard anything."""
+        """Begin episodes in which no message has been received."""
         self._heard[episodes], self._heard_at[episodes], self._last[episodes] = 0.0, -1, 0
         for entry in self._log:
             entry.first[episodes], entry.last[episodes] = 0, 0
@@ -95,7 +95,7 @@ class MessageBoard:
         sent : (rows, floats) float64
             The messages that robots sent with their actions.
         acted : (rows,) bool
-            Who did; receivers are all.
+            Rows that acted; all robots may receive.
         """
         episodes, robots = self._heard.shape[:2]
         now = self._perception.world.steps.copy()
@@ -117,7 +117,7 @@ class MessageBoard:
         return np.stack([exchange.heard_at for exchange in exchanges])
 
     def table(self) -> NDArray[np.float32]:
-        """Return what each robot has heard, (rows, robots - 1, floats + 2), in a new array."""
+        """Return the messages received by each robot, (rows, robots - 1, floats + 2), in a new array."""
         episodes, robots = self._heard.shape[:2]
         steps = self._perception.world.steps[:, None, None]
         is_known = self._heard_at >= 0
@@ -130,7 +130,7 @@ class MessageBoard:
 
 
 def talking_space(space: spaces.Space[Any], floats: int) -> spaces.Space[Any]:
-    """Return a space of actions with messages: a longer vector, or a ``Dict`` where actions are none."""
+    """Return a space of actions with messages: a longer vector, or a ``Dict`` if actions are not vectors."""
     message = spaces.Box(-1.0, 1.0, (floats,), np.float32)
     if isinstance(space, spaces.Box):
         low, high = (np.concatenate(pair) for pair in ((space.low, message.low), (space.high, message.high)))

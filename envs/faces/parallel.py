@@ -61,14 +61,14 @@ class ExplorationEnv(ParallelEnv[str, Any, Any]):
         Takes the number of an episode, from 0 on, and returns options of ``reset`` for it; those that a reset gets
         itself go before.
     level : str, optional
-        What an action is: a name in the registry ``level``. ``velocity`` by default.
+        Type of an action: a name in the registry ``level``. ``velocity`` by default.
     conventions : Conventions, optional
-        The forms of what ``reset`` and ``step`` return.
+        The forms of the results of ``reset`` and ``step``. Those of `Conventions` by default.
 
     Attributes
     ----------
     engine : Engine
-        What steps the episode.
+        Steps the episode.
     simulation, world, beliefs, score : Simulation, World, Beliefs, Score
         Its simulation and the parts of that.
     perception : Perception
@@ -76,11 +76,11 @@ class ExplorationEnv(ParallelEnv[str, Any, Any]):
     operating : Operating
         The robots' operating states and orders.
     station : Station
-        Where the robots' reports come in.
+        Receives the robots' reports and sends their orders.
     scorer : Tally
         The true coverage over time.
     floor, goal, seed
-        Of the episode; ``seed`` is that of the noise.
+        Floor, goal and seed of the episode; ``seed`` is that of the noise.
 
     Raises
     ------
@@ -168,7 +168,7 @@ class ExplorationEnv(ParallelEnv[str, Any, Any]):
 
     @property
     def driver(self) -> TeamDriver | None:
-        """What drives the robots to their targets; None if actions are speeds."""
+        """Drives the robots to their targets; None if actions are speeds."""
         return self.engine.level.driver
 
     def observation_space(self, agent: str) -> spaces.Space[Any]:
@@ -180,7 +180,7 @@ class ExplorationEnv(ParallelEnv[str, Any, Any]):
         return self.action_spaces[agent]
 
     def columns(self, agent: str) -> tuple[tuple[str, int, int], ...]:
-        """Return where each key of an agent's observation lies in the flat form; see `flat_columns`."""
+        """Return the columns of each key of an agent's observation in the flat form; see `flat_columns`."""
         self._row(agent)
         return self._rows.columns
 
@@ -192,7 +192,7 @@ class ExplorationEnv(ParallelEnv[str, Any, Any]):
         Parameters
         ----------
         seed : int, optional
-            Where all draws of this and the later episodes come from. By default the generator of the last seed goes
+            Seed of all draws of this and the later episodes. By default the generator of the last seed goes
             on.
         options : dict, optional
             ``floor``, ``starts`` (robots, 3) in the floor's frame [m, rad], or ``fixed`` or ``drawn``, ``goal`` (2,)
@@ -203,7 +203,7 @@ class ExplorationEnv(ParallelEnv[str, Any, Any]):
         return self._begun()
 
     def start(self, beginning: EpisodeStart) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
-        """Start an episode that begins as another one did; returns what ``reset`` returns."""
+        """Start an episode with the same beginning as another one; returns the results of ``reset``."""
         self.engine.begin({0: beginning})
         return self._begun()
 
@@ -274,7 +274,7 @@ class ExplorationEnv(ParallelEnv[str, Any, Any]):
         self.engine.step_at(commands, self._after_step)
 
     def outcome(self) -> Outcome:
-        """Return what ``step`` returns for the time since the last outcome, after steps by ``drive_at``."""
+        """Return the results of ``step`` for the time since the last outcome, after steps by ``drive_at``."""
         masked = ~self.engine.live
         self.engine.finish()
         self._rows.came_out(masked)
@@ -357,7 +357,7 @@ class ExplorationEnv(ParallelEnv[str, Any, Any]):
         return {self.possible_agents[row]: reason for row, reason in self.operating.stopping.items()}
 
     def order(self, agent: str, order: Order) -> None:
-        """Send an agent an order from the station; see docs/reference/station.md for what each does.
+        """Send an agent an order from the station; see docs/reference/station.md for the types.
 
         It takes effect at once or, over a radio that is not ideal, when it arrives. An order that does not reach the
         robot, or that the robot does not take, is noted in ``operating.events``.
@@ -365,7 +365,7 @@ class ExplorationEnv(ParallelEnv[str, Any, Any]):
         Raises
         ------
         ValueError
-            If there is no such agent; one that has ended takes no order, which is no error.
+            If the agent does not exist; an agent that has ended takes no order, which is not an error.
         """
         self.operating.order(self._row(agent), order)
 
@@ -380,7 +380,7 @@ class ExplorationEnv(ParallelEnv[str, Any, Any]):
         return self.engine.used_j
 
     def belief(self, agent: str) -> Belief:
-        """Return the handle on what an agent's onboard software knows.
+        """Return the handle on the belief of an agent's onboard software.
 
         Raises
         ------
@@ -398,11 +398,11 @@ class ExplorationEnv(ParallelEnv[str, Any, Any]):
         return self.operating.states[self._row(agent)]
 
     def last_order(self, agent: str) -> Order | None:
-        """Return the last order that an agent took, None if it took none."""
+        """Return the last order that an agent took, None if it took no order."""
         return self.operating.orders[self._row(agent)]
 
     def report(self, agent: str) -> Report | None:
-        """Return the last report of an agent that reached the station, None if there is none."""
+        """Return the last report of an agent that reached the station, None if no report has."""
         return self.station.report(self._row(agent))
 
     def send_map(self, agent: str, others: FusedMap | None) -> bool:
@@ -439,7 +439,7 @@ class ExplorationEnv(ParallelEnv[str, Any, Any]):
         return state_space(self.settings)
 
     def state(self) -> NDArray[np.float32]:
-        """Return the true state of the team with what it has seen; see `team_state`."""
+        """Return the true state of the team and its coverage; see `team_state`."""
         if self.floor is None:
             raise RuntimeError("the environment was not reset; call reset() before state()")
         return team_state(self.simulation, self.settings)
@@ -464,7 +464,7 @@ class ExplorationEnv(ParallelEnv[str, Any, Any]):
         return None
 
     def scene(self) -> "Scene":
-        """Return what a frame shows of the environment."""
+        """Return the content of a frame of the environment."""
         from lidarium.envs.drawing.frame_parts import RECENT_S
         from lidarium.envs.drawing.rendering import Scene
 
@@ -505,7 +505,7 @@ def _listed(values: Any) -> list[Any]:  # noqa: ANN401
 def _check_agents(actions: Any, agents: Collection[str]) -> None:  # noqa: ANN401
     """Check that actions are given by agent, and that there are such agents.
 
-    Those of agents that have ended are no error: trainers go on with them.
+    Actions of agents that have ended are not an error: trainers continue to send them.
 
     Raises
     ------

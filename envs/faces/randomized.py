@@ -17,10 +17,11 @@ from lidarium.envs.settings.reset_options import ResetOptions, checked_seed
 from lidarium.mapping.geometry.bounds import shown
 
 Distribution = Callable[[np.random.Generator], Any] | tuple[float, float] | list[Any]
-"""Of a setting: a callable of a generator; (low, high) for all between; a list of which each is as likely."""
+"""Distribution of a setting: a callable of a generator; (low, high) for a uniform one; a list of equally likely
+values."""
 
 Distributions = Mapping[str, Distribution]
-"""By the names of settings, such as ``lidar.noise_floor``."""
+"""Distributions by the names of settings, such as ``lidar.noise_floor``."""
 
 ROBOTS = "robots"
 """The setting by which teams differ in size."""
@@ -45,7 +46,7 @@ class Draws:
     Raises
     ------
     ValueError
-        If there are none, or one is of no kind of `Distribution`.
+        If the mapping is empty, or a value is not a `Distribution`.
     """
 
     def __init__(self, settings: ExplorationSettings, distributions: Any) -> None:  # noqa: ANN401
@@ -130,8 +131,8 @@ class RandomizedTeam(TeamWrapper):
     Raises
     ------
     ValueError
-        If a name or a distribution is none, a draw is no value of its setting, or draws change the spaces of
-        observations or actions.
+        If a name or a distribution is not valid, a draw is not a valid value of its setting, or draws change the
+        spaces of observations or actions.
     """
 
     def __init__(
@@ -472,7 +473,7 @@ def check_spaces(
     made: tuple[spaces.Space[Any], spaces.Space[Any]],
     wanted: tuple[spaces.Space[Any], spaces.Space[Any]],
 ) -> None:
-    """Check that drawn settings leave the spaces of observations and actions as they are.
+    """Check that drawn settings leave the spaces of observations and actions unchanged.
 
     Raises
     ------

@@ -16,28 +16,30 @@ from lidarium.envs.onboard.radio.messages import DriveState, Route, Target
 from lidarium.envs.simulation.kernels.arrays import ENDED
 
 NEAR_GOAL_M = 0.6
-"""If the body cannot stand at a goal, a position as near as this will do [m]."""
+"""Maximum distance to a goal of a substitute position if the body cannot stand at the goal [m]."""
 
 
 class SparsePlanning(TeamWrapper):
     """Lets robots drive to their goals along routes on their sparse maps, instead of paths on grids.
 
-    A robot codes what its depth camera sees, and plans on the graph of that; if it leads to no goal, ground that the
-    camera has not seen counts as free. It keeps a route as long as nothing new blocks it, and plans again otherwise.
-    Observations, actions and infos are those of the environment below; ``infos[agent]["route"]`` says why there is no
-    route to a robot's goal: ``start in collision``, ``goal in collision`` or ``no path``; it is empty if there is one.
+    A robot codes the images of its depth camera, and plans on the resulting graph; if the graph has no path to the
+    goal, ground that the camera has not seen counts as free. The robot keeps a route until a new obstacle blocks it,
+    Observations, actions and infos are those of the environment below; ``infos[agent]["route"]`` gives the reason if
+    there is no route to a robot's goal: ``start in collision``, ``goal in collision`` or ``no path``; otherwise it is
+    empty.
+    route to a robot's goal: ``start in collision``, ``goal in collision`` or ``no path``; otherwise it is empty.
 
     Parameters
     ----------
     env : ParallelEnv
         The environment at the level of waypoints or frontiers, with ``camera`` set.
     shares_map : bool, optional
-        Whether robots plan on what the whole team knows, if it reaches them at once. True by default.
+        Whether robots plan on the map of the whole team, if it reaches them at once. True by default.
 
     Raises
     ------
     ValueError
-        If the robots have no depth camera, or one that sees no ground, or decide speeds.
+        If the robots have no depth camera, or one that sees no ground, or actions are speeds.
     """
 
     def __init__(self, env: Any, shares_map: bool = True) -> None:  # noqa: ANN401
@@ -77,7 +79,7 @@ class _Router:
     engine : Engine
         The episodes, at the level of waypoints or frontiers.
     shares_map : bool
-        Whether robots plan on what the whole team knows.
+        Whether robots plan on the map of the whole team.
 
     Attributes
     ----------
@@ -120,7 +122,7 @@ class _Router:
             driver.follow(row, self._planned(row, target))
 
     def _planned(self, row: int, target: Target) -> Route | None:
-        """Return the route of a robot to its goal, or near it; None if there is none."""
+        """Return the route of a robot to its goal, or near it; None if no route exists."""
         perception = self._perception
         known = perception.sparse_maps.belief(row, self._shares_map)
         start, goal = perception.poses.pose_in_frame(row, row)[:2], np.array([target.x, target.y])

@@ -33,12 +33,11 @@ class ExplorationVecEnv(VecEnv):
 
     Many episodes run in one kernel call.
 
-    Row = episode * robots + robot; one policy drives all rows. A robot that ends before its team is done
-    once; its row then repeats its last observation with reward 0 and ``infos[row]["active"]`` False. Where
-    the last robot of an episode ends, the rows that repeat are done as well, truncated, and the episode
-    begins again in the same step. In every row that is done, ``infos[row]["terminal_observation"]`` is what
-    the robot saw last, and ``infos[row]["TimeLimit.truncated"]`` says whether it was the horizon or an
-    ending.
+    Row = episode * robots + robot; one policy drives all rows. A robot that ends before its team is done once; its
+    row then repeats its last observation with reward 0 and ``infos[row]["active"]`` False. When the last robot of an
+    episode ends, the repeating rows are done as well, truncated, and the episode begins again in the same step. In
+    every row that is done, ``infos[row]["terminal_observation"]`` is the last observation of the robot, and
+    ``infos[row]["TimeLimit.truncated"]`` tells the horizon from an ending of the robot itself.
 
     Parameters
     ----------
@@ -47,8 +46,8 @@ class ExplorationVecEnv(VecEnv):
 
     Notes
     -----
-    Observations are written into two sets of arrays that take turns: what a step returns is overwritten by
-    the step after the next one. Replay and rollout buffers copy what they keep.
+    Observations are written into two sets of arrays that take turns: the arrays that a step returns are overwritten
+    by the step after the next one. Replay and rollout buffers copy the observations that they keep.
 
     Raises
     ------
@@ -176,7 +175,7 @@ class ExplorationVecEnv(VecEnv):
             raise RuntimeError("the environment is closed; make a new one")
 
     def close(self) -> None:
-        """Close, and give back what the worlds hold."""
+        """Close the environment and release the worlds."""
         self.batch.close()
         self._is_closed = True
 

@@ -32,7 +32,7 @@ class EpisodeTeam:
 
     @property
     def possible_agents(self) -> list[str]:
-        """All agents of the team."""
+        """Names of all agents of the team."""
         return list(self._index)
 
     @property
@@ -57,7 +57,7 @@ class EpisodeTeam:
         return self._first + self._index[agent]
 
     def belief(self, agent: str) -> Belief:
-        """Return the handle on what an agent's onboard software knows."""
+        """Return the handle on the belief of an agent's onboard software."""
         return Belief(self._engine.perception, self.row(agent))
 
     def drive_state(self, agent: str) -> DriveState:
@@ -70,7 +70,7 @@ class EpisodeTeam:
         return self._engine.operating.states[self.row(agent)]
 
     def last_order(self, agent: str) -> Order | None:
-        """Return the last order that an agent took, None if it took none."""
+        """Return the last order that an agent took, None if it took no order."""
         return self._engine.operating.orders[self.row(agent)]
 
     def order(self, agent: str, order: Order) -> None:
@@ -85,7 +85,7 @@ class EpisodeTeam:
         self._engine.operating.stopping[row] = reason
 
     def report(self, agent: str) -> Report | None:
-        """Return the last report of an agent that reached the station, None if there is none."""
+        """Return the last report of an agent that reached the station, None if no report has."""
         robot = self.row(agent) - self._first
         return self._station.report(robot)
 

@@ -18,7 +18,7 @@ from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.merging.settings import MergeSettings
 
 OLDEST_S = 3600.0
-"""Bound of the age of what was received, in observations [s]."""
+"""Maximum age of received data in observations [s]."""
 
 
 CanTalk = Callable[[float, NDArray[np.float64]], NDArray[np.bool_]]
@@ -50,7 +50,7 @@ def clusters_of(agents: Sequence[str], links: NDArray[np.bool_]) -> list[list[st
     Parameters
     ----------
     agents : sequence of str
-        All of them.
+        Names of all robots.
     links : (robots, robots) bool
         Which reach each other, see `check_links`.
     """
@@ -67,7 +67,7 @@ def clusters_of(agents: Sequence[str], links: NDArray[np.bool_]) -> list[list[st
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MergingSettings:
-    """How a team merges its maps.
+    """Settings by which a team merges its maps.
 
     Attributes
     ----------
@@ -76,10 +76,10 @@ class MergingSettings:
     known_starts : bool
         Whether the robots know how their frames lie, for comparison; nothing is searched for then.
     merge : MergeSettings
-        How maps are merged; by default as `lidarium merge` does.
+        Settings of map merging; by default those of `lidarium merge`.
     confirms : bool
         Whether two robots are joined only when their maps were found twice to be of one place and convince,
-        as a station joins them; else by the first finding.
+        as a station joins them; otherwise by the first match.
     """
 
     period_s: Annotated[float, above(0.0, 1e7)] = 1.0
@@ -102,9 +102,9 @@ class MergeEvent:
     a, b : str
         The robots.
     found, true : (x, y, theta)
-        Of b's map frame in that of a [m, rad].
+        Transform of b's map frame to that of a [m, rad].
     at : (x, y)
-        Where errors are taken, the middle of what both maps know, in b's frame [m].
+        Position at which errors are measured, the middle of the area known to both maps, in b's frame [m].
     is_direct : bool
         Whether these two maps were laid on each other; otherwise those of others lie between them.
     """
@@ -124,9 +124,9 @@ class TeamExchange:
     Parameters
     ----------
     perception : Perception
-        Of all episodes.
+        Onboard software of all episodes.
     merging : MergingSettings
-        How.
+        Settings of merging.
     can_talk : (robots, robots) bool, callable or None
         Which robots reach each other, at all times or as a function (see `CanTalk`); if None, those that
         the radio joins.
@@ -136,9 +136,9 @@ class TeamExchange:
     Attributes
     ----------
     team : TeamMapping
-        What the robots hold of each other.
+        Maps that the robots hold of each other.
     events : list of MergeEvent
-        All of this episode, in their order.
+        All merges of this episode, in their order.
 
     Raises
     ------
@@ -178,7 +178,7 @@ class TeamExchange:
         return float(self._perception.world.steps[self._episode]) * self._perception.settings.time_step
 
     def exchange(self) -> list[MergeEvent]:
-        """Exchange maps if it is time, and return who has come to know whom."""
+        """Exchange maps if it is time, and return the new merges."""
         steps = int(self._perception.world.steps[self._episode])
         if steps < self._due:
             return []
@@ -217,7 +217,7 @@ class TeamExchange:
         return clusters_of(self._agents, check_links(np.asarray(links), robots))
 
     def observed(self, robot: int) -> dict[str, NDArray[Any]]:
-        """Return what merging adds to the observation of a robot, by its number."""
+        """Return the observations that merging adds for a robot, by its number."""
         x, y, _ = self._perception.poses.pose_in_frame(self._first + robot, self._first + robot).tolist()
         agent, cells = self._agents[robot], self._perception.settings.map_cells
         return {
@@ -268,7 +268,7 @@ def frames_of(perception: Perception, episode: int) -> Frames:
 
 
 def team_boxes(robots: int, cells: int) -> dict[str, spaces.Space[Any]]:
-    """Return the spaces of what merging adds to an observation."""
+    """Return the spaces of the observations that merging adds."""
     turn = float(np.nextafter(np.float32(math.pi), np.float32(4.0)))
     high = np.tile(np.array([FARTHEST, FARTHEST, turn, OLDEST_S, 1.0], np.float32), (robots - 1, 1))
     low = np.tile(np.array([-FARTHEST, -FARTHEST, -turn, 0.0, 0.0], np.float32), (robots - 1, 1))
@@ -286,16 +286,16 @@ class MergedRows:
     engine : Engine
         The episodes.
     merging : MergingSettings
-        How.
+        Settings of merging.
 
     Attributes
     ----------
     boxes : dict
-        Spaces of what merging adds to an observation.
+        Spaces of the observations that merging adds.
     arrays : dict of arrays
-        What it adds to the observations of all rows, as of the last exchange; new ones after each.
+        The added observations of all rows, as of the last exchange; new arrays after each.
     teams : list of TeamExchange
-        Of each episode.
+        Exchange of each episode.
 
     Raises
     ------
@@ -323,7 +323,7 @@ class MergedRows:
         Parameters
         ----------
         seen : (rows,) bool
-            Whose observations are new; the others keep theirs.
+            Rows with new observations; the others keep theirs.
         began : (episodes,) bool
             Which episodes have begun.
         """

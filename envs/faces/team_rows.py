@@ -42,14 +42,14 @@ class TeamRows:
     conventions : Conventions, optional
         The forms. Those of a plain environment by default.
     merging : MergingSettings, optional
-        How robots merge their maps. They do not by default.
+        Settings of map merging. No merging by default.
 
     Attributes
     ----------
     space, action_space : Space
-        Of the observations and actions of a row.
+        Spaces of the observations and actions of a row.
     columns : tuple
-        Where each key lies in the flat form; see ``flat_columns``.
+        Columns of each key in the flat form; see ``flat_columns``.
     rewards : (rows,) float64
         Rewards of the last step.
     terminated, truncated, active : (rows,) bool
@@ -125,7 +125,7 @@ class TeamRows:
         self.came_out(masked)
 
     def step_each(self, actions: Mapping[int, Any], names: list[str], after_step: AfterStep | None) -> None:
-        """Run all live episodes by actions of rows; robots without one go on with their last orders."""
+        """Run all live episodes by actions of rows; robots without one continue with their last orders."""
         engine = self.engine
         if self._board is not None:
             has_vectors = isinstance(engine.action_space, spaces.Box)
@@ -213,7 +213,7 @@ class TeamRows:
         return self._form.of({name: array[row].copy() for name, array in self._with_more().items()})
 
     def _with_more(self) -> Mapping[str, NDArray[Any]]:
-        """Return the observations with what was exchanged."""
+        """Return the observations including exchanged data."""
         if self._board is None and self._merged is None:
             return self.engine.observations
         more: dict[str, NDArray[Any]] = {} if self._merged is None else dict(self._merged.arrays)
@@ -243,7 +243,7 @@ class TeamRows:
         return infos
 
     def _with_ended(self, infos: dict[str, Any], form: str) -> dict[str, Any]:
-        """Return infos in which robots that had ended say why, and keep their last numbers."""
+        """Return infos in which robots that had ended keep their reason and their last numbers."""
         kept = self._kept
         for row, word in self.engine.ended_because.items():
             if self.engine.reasons[row]:

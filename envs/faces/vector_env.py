@@ -27,23 +27,23 @@ class ExplorationVectorEnv(VectorEnv[Any, NDArray[Any], NDArray[Any]]):
 
     Row = episode * robots + robot. A robot that ends before its team returns terminated once; its row then repeats
     its last observation with reward 0 and ``infos["active"]`` False. When the last robot of an episode ends, the rows
-    that repeat return truncated, and the next step begins the episode again whatever its actions
-    (``AutoresetMode.NEXT_STEP``). Every row sees, earns and ends as the robot of a single environment with the same
-    seed, to the bit.
+    that repeat return truncated, and the next step begins the episode again, independent of its actions
+    (``AutoresetMode.NEXT_STEP``). Every row has the same observations, rewards and endings as the robot of a single
+    environment with the same seed, to the bit.
 
     Parameters
     ----------
     episodes : int
         Number of episodes.
     floor : Floors, optional
-        As for ``lidarium.parallel_env``; of a set, each beginning draws one.
+        As for ``lidarium.parallel_env``, ``apartment`` by default; of a set, each beginning draws one.
     level : str, optional
-        What an action is: ``velocity`` by default, ``waypoint``, ``frontier`` or a registered one.
+        Type of an action: ``velocity`` by default, ``waypoint``, ``frontier`` or a registered one.
     image_resolution : float, optional
         Side of a pixel [m] if the floor is a plain image.
     copy : bool, optional
-        Whether each step returns new arrays, the default. Otherwise two sets take turns: what a step returns is
-        overwritten by the step after the next one.
+        Whether each step returns new arrays, True by default. Otherwise two sets take turns: the arrays that a step
+        returns are overwritten by the step after the next one.
     render_mode : str, optional
         ``rgb_array``, for ``render`` and Gymnasium's ``RecordVideo``. Nothing is drawn by default.
     curriculum : callable, optional
@@ -76,7 +76,7 @@ class ExplorationVectorEnv(VectorEnv[Any, NDArray[Any], NDArray[Any]]):
         curriculum: Curriculum | None = None,
         **options: Any,  # noqa: ANN401
     ) -> None:
-        self.closed = True  # Gymnasium before 1.2 closes even what could not be made
+        self.closed = True  # Gymnasium before 1.2 also closes environments that could not be made
         check_render_mode(render_mode)
         self.batch = make_rows(episodes, floor, options, level, image_resolution, copy, curriculum)
         self.settings = self.batch.settings
@@ -151,7 +151,7 @@ class ExplorationVectorEnv(VectorEnv[Any, NDArray[Any], NDArray[Any]]):
 
     @property
     def columns(self) -> tuple[tuple[str, int, int], ...]:
-        """Where each key of an observation lies in the flat form; see `flat_columns`."""
+        """Columns of each key of an observation in the flat form; see `flat_columns`."""
         return self.batch.columns
 
     @property

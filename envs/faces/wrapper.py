@@ -13,7 +13,7 @@ from lidarium.envs.onboard.radio.messages import Order
 
 
 class TeamWrapper(ParallelEnv[str, Any, Any]):
-    """Passes everything on to the environment below; wrappers change what they are about.
+    """Passes everything on to the environment below; subclasses override the methods that they change.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Which free area of a picture is the floor: that of the starts, else the largest that is not outside."""
+"""Choice of the free area of a picture that is the floor: with the starts, or the largest that is not outside."""
 
 import math
 from typing import Any

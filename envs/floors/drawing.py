@@ -19,7 +19,7 @@ Rings = list[NDArray[np.float64]]
 # machines.
 _SNAP = 1e6
 
-_FEW = 16  # so many values are sorted fastest by insertion
+_FEW = 16  # up to this number values are sorted fastest by insertion
 
 
 def ring_edges(ring: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -93,7 +93,7 @@ def strip(segment: NDArray[np.float64], thickness: float, overhang: float = 0.0)
     thickness : float
         Width of the rectangle [m].
     overhang : float
-        How far it goes on beyond both ends [m].
+        Additional length beyond both ends [m].
 
     Returns
     -------

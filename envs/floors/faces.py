@@ -2,7 +2,7 @@
 
 A face is convex and has four corners; a triangle repeats one. Seen from the outside, its corners run
 counter-clockwise. Solids are prisms, so that their faces are sides, tops and undersides; bent outlines and
-holes are cut into trapezoids. Faces on the ground or at the ceiling are left out: nobody sees them.
+holes are cut into trapezoids. Faces on the ground or at the ceiling are left out: they are never visible.
 """
 
 from dataclasses import dataclass, replace
@@ -131,7 +131,7 @@ def convex_parts(solid: Solid) -> list[Points]:
     Returns
     -------
     list of (3 or more, 2) float64
-        Corners, counter-clockwise [m]: the outline itself if it is convex, else trapezoids.
+        Corners, counter-clockwise [m]: the outline itself if it is convex, otherwise trapezoids.
     """
     ring = _counter_clockwise(solid.polygon)
     if not solid.holes and _is_convex(ring):
@@ -213,7 +213,7 @@ def _trapezoids(edges: Points) -> list[Points]:
         crossing = np.flatnonzero((upward[:, 1] <= low) & (upward[:, 3] >= high))
         order = np.argsort(_x_at(upward[crossing], middle), kind="stable")
         pairs = crossing[order][: len(crossing) // 2 * 2].reshape(-1, 2).tolist()
-        # A trapezoid goes on while the same two edges bound it.
+        # A trapezoid continues while the same two edges bound it.
         here = {(left, right): begun.pop((left, right), low) for left, right in pairs}
         parts += [_trapezoid(upward[left], upward[right], base, low) for (left, right), base in begun.items()]
         begun = here
@@ -231,7 +231,7 @@ def _trapezoid(left: Points, right: Points, low: float, high: float) -> Points:
 
 
 def _x_at(edges: Points, y: float) -> Points:
-    """Return where edges (E, 4) are at a height y; their ends exactly."""
+    """Return x of edges (E, 4) at a height y; their ends exactly."""
     x1, y1, x2, y2 = edges.T
     between = x1 + (y - y1) / (y2 - y1) * (x2 - x1)
     return np.asarray(np.where(y == y1, x1, np.where(y == y2, x2, between)))

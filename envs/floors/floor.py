@@ -30,10 +30,10 @@ MAX_OUTLINE_M = 500_000.0
 """Longest sum of all outlines: each is followed cell by cell [m]."""
 
 MAX_PAIRS = 250_000
-"""Most walls times doors: each is compared with each."""
+"""Maximum product of the numbers of walls and doors: each is compared with each."""
 
 MAX_CORNERS = 2_000_000
-"""Most corners of all outlines."""
+"""Maximum number of corners of all outlines."""
 
 
 def check_extent(what: str, bounds: Iterable[float], rings: Iterable[NDArray[np.float64]] = ()) -> None:
@@ -150,7 +150,7 @@ def _width_of(polygon: NDArray[np.float64]) -> float:
 def _middle_line(polygon: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the segments that replace a thin polygon.
 
-    They are the middle line of four corners, else the outline.
+    They are the middle line of four corners, otherwise the outline.
     """
     if len(polygon) != 4:
         return ring_edges(polygon)

@@ -133,7 +133,7 @@ def _is_folder(floor: Any) -> bool:  # noqa: ANN401
 def _folder_floors(folder: Path) -> tuple[Path, ...]:
     """Return the files of a folder that have the name of a floor, in the order of their names.
 
-    Pictures besides the description of a ROS map of the same name belong to it.
+    Pictures next to the description of a ROS map of the same name belong to it.
     """
     suffixes = tuple(suffix for known in FORMATS.values() for suffix in known.suffixes)
     files = sorted(path for path in folder.iterdir() if path.name.lower().endswith(suffixes))

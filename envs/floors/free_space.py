@@ -14,7 +14,7 @@ from lidarium.envs.floors.raster import Runs
 from lidarium.mapping.kernels.compilation import kernel
 
 KEPT = 8
-"""Most entries that a raster keeps.
+"""Maximum number of entries that a raster keeps.
 
 It keeps components for radii, and the footprints covered from some of them.
 """

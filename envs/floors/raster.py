@@ -17,9 +17,9 @@ class Runs:
     values : (runs,) array
         Value of the cells of each run; of the grid's type.
     lengths : (runs,) int32
-        Number of they are.
+        Number of cells of each run.
     shape : (rows, columns)
-        Of the grid.
+        Shape of the grid.
     """
 
     values: NDArray[Any]
@@ -46,7 +46,7 @@ class Runs:
 
     @property
     def nbytes(self) -> int:
-        """How much memory the runs take."""
+        """Memory of the runs [bytes]."""
         return self.values.nbytes + self.lengths.nbytes
 
 

@@ -1,4 +1,4 @@
-"""Levels of decision: what an action of a robot is, and how it becomes motion."""
+"""Levels of decision: the actions of robots, and their conversion to motion."""
 
 from collections.abc import Callable
 from typing import TypeVar

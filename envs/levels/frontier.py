@@ -33,7 +33,7 @@ from lidarium.mapping.planning.search.search_state import disc_spans
 from lidarium.mapping.planning.search.swept_costs import SweepMemory
 
 REASONS = ("", "unseen", "blocked", "no_progress")
-"""Why a chosen frontier is given up, by number; 0 where it is not."""
+"""Reasons for giving up a chosen frontier, by number; 0 if it is not given up."""
 
 
 _renew_teams_serial = kernel(renew_teams)
@@ -43,23 +43,23 @@ _renew_teams_parallel = kernel(parallel=True)(renew_teams)
 
 
 class FrontierOffers:
-    """Offers frontiers to the robots of all episodes, and keeps what they chose.
+    """Offers frontiers to the robots of all episodes, and keeps their choices.
 
     Parameters
     ----------
     perception : Perception
-        What the robots know.
+        The beliefs of the robots.
     settings : ExplorationSettings
         The team of every episode.
     driver : TeamDriver
-        Who drives the robots; on the same maps frontiers are searched.
+        Drives the robots; frontiers are searched on the same maps.
 
     Attributes
     ----------
     offers : Offers
-        What every robot is offered.
+        Frontiers offered to every robot.
     choices : Choices
-        What every robot has chosen.
+        Frontiers chosen by every robot.
     """
 
     def __init__(self, perception: Perception, settings: ExplorationSettings, driver: TeamDriver) -> None:
@@ -106,7 +106,7 @@ class FrontierOffers:
 
     @property
     def observed(self) -> dict[str, NDArray[Any]]:
-        """What offers add to observations, arrays over rows by key."""
+        """Return the offers as observations, arrays over rows by key."""
         offers = self.offers
         gains = {GAINS: offers.gains} if offers.gains.size else {}
         return {"frontiers": offers.tables, "action_mask": offers.masks, **gains}
@@ -117,14 +117,14 @@ class FrontierOffers:
         Parameters
         ----------
         rows : (rows,) bool
-            Who chooses.
+            Rows that choose.
         numbers : (rows,) int64
             Number of an offer; any that is not offered lets the robot stay.
 
         Returns
         -------
         Orders
-            What to drive to; robots that do not choose stay.
+            Targets to drive to; robots that do not choose stay.
         """
         offers, choices = self.offers, self.choices
         is_taken = rows & (numbers >= 0) & (numbers < offers.counts)
@@ -136,14 +136,14 @@ class FrontierOffers:
         return Orders(is_taken, choices.targets, choices.headings)
 
     def renew(self, is_live: NDArray[np.bool_], is_offered: NDArray[np.bool_]) -> NDArray[np.int8]:
-        """Give up what was chosen in vain and offer again.
+        """Give up unreachable or unproductive choices and offer again.
 
         Called after the steps of a decision, and at the start.
 
         Parameters
         ----------
         is_live, is_offered : (rows,) bool
-            Whose choices are examined, and who is offered frontiers.
+            Rows with choices to examine, and rows to offer frontiers.
 
         Returns
         -------
@@ -182,10 +182,10 @@ class FrontierOffers:
 class FrontierLevel(WaypointLevel):
     """An action is the number of a frontier.
 
-    Observations have ``frontiers`` float32 (F, 4): position along the axes of the map frame from where the robot
-    believes to be [m], cost of the path [m] and size [m] of each frontier on offer, cheapest path first, zeros behind
-    the last; and ``action_mask`` int8 (F + 1,). F is ``settings.frontiers``. Action k < F drives to frontier k, action
-    F stays and gives way; an action that the mask rules out stays as well.
+    Observations have ``frontiers`` float32 (F, 4): position along the axes of the map frame from the believed
+    position of the robot [m], cost of the path [m] and size [m] of each frontier on offer, cheapest path first, zeros
+    after the last; and ``action_mask`` int8 (F + 1,). F is ``settings.frontiers``. Action k < F drives to frontier k,
+    action F stays and gives way; an action that the mask rules out stays as well.
 
     A frontier to which a robot has driven and turned, and which is still there, is not offered again; the info
     ``given_up`` names it with the reason. Robots without a frontier in reach stay idle; if no robot has one, all end
@@ -263,7 +263,7 @@ class FrontierLevel(WaypointLevel):
     def observe(
         self, acted: Mask, live: Mask, seen: Mask, out: dict[str, NDArray[Any]], infos: dict[str, Any]
     ) -> None:
-        """Give up what was chosen in vain, offer again, and report both."""
+        """Give up unreachable or unproductive choices, offer again, and report both."""
         reasons = self.offers.renew(live, seen)
         for name, array in self.offers.observed.items():
             out[name][seen] = array[seen]
@@ -275,7 +275,7 @@ class FrontierLevel(WaypointLevel):
 
 
 def _whole_number(action: Any, maximum: int) -> int | None:  # noqa: ANN401
-    """Return an action as a number from 0 to ``maximum``, None if it is none; arrays of one number count."""
+    """Return an action as a number from 0 to ``maximum``, None if it is not one; arrays of one number count."""
     try:
         array = np.asarray(action)
     except ValueError:  # rows of different lengths

@@ -61,7 +61,7 @@ def expected_gain(log_odds: Array, row: int, column: int, rays: Array, reach: in
     rays : (rays, 2) float64
         See `ray_directions`.
     reach : int
-        How far the rays go [cells].
+        Range of the rays [cells].
     """
     rows, columns = log_odds.shape
     area = 0.0
@@ -82,9 +82,9 @@ def expected_gain(log_odds: Array, row: int, column: int, rays: Array, reach: in
 
 @kernel
 def _rank(values: Array, is_wanted: Array, ranked: Array, first: int, last: int) -> int:
-    """Write wanted clusters to ``ranked[first:last]``, the highest value first; return where they end.
+    """Write wanted clusters to ``ranked[first:last]``, the highest value first; return the end of the list.
 
-    The first of equals comes first. What is ranked is wanted no more.
+    The first of equals comes first. Ranked clusters are no longer wanted.
     """
     while first < last:
         best = -1
@@ -108,13 +108,13 @@ def choose_offers(left: Array, sizes: Array, is_wanted: Array, by_size: int, ran
     Parameters
     ----------
     left : (clusters,) array
-        What is left of the budget at each cluster: more is cheaper.
+        Rest of the budget at each cluster: more is cheaper.
     sizes : (clusters,) array
-        How long each is.
+        Size of each cluster.
     is_wanted : (clusters,) bool
         Which may be offered; overwritten.
     ranked : (offers,) int64
-        Where the numbers of the chosen clusters are written.
+        The numbers of the chosen clusters (written).
     """
     count = int(_rank(left, is_wanted, ranked, 0, len(ranked) - by_size))
     if by_size == 0:
@@ -135,34 +135,34 @@ MOST_GAIN = 10_000.0
 
 
 PATIENCE_S = 20.0
-"""A frontier is given up where its robot has not moved for this long [s]."""
+"""Time without motion after which a robot gives up its frontier [s]."""
 
 
 MOVED = 0.15
-"""What counts as having moved [m]."""
+"""Minimum distance that counts as motion [m]."""
 
 
 UNSEEN, BLOCKED, NO_PROGRESS = 1, 2, 3
 
 
 class Offers(NamedTuple):
-    """What each robot is offered; row = episode * robots + robot, offers: ``settings.frontiers``.
+    """Frontiers offered to each robot; row = episode * robots + robot, offers: ``settings.frontiers``.
 
     Attributes
     ----------
     tables : (rows, offers, 4) float32
-        Position along the axes of the map frame from where the robot believes to be, cost of the path and
-        size [m] of each frontier, cheapest path first, zeros behind the last.
+        Position along the axes of the map frame from the robot's believed position, cost of the path and size [m] of
+        each frontier, cheapest path first, zeros after the last.
     masks : (rows, offers + 1) int8
-        1 for what may be chosen; the last is to stay.
+        1 for allowed choices; the last choice is to stay.
     counts : (rows,) int64
         Number of frontiers.
     targets, headings : (rows, offers, 2), (rows, offers) float64
-        Where to stand in the map frame [m] and how to turn there [rad], nan for any.
+        Final position in the map frame [m] and heading there [rad], nan for any.
     cells : (rows, offers, 2) int64
         The frontier cell (row, column) to observe.
     gains : (rows, offers) float32
-        Area that may be expected to be seen anew at the target [m2]; (0, 0) if nobody asks.
+        Area expected to be newly seen at the target [m2]; (0, 0) if not observed.
     """
 
     tables: NDArray[np.float32]
@@ -175,18 +175,18 @@ class Offers(NamedTuple):
 
 
 class Choices(NamedTuple):
-    """What each robot has chosen, and where it last got on with it.
+    """Frontiers chosen by each robot, and its last progress.
 
     Attributes
     ----------
     is_chosen : (rows,) bool
         Whether the robot has chosen a frontier.
     targets, headings, cells : (rows, 2), (rows,), (rows, 2)
-        As they were offered.
+        Target and heading as they were offered.
     tried : (rows, 2) int64
-        The frontier cell that the robot was last seen at work on, -1 for none.
+        Cell of the last frontier that the robot was driving to, -1 for none.
     places, since : (rows, 2), (rows,) float64
-        Where it then last got on [m], and since when [s].
+        Position [m] and time [s] of its last progress.
     """
 
     is_chosen: NDArray[np.bool_]
@@ -199,7 +199,7 @@ class Choices(NamedTuple):
 
 
 class ViewReach(NamedTuple):
-    """From where robots observe frontiers, and which they are offered.
+    """Positions from which robots observe frontiers, and the frontiers that are offered.
 
     Attributes
     ----------
@@ -212,11 +212,11 @@ class ViewReach(NamedTuple):
     least_size : float
         Shorter frontiers are offered only if there is no longer one [m].
     by_size : int
-        How many of the offers are the longest ones, the others are the cheapest.
+        Number of offers for the longest frontiers, the others are the cheapest.
     rays : (rays, 2) float64
         Directions by which gains are measured.
     range_cells : int
-        How far robots see [cells].
+        Range at which robots see [cells].
     """
 
     spans: NDArray[np.int64]
@@ -229,16 +229,16 @@ class ViewReach(NamedTuple):
 
 
 class Renewal(NamedTuple):
-    """Whose choices and offers are renewed, and what comes of it.
+    """Rows with choices and offers to renew, and the results.
 
     Attributes
     ----------
     is_live, is_offered : (rows,) bool
-        Whose choices are examined, and who is offered frontiers.
+        Rows with choices to examine, and rows to offer frontiers.
     reasons : (rows,) int8
         Result: why each robot's chosen frontier was given up, 0 if it was not.
     memory : (pieces, 5) int64
-        For the costs of paths, a piece for each thread, see ``SweepMemory``.
+        Scratch of the path costs, one for each thread, see ``SweepMemory``.
     """
 
     is_live: NDArray[np.bool_]
@@ -251,7 +251,7 @@ class Renewal(NamedTuple):
 def _why_in_vain(planning: Planning, drives: Drives, choices: Choices, row: int, time: float) -> int:
     """Return the reason why a chosen frontier is not worth more driving, or 0.
 
-    The reason is a number. Where the robot makes progress is noted.
+    The reason is a number. Progress of the robot is recorded.
     """
     state = drive_state(drives, row)
     if state == STATE_ARRIVED:
@@ -285,7 +285,7 @@ def _offer(
 ) -> None:
     """Offer a robot frontier clusters that it can approach and see, see `choose_offers`.
 
-    The cheapest path comes first. ``swept`` is where costs are found, prepared for the map.
+    The cheapest path comes first. ``swept`` holds the costs, prepared for the map.
     """
     table, mask = offers.tables[row], offers.masks[row]
     table[:], mask[:], offers.counts[row] = 0.0, 0, 0
@@ -342,7 +342,7 @@ def _leave_and_spread(
 ) -> None:
     """Find the costs of paths from a cell if the body does not fit.
 
-    It leaves by where there is no less room. Few robots stand so: a search cell by cell does it.
+    It leaves towards cells with no less room. Few robots are in such a place: a search cell by cell is enough.
     """
     memory = planning.memory[piece]
     remaining, parent, count, least = search_all(
@@ -363,7 +363,7 @@ def _give_up(
     renewal: Renewal,
     episode: int,
 ) -> None:
-    """Give up what live robots of a team chose in vain, on fresh maps."""
+    """Give up unreachable or unproductive choices of live robots of a team, on fresh maps."""
     refresh_team(maps, episode)
     time = maps.steps[episode] * view.time_step
     for row in range(episode * planning.robots, (episode + 1) * planning.robots):
@@ -377,7 +377,7 @@ def _give_up(
 
 @kernel
 def _prepared(planning: Planning, record: Array, memory: Array) -> SweptCosts:
-    """Return what the costs of paths on a map are found in, once for all robots that plan on it."""
+    """Return the scratch for path costs on a map, once for all robots that plan on it."""
     row_low, row_high, column_low, column_high = record[ROW_LOW:]
     window = (row_low, max(row_high, row_low), column_low, max(column_high, column_low))
     swept: SweptCosts = costs_in(memory, window)
@@ -395,7 +395,7 @@ def renew_teams(
     renewal: Renewal,
     work: Work,
 ) -> None:
-    """Give up what robots chose in vain, then offer again."""
+    """Give up unreachable or unproductive choices of the robots, then offer again."""
     for piece in numba.prange(work.threads):
         k = take_next(work.taken)
         while k < len(work.items):

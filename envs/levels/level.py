@@ -28,18 +28,18 @@ Mask = NDArray[np.bool_]
 
 
 class Turn(NamedTuple):
-    """The rows of a run, and where a level writes how they run.
+    """The rows of a run, and the outputs of a level that control the run.
 
     Attributes
     ----------
     acting : (rows,) bool
         Live robots of the episodes that run.
     given : (rows,) bool
-        Those of them that decide now; the others go on with their last orders.
+        Those of them that decide now; the others continue with their last orders.
     commands : (rows, 2) float64
         Speeds and turn rates for episodes that take one step [m/s, rad/s]; written by the level.
     modes : (episodes,) int8
-        How each episode runs: ``STEPS`` if it is to run, which the level may change to ``DECIDES``.
+        Mode of each episode: ``STEPS`` if it runs, which the level may change to ``DECIDES``.
     operating : Operating
         The operating states and orders of all robots.
     """
@@ -52,14 +52,14 @@ class Turn(NamedTuple):
 
 
 class Level(ABC):
-    """What an action of a robot is, and how it becomes motion; row = episode * robots + robot.
+    """A type of action of the robots, and its conversion to motion; row = episode * robots + robot.
 
     A subclass has an ``action_space`` and decodes actions in `read_rows`; `carry_out` turns them into motion.
 
     Parameters
     ----------
     perception : Perception
-        What the robots know.
+        The beliefs of the robots.
     settings : ExplorationSettings
         The team of every episode.
     shares_map : bool, optional
@@ -70,17 +70,17 @@ class Level(ABC):
     Attributes
     ----------
     action_space : Space
-        Of one robot.
+        Action space of one robot.
     boxes : dict
-        Spaces of what the level adds to an observation.
+        Spaces of the observations that the level adds.
     period_s : float
         Longest time of a decision, or of a step if the level decides at each step [s].
     steps : int
         The same in steps.
     driver : TeamDriver or None
-        What drives robots to targets, if the level has targets.
+        Drives robots to targets, if the level has targets.
     drives, following : Drives, Following
-        What kernels follow in a decision.
+        Drives that kernels follow during a decision.
     """
 
     takes_none: ClassVar[bool] = False
@@ -126,7 +126,7 @@ class Level(ABC):
     def read(self, actions: Mapping[int, Any], names: list[str]) -> Any:  # noqa: ANN401
         """Decode actions by row; ``names`` are the agents of a team, for messages.
 
-        By default they are put into an array and given to `read_rows`.
+        By default they are combined in an array and passed to `read_rows`.
         """
         space, chosen = self.action_space, np.zeros(self.rows, np.bool_)
         values = np.zeros((self.rows, *(space.shape or ())), space.dtype)
@@ -148,7 +148,7 @@ class Level(ABC):
     def observe(  # noqa: B027
         self, acted: Mask, live: Mask, seen: Mask, out: dict[str, NDArray[Any]], infos: dict[str, Any]
     ) -> None:
-        """Write what the level adds to observations and infos, after the episodes have run.
+        """Write the observations and infos of the level, after the episodes have run.
 
         ``acted`` took part in the step, ``live`` are those of ``seen`` that have not ended, ``seen`` are the rows
         that are observed.
@@ -184,7 +184,7 @@ def check_rows(actions: Any, shape: tuple[int, ...], live: Mask, wanted: str) ->
 
 
 def numbers_of(action: Any) -> NDArray[np.float64]:  # noqa: ANN401
-    """Return an action as an array of numbers, empty if it is none."""
+    """Return an action as an array of numbers, empty if it is not numeric."""
     try:
         return np.asarray(action, np.float64)
     except (TypeError, ValueError):
@@ -192,7 +192,7 @@ def numbers_of(action: Any) -> NDArray[np.float64]:  # noqa: ANN401
 
 
 def add_info(infos: dict[str, Any], name: str, rows: Mask, values: list[Any]) -> None:
-    """Add an info for some rows, with the mask that Gymnasium's vector environments put besides it."""
+    """Add an info for some rows, with the mask that Gymnasium's vector environments add to it."""
     described = np.full(len(rows), None, object)
     for row, value in zip(np.flatnonzero(rows).tolist(), values, strict=True):
         described[row] = value

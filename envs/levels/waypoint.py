@@ -17,14 +17,14 @@ from lidarium.mapping.geometry.bounds import shown
 
 
 class Ways(NamedTuple):
-    """Where robots are to drive.
+    """The targets and routes of robots.
 
     Attributes
     ----------
     orders : Orders
         The target of each row.
     routes : dict of int to Route
-        Routes that are followed as they are, by row.
+        Routes that are followed unchanged, by row.
     """
 
     orders: Orders
@@ -34,11 +34,11 @@ class Ways(NamedTuple):
 class WaypointLevel(Level):
     """An action is a point within the observed map.
 
-    It is two numbers within [-1, 1]: the position along the axes of the robot's map frame from where it believes to
-    be, as a share of half the map's side. A ``Target`` gives a position in the map frame directly; a ``Route`` is a
-    path that the policy has planned itself, and the robot follows it as it is, with the safety stop and right of way
-    of all driving; None lets the robot stay and give way. The onboard driver plans a path on what the robot knows. A
-    point that is not known to be free is approached as far as planning can come; if there is no path, the robot stays.
+    It is two numbers within [-1, 1]: the position along the axes of the robot's map frame from its believed position,
+    as a share of half the map's side. A ``Target`` gives a position in the map frame directly; a ``Route`` is a path
+    planned by the policy, which the robot follows unchanged, with the usual safety stop and right of way; with None
+    the robot stays and gives way. The onboard driver plans a path on the robot's map. If a point is not known to be
+    free, the robot approaches it as far as a path exists; if no path exists, the robot stays.
 
     A decision lasts for the decision period. It ends earlier if any robot with a target arrives or finds no path,
     pauses by itself, gets an order late, or ends.
@@ -46,10 +46,10 @@ class WaypointLevel(Level):
     Attributes
     ----------
     driver : TeamDriver
-        What drives the robots.
+        Drives the robots.
     router : callable or None
-        Called with the rows that have a say in each decision, when all robots have their targets: it may let the
-        driver follow routes to them. None by default: paths are planned on grids.
+        Called in each decision, when all robots have their targets, with the rows that take part: it may let the
+        driver follow routes to the targets. None by default: paths are planned on grids.
     """
 
     takes_none: ClassVar[bool] = True
@@ -105,7 +105,7 @@ class WaypointLevel(Level):
         return self.ways_to(positions + np.clip(shares, -1.0, 1.0) * self._half_side, live)
 
     def ways_to(self, targets: NDArray[np.float64], live: Mask) -> Ways:
-        """Return the ways of live rows to targets (rows, 2) in their map frames [m]."""
+        """Return the targets or routes of live rows to positions (rows, 2) in their map frames [m]."""
         return Ways(Orders(live.copy(), targets, np.full(self.rows, np.nan)), {})
 
     def _target(self, row: int, action: Any, name: str) -> Target:  # noqa: ANN401
@@ -120,9 +120,9 @@ class WaypointLevel(Level):
         return Target(float(x), float(y))
 
     def carry_out(self, decoded: Ways, turn: Turn) -> None:
-        """Give robots their targets and plan; an episode in which a robot is to end stands for one step.
+        """Give robots their targets and plan; an episode in which a robot should end takes one step only.
 
-        A paused robot keeps its target, and an order of the station goes before the policy's choice.
+        A paused robot keeps its target, and an order of the station has priority over the policy's choice.
         """
         operating, modes = turn.operating, turn.modes
         is_assigned = turn.given & ~operating.held

@@ -36,12 +36,12 @@ SCAN, POSE, VELOCITY, BUMPER, LEVELS, EGOCENTRIC_LEVELS, GOAL = range(len(KEYS))
 Arrays = tuple[Array, ...]
 """Arrays that go to the kernel together.
 
-A tuple costs no more than its arrays alone, where a named one costs twice as much.
+A tuple costs no more than its arrays alone; a named one costs twice as much.
 """
 
 
 class _Sources(NamedTuple):
-    """What observations are written from.
+    """Arrays that observations are written from.
 
     Attributes
     ----------
@@ -52,7 +52,7 @@ class _Sources(NamedTuple):
     pools : (rows, scales * 3) int64
         Address, rows and columns of each robot's pooled maps.
     limits : (4,) float64
-        Resolution of the maps [m], and what ranges [m], speeds [m/s] and turn rates [rad/s] are clipped to.
+        Resolution of the maps [m], and limits of ranges [m], speeds [m/s] and turn rates [rad/s].
     scales : (scales,) int64
         Scales of the pooled maps [cells].
     """

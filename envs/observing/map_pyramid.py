@@ -29,7 +29,7 @@ def _known_reach(log_odds: Array, row: int, column: int) -> int:
 
 @kernel
 def _least_level(log_odds: Array, first_row: int, first_column: int, scale: int) -> int:
-    """Return the least level of a block of cells: occupied, else unknown, else free."""
+    """Return the lowest level of a block of cells: occupied, otherwise unknown, otherwise free."""
     rows, columns = log_odds.shape
     found = _FREE
     for i in range(first_row, first_row + scale):

@@ -1,4 +1,4 @@
-"""Observables that are functions: how one is made known, and what writes them."""
+"""Observables that are functions: their registration, and the writer of their values."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -13,7 +13,7 @@ from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.settings.observables import SENSED, Observable
 
 OLDEST_S = 3600.0
-"""Bound of the age of what is known of others [s]."""
+"""Maximum age of information on others [s]."""
 
 
 def _share(settings: ExplorationSettings) -> spaces.Box:
@@ -21,7 +21,7 @@ def _share(settings: ExplorationSettings) -> spaces.Box:
 
 
 def time_left(rows: Rows) -> NDArray[np.float64]:
-    """Return the share of the horizon that is left; 1 if there is none."""
+    """Return the share of the horizon that is left; 1 without a horizon."""
     horizon = rows.settings.horizon_steps
     if horizon is None:
         return np.ones((rows.robots * rows.episodes, 1))
@@ -34,7 +34,7 @@ def coverage(rows: Rows) -> NDArray[np.float64]:
 
 
 def teammates(rows: Rows) -> NDArray[np.float64]:
-    """Return what each robot knows of the others, places from its own."""
+    """Return the state of each robot's teammates as it knows them, relative to its own position."""
     table = rows.teammates
     known = table[..., 7:] > 0.0
     here = rows.pose[:, None, :2]
@@ -116,7 +116,7 @@ class ComputedObservations:
     Parameters
     ----------
     rows : Rows
-        What they are computed from.
+        Input of the functions.
 
     Attributes
     ----------

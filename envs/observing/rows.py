@@ -16,7 +16,7 @@ FARTHEST = 1000.0
 
 
 class Rows:
-    """What is known of all robots of all episodes, row = episode * robots + robot.
+    """State of all robots of all episodes, row = episode * robots + robot.
 
     The arrays are the simulation's own: read them, and keep copies. Attributes of the world that are not
     named here, such as ``poses``, are the world's.
@@ -24,11 +24,11 @@ class Rows:
     Parameters
     ----------
     simulation : Simulation
-        Of all episodes.
+        Simulation of all episodes.
     settings : ExplorationSettings
         The team of every episode.
     poses : KnownPoses or None
-        What the robots know of where they and the others are; None if no observable asks.
+        Poses of the robots and their teammates as known to them; None if no observable needs them.
 
     Attributes
     ----------
@@ -53,7 +53,7 @@ class Rows:
 
     @property
     def sensors(self) -> Mapping[str, NDArray[Any]]:
-        """What the sensors measured, by name: ``scan``, ``odometry``, ``velocity``, ``bumper``."""
+        """Measurements of the sensors, by name: ``scan``, ``odometry``, ``velocity``, ``bumper``."""
         return self._world.sensors
 
     @property
@@ -142,13 +142,13 @@ class Rows:
 
     @property
     def is_covered(self) -> NDArray[np.bool_]:
-        """Whether the team has seen ``stop_coverage`` of F, or all of it if there is none, (rows,)."""
+        """Whether the team has seen ``stop_coverage`` of F, by default all of it, (rows,)."""
         wanted = self.settings.stop_coverage
         return np.asarray(self.coverage >= (1.0 if wanted is None else wanted))
 
     @property
     def teammates(self) -> NDArray[np.float64]:
-        """What each robot knows of the others, (rows, robots - 1, 8); see ``KnownPoses.table``."""
+        """Teammates as each robot knows them, (rows, robots - 1, 8); see ``KnownPoses.table``."""
         if self._poses is None:
             raise ValueError("teammates are known to observables only, not to rewards")
         return self._poses.table()

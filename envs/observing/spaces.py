@@ -1,4 +1,4 @@
-"""Spaces of observations, with the actions besides them."""
+"""Spaces of observations, and of the actions that go with them."""
 
 import math
 
@@ -20,17 +20,17 @@ KERNEL_SUMMARIES = {
     "egocentric_map": "turned crops of the map around the robot, (scales, C, C)",
     GAINS: "unknown area in view at each frontier on offer [m2], (F,); at the level of frontiers",
 }
-"""What each observable of the kernel is, in one line."""
+"""One-line description of each observable of the kernel."""
 
 
 KEYS = (*OBSERVABLES, "goal")
-"""All that the kernel writes, in the order in which it takes the arrays."""
+"""All keys that the kernel writes, in the order in which it takes the arrays."""
 
 
 def observed_keys(settings: ExplorationSettings, has_goal: bool) -> tuple[str, ...]:
     """Return the keys of an observation that the writer writes.
 
-    They are what the settings choose but for functions, and the goal if there is one.
+    They are the keys that the settings choose, except functions, and the goal if the floor has one.
     """
     functions = computed(settings)
     chosen = tuple(name for name in settings.observe if name not in (*functions, *LEVEL_OBSERVABLES))

@@ -1,6 +1,6 @@
 """Observations of a robot: the spaces, and the kernel that writes them.
 
-The kernel writes the observations of all rows where the caller wants them.
+The kernel writes the observations of all rows directly into the arrays of the caller.
 """
 
 from collections.abc import Mapping
@@ -22,14 +22,14 @@ from lidarium.mapping.kernels.views import table_of
 class ObservationWriter:
     """Writes the observations of all rows of a world in one kernel call.
 
-    It writes what the settings choose and nothing else.
+    It writes the observations chosen by the settings and nothing else.
 
     Parameters
     ----------
     simulation : Simulation
-        Of the robots.
+        Simulation of the robots.
     settings : ExplorationSettings
-        What is observed; sizes, limits and threads.
+        Choice of observations; sizes, limits and threads.
     offsets : (rows, 2) float64
         Origin of each robot's map frame in the frame of its believed pose [m]; read at each call.
     goals : (rows, 2) float64 or None
@@ -39,7 +39,7 @@ class ObservationWriter:
     Attributes
     ----------
     keys : tuple of str
-        What is observed.
+        Names of the observations.
 
     Raises
     ------
@@ -75,7 +75,7 @@ class ObservationWriter:
             raise ValueError(
                 f"the world has no sensor {missing[0]!r}; it has {', '.join(simulation.sensors)}"
             )
-        # The kernel takes the arrays of all its keys, in order; what is not observed stands behind what is.
+        # The kernel takes the arrays of all its keys, in order; keys that are not observed come last.
         absent = [name for name in KEYS if name not in self.keys]
         self._absent = [np.empty((0,) * len(kinds[name][0]), kinds[name][1]) for name in absent]
         self._in_order = itemgetter(*((*self.keys, *absent).index(name) for name in KEYS))
@@ -104,7 +104,7 @@ class ObservationWriter:
     def buffers(self) -> dict[str, NDArray[Any]]:
         """Return new arrays for the observations, by key.
 
-        What they hold is undefined until it is written.
+        Their contents are undefined until they are written.
         """
         return {name: np.empty(*kind) for name, kind in zip(self.keys, self._kinds, strict=True)}
 
@@ -116,7 +116,7 @@ class ObservationWriter:
         Parameters
         ----------
         active : (rows,) bool or None
-            Which rows to write, the others keep what they hold; all by default.
+            Rows to write, the others keep their values; all by default.
         """
         arrays = list(starmap(np.empty, self._kinds)) if out is None else self.check(out)
         self._write(arrays, active)
@@ -138,7 +138,7 @@ class ObservationWriter:
             self._copy_sensors(arrays, active)
 
     def copy_sensors(self, out: Mapping[str, NDArray[Any]], active: NDArray[np.bool_]) -> None:
-        """Write what the kernel does not write: last measurements of sensors, of the rows that are active."""
+        """Write the observations that the kernel does not: last measurements of sensors, of the active rows."""
         if self._sensed:
             self._copy_sensors([out[name] for name in self.keys], active)
 
@@ -151,9 +151,9 @@ class ObservationWriter:
                 arrays[place][active] = measured[active]
 
     def arguments(self, out: Mapping[str, NDArray[Any]]) -> tuple[Array, Arrays]:
-        """Return what ``write_row`` takes besides the row.
+        """Return the arguments of ``write_row`` except the row.
 
-        These are where the sources of the observations lie, and where to write, as ``buffers`` makes it.
+        These are the addresses of the sources, and of the output as ``buffers`` makes it.
         """
         sources = self._table() if self._sources is None else self._sources
         return sources, self._in_order([out[name] for name in self.keys] + self._absent)
@@ -167,7 +167,7 @@ class ObservationWriter:
         return self._sources
 
     def __getstate__(self) -> dict[str, Any]:
-        # A copy's arrays lie elsewhere; where, is known when all of it has been made.
+        # A copy's arrays have other addresses, which are known when all of it has been made.
         return {**self.__dict__, "_sources": None}
 
     def check(self, out: Mapping[str, NDArray[Any]]) -> list[NDArray[Any]]:

@@ -1,4 +1,4 @@
-"""What a policy may read of what one robot knows."""
+"""Read-only access of a policy to the belief of one robot."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,9 +12,9 @@ from lidarium.envs.settings.robots import Robot
 
 
 class Belief:
-    """Read-only handle on what one robot knows.
+    """Read-only handle on the belief of one robot.
 
-    What it shows is valid until the next step.
+    Its values are valid until the next step.
 
     All positions are in the robot's map frame: with known starts the floor's axes from the corner of its
     start cell.
@@ -44,7 +44,7 @@ class Belief:
     def spread(self) -> NDArray[np.float64]:
         """Estimated standard deviation of the pose [m, m, rad], shape (3,).
 
-        Zero where it claims to know.
+        0 if it claims to know.
         """
         return self._perception.poses.spread(self._row)
 
@@ -80,7 +80,7 @@ class Belief:
     def shared_map(self) -> NavigationMap | None:
         """The team's map, if it reached this robot.
 
-        With unknown starts None until the robot is sent what others know.
+        With unknown starts None until the robot is sent the knowledge of others.
         """
         return self._perception.shared_map(self._row)
 
@@ -91,20 +91,20 @@ class Belief:
 
     @property
     def shared_sparse_map(self) -> SparseBelief:
-        """What the team's sparse maps hold, as far as they reach this robot at once; else its own.
+        """The sparse maps of the team if they reach this robot at once, otherwise its own map.
 
-        With unknown starts, and where the radio is not ideal, they do not.
+        They do not with unknown starts or if the radio is not ideal.
         """
         return self._perception.sparse_maps.belief(self._row)
 
     @property
     def teammates(self) -> dict[str, Teammate]:
-        """What is known of the others, by name."""
+        """The known state of the teammates, by name."""
         return self._perception.poses.teammates(self._row)
 
     @property
     def energy_left_j(self) -> float | None:
-        """What is left in the battery [J]; None if it has no limit."""
+        """The energy left in the battery [J]; None if it has no limit."""
         meters = self._perception.meters
         return None if meters is None else meters.left_j(self._row)
 

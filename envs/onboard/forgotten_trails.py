@@ -18,14 +18,13 @@ class ForgottenTrails:
     Parameters
     ----------
     simulation : Simulation
-        Whose maps they are; row = episode * robots + robot.
+        The simulation with the maps; row = episode * robots + robot.
     settings : ExplorationSettings
         The team of every episode.
     poses : KnownPoses
-        Where the map frames of the robots are.
+        Origins of the robots' map frames.
     fresh_at : (episodes,) int64
-        At which step the maps of each team were last brought up to date; ``STALE`` is written to it where
-        walls are forgotten.
+        Step at which the maps of each team were last brought up to date; ``STALE`` if walls are forgotten.
     """
 
     def __init__(
@@ -54,8 +53,8 @@ class ForgottenTrails:
         Parameters
         ----------
         trail : (N, 2) float64
-            Where the other one was, in the map frame of this [m]; what may show it where it stands at the end
-            is kept.
+            Trail of the other robot, in the map frame of this one [m]; cells that may show it at its last position
+            are kept.
         """
         if trail.ndim != 2 or trail.shape[1] != 2 or not len(trail) or not np.isfinite(trail).all():
             raise ValueError(

@@ -1,4 +1,4 @@
-"""What the robots know of where they are, and where their teammates are."""
+"""The poses that robots know: their own and those of their teammates."""
 
 from dataclasses import dataclass
 
@@ -14,18 +14,18 @@ from lidarium.mapping.localization.localizer import Localizer
 
 @dataclass(frozen=True, slots=True)
 class Teammate:
-    """What a robot knows of another.
+    """State of a teammate as known to a robot.
 
     Attributes
     ----------
     pose : (3,) float64
         x, y, theta in the knowing robot's map frame [m, rad].
     age_s : float
-        Age of what is known [s].
+        Age of this information [s].
     radius : float
         Radius of the body [m].
     has_ended : bool
-        Whether it has ended and stands if it is.
+        Whether it has ended and no longer moves.
     """
 
     pose: NDArray[np.float64]
@@ -40,7 +40,7 @@ class KnownPoses:
     Parameters
     ----------
     simulation : Simulation
-        Whose believed poses they are; row = episode * robots + robot.
+        The simulation with the believed poses; row = episode * robots + robot.
     settings : ExplorationSettings
         The team of every episode.
     offsets : (rows, 2) float64
@@ -53,9 +53,9 @@ class KnownPoses:
     knows_teammates : bool
         Whether all teammates' poses are known at once.
     localizers : list of Localizer or None
-        What estimates each robot's pose, by row; None if kernels do.
+        The localizer of each robot, by row; None if kernels localize.
     goals : list of tuple or None
-        The goal of each episode in the frame of the floor (x, y) [m]; None if it has none.
+        The goal of each episode in the frame of the floor (x, y) [m]; None without a goal.
     """
 
     def __init__(
@@ -67,7 +67,7 @@ class KnownPoses:
     ) -> None:
         self._settings, self._offsets, self._exchanges = settings, offsets, exchanges
         self._world, self._beliefs, self._robots = simulation.world, simulation.beliefs, settings.robots
-        # Without known starts no robot can know where another is, whatever it hears.
+        # Without known starts no robot can locate another, whatever it hears.
         self._hears = settings.known_starts and settings.robots > 1 and not settings.radio.is_ideal
         self.knows_teammates = settings.known_starts and settings.radio.is_ideal
         self.localizers: list[Localizer | None] = [None] * (settings.robots * simulation.episodes)
@@ -81,7 +81,7 @@ class KnownPoses:
         return self._offsets
 
     def attach_targets(self, is_sent: NDArray[np.bool_], targets: NDArray[np.float64]) -> None:
-        """Take the arrays that say where robots drive.
+        """Set the arrays with the targets of the robots.
 
         Parameters
         ----------
@@ -93,9 +93,9 @@ class KnownPoses:
         self._is_sent, self._targets = is_sent, targets
 
     def table(self) -> NDArray[np.float64]:
-        """Return what all robots know of their teammates, (rows, robots - 1, 8), in a new array.
+        """Return the known state of all robots' teammates, (rows, robots - 1, 8), in a new array.
 
-        Of each of the others in their order: x, y [m], theta [rad]; x, y of its target [m], and 1 if it is
+        For each of the others in their order: x, y [m], theta [rad]; x, y of its target [m], and 1 if it is
         known; age of the pose [s], and 1 if that is known. Zeros if nothing is. All in the knowing robot's
         map frame. A target is known with a pose of this step.
         """
@@ -158,9 +158,9 @@ class KnownPoses:
         return np.asarray(self._beliefs.heard[row].reshape(-1, 3)[other % self._robots])
 
     def teammates(self, row: int) -> dict[str, Teammate]:
-        """Return what a robot knows of its teammates.
+        """Return the known state of a robot's teammates.
 
-        With known starts and the ideal radio these are their current poses, else the last reported ones.
+        With known starts and the ideal radio these are their current poses, otherwise the last reported ones.
         """
         if not self._settings.known_starts:
             return {}
@@ -179,7 +179,7 @@ class KnownPoses:
         }
 
     def _heard_teammates(self, row: int, first: int) -> dict[str, Teammate]:
-        """Return what a robot heard of the others."""
+        """Return the state of the others as a robot heard it."""
         exchange, robot = self._exchanges[row // self._robots], row - first
         step, radius = int(self._world.steps[row // self._robots]), self._settings.robot.radius
         known = {}
@@ -194,7 +194,7 @@ class KnownPoses:
     def goal_of(self, row: int) -> NDArray[np.float64] | None:
         """Return the goal in a robot's map frame.
 
-        None without a goal, and where the robot does not know its start.
+        None without a goal, or if the robot does not know its start.
         """
         goal = self.goals[row // self._robots]
         if goal is None or not self._settings.known_starts:

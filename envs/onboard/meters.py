@@ -19,14 +19,14 @@ class Meters:
     Parameters
     ----------
     world : World
-        Whose robots.
+        The world with the robots.
     settings : ExplorationSettings
         Their wheels and batteries.
 
     Attributes
     ----------
     is_active : bool
-        Whether anything has to be done in a step.
+        Whether a step changes anything.
     used_j : (rows,) float64
         Energy used since the beginning of the episode [J]; 0 if batteries have no limit.
     """
@@ -78,7 +78,7 @@ class Meters:
         used = (
             battery.idle_w * self._time_step + battery.per_metre_j * driven + battery.per_radian_j * turning
         )
-        # Who has ended is switched off.
+        # Robots that have ended are switched off.
         self.used_j[rows] += np.where(world.flags[rows] & ENDED, 0.0, used)
         self._headings[rows], self._travelled[rows] = headings, travelled
 

@@ -1,4 +1,4 @@
-"""A map with what planning needs of it.
+"""A map with its planning data.
 
 Kernels update the maps of many teams.
 
@@ -26,7 +26,7 @@ CLEARANCE_LIMIT = 0.6
 LOG_ODDS, ROWS, COLUMNS, CLOSENESS, FLAGS, TILES, ROW_LOW, ROW_HIGH, COLUMN_LOW, COLUMN_HIGH = range(10)
 """Places in a record: addresses, shape and the known window.
 
-Addresses are 0 for what is not kept. Nothing is known outside the window.
+Addresses are 0 for arrays that are not kept. Nothing is known outside the window.
 """
 
 
@@ -40,7 +40,7 @@ class NavigationMap:
     Parameters
     ----------
     log_odds : (rows, columns) int8
-        The map; it may be written by its owner, who says so by ``changed``. Blank, or followed by a call of
+        The map; its owner may write it and then calls ``changed``. Initially blank, or followed by a call of
         ``changed``.
     resolution : float
         Side of a cell [m].
@@ -60,7 +60,7 @@ class NavigationMap:
 
     @property
     def log_odds(self) -> NDArray[np.int8]:
-        """The map, read-only: only its owner, who holds the array itself, writes it."""
+        """The map, read-only: only its owner, which holds the array itself, writes it."""
         view = self._log_odds.view()
         view.flags.writeable = False
         return view
@@ -91,14 +91,14 @@ class NavigationMap:
         refresh_map(self._record, self.clearance.limit, self.clearance.stamp, np.array(window, np.int64))
 
     def keep_record_in(self, record: NDArray[np.int64]) -> None:
-        """Let ``record`` (10,) be where kernels look the map up."""
+        """Use ``record`` (10,) as the record from which kernels look up the map."""
         record[:] = self._record
         self._record = record
         self._point()
 
     @property
     def record(self) -> NDArray[np.int64]:
-        """Where kernels look the map up, (10,)."""
+        """Record from which kernels look up the map, (10,)."""
         return self._record
 
     def _point(self) -> None:
@@ -170,7 +170,7 @@ def tiles_of(record: Array) -> Any:  # noqa: ANN401
 def refresh_map(record: Array, limit: int, stamp: Array, window: Array) -> None:
     """Update clearance and frontiers in a window (4,) of a map (kernel).
 
-    The window is where the map changed; frontiers are updated if they are kept.
+    The window is the changed part of the map; frontiers are updated if they are kept.
     """
     inside = is_inside(record, window)
     take_in(
@@ -186,7 +186,7 @@ def is_inside(record: Array, window: Array) -> Window:
 
 @kernel
 def take_in(record: Array, limit: int, stamp: Array, inside: Window, changed: Array) -> None:
-    """Update what is kept beside a map that changed in a window.
+    """Update the planning data of a map that changed in a window.
 
     The cells (N, 2) became occupied or ceased to be.
     """

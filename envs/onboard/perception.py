@@ -1,9 +1,9 @@
-"""What the robots' onboard software knows: poses, maps and received data.
+"""The beliefs of the robots' onboard software: poses, maps and received data.
 
-This includes what reached each of the others.
+This includes data received from the other robots.
 
 With known starts and the ideal radio all robots of a team share one map, the sum of their log-odds. A robot
-that does not know its start can be sent what others know, overlaid on its own map. All maps come with what
+that does not know its start can be sent the map of others, overlaid on its own map. All maps come with the data that
 planning needs (clearance and frontiers), brought up to date only if the map has changed.
 """
 
@@ -43,7 +43,7 @@ class Perception:
     Parameters
     ----------
     simulation : Simulation
-        Whose maps and believed poses they are; row = episode * robots + robot.
+        The simulation with the maps and believed poses; row = episode * robots + robot.
     settings : ExplorationSettings
         The team of every episode.
     offsets : (rows, 2) float64
@@ -52,19 +52,19 @@ class Perception:
     Attributes
     ----------
     memory : SearchMemory
-        For the searches of kernels, a piece for each thread.
+        Scratch of the searches in kernels, one for each thread.
     exchanges : list of Exchange
         The radio traffic of each episode; none if the radio is ideal.
     poses : KnownPoses
-        Where the robots know themselves and their teammates to be.
+        Poses of the robots and their teammates as known to the robots.
     received : ReceivedMaps
-        What the robots know together with what reached them from others.
+        The robots' maps combined with data received from others.
     trails : ForgottenTrails
         The trails of others along which robots forget the walls of their maps.
     sparse_maps : SparseMaps
         The sparse maps that they make by their depth cameras, if these were asked for.
     meters : Meters or None
-        Odometers and battery gauges of the robots of a lone episode; None in batches, which have none.
+        Odometers and battery gauges of the robots of a lone episode; None in batches.
     """
 
     def __init__(
@@ -96,7 +96,7 @@ class Perception:
 
     @property
     def hears(self) -> bool:
-        """Whether a robot's map of the team is what reached it by radio."""
+        """Whether a robot's team map holds only data received by radio."""
         return self.received.hears
 
     def start(self, goal: tuple[float, float] | None = None, episode: int = 0) -> None:
@@ -104,7 +104,7 @@ class Perception:
         first, last = episode * self._robots, (episode + 1) * self._robots
         for navigation in (*self._own[first:last], self._shared[episode]):
             if navigation is not None:
-                # Whoever still holds a map of the last episode may go on reading it.
+                # A caller that still holds a map of the last episode may continue to read it.
                 navigation.keep_record_in(np.zeros(RECORD, np.int64))
         self._own[first:last], self._shared[episode] = [None] * self._robots, None
         self._own_records[first:last], self._shared_records[episode] = 0, 0
@@ -120,7 +120,7 @@ class Perception:
     def maps(self) -> TeamMaps:
         """The maps as kernels see them."""
         if self.received.adds_up:
-            # What kernels bring up to date by themselves does not include what came from others.
+            # Kernels do not include the maps of others when they bring maps up to date.
             for episode in range(self._episodes):
                 self._refresh(episode)
         return self._maps
@@ -184,7 +184,7 @@ class Perception:
     def shared_map(self, row: int = 0) -> NavigationMap | None:
         """Return the team's map as it reached a robot, up to date.
 
-        A lone robot's is its own, with unknown starts what it was sent.
+        A lone robot's is its own; with unknown starts it is the map that was sent to it.
         """
         if not self.settings.known_starts:
             return self._heard_map(row) if self.received.has_merged_map(row) else None
@@ -213,7 +213,7 @@ class Perception:
     def planning_map(self, row: int, shares_map: bool) -> NavigationMap:
         """Return the map that a robot plans on, up to date.
 
-        It is the team's where that reaches the robot, else the robot's own.
+        It is the team's map if it reaches the robot, otherwise the robot's own.
         """
         if shares_map and self.received.adds_up:
             # Also that of a robot to which nothing came: kernels look the maps of all up in one table.
@@ -224,7 +224,7 @@ class Perception:
     def provide_records(
         self, rows: NDArray[np.int64], shares_map: bool, *, with_frontiers: bool = False
     ) -> tuple[NDArray[np.int64], int]:
-        """Make the maps that robots plan on if there are none yet, for kernels.
+        """Make the maps that robots plan on if they do not exist yet, for kernels.
 
         Returns
         -------
@@ -244,7 +244,7 @@ class Perception:
         return records, sharing
 
     def _refresh(self, episode: int) -> None:
-        """Take in what the maps of a team have changed since the last step."""
+        """Apply the changes of a team's maps since the last step."""
         if self._fresh_at[episode] == self.world.steps[episode]:
             return
         if not self.received.adds_up:

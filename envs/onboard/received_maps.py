@@ -17,29 +17,29 @@ from lidarium.mapping.planning.frontiers.frontier_map import IGNORED
 
 
 class ReceivedMaps:
-    """What the robots of all episodes know together with what reached them from others.
+    """Maps of the robots of all episodes combined with data from other robots.
 
-    That is what came by radio if the starts are known, else what the station sent to a robot.
+    The data come by radio if the starts are known, otherwise from the station.
 
     Parameters
     ----------
     simulation : Simulation
-        Whose maps they are; row = episode * robots + robot.
+        The simulation with the maps; row = episode * robots + robot.
     settings : ExplorationSettings
         The team of every episode.
     poses : KnownPoses
-        Where the map frames of the robots are.
+        Origins of the robots' map frames.
     exchanges : list of Exchange
         The radio traffic of each episode; none if the radio is ideal.
 
     Attributes
     ----------
     hears : bool
-        Whether a robot's map of the team is what reached it by radio.
+        Whether a robot's team map holds only data received by radio.
     adds_up : bool
-        Whether robots plan on sums of their own map and of what came from others.
+        Whether robots plan on sums of their own map and received maps.
     records : (rows, 10) int64
-        The sums as kernels see them, zeros if there is none yet.
+        The sums as kernels see them, zeros if they do not exist yet.
     """
 
     def __init__(
@@ -63,7 +63,7 @@ class ReceivedMaps:
         for row in rows:
             navigation = self._sums[row]
             if navigation is not None:
-                # Whoever still holds a map of the last episode may go on reading it.
+                # A caller that still holds a map of the last episode may continue to read it.
                 navigation.keep_record_in(np.zeros(RECORD, np.int64))
             self._sums[row], self._others[row] = None, None
             self.records[row] = 0
@@ -74,7 +74,7 @@ class ReceivedMaps:
         return self._sums[row] is not None
 
     def has_merged_map(self, row: int) -> bool:
-        """Whether a robot has received what others know."""
+        """Whether a robot has received a map of others."""
         return self._others[row] is not None
 
     def sum_of(self, row: int, own: NavigationMap | None) -> NavigationMap:
@@ -91,12 +91,12 @@ class ReceivedMaps:
             _, rows, columns = self._beliefs.belief_rows[row, :3]
             self.sum_window(row, np.array([0, rows, 0, columns]))
             if not self.hears and own is not None and own.record[FLAGS] != 0:
-                # What the robot gave up on its own map it does not try again.
+                # Frontiers that the robot gave up on its own map are not tried again.
                 navigation.frontiers.ignore(np.argwhere(own.frontiers.flags == IGNORED))
         return navigation
 
     def sum_window(self, row: int, window: NDArray[np.int64]) -> None:
-        """Update the sum of what reached a robot in a window (4,)."""
+        """Update the sum of the maps that a robot received, in a window (4,)."""
         episode, robot = divmod(row, self._robots)
         received = self._others[row]
         if self.hears:
@@ -117,9 +117,9 @@ class ReceivedMaps:
         sum_maps(self.records[row], beliefs, limit, stamp_of(limit), window)
 
     def receive(self, row: int, others: FusedMap | None) -> None:
-        """Let a robot that does not know its start receive what others know.
+        """Give a robot that does not know its start the map of the others.
 
-        It plans and explores on that as on its own map.
+        It plans and explores on that map as on its own.
         """
         resolution = self._settings.occupancy.resolution
         if self._settings.known_starts:

@@ -1,6 +1,6 @@
 """Onboard steps between sensing and deciding: localization and radio.
 
-They cover who reports if a robot is, and what the radio brings.
+They cover localization and radio.
 
 In the ideal world the kernels of a step do all of it. Localizers and radios that are not kernels run here,
 between and after the two stages of a step, robot by robot.
@@ -27,7 +27,7 @@ class Software:
     Parameters
     ----------
     perception : Perception
-        What the robots know; it holds their localizers and radios.
+        The beliefs of the robots, with their localizers and radios.
     settings : ExplorationSettings
         The team of every episode.
 
@@ -48,7 +48,7 @@ class Software:
     def start(self, episode: int, seed: int) -> None:
         """Begin an episode, after its robots were placed.
 
-        Whatever is drawn comes from ``seed``.
+        All random draws use ``seed``.
         """
         robots = self._settings.robots
         if self._localizes:
@@ -70,7 +70,7 @@ class Software:
         moves_bodies: bool = True,
         runs: NDArray[np.bool_] | None = None,
     ) -> None:
-        """Run a step of the world, as ``Simulation.step``, and what belongs to it on board."""
+        """Run a step of the world, as ``Simulation.step``, and the onboard software."""
         simulation = self._perception.simulation
         simulation.step(commands, moves_bodies=moves_bodies, perceives=not self._localizes, runs=runs)
         if not self.is_staged:
@@ -87,7 +87,7 @@ class Software:
         perception.sparse_maps.sense(runs)
 
     def _localize(self, episode: int) -> None:
-        """Let the robots of an episode find out if they are."""
+        """Localize the robots of an episode."""
         simulation, robots = self._perception.simulation, self._settings.robots
         world = simulation.world
         time_s = float(world.steps[episode]) * self._settings.time_step

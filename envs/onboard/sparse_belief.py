@@ -1,4 +1,4 @@
-"""What a robot knows by its depth camera, asked and answered in its own map frame."""
+"""Map of a robot from its depth camera; queries use the robot's own map frame."""
 
 from dataclasses import dataclass, replace
 
@@ -15,7 +15,7 @@ from lidarium.mapping.sparse.exploring.views import Sight, View
 class SparseBelief:
     """A sparse map with its graph and the ground that was seen, ready to be planned on.
 
-    All places are x, y in the map frame of the robot [m].
+    All positions are x, y in the map frame of the robot [m].
 
     Attributes
     ----------
@@ -26,7 +26,7 @@ class SparseBelief:
     camera : GroundCamera
         The camera by which it was made.
     corrections : int
-        How often the localizer corrected the past, and the map with it.
+        Number of corrections of the past trajectory, and of the map with it.
     """
 
     navigation: SparseNavigation
@@ -46,11 +46,11 @@ class SparseBelief:
 
     @property
     def has_moved(self) -> bool:
-        """Whether the robot has left the place where its map begins."""
+        """Whether the robot has left the start of its map."""
         return len(self.navigation.trail) > 1
 
     def amid(self, places: NDArray[np.float64], half: float, height: float) -> "SparseBelief":
-        """Return the same with boxes around places (B, 2) that stand there for now.
+        """Return a copy with boxes around temporary obstacles at positions (B, 2).
 
         They reach ``half`` to each side, and up to ``height`` [m].
         """
@@ -62,7 +62,7 @@ class SparseBelief:
         return replace(self, navigation=self.navigation.amid(boxes))
 
     def hopeful(self, goal: NDArray[np.float64]) -> "SparseBelief":
-        """Return the same where unknown ground, up to that around a goal (2,), counts as free."""
+        """Return a copy in which unknown ground, up to that around a goal (2,), counts as free."""
         return replace(self, navigation=self.navigation.hopeful(self._own(goal)))
 
     def route(self, start: NDArray[np.float64], goal: NDArray[np.float64]) -> PlannedRoute:
@@ -75,7 +75,7 @@ class SparseBelief:
         return self.navigation.is_free(self._own(points))
 
     def nearest_standing(self, place: NDArray[np.float64], within_m: float) -> NDArray[np.float64] | None:
-        """Return the node nearest to a place (2,) within a distance [m], (2,); None if there is none."""
+        """Return the node nearest to a position (2,) within a distance [m], (2,); None if no node is."""
         node = self.navigation.nearest_standing(self._own(place), within_m)
         return None if node is None else self.frame.apply(node)
 
@@ -97,7 +97,7 @@ class SparseBelief:
     ) -> View | None:
         """Return the best view of unknown ground (F, 2), for a robot at x, y, theta (3,).
 
-        Its place is (2,) and what it shows (K, 2); None if the robot cannot come to see enough.
+        Its position is (2,) and the points it shows (K, 2); None if the robot cannot reach a sufficient view.
         """
         view = self.navigation.best_view(self._own_pose(pose), self._own(frontier), sight)
         return None if view is None else self._out(view)
@@ -107,7 +107,7 @@ class SparseBelief:
         return self._out(self.navigation.nearest_view(self._own_pose(pose), self._own(points)))
 
     def are_cut_off(self, pose: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """Return beside which points (N, 2) a robot at x, y, theta (3,) could stand but cannot come to."""
+        """Return which points (N, 2) a robot at x, y, theta (3,) could stand next to but cannot reach."""
         return self.navigation.are_cut_off(self._own_pose(pose), self._own(points))
 
     def _out(self, view: View) -> View:

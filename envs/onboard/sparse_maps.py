@@ -33,13 +33,13 @@ from lidarium.mapping.sparse.sparse_map import SparseMap
 from lidarium.mapping.sparse.swept_body import SweptBody
 
 SEEN_MOTION_M, SEEN_TURN = 0.1, math.radians(5.0)
-"""An image shows new ground where the robot has moved or turned by so much since the last one [m, rad]."""
+"""Minimum motion since the last image after which an image shows new ground [m, rad]."""
 
 SHORTFALL = 0.4
 """Ground may be seen so far too near, as a share of a cell: less than from a wall to the cell behind it."""
 
 LEAST_WALL_M, MOST_WALL_POINTS = 0.15, 3000
-"""Points lower than this show no wall; of the others so many show how walls run [m]."""
+"""Minimum height of points that show walls [m], and maximum number of points that show their direction."""
 
 LEAST_TURN = math.radians(1.0)
 """Walls that run along the axes of the believed poses to within this are taken to [rad]."""
@@ -48,7 +48,7 @@ TRAIL_M = 0.2
 """Distance between the places of the trail on which a robot can go back [m]."""
 
 BODY_HEIGHT_MARGIN_M = 0.03
-"""What hangs no more than this above the body is in its way [m]."""
+"""Maximum height above the body at which an overhanging object is in its way [m]."""
 
 MERGE_RADIUS_M = 0.20
 """Free codes of a robot that drives on its map merge within this [m].
@@ -78,9 +78,9 @@ class SparseMapper:
     ground : SeenGround
         The ground that it has seen.
     version : int
-        Counts up where map or ground change.
+        Incremented when map or ground changes.
     corrections : int
-        How often poses of the past were corrected.
+        Number of corrections of past poses.
 
     Raises
     ------
@@ -104,7 +104,7 @@ class SparseMapper:
             least_turn=sparse.least_turn,
             merge_radius_m=MERGE_RADIUS_M,
         )
-        # The camera stands on its robot, and the robot on the floor.
+        # The camera is fixed to its robot, and the robot is on the floor.
         self._mapper = IncrementalMapper(sparse.codes, mapping, floor=FloorPlane())
         eye = GroundCamera(
             intrinsics=camera.intrinsics,
@@ -129,7 +129,7 @@ class SparseMapper:
 
     @property
     def trail(self) -> NDArray[np.float64]:
-        """Where the robot has been on the map, a place every ``TRAIL_M``, the last one last, (T, 3) [m]."""
+        """Trail of the robot on the map, one pose every ``TRAIL_M``, the latest last, (T, 3) [m]."""
         poses = self._poses.rows
         steps = np.hypot(*np.diff(poses[:, :2], axis=0, prepend=poses[:1, :2]).T)
         firsts = np.unique(np.floor(np.cumsum(steps) / TRAIL_M), return_index=True)[1]
@@ -142,7 +142,7 @@ class SparseMapper:
         depth: NDArray[np.float32] | None,
         bodies: NDArray[np.float64],
     ) -> None:
-        """Take in if the robot is, and what its camera sees there.
+        """Add the pose of the robot and the image of its camera.
 
         Parameters
         ----------
@@ -151,9 +151,9 @@ class SparseMapper:
         pose : (3,) float64
             x, y, theta as the robot believes [m, rad].
         depth : (rows, columns) float32 or None
-            The image [m]; None if none was taken now.
+            The image [m]; None if the camera took no image in this step.
         bodies : (K, 3) float64
-            x, y and radius of other robots, whose points are no part of the map [m].
+            x, y and radius of other robots, which are not mapped [m].
         """
         if self.axes is None and depth is not None:
             self.axes = self._axes_of_walls(pose, depth)
@@ -176,7 +176,7 @@ class SparseMapper:
                 self.version += 1
 
     def correct(self, scans: KeyScans) -> None:
-        """Move all that was mapped with the poses of scans, as they are believed now.
+        """Move the map with the poses of the scans, as they are believed now.
 
         Each pose of the robot moves with the last scan before it.
         """
@@ -197,7 +197,7 @@ class SparseMapper:
         self.corrections += 1
 
     def _forget_what_is_gone(self, depth: NDArray[np.float32], frame: NDArray[np.float64]) -> None:
-        """Leave out the boxes of what has moved, as other robots do."""
+        """Remove the boxes of objects that have moved, such as other robots."""
         if self._coded:
             boxes = self._mapper.map.boxes
             gone = are_seen_through(boxes, depth, self._intrinsics, frame, self._range)
@@ -253,25 +253,25 @@ def _sparse_body(settings: ExplorationSettings) -> SweptBody:
 
 
 BODY_MARGIN_M = 0.1
-"""What is so near to the body of another robot is taken to be that robot [m]."""
+"""Points within this distance of another robot's body count as that robot [m]."""
 
 HEARD_MARGIN_M = 0.4
-"""The same, where it is only known where the other one was when it was heard of [m]."""
+"""The same if only an earlier position of the other robot is known [m]."""
 
 
 class SparseMaps:
     """Sparse maps by row = episode * robots + robot.
 
-    Robots that know each other's starts, and hear each other at once, plan on what all of them know.
+    Robots that know each other's starts, and hear each other at once, plan on their combined map.
 
     Parameters
     ----------
     simulation : Simulation
-        Whose images they are.
+        The simulation with the images.
     settings : ExplorationSettings
         The team of every episode.
     poses : KnownPoses
-        Where the robots know themselves and others to be.
+        Poses of the robots and others as known to the robots.
     """
 
     def __init__(self, simulation: Simulation, settings: ExplorationSettings, poses: KnownPoses) -> None:
@@ -281,7 +281,7 @@ class SparseMaps:
         self._shares = settings.known_starts and settings.robots > 1 and settings.radio.is_ideal
 
     def start(self, rows: Iterable[int]) -> None:
-        """Begin the episode of some rows: nobody has asked for their maps."""
+        """Begin the episode of some rows; no maps are requested yet."""
         for row in rows:
             self._mappers.pop(row, None)
             for count in (1, self._settings.robots):
@@ -289,7 +289,7 @@ class SparseMaps:
 
     @property
     def made(self) -> dict[int, SparseMapper]:
-        """What makes the maps that were asked for, by row."""
+        """The mappers of the requested maps, by row."""
         return dict(self._mappers)
 
     def check(self) -> None:
@@ -297,7 +297,7 @@ class SparseMaps:
         SparseMapper(self._settings)
 
     def of(self, row: int) -> SparseMapper:
-        """Return what makes a robot's map; from the first call on, it is made."""
+        """Return the mapper of a robot; the first call creates it."""
         mapper = self._mappers.get(row)
         if mapper is None:
             # Robots that share their maps have common axes.
@@ -307,7 +307,7 @@ class SparseMaps:
         return mapper
 
     def belief(self, row: int, shares_map: bool = True) -> SparseBelief:
-        """Return what a robot knows, in its map frame, up to date."""
+        """Return the belief of a robot, in its map frame, up to date."""
         own = self.of(row)
         sharing = self._sharing(row, shares_map)
         mappers = [self.of(each) for each in sharing]
@@ -321,7 +321,7 @@ class SparseMaps:
         return SparseBelief(replace(made[1], trail=own.trail), frame, own.ground.camera, own.corrections)
 
     def sense(self, runs: NDArray[np.bool_] | None = None) -> None:
-        """Take in the step that was taken, of all episodes or of those that ``runs`` (episodes,) says."""
+        """Process the last step, of all episodes or of those with ``runs`` (episodes,)."""
         for row, mapper in self._mappers.items():
             is_live = not self._simulation.world.flags[row] & ENDED
             if is_live and (runs is None or runs[row // self._settings.robots]):
@@ -346,7 +346,7 @@ class SparseMaps:
         mapper.sense(step * self._settings.time_step, pose, depth, self._bodies(row))
 
     def _bodies(self, row: int) -> NDArray[np.float64]:
-        """Return if a robot knows others to be, with what may show them around, (K, 3) [m]."""
+        """Return the known positions of other robots, with a margin around them, (K, 3) [m]."""
         known, robots = self._known_poses, self._settings.robots
         if not self._settings.known_starts:
             return np.empty((0, 3))
@@ -361,10 +361,10 @@ class SparseMaps:
         ).reshape(-1, 3)
 
     def _navigation(self, mappers: list[SparseMapper]) -> SparseNavigation:
-        """Return what some robots know together, along the axes that they share."""
+        """Return the combined map of some robots, along the axes that they share."""
         maps = [mapper.map for mapper in mappers if mapper.map is not None]
         boxes = np.concatenate([np.empty((0, 2, 3)), *(each.boxes for each in maps)])
-        # Where a robot has been it can drive.
+        # A robot can drive along its trail.
         nodes = np.concatenate([*(mapper.trail for mapper in mappers), *(each.free for each in maps)])
         body, sparse = _sparse_body(self._settings), self._settings.sparse_map
         cells, low = joined_ground([mapper.ground for mapper in mappers])

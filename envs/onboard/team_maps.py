@@ -94,16 +94,16 @@ class TeamMaps(NamedTuple):
     robots : int
         Robots of a team.
     own, shared : (rows, 10), (episodes, 10) int64
-        Records of the robots' own maps and of the teams', zeros if there is none.
+        Records of the robots' own maps and of the teams', zeros if they do not exist.
     beliefs : (rows, 3) int64
         Address, rows and columns of each robot's log-odds.
     windows, known : (rows, 4) int64
-        What part of each robot's log-odds has changed since it was last taken in, and the part that ever had
-        until then.
+        Part of each robot's log-odds that has changed since the last update, and the part that had ever changed by
+        then.
     steps, fresh_at : (episodes,) int64
         The step of each episode, and the one at which its maps were last brought up to date.
     limit, stamp : int, (2 k + 1, 2 k + 1 and more) uint16
-        Of the clearance, see ``ClearanceField``.
+        Limit and stamp of the clearance, see ``ClearanceField``.
     """
 
     robots: int
@@ -125,8 +125,8 @@ def sum_maps(record: Array, beliefs: Array, limit: int, stamp: Array, window: Ar
     The maps have its shape and changed in this window.
     """
     inside = is_inside(record, window)
-    # Nobody else writes a sum: where it changed is known without reading its clearance, which takes twice
-    # the memory of a map.
+    # Only this kernel writes a sum, so its changed part is known without reading its clearance, which takes twice the
+    # memory of a map.
     take_in(record, limit, stamp, inside, _sum_maps(beliefs, inside, log_odds_of(record)))
 
 

@@ -1,4 +1,4 @@
-"""Batteries: what a robot uses of its energy by standing, driving and turning.
+"""Batteries: the energy that a robot uses for standing, driving and turning.
 
 References
 ----------
@@ -16,19 +16,19 @@ from lidarium.registry import Registry
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Battery:
-    """What a robot can use, and what its work costs.
+    """Capacity of a battery, and energy costs of the robot.
 
     Attributes
     ----------
     capacity_j : float or None
-        What it holds at the beginning [J]; None for no limit, if nothing is counted.
+        Energy at the start [J]; None for no limit, in which case energy is not counted.
     idle_w : float
-        What electronics and sensors take, whatever the robot does [W].
+        Power of electronics and sensors, driving or not [W].
     per_metre_j : float
-        What a metre of way costs besides it [J/m].
+        Additional energy per metre of path [J/m].
     per_radian_j : float
-        What a radian of turning costs [J/rad]. By default what it costs to move the wheels of a Kobuki, 0.115
-        m off the middle, so far.
+        Energy per radian of turning [J/rad]. The default is the energy that moves the wheels of a Kobuki, 0.115 m off
+        the middle, along their arcs.
     """
 
     capacity_j: Annotated[float, above(0.0, 1e12, "a number of joules")] | None = None

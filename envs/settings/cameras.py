@@ -33,11 +33,11 @@ class DepthCamera:
     field_of_view : float
         Horizontal angle that an image covers [rad]; pixels are square.
     depth_min, depth_max : float
-        Least and greatest depth that is measured [m].
+        Minimum and maximum depth that is measured [m].
     height : float
         Height of the optical centre above the floor [m].
     forward, left : float
-        Where the optical centre is from the centre of the robot [m].
+        Position of the optical centre from the centre of the robot [m].
     pitch, pan : float
         Downward and leftward angle of the axis from the robot's heading [rad].
     rate_hz : float
@@ -83,7 +83,7 @@ class DepthCamera:
 
     @property
     def calibration(self) -> dict[str, Any]:
-        """What infos say of the camera: its ``intrinsics`` by name, and its ``mount``."""
+        """The camera's parameters for infos: its ``intrinsics`` by name, and its ``mount``."""
         pinhole = self.intrinsics
         intrinsics = {"fx": pinhole.fx, "fy": pinhole.fy, "cx": pinhole.cx, "cy": pinhole.cy}
         return {"intrinsics": intrinsics, "mount": self.mount}

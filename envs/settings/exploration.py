@@ -36,7 +36,7 @@ from lidarium.registry import REGISTRIES, registry
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SparseMapSettings:
-    """How a robot makes its sparse map; it does from when the map is first asked for.
+    """Parameters of a robot's sparse map, which it makes from the first request on.
 
     Attributes
     ----------
@@ -45,7 +45,7 @@ class SparseMapSettings:
     most_boxes : int
         A map with more boxes merges them with a larger slack.
     least_motion_m, least_turn : float
-        An image is coded if the robot has moved or turned by so much since the last one [m, rad].
+        An image is coded if the robot has moved or turned this far since the last one [m, rad].
     cell_m : float
         Side of the cells of seen ground [m].
     margin_m : float
@@ -76,13 +76,13 @@ OCCUPANCY = inner(
     minimum=within(-127.0, 0.0),
     maximum=within(0.0, 127.0),
 )
-"""Bounds of the maps, whose own class only says how its numbers fit together."""
+"""Bounds of the maps' settings; their own class only checks that the values fit together."""
 
 TRUE_POSE = "truth"
-"""The localization that is none: the robot is given its true pose."""
+"""The name for no localization: the robot is given its true pose."""
 
 STARTS = ("fixed", "drawn")
-"""Where robots start: where the floor says, or anywhere in its largest free area."""
+"""Start poses of the robots: those of the floor, or random ones in its largest free area."""
 
 KERNEL_LOCALIZATIONS = (TRUE_POSE, "odometry")
 """Localizations that can run within the kernels of a step.
@@ -116,28 +116,27 @@ class ExplorationSettings:
     reward : RewardSettings
         Weights of the reward.
     known_starts : bool
-        Whether the robots know where they start; otherwise each believes to start at (0, 0, 0).
+        Whether the robots know their start poses; otherwise each believes to start at (0, 0, 0).
     starts : str or None
-        Where robots start: ``fixed``, at the starts of the floor as far as it has some; ``drawn``, anywhere;
-        None for drawn ones where each episode draws its floor, else fixed ones.
+        Start poses: ``fixed`` uses the starts of the floor as far as it has some; ``drawn`` random ones. None draws
+        them if each episode draws its floor, and uses the fixed ones otherwise.
     reveals_starts : bool
-        Whether reports hold where robots with unknown starts truly started, as a bound for what merging maps
-        can reach.
+        Whether reports include the true starts of robots with unknown starts, as a bound for the results of map
+        merging.
     localization : str
-        Who says where the robot is: ``truth`` or the name of a localizer.
+        Source of the robot's pose: ``truth`` or the name of a localizer.
     localizer : object or None
         Own settings of that localizer, of its class ``Settings``; None for its defaults.
     odometry : OdometrySettings
-        How well wheels measure the path.
+        Accuracy of the wheels' path measurement.
     radio : RadioSettings
-        How robots reach each other.
+        Radio links between the robots.
     faults : FaultSettings
-        What goes wrong with them.
+        Faults of the robots.
     battery : Battery
-        What energy each has.
+        Battery of each robot.
     pauses_when_blocked : bool
-        Whether a robot whose bumper touches anything, or whose way is blocked, pauses until it is ordered to
-        resume.
+        Whether a robot pauses until it is ordered to resume if its bumper touches anything, or its way is blocked.
     backend : str
         The world: ``kinematic``, ``bullet`` or another that is registered.
     time_step : float
@@ -151,7 +150,7 @@ class ExplorationSettings:
     goal_radius : float
         Distance to the goal, if the floor has one, at which a robot ends as ``reached`` [m].
     observe : tuple of str
-        What the robots observe: any of ``OBSERVABLES``, kept in that order, and of the registry
+        The observations: any of ``OBSERVABLES``, kept in that order, and of the registry
         ``observable``. The makers of environments leave out ``pose`` if it is not named.
     map_cells : int
         Side of the observed ``map`` [cells], a multiple of 2; half of it is how far a waypoint of the level
@@ -163,11 +162,11 @@ class ExplorationSettings:
     pyramid_cells : int
         Side of each picture of the ``pyramid`` [cells of the picture], a multiple of 2.
     pyramid_levels : int
-        How many pictures the ``pyramid`` has.
+        Number of pictures of the ``pyramid``.
     frontiers : int
-        How many frontiers the level of frontiers offers at most.
+        Maximum number of frontiers that the level of frontiers offers.
     least_frontier : float
-        Length of a frontier that is offered [m]; shorter ones are if there is no longer one.
+        Length of a frontier that is offered [m]; shorter ones are offered if no longer one exists.
     frontiers_by_size : float
         Share of the frontiers that are offered because they are the longest; the others are those with the
         cheapest way.
@@ -176,7 +175,7 @@ class ExplorationSettings:
     raster_resolution : float
         Side of a cell of the world's raster [m]; the maps' cell is a whole multiple of it.
     decision_period_s : float
-        How long a waypoint or a frontier holds [s].
+        Maximum duration of a waypoint or a frontier [s].
     threads : int
         Threads of the kernels; the result does not depend on it.
     """
@@ -345,7 +344,7 @@ OPTIONAL_PARTS = tuple(name for name in PARTS if type(None) in _KINDS[name])
 
 
 def _localizations() -> tuple[str, ...]:
-    """Return the names of all who can say where a robot is."""
+    """Return the names of all sources of poses."""
     return (TRUE_POSE, *LOCALIZERS)
 
 

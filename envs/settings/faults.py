@@ -11,22 +11,22 @@ KINDS = ("", "laser_dropout", "blind_sector", "stuck_wheel", "kidnapping", "dead
 """Kinds of faults by name, in the order of their numbers."""
 
 Rate = Annotated[float, within(0.0, 1e6, "a number an hour")]
-"""How often a fault befalls a robot [1/h]."""
+"""Mean rate of a fault of a robot [1/h]."""
 
 LASTING = Bounds(0.0, 1e9, has_minimum=False, what="a time", never=True)
-"""How long a fault may last [s]."""
+"""Bounds of the duration of a fault [s]."""
 
 WIDTH = Rule(float, bounds=above(0.0, 2.0 * math.pi))
-"""How wide a blind sector may be [rad]."""
+"""Bounds of the width of a blind sector [rad]."""
 
 PLACE = Rule(float, bounds=within(-1e6, 1e6))
-"""What a number of a place has to be [m, rad]."""
+"""Rule for a number of a position [m, rad]."""
 
 MOST_SCHEDULED = 10_000
-"""Most faults of a schedule."""
+"""Maximum number of faults of a schedule."""
 
 MOST_DRAWN = 32
-"""Most faults that rates bring a robot in an episode."""
+"""Maximum number of random faults of a robot in an episode."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,13 +43,13 @@ class Fault:
     at_s : float
         When it begins [s].
     lasts_s : float or None
-        How long it lasts [s], None for ever; a robot that is dead stays so.
+        Duration [s]; None (default) for permanent. A dead robot stays dead.
     bearing, width : float
         Middle and width of the blind sector against the heading [rad].
     wheel : str
         Which wheel sticks: ``left`` or ``right``.
     place : (x, y, theta) or None
-        Where a kidnapped robot is put, in the floor's frame [m, rad]; drawn if None.
+        Pose to which a kidnapped robot is moved, in the floor's frame [m, rad]; drawn if None.
     """
 
     kind: str
@@ -78,16 +78,16 @@ class Fault:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FaultSettings:
-    """What goes wrong with a team.
+    """Faults of a team.
 
     Attributes
     ----------
     schedule : tuple of Fault
         Faults at set times.
     laser_dropout, blind_sector, stuck_wheel, kidnapping, dead_robot, dead_radio : float
-        How often each kind befalls a robot, on average [1/h].
+        Mean rate of each kind of fault per robot [1/h].
     lasts_s : float
-        How long those that pass by last, on average [s].
+        Mean duration of temporary faults [s].
     """
 
     schedule: tuple[Fault, ...] = ()
@@ -113,7 +113,7 @@ class FaultSettings:
 
     @property
     def capacity(self) -> int:
-        """Most faults of one robot in an episode."""
+        """Maximum number of faults of one robot in an episode."""
         robots = [fault.robot for fault in self.schedule]
         return max((robots.count(robot) for robot in robots), default=0) + (
             MOST_DRAWN if any(self.rates) else 0
@@ -121,7 +121,7 @@ class FaultSettings:
 
 
 def _place(place: Any) -> tuple[float, float, float]:  # noqa: ANN401
-    """Return where a kidnapped robot is put, checked."""
+    """Return the pose of a kidnapped robot, checked."""
     is_pose = isinstance(place, Sequence) and len(place) == 3
     if not is_pose or not all(PLACE.hold(value) for value in place):
         raise ValueError(
@@ -145,4 +145,4 @@ def _schedule(faults: Any) -> tuple[Fault, ...]:  # noqa: ANN401
 
 
 NO_FAULTS = FaultSettings()
-"""Nothing goes wrong."""
+"""No faults."""

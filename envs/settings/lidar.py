@@ -24,7 +24,7 @@ class Lidar(ScanGeometry):
         Height of the laser's plane above the floor [m].
     """
 
-    # The first four are those of a scan; here they have the bounds of what can be simulated.
+    # The first four are those of a scan, here with the bounds of the simulation.
     beams: Annotated[int, within(1, MAX_BEAMS)] = 727
     field_of_view: Annotated[float, above(0.0, 2.0 * math.pi + 1e-9)] = math.radians(240.0)
     range_min: Distance = 0.02

@@ -1,4 +1,4 @@
-"""Limits beyond single bounds: what can be observed, and how much a step does.
+"""Limits beyond single bounds: the observations available, and the cost of a step.
 
 Without the latter a step of settings that are each within their bounds would take all memory, or hours.
 """
@@ -15,20 +15,22 @@ MAX_EGOCENTRIC_SCALE = 64
 MAX_SCALES = 16
 
 OBSERVABLES = ("scan", "pose", "velocity", "bumper", "map", "egocentric_map")
-"""What any robot can observe, in the order in which observations have it.
+"""Observations that are available to any robot, in their order.
 
-A goal is observed wherever the floor has one. What further sensors measure is in the registry ``observable``.
+A goal is observed if the floor has one. Measurements of further sensors are in the registry ``observable``.
 """
 
 LEARNERS_SEE = ("scan", "velocity", "bumper", "map")
-"""What the makers of environments show where ``observe`` is not named: who sees the absolute pose may learn
-floors by heart."""
+"""Default observations of the makers of environments.
+
+The absolute pose is left out, because policies may learn floors by heart with it.
+"""
 
 GAINS = "frontier_gains"
-"""What may be expected to be seen at each frontier on offer."""
+"""Area expected to be newly seen at each frontier on offer."""
 
 LEVEL_OBSERVABLES = ("frontiers", "action_mask", GAINS)
-"""What can be observed at the level of frontiers only; the first two always are."""
+"""Observations at the level of frontiers only; the first two are always included."""
 
 MOST_SCAN_CELLS = 16_384
 MOST_BEAMS = 262_144
@@ -46,11 +48,11 @@ class _Product:
     Attributes
     ----------
     what : str
-        What it stands for.
+        Meaning of the product.
     of : callable
         The product, from the settings.
     most : float
-        How large it may be.
+        Maximum of the product.
     cure : str
         Which settings to change, and how.
     """
@@ -124,7 +126,7 @@ PRODUCTS = (
         "a shorter decision_period_s",
     ),
 )
-"""What a step may ask for."""
+"""Limits of the cost of a step."""
 
 
 def check_workload(settings: Any) -> None:  # noqa: ANN401
@@ -138,7 +140,7 @@ def check_workload(settings: Any) -> None:  # noqa: ANN401
 
 
 def observed_names(names: Iterable[str]) -> tuple[str, ...]:
-    """Return names of what is observed, checked, in the order of ``OBSERVABLES``, the registry, the level."""
+    """Return checked names of observations, in the order of ``OBSERVABLES``, the registry, the level."""
     known = (*OBSERVABLES, *registry("observable"), *LEVEL_OBSERVABLES)
     wanted = f"want one or more of {', '.join(known)}"
     if isinstance(names, str) or not isinstance(names, Iterable):
@@ -155,7 +157,7 @@ def observed_names(names: Iterable[str]) -> tuple[str, ...]:
 
 
 def check_level(names: Iterable[str], level: str) -> None:
-    """Check that what is observed is there at a level of decision."""
+    """Check that the observations exist at a level of decision."""
     absent = [name for name in names if name in LEVEL_OBSERVABLES]
     if absent and level != "frontier":
         raise ValueError(f"observe has {absent[0]!r}, which needs level='frontier'; level is {level!r}")

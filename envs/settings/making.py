@@ -54,7 +54,7 @@ REALISM.register(
 
 
 CYCLES = Rule(int, bounds=within(1, 10**9))
-"""How many steps an episode may have."""
+"""Rule for the number of steps of an episode."""
 
 TIME_STEP = rules_of(ExplorationSettings)["time_step"]
 
@@ -120,7 +120,7 @@ def make_settings(settings: ExplorationSettings | None = None, **options: Any) -
     known = ExplorationSettings.__dataclass_fields__
     for name in options:
         if name not in known:
-            # In Python's words, too: TorchRL tries options and reads in the error that they are none.
+            # Worded as Python does, too: TorchRL tries options and detects unknown ones by the error text.
             said = unknown("option", name, sorted((*known, *SHORT_OPTIONS)))
             raise TypeError(f"got an unexpected keyword argument {name!r}: {said}")
     if isinstance(options.get("localizer"), Mapping):
@@ -130,9 +130,9 @@ def make_settings(settings: ExplorationSettings | None = None, **options: Any) -
 
 
 def makers_settings(settings: ExplorationSettings | None, options: Mapping[str, Any]) -> ExplorationSettings:
-    """Fill settings as ``make_settings``, for who makes an environment to learn in.
+    """Fill settings as ``make_settings``, for makers of training environments.
 
-    Robots observe ``LEARNERS_SEE`` where neither settings nor ``observe`` are given.
+    By default, robots observe ``LEARNERS_SEE`` if neither settings nor ``observe`` are given.
     """
     observe = {} if settings is not None or "observe" in options else {"observe": LEARNERS_SEE}
     return make_settings(settings, **observe, **options)
@@ -203,7 +203,7 @@ def _replaced(part: Any, path: list[str], value: Any, name: str) -> Any:  # noqa
 
 
 def value_of(text: str) -> Any:  # noqa: ANN401
-    """Return the value that a text stands for: as in TOML, ``none`` for None, else the text itself."""
+    """Return the value of a text: as in TOML, ``none`` for None, otherwise the text itself."""
     if text.lower() == "none":
         return None
     try:

@@ -1,4 +1,4 @@
-"""What robots can observe besides what the kernels write.
+"""Observations in addition to those of the kernels.
 
 An entry of the registry ``observable`` is a function of named arrays, or has the name of an array of
 ``Simulation.sensors`` and is observed as that array has it, row by row.
@@ -24,7 +24,7 @@ class Observable:
     box : callable
         The space of one robot's observation, from the settings; bounded.
     missing : callable
-        What the settings lack for it, in words; empty if nothing.
+        Returns the missing requirement of the settings, in words; empty if nothing is missing.
     compute : callable or None
         Takes ``Rows``, named arrays over the robots of all episodes, and returns the values of all, (rows,
         ...); it keeps nothing from call to call. None for the array of sensors of this name.
@@ -36,7 +36,7 @@ class Observable:
 
 
 SENSED: Registry[Observable] = Registry("observable")
-"""What can be observed by name: sensors have that of their array."""
+"""Observations by name: sensors have that of their array."""
 
 
 def _depth_box(settings: Any) -> spaces.Box:  # noqa: ANN401

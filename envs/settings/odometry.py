@@ -12,7 +12,7 @@ from lidarium.registry import Registry
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OdometrySettings:
-    """How well wheels measure the path.
+    """Accuracy of the wheels' path measurement.
 
     Attributes
     ----------
@@ -49,19 +49,19 @@ class OdometrySettings:
 
     @property
     def is_ideal(self) -> bool:
-        """Whether wheels measure exactly and drives do as they are commanded."""
+        """Whether wheels measure exactly and drives follow their commands exactly."""
         return self == OdometrySettings()
 
     @property
     def disturbs_drives(self) -> bool:
-        """Whether drives do not quite what they are commanded."""
+        """Whether drives deviate from their commands."""
         return self.speed_noise > 0.0 or self.turn_rate_noise > 0.0
 
     @property
     def numbers(self) -> NDArray[np.float64]:
         """Numbers of the odometry for the kernels, shape (7,).
 
-        Four are of encoder noise, one says whether there are ticks, two are of the drive's noise.
+        Four are of encoder noise, one selects ticks, two are of the drive's noise.
         """
         return np.array(
             [

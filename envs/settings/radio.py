@@ -13,12 +13,12 @@ from lidarium.mapping.geometry.bounds import above, check_settings, share, withi
 from lidarium.registry import Registry
 
 RADIO_KINDS = ("all", "none", "range", "line_of_sight", "signal")
-"""How robots reach each other."""
+"""Types of radio links."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RadioSettings:
-    """How robots of a team reach each other.
+    """Radio links between the robots of a team.
 
     Attributes
     ----------
@@ -28,15 +28,15 @@ class RadioSettings:
     reach : float
         Of ``range`` and ``line_of_sight`` [m].
     power, threshold : float
-        Of the sender, and what the receiver needs [dBm].
+        Power of the sender, and power that the receiver needs [dBm].
     reference_distance, reference_loss : float
-        Where the loss in free space is known [m], and what it is there [dB].
+        Distance at which the loss in free space is known [m], and that loss [dB].
     free_exponent, wall_exponent : float
-        How loss grows with the free path and with the path through what is solid [1].
+        Growth of the loss with the free path and with the path through solids [1].
     wall_loss : float
-        Loss where anything solid is between [dB].
+        Loss if any solid is between [dB].
     shadowing : float
-        Standard deviation of what a link loses or gains by chance, drawn at every exchange [dB].
+        Standard deviation of the random loss or gain of a link, drawn at every exchange [dB].
     loss : float
         Probability that a message is lost [1].
     latency_s : float

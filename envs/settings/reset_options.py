@@ -29,7 +29,7 @@ OPTIONS = tuple(each.name for each in fields(ResetOptions))
 """Names of the options of ``reset``."""
 
 SIMILARITY = 0.8
-"""How alike an unknown option's name is to a known one where it is taken for a slip of the pen."""
+"""Minimum similarity of an unknown option's name to a known one for it to count as a typo."""
 
 
 def check_options(options: Any, known: Iterable[str] = OPTIONS) -> None:  # noqa: ANN401
@@ -81,7 +81,7 @@ def read_options(options: Mapping[str, Any] | None, robots: int) -> ResetOptions
 
 
 def _numbers(value: Any) -> NDArray[np.float64] | None:  # noqa: ANN401
-    """Return a value as an array, or None if it is not one of finite numbers."""
+    """Return a value as an array, or None if it is not an array of finite numbers."""
     try:
         array = np.asarray(value, np.float64)
     except (TypeError, ValueError):
@@ -90,14 +90,14 @@ def _numbers(value: Any) -> NDArray[np.float64] | None:  # noqa: ANN401
 
 
 def of_number(curriculum: Curriculum | None, number: int) -> Mapping[str, Any]:
-    """Return a curriculum's options for an episode; none without a curriculum."""
+    """Return a curriculum's options for an episode; empty without a curriculum."""
     return {} if curriculum is None else curriculum(number)
 
 
 def of_curriculum(
     curriculum: Curriculum | None, number: int, chosen: ResetOptions, robots: int
 ) -> ResetOptions:
-    """Return the options of an episode: the chosen ones, and those of a curriculum besides them."""
+    """Return the options of an episode: the chosen ones, and in addition those of a curriculum."""
     if curriculum is None:
         return chosen
     try:

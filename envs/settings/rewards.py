@@ -7,12 +7,12 @@ from typing import Annotated
 from lidarium.mapping.geometry.bounds import Rule, check_settings, shown, within
 
 WEIGHT = Rule(float, bounds=within(-1e6, 1e6))
-"""What the weight of a registered term has to be."""
+"""Rule for the weight of a registered term."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RewardSettings:
-    """What a robot earns and pays.
+    """Rewards and costs of a robot.
 
     Attributes
     ----------

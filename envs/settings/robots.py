@@ -50,7 +50,7 @@ class Build:
     wheel_friction, caster_friction : float
         Friction of the wheels and of the casters on the ground [1].
     body_friction : float
-        Friction of the body on what it touches [1].
+        Friction between the body and objects that it touches [1].
     motor_torque : float
         Greatest torque of a wheel's motor [N m].
     """
@@ -249,10 +249,10 @@ ROBOTS.register(
 )
 
 LARGEST = ("radius", "height", "length", "width")
-"""Of a mixed team the largest counts."""
+"""Values for which a mixed team uses the maximum."""
 
 SMALLEST = ("cruise_speed", "max_speed", "max_turn_rate", "max_acceleration", "max_turn_acceleration")
-"""Of a mixed team the smallest counts."""
+"""Values for which a mixed team uses the minimum."""
 
 
 def kinds_of(names: Any) -> tuple[str, ...]:  # noqa: ANN401
@@ -269,7 +269,7 @@ def kinds_of(names: Any) -> tuple[str, ...]:  # noqa: ANN401
 def envelope_of(team: Sequence[Robot]) -> Robot:
     """Return a body with room for all of a team, with the limits of the slowest.
 
-    What is planned for it can be driven by each.
+    Each robot can drive the paths planned for it.
     """
     largest = {name: max(getattr(robot, name) for robot in team) for name in LARGEST}
     smallest = {name: min(getattr(robot, name) for robot in team) for name in SMALLEST}

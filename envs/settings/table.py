@@ -23,9 +23,9 @@ class _Setting:
     default : object
         Its default.
     summary : str
-        What it is, with its unit.
+        Description, with the unit.
     bounds : str
-        Where it may be, as an interval; empty for what is no number.
+        Valid interval; empty if the setting is not a number.
     """
 
     name: str
@@ -55,7 +55,7 @@ def settings_table(settings: Any = None, prefix: str = "") -> Iterator[_Setting]
 
 
 def _documented_attributes(kind: type) -> dict[str, tuple[str, str]]:
-    """Return what the docstrings of a class and its bases say of each attribute: its type, what it is."""
+    """Return the type and description of each attribute in the docstrings of a class and its bases."""
     found: dict[str, tuple[str, str]] = {}
     for each in reversed(kind.__mro__):
         text = inspect.cleandoc(each.__doc__ or "")

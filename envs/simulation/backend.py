@@ -1,4 +1,4 @@
-"""What a world is: it moves the bodies of robots and senses for them.
+"""The interface of worlds: a world moves the bodies of robots and senses for them.
 
 Maps are not its business, nor is the score: it has bodies, sensors, and the truth. Row = episode * robots +
 robot in all arrays over rows, which keep their place in memory for the life of a world.
@@ -25,7 +25,7 @@ class World(Protocol):
     floors : list of FloorTables or None
         The floor of each episode.
     seeds, steps : (episodes,) uint64, (episodes,) int64
-        Where noise comes from, and the step that comes next; -1 before the scan at the start.
+        Seeds of the noise, and the next step; -1 before the scan at the start.
     starts, poses, velocities : (rows, 3), (rows, 3), (rows, 2) float64
         True poses at the start and now [m, rad], true speeds and turn rates [m/s, rad/s].
     moves, flags, failed : (rows,) uint8, (rows,) int64, (rows,) uint8
@@ -39,7 +39,7 @@ class World(Protocol):
     true_ranges : (rows, beams) float32
         The last scans without noise [m]; inf for no return, nan for an invalid beam.
     sensors : mapping of str to array over rows
-        What the sensors measured in the last step, by name: ``scan`` (rows, beams) float32 [m], ``odometry``
+        Measurements of the last step, by sensor name: ``scan`` (rows, beams) float32 [m], ``odometry``
         (rows, 3) float64 [m, rad], ``velocity`` (rows, 2) float64 [m/s, rad/s], ``bumper`` (rows, 3) int8.
     """
 
@@ -68,7 +68,7 @@ class World(Protocol):
 
     @property
     def sensors(self) -> Mapping[str, NDArray[Any]]:
-        """What the sensors measured in the last step, by name."""
+        """Measurements of the last step, by sensor name."""
         ...
 
     def place(
@@ -99,7 +99,7 @@ class World(Protocol):
     ) -> None:
         """Drive the robots for one time step, then take their scans.
 
-        Robots that have ended stand and sense nothing. ``steps`` is left alone: the simulation counts.
+        Robots that have ended do not move or sense. ``steps`` is left alone: the simulation counts.
 
         Parameters
         ----------
@@ -111,9 +111,9 @@ class World(Protocol):
         ...
 
     def show(self) -> bool:
-        """Show the bodies in a window of the world's own; returns False if it has none."""
+        """Show the bodies in a window of the world's own; returns False without a window."""
         ...
 
     def close(self) -> None:
-        """Give back what is held beyond arrays; closing again does nothing, and ``place`` opens anew."""
+        """Release everything that is not an array; further calls do nothing, and ``place`` opens anew."""
         ...

@@ -1,4 +1,4 @@
-"""The backends by name: what makes a simulation from settings."""
+"""The backends by name: functions that make a simulation from settings."""
 
 from collections.abc import Callable
 
@@ -11,7 +11,7 @@ from lidarium.envs.simulation.simulation import PoseSources, Simulation
 from lidarium.registry import Registry
 
 BACKENDS: Registry[Callable[[ExplorationSettings, int], Simulation]] = Registry("backend")
-"""What makes the simulation of so many episodes, by name."""
+"""Functions that make the simulation of a number of episodes, by name."""
 
 
 def kinematic_world(settings: ExplorationSettings, episodes: int = 1) -> KinematicWorld:

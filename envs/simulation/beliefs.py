@@ -1,4 +1,4 @@
-"""What robots believe: their poses, their log-odds, what of these has changed."""
+"""Beliefs of the robots: their poses, their log-odds and the changed parts of these."""
 
 import math
 from collections.abc import Sequence
@@ -13,10 +13,10 @@ from lidarium.mapping.grids.scan_integration import WORD
 from lidarium.mapping.kernels.huge_pages import ArrayPool
 
 LEAST_MARGIN = 8.0
-"""Maps of robots whose poses drift reach at least this far beyond the floor [m]."""
+"""Minimum distance that maps of robots with drifting poses reach beyond the floor [m]."""
 
 Map = tuple[NDArray[np.int8], tuple[float, float]]
-"""Log-odds (rows, columns), and where cell (0, 0) begins [m]."""
+"""Log-odds (rows, columns), and position of the corner of cell (0, 0) [m]."""
 
 
 def _map_around_start(pages: ArrayPool, floor: FloorTables, resolution: float) -> Map:
@@ -47,7 +47,7 @@ def _map_with_margin(pages: ArrayPool, floor: FloorTables, rows: int, columns: i
 
 
 def wipe(log_odds: NDArray[np.int8], touched: NDArray[np.uint64], window: NDArray[np.int64]) -> None:
-    """Make a map blank again, and note where it was not.
+    """Make a map blank again, and mark the cells that were not.
 
     This is noted in ``touched`` and in the ``window`` of changes (4,).
     """
@@ -121,19 +121,18 @@ class Beliefs:
     log_odds : list of (map rows, map columns) int8
         The map of each robot.
     origins : (rows, 2) float64
-        Where cell (0, 0) of each map begins [m].
+        Position of the corner of cell (0, 0) of each map [m].
     windows : (rows, 4) int64
-        What part of each map has changed since ``forget_changes``: row_low, row_high, column_low,
-        column_high.
+        Part of each map that has changed since ``forget_changes``: row_low, row_high, column_low, column_high.
     belief_rows : (rows, 5) int64
-        Where the maps lie (``maps`` of ``kernels.arrays``).
+        Addresses of the maps (``maps`` of ``kernels.arrays``).
     pool_rows : (rows, scales, 3) int64
         Address, rows and columns of each robot's pooled maps.
     contact, heard : (rows, robots) uint8, (rows, robots * 3) float64
         Of which teammates a robot knows the pose although not all are known, and these poses [m, rad]; the
         radio writes them.
     renderings : (rows,) int64
-        How often each map was rendered again.
+        Number of times that each map was rendered again.
     """
 
     def __init__(
@@ -187,7 +186,7 @@ class Beliefs:
         self.contact[row], self.heard[row] = 0, 0.0
 
     def point_at(self, row: int) -> None:
-        """Note where the maps of a robot lie, for kernels."""
+        """Store the addresses of a robot's maps, for kernels."""
         log_odds, touched = self.log_odds[row], self._touched[row]
         self.belief_rows[row] = (log_odds.ctypes.data, *log_odds.shape, touched.ctypes.data, len(touched))
         for k, pooled in enumerate(self._pools[row]):

@@ -1,4 +1,4 @@
-"""What counts as explored.
+"""The explored area.
 
 The score keeps a bit per robot and cell of the floor, at the resolution of the beliefs: the cells seen by
 true beams from true poses, before noise. Of these only the cells of F count: those that the disc of the
@@ -13,7 +13,7 @@ from lidarium.mapping.kernels.simd.cells import prefetch
 from lidarium.mapping.kernels.views import grid_at
 
 ROWS_AHEAD = 24
-"""So many rows before a row of a mask is read it is fetched from memory."""
+"""Number of rows by which rows of a mask are prefetched from memory."""
 
 
 def pack_bits(cells: NDArray[np.bool_]) -> NDArray[np.uint64]:
@@ -61,7 +61,7 @@ def mark_seen(
     Parameters
     ----------
     own, counted : (rows, words) uint64
-        What the robot has seen (updated), and F.
+        Area that the robot has seen (updated), and F.
     bits : (window rows, words) uint64
         The seen area.
     changes : (4,) int64
@@ -100,16 +100,16 @@ def share_new_cells(owns: Array, team: Array, changes: Array, first: int, robots
 
     Those that saw it in this step share it equally, in robot order.
 
-    What a robot's mask holds and the team's does not is what the robot saw in this step.
+    Cells in a robot's mask but not in the team's are those that the robot saw in this step.
 
     Parameters
     ----------
     owns : (maps,) int64
         Addresses of the robots' masks, of the shape of ``team``.
     team : (rows, words) uint64
-        What the team has seen; updated.
+        Area that the team has seen; updated.
     changes : (maps, 4) int64
-        Where ``mark_seen`` found cells that are new to each robot.
+        Windows in which ``mark_seen`` found cells that are new to each robot.
     gains : (maps,) float64
         Result: cells credited to each robot.
     """

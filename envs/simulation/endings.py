@@ -24,9 +24,9 @@ REASONS = (
     "frontier_unreachable",
     "physics",
 )
-"""Why a robot ended, by number; 0 where it has not.
+"""Reasons of endings, by number; 0 if the robot has not ended.
 
-Of several of the first six the first counts; ``physics`` takes the place of ``failed`` where the world says
+If several of the first six apply, the first counts; ``physics`` takes the place of ``failed`` if the world reports
 `BROKEN_PHYSICS`.
 """
 
@@ -36,7 +36,7 @@ _, COVERED, FAILED, BATTERY, COLLISION, REACHED, HORIZON, NO_FRONTIER, FRONTIER_
 
 
 class Rules(NamedTuple):
-    """What ends the robots of all episodes.
+    """Rules that end the robots of all episodes.
 
     Attributes
     ----------
@@ -89,7 +89,7 @@ def _is_near(x: float, y: float, goal_x: float, goal_y: float, radius: float) ->
 
 @kernel(nrt=False)
 def ending_of(world: WorldArrays, row: int, episode: int, rules: Rules) -> int:
-    """Return why a robot ends now, by number in ``REASONS``; 0 if it goes on or has ended."""
+    """Return the reason for which a robot ends now, by number in ``REASONS``; 0 if it continues or has ended."""
     if not rules.live[row]:
         return 0
     bounds = rules.bounds

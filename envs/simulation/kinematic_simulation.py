@@ -17,7 +17,7 @@ from lidarium.mapping.grids.occupancy import OccupancySettings
 class KinematicSimulation(Simulation):
     """A kinematic world with beliefs and score, stepped by fused kernels.
 
-    It gives what ``Simulation`` gives for the same world, to the bit: the area seen is worked out once for
+    Its results equal those of ``Simulation`` for the same world to the bit: the area seen is worked out once for
     the mask and the map, and an episode's arrays stay in the caches.
     """
 

@@ -20,7 +20,7 @@ from lidarium.envs.simulation.kernels.stepping import move_and_sense
 
 
 class KinematicWorld:
-    """Robots on floors whose drives do what they are commanded, within their limits; a ``World``.
+    """Robots that drive exactly as commanded, within the limits of their drives; a ``World``.
 
     Parameters
     ----------
@@ -33,11 +33,11 @@ class KinematicWorld:
     episodes : int
         Number of episodes.
     odometry : OdometrySettings
-        How well wheels measure the path.
+        Accuracy of the wheels' path measurement.
     has_odometry : bool
-        Whether dead reckoning is kept, even where wheels measure exactly.
+        Whether dead reckoning is kept, even if wheels measure exactly.
     faults : FaultSettings
-        What goes wrong with the robots.
+        Faults of the robots.
     horizon_s : float or None
         For how long faults are drawn [s].
     """
@@ -87,7 +87,7 @@ class KinematicWorld:
 
     @property
     def sensors(self) -> Mapping[str, NDArray[Any]]:
-        """What the sensors measured in the last step, by name."""
+        """Measurements of the last step, by sensor name."""
         return {
             "scan": self.ranges,
             "odometry": self.odometry,

@@ -43,11 +43,11 @@ def add_rewards(
     gains, contacts, travelled : (robots,) arrays
         Cells credited in the step, whether the body touched anything, and length of the path [m].
     weights : (4,) float64
-        What a new cell earns, and what a step, a contact and a metre cost.
+        Reward of a new cell, and costs of a step, a contact and a metre.
     travelled_before : (robots,) float64
         Length of the path at the last reward [m]; updated.
     terms : (robots, 4) float64
-        What each term brings; added to.
+        Amount of each term; added to.
     rewards : (robots,) float64
         Added to.
     """

@@ -1,4 +1,4 @@
-"""The score: what of a floor counts, who has sensed which of it, what that earns."""
+"""The score: the counted cells of a floor, the cells seen by each robot, and their reward."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -12,7 +12,7 @@ from lidarium.mapping.kernels.huge_pages import ArrayPool
 
 
 def counted_cells(body_free: NDArray[np.bool_], multiple: int) -> NDArray[np.bool_]:
-    """Return the map cells whose world cells all count.
+    """Return the map cells in which all world cells count.
 
     A map cell is ``multiple`` x ``multiple`` world cells.
     """
@@ -45,13 +45,13 @@ class Score:
     gains : (rows,) float64
         Cells credited to each robot in the last step.
     rewards : (rows,) float64
-        What each robot has earned since this was last set to 0.
+        Reward of each robot since this was last set to 0.
     reward_terms : (rows, 4) float64
         The same by ``rewards.TERMS``; before weights.
     earned : (rows * 5,) float64
         The memory of both.
     mask_rows : (rows, 5) int64
-        Where the masks lie (``masks`` of ``kernels.arrays``).
+        Addresses of the masks (``masks`` of ``kernels.arrays``).
     """
 
     def __init__(self, robots: int, episodes: int, weights: NDArray[np.float64] | None = None) -> None:
@@ -91,7 +91,7 @@ class Score:
         return next((mask for mask in others if np.array_equal(mask, counted)), counted)
 
     def place(self, episode: int, counted: NDArray[np.uint64], pages: ArrayPool) -> None:
-        """Start an episode whose F is ``counted`` (rows, words): nothing is sensed."""
+        """Start an episode with F = ``counted`` (rows, words) and no cells seen."""
         self.counted_masks[episode] = counted
         self.team_masks[episode] = pages.blank(counted.shape, np.uint64)
         self.counted[episode] = int(np.bitwise_count(counted).sum())
@@ -105,7 +105,7 @@ class Score:
         self.masks[row] = pages.blank(self.counted_masks[row // self._robots].shape, np.uint64)
 
     def point_at(self, row: int) -> None:
-        """Note where the masks of a robot lie, for kernels."""
+        """Store the addresses of a robot's masks, for kernels."""
         episode = row // self._robots
         counted, team = self.counted_masks[episode], self.team_masks[episode]
         self.mask_rows[row] = (

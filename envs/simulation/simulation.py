@@ -43,7 +43,7 @@ ROWS_FOR_THREADS = 8
 
 
 def within_half_turns(starts: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return poses (robots, 3) with headings in (-pi, pi]; what lies there already keeps its bits."""
+    """Return poses (robots, 3) with headings in (-pi, pi]; headings in that range keep their bits."""
     poses = np.array(starts, np.float64)
     headings = poses[:, 2]
     wrapped = math.pi - np.mod(math.pi - headings, 2.0 * math.pi)
@@ -53,12 +53,12 @@ def within_half_turns(starts: NDArray[np.float64]) -> NDArray[np.float64]:
 
 @dataclass(frozen=True, slots=True)
 class PoseSources:
-    """Where robots know their poses from.
+    """Sources of the robots' pose information.
 
     Attributes
     ----------
     localization : str
-        Who localizes the robots: ``truth``, ``odometry``, or another, which writes ``beliefs.believed``
+        Localization of the robots: ``truth``, ``odometry``, or another, which writes ``beliefs.believed``
         before ``perceive``.
     knows_teammates : bool
         Whether, with known starts, all poses of teammates are known at once; otherwise those that
@@ -72,7 +72,7 @@ class PoseSources:
 class Simulation:
     """A world of any kind, with the beliefs of its robots and its score.
 
-    Row = episode * robots + robot. Maps of the score and of the beliefs share the floor's lattice: where a
+    Row = episode * robots + robot. Maps of the score and of the beliefs share the floor's lattice: if a
     robot's believed pose is the true one, its map and its mask agree to the cell.
 
     Parameters
@@ -93,7 +93,7 @@ class Simulation:
     reward_weights : (4,) float64 or None
         Weights of ``scoring.rewards.TERMS``; nothing if None.
     pose_sources : PoseSources
-        Where robots know their poses from.
+        Sources of the robots' pose information.
 
     Attributes
     ----------
@@ -144,7 +144,7 @@ class Simulation:
 
     @property
     def sensors(self) -> Mapping[str, NDArray[Any]]:
-        """What the sensors measured last, by name: those of the world, and ``depth`` of the cameras."""
+        """Last measurements by sensor name: those of the world, and ``depth`` of the cameras."""
         sensors = self.world.sensors
         return sensors if self.camera is None else {**sensors, "depth": self.camera.frames}
 
@@ -163,14 +163,14 @@ class Simulation:
         multiple = self._multiple(floor)
         first, last = episode * self.robots, (episode + 1) * self.robots
         starts = within_half_turns(starts)
-        # What the laser cannot see does not count, even where a low body could pass below it.
+        # Area that the laser cannot see does not count, even if a low body could pass below it.
         smallest = float(self.world.bodies[:, RADIUS].min())
         free = reachable_free_space(floor.body, smallest, starts) & (floor.laser.solid == 0)
         floors = enumerate(self.world.floors)
         same = [other for other, known in floors if other != episode and known is floor]
         counted = self.score.shared(free, multiple, same)
         rows, words = counted.shape
-        # What an episode's step goes through lies together.
+        # Arrays used in one step of an episode are stored together.
         if self._pool is None:
             # Log-odds take a byte a cell; masks and pooled maps hardly half of that.
             self._pool = ArrayPool(3 * counted.size * WORD * self.robots * self.episodes // 2)
@@ -199,7 +199,7 @@ class Simulation:
         return multiple
 
     def _point_at(self, episode: int) -> None:
-        """Note where the floor, the maps and the masks of an episode lie, for kernels."""
+        """Store the addresses of the floor, the maps and the masks of an episode, for kernels."""
         floor = self.world.floors[episode]
         if floor is not None:
             self.floor_rows[episode] = floor.row
@@ -209,7 +209,7 @@ class Simulation:
 
     @property
     def table(self) -> NDArray[np.int64]:
-        """Where all arrays lie, as kernels take them (``kernels.arrays``); the same for life."""
+        """Addresses of all arrays, as kernels take them (``kernels.arrays``); never changes."""
         return self._table
 
     @property
@@ -257,7 +257,7 @@ class Simulation:
         perceive(self._table, self.robots, self._everywhere if runs is None else runs)
 
     def close(self) -> None:
-        """Give back what the world holds beyond arrays; closing again does nothing."""
+        """Release everything of the world that is not an array; further calls do nothing."""
         self.world.close()
 
     def render_again(self, row: int, poses: NDArray[np.float64], ranges: NDArray[np.float32]) -> None:
@@ -266,7 +266,7 @@ class Simulation:
         Parameters
         ----------
         poses : (scans, 3) float64
-            Where the scans were taken, in the frame of its believed pose [m, rad].
+            Sensor poses of the scans, in the frame of its believed pose [m, rad].
         ranges : (scans, beams) float32
             The scans [m].
         """

@@ -40,7 +40,7 @@ MOST_LETTERS = 1000
 _GROUPS = ("path_m", "ended_because")
 _MAY_BE_NULL = ("horizon_s", "t90_s", "t99_s")
 _OF_SETTINGS = ("backend", "localization", "realism", "horizon_s")
-"""Keys of a line that say something of the settings behind their hash."""
+"""Keys of a line that describe the settings in addition to their hash."""
 
 
 @dataclass(frozen=True, slots=True)

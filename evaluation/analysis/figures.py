@@ -44,7 +44,7 @@ TIMES = {key: METRICS[key].title for key in ("t90_s", "t99_s")}
 
 
 MAY_LACK = ("bound_s", "t99_over_bound")
-"""Figures beside times that are null if something was not reached."""
+"""Figures in addition to times that are null if something was not reached."""
 
 _NOT_FIGURES = ("robots", "seed", "horizon_s", *TIMES)
 
@@ -78,13 +78,13 @@ class TimeFigure:
     Attributes
     ----------
     reached, size, cut : int
-        How many did, of how many, and how many were cut before the horizon without it.
+        Number of runs that did, of all runs, and of those cut before the horizon without it.
     success : Interval
         Share of the runs that did, up to the horizon.
     median : Interval
-        Of all runs; inf is later than the horizon.
+        Median time of all runs; inf is later than the horizon.
     restricted_mean : Interval or None
-        Of min(time, horizon); None if no run reached the share or if cuts leave it unknown.
+        Restricted mean, of min(time, horizon); None if no run reached the share or if cuts leave it unknown.
     """
 
     reached: int
@@ -111,7 +111,7 @@ class Comparison:
     Attributes
     ----------
     policy, key : str
-        Who, and in what.
+        The policy and the figure.
     pairs : int
         Number of pairs.
     difference, ratio : Interval or None
@@ -162,7 +162,7 @@ def value_figure(values: Sequence[float], seed: int) -> ValueFigure:
 
 
 def further_keys(rows: Sequence[Row], values: Sequence[Value]) -> list[str]:
-    """Return the keys beside times and values under which every run has a number; some may be null."""
+    """Return the keys, apart from times and values, under which every run has a number; some may be null."""
     told = {*_NOT_FIGURES, *(value.metric for value in values)}
     candidates = [key for key in rows[0] if key not in told and not key.endswith("_sha256")]
     return [key for key in candidates if all(_is_figure(key, row.get(key, "")) for row in rows)]
@@ -218,7 +218,7 @@ def _compared_times(
         difference = restricted_difference(a.censored, b.censored, seed=seed)
         ratio = restricted_ratio(a.censored, b.censored, seed=seed)
     except ValueError:
-        # As above: without restricted means there is nothing to subtract; the tests still know who was
+        # As above: without restricted means there is nothing to subtract; the tests still tell which was
         # faster.
         pass
     return _tested(policy, key, a.up_to_horizon, b.up_to_horizon, difference, ratio)

@@ -35,7 +35,7 @@ class Group:
     runs : dict
         Episodes by policy, policies in alphabetical order.
     horizon_s : float
-        Up to when times count: the horizon of the runs, or where they had none the longest run of the group.
+        Time up to which times count: the horizon of the runs, by default the longest run of the group.
     """
 
     variant: str
@@ -81,7 +81,7 @@ class _Reached:
     horizon_s : float
         Up to when times count [s].
     cut : int
-        How many did not and were cut before the horizon: nobody knows when they would have.
+        Number of runs that did not and were cut before the horizon: their times are unknown.
     """
 
     times: NDArray[np.float64]
@@ -135,7 +135,7 @@ def floor_set_of(floor: str) -> str:
     kind, _, seed = floor.partition(":")
     if kind not in GENERATORS or not seed.isdigit():
         return "drawn floors" if floor in floor_names() else "floors from files"
-    # A building is named by its kind, whatever it was asked for as.
+    # A building is named by its kind, however it was requested.
     within = (name for name, (first, count) in SETS.items() if first <= int(seed) < first + count)
     return next((f"set:{name}" for name in within), "generated floors")
 
@@ -172,7 +172,7 @@ def repeats(rows: Iterable[Row]) -> int:
 
     Seed and wall time are not compared.
 
-    If neither starts nor noise are drawn, a policy without chance does the same whatever the seed.
+    If neither starts nor noise are drawn, a deterministic policy has the same result for every seed.
     """
     said = [
         json.dumps(

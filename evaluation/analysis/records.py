@@ -17,7 +17,7 @@ from lidarium.mapping.grids.speckle_filter import without_small_components
 FOLDER = "records"
 
 Key = str
-"""Where an episode's line says that its record is, in the directory.
+"""Path of an episode's record in the directory, as given in the episode's line.
 
 Empty for no record.
 """
@@ -97,7 +97,7 @@ def record_key(row: Row) -> Key:
 
 
 def read_track(entry: Entry) -> Track:
-    """Read ways and the last map of a record."""
+    """Read the paths and the last map of a record."""
     display = read_record(entry.path).display
     levels = without_small_components(display.map_at(float(display.times[-1])))
     return Track(

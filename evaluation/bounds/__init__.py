@@ -1,1 +1,1 @@
-"""How soon a team that knew a floor could have seen it."""
+"""Bounds: the fastest exploration by a team that knows the floor."""

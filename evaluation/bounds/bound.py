@@ -1,4 +1,4 @@
-"""How soon a team that has the floor plan could have seen the floor.
+"""Bounds: the fastest exploration by a team that has the floor plan.
 
 The plan is feasible, so its time is an upper bound on the optimum; it is driven with the limits of the
 robots.
@@ -35,9 +35,9 @@ from lidarium.evaluation.bounds.view_graph import (
 from lidarium.evaluation.episodes.runner import run_episode
 
 PATIENCE, LEAST_PATIENCE_S = 4.0, 60.0
-"""How many times as long as its walks take at cruising speed a drive may last, and more [s].
+"""Maximum duration of a drive as a multiple of its time at cruising speed, and additional time [s].
 
-Robots that block each other would stand until the end of days.
+Without a limit, robots that block each other would never finish.
 """
 
 Looks = Mapping[tuple[int, int], float]
@@ -53,7 +53,7 @@ class Walk:
     points : (P, 2) float64
         x, y in the floor's frame, from the start on [m].
     room : (P,) float64
-        Room besides the body on the piece that leads to each [m].
+        Room around the body on the piece that leads to each [m].
     headings : (P,) float64
         Heading to turn to there [rad]; nan for none.
     """
@@ -76,7 +76,7 @@ def walks_of(graph: ViewGraph, plan: TourPlan, looks: Looks) -> list[Walk]:
 
 
 class _WalkPolicy(Policy):
-    """Robots that follow walks, one after the other piece; who has arrived stays.
+    """Robots that follow walks, one piece after the other; a robot that has arrived stays.
 
     Parameters
     ----------
@@ -112,7 +112,7 @@ class _WalkPolicy(Policy):
 def _pieces(walk: Walk, offset: NDArray[np.float64]) -> list[Route]:
     """Return a walk as routes.
 
-    They end where the robot turns, and have no more points than routes may.
+    They end at the turns of the robot, and have no more points than routes may.
     """
     pieces, start, last = [], 0, len(walk.points) - 1
     for at in range(last + 1):
@@ -135,7 +135,7 @@ def drive(
     Parameters
     ----------
     starts : sequence of (x, y, theta)
-        Where the robots start [m, rad].
+        Start poses of the robots [m, rad].
 
     Returns
     -------
@@ -170,7 +170,7 @@ MARGINS = (0.001, 0.004, 1.0)
 """Additional share of the floor that plans see; more if a drive sees too little."""
 
 MOST_LOOKS, LEAST_LOOK = 40, 4
-"""Robots turn to something at so many places at most, where they see so many points by it at least."""
+"""Maximum number of positions at which robots turn to a target, and minimum number of points seen by it."""
 
 SIGHT_MARGIN = 0.1
 """Margin within a laser's field of view in which cells are certain to be seen [rad]."""
@@ -235,13 +235,13 @@ def known_floor_bound(
     Parameters
     ----------
     starts : sequence of (x, y, theta)
-        Where each robot starts in the floor's frame [m, rad].
+        Start pose of each robot in the floor's frame [m, rad].
     """
     if settings.stop_coverage is None:
         raise ValueError("stop_coverage is None; want the share that has to be seen, such as 0.99")
     if len(starts) != settings.robots:
         raise ValueError(f"there are {len(starts)} starts; want one for each of {settings.robots} robots")
-    # All of the floor has to be seen: nobody ends at its goal.
+    # The whole floor has to be seen, so robots must not end at its goal.
     loaded = replace(load_floor(floor) if isinstance(floor, str) else floor, goal=None)
     team = _team_of(settings)
     key = _key(loaded, team, starts, rounds, seed)
@@ -301,7 +301,7 @@ def _driven(
 def _looks(
     graph: ViewGraph, plan: TourPlan, missed: NDArray[np.uint64], field_of_view: float
 ) -> dict[tuple[int, int], float]:
-    """Return where and towards which points robots turn to see most of the missed cells."""
+    """Return the positions and directions to which robots turn to see most of the missed cells."""
     found: dict[tuple[int, int], float] = {}
     origin, resolution = np.asarray(graph.laser.origin), graph.laser.resolution
     left = missed.copy()

@@ -1,7 +1,7 @@
 """Lower bounds on the walks from which a floor is seen, by linear programming with cuts.
 
 A walk that sees a point comes to one of the places that see it. It crosses the border of any set that holds
-all of these and no start, once where it ends within and twice where it goes on. Such cuts are added where the
+all of these and no start, once if it ends within and twice otherwise. Such cuts are added if the
 solution so far breaks them (minimum cuts; Dantzig, Fulkerson and Johnson 1954 for tours; Current and
 Schilling 1989 for tours that need only come near). The length of all walks together is minimized, so
 its share holds for the longest one.
@@ -38,11 +38,11 @@ class _Relaxation:
     Attributes
     ----------
     lower_m : float
-        No walks from which so much is seen are shorter in all [m].
+        Lower bound of the total length of all walks that see this much [m].
     optimum_m : float
         Length of the shortest walks in all [m]; inf if it was not found.
     cuts : int
-        How many cuts were needed.
+        Number of cuts.
     """
 
     lower_m: float

@@ -17,7 +17,7 @@ SUM_WEIGHT = 0.05
 """Weight of the sum of all tours against the longest one."""
 
 MOST_TAKEN = 5
-"""So many stops are taken out at once at most."""
+"""Maximum number of stops removed at once."""
 
 LONGER = 0.05
 """Tours that are longer by up to this share may be gone on from at first."""
@@ -37,7 +37,7 @@ class TourPlan:
     stops : list of list of int
         Places at which each robot's tour is anchored; it starts at the robot's start.
     walks : list of list of int
-        All places that each robot passes.
+        All positions that each robot passes.
     lengths : (robots,) float64
         Lengths of the tours [m].
     share : float
@@ -62,7 +62,7 @@ def plan_tours(graph: ViewGraph, share: float, rounds: int, seed: int = 0) -> To
     for left in range(rounds, 0, -1):
         trial = covered(graph, _thinned(current, generator), wanted)
         trial_cost = cost_of(graph, trial)
-        # What is a little longer is gone on from, too, the less the fewer rounds are left.
+        # Slightly longer tours are accepted, too, less so towards the last rounds.
         if trial_cost < at * (1.0 + LONGER * left / rounds * generator.random()):
             current, at = trial, trial_cost
         if trial_cost < cost - 1e-9:
@@ -103,7 +103,7 @@ def cost_of(graph: ViewGraph, stops: Stops) -> float:
 def covered(graph: ViewGraph, stops: Stops, wanted: int) -> Stops:
     """Add stops to tours until that many points are seen.
 
-    It is each time the one that shows most for its way.
+    Each added stop shows the most points for its additional path.
     """
     tours = [list(tour) for tour in stops]
     by_robot = [graph.seen(walk_of(graph, robot, tour)) for robot, tour in enumerate(tours)]
@@ -122,7 +122,7 @@ def covered(graph: ViewGraph, stops: Stops, wanted: int) -> Stops:
         robot, position = int(where[best, 0]), int(where[best, 1])
         tours[robot].insert(position, best)
         lengths = lengths_of(graph, tours)
-        # A stop between two others may take the tour off what was passed before.
+        # A new stop between two others may change the area seen on the way.
         by_robot[robot] = graph.seen(walk_of(graph, robot, tours[robot]))
 
 

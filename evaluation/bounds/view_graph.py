@@ -19,22 +19,22 @@ from lidarium.mapping.grids.grid_lines import line_is_open
 from lidarium.mapping.kernels.compilation import Array, kernel
 
 MOST_PLACES = 2500
-"""Squares are so large that a floor has about so many places at most."""
+"""Approximate maximum number of positions on a floor; it determines the size of the squares."""
 
 LEAST_SIDE = 0.3
-"""Least side of the squares [m]."""
+"""Minimum side of the squares [m]."""
 
 NARROW_M, NARROW_SIDE = 0.3, 0.15
-"""Passages with less room than this beside the body have places so near to each other [m]."""
+"""Passages with less room than this around the body have positions this close to each other [m]."""
 
 TRIALS, FINER = 4, 0.75
-"""Where places are not joined to each other, so many finer lattices are tried, each finer by this."""
+"""Maximum number of finer lattices tried if positions are not connected, and the factor of their side."""
 
 SAMPLE_M = 0.1
-"""Distance of the points that are to be seen [m]."""
+"""Distance between the points to be seen [m]."""
 
 NEIGHBOURS = 2.9
-"""Places are joined to those within so many sides of a square."""
+"""Positions within this number of sides of a square are connected."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,21 +44,21 @@ class ViewGraph:
     Attributes
     ----------
     places : (N, 2) float64
-        x, y in the floor's frame [m]; the first ones are where the robots start.
+        x, y in the floor's frame [m]; the first ones are the start positions.
     room : (N,) float64
-        Room besides the body there [m].
+        Room around the body there [m].
     robots : int
-        Number of start.
+        Number of start positions.
     links : (N, N) csr_array
         Lengths of the straight lines between neighbours [m].
     lengths : (N, N) float64
-        Lengths of the shortest paths [m]; inf if there is none.
+        Lengths of the shortest paths [m]; inf if no path exists.
     before : (N, N) int32
-        The place before the last one on the path from each to each, negative if there is none.
+        The position before the last one on the path between each pair, negative if no path exists.
     views : (N, words) uint64
         Which points are seen from each place, a bit for each.
     points : (M, 2) int64
-        Cells (row, column) of the laser's raster that are to be seen.
+        Cells (row, column) of the laser's raster to be seen.
     laser : Raster
         Cells that lasers can see.
     """
@@ -116,9 +116,9 @@ def view_graph(
     Parameters
     ----------
     starts : (robots, 2 or 3) float64
-        Where they start [m].
+        Start positions [m].
     spacing : (float, float)
-        Least side of the squares of places, and distance of the points that are to be seen [m].
+        Minimum side of the squares of positions, and distance between the points to be seen [m].
     """
     if body.solid.shape != laser.solid.shape or body.origin != laser.origin:
         raise ValueError("the rasters of body and laser lie in different frames; want those of one floor")

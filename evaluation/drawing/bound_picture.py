@@ -27,7 +27,7 @@ LOOK_M = 0.5
 def save_bound_picture(
     path: Path, floor: Floor, settings: ExplorationSettings, bound: KnownFloorBound, name: str
 ) -> None:
-    """Draw a floor and tours of a team, with arrows where robots turn to something."""
+    """Draw a floor and tours of a team, with arrows at turns towards a target."""
     tables = floor_tables(floor, settings.raster_resolution, settings.lidar.height, settings.robot.height)
     raster = tables.laser
     box = box_around(raster.solid == 0, raster.origin, raster.resolution)

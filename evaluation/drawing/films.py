@@ -31,14 +31,14 @@ MOST_FRAMES_PER_SECOND = 50.0
 """No GIF is faster: viewers slow down faster ones."""
 
 WIDTHS = 120, 4096
-"""Least and greatest width of a film [pixels]."""
+"""Minimum and maximum width of a film [pixels]."""
 
 _LOOP = ("-loop", "0")
 
 
 @dataclass(frozen=True, slots=True)
 class _FilmFormat:
-    """How a film is encoded.
+    """Encoding of a film.
 
     Attributes
     ----------
@@ -47,11 +47,11 @@ class _FilmFormat:
     parameters : tuple of str
         Further arguments of FFmpeg.
     width : int
-        Most pixels that a frame is wide, by default.
+        Maximum width of a frame by default [pixels].
     frames_per_second : float
-        If nothing is said.
+        Default frame rate [1/s].
     is_whole : callable
-        Takes the content of a file, and says whether its end was written.
+        Takes the content of a file, and returns whether its end was written.
     has_palette : bool
         Whether all frames share 256 colours, which are known when all frames are.
     """
@@ -96,7 +96,7 @@ FORMATS = {
 
 
 def format_of(path: Path) -> _FilmFormat:
-    """Return the format that the ending of a film's name stands for."""
+    """Return the format for the suffix of a film's name."""
     found = FORMATS.get(Path(path).suffix.lower())
     if found is None:
         raise ValueError(f"the film {path} has no ending of a film; want one of {', '.join(FORMATS)}")
@@ -105,16 +105,16 @@ def format_of(path: Path) -> _FilmFormat:
 
 @dataclass(frozen=True, slots=True)
 class FilmSettings:
-    """How a film is made; checks itself.
+    """Parameters of a film; checks itself.
 
     Attributes
     ----------
     speed : float
         Simulated seconds per second of the film, above 0.
     width : int or None
-        Most pixels that a frame is wide; as the format has it if None.
+        Maximum width of a frame [pixels]; by default (None) that of the format.
     frames_per_second : float or None
-        As the format has it if None.
+        Frames per second of the film; by default (None) those of the format.
     """
 
     speed: float = 10.0
@@ -162,7 +162,7 @@ class _FilmWriter:
 
     @property
     def seconds(self) -> float:
-        """How long the film is so far [s]."""
+        """Length of the film so far [s]."""
         return self.frames / self.rate
 
     def append_data(self, frame: Frame) -> None:
@@ -242,7 +242,7 @@ def _write_with_palette(frames: Path, film: Path, encoded: _FilmFormat) -> bool:
 def _is_done(*arguments: str | Path) -> bool:
     """Run FFmpeg; return whether it succeeded.
 
-    It is in a group of its own: Ctrl-C is for us, who then end it.
+    It runs in a group of its own: Ctrl-C reaches only this process, which then ends it.
     """
     words = [str(word.absolute()) if isinstance(word, Path) else word for word in arguments]
     command = [imageio_ffmpeg.get_ffmpeg_exe(), "-y", "-v", "quiet", *words]

@@ -37,7 +37,7 @@ Extent = tuple[float, float, float, float]
 
 @dataclass(frozen=True, slots=True)
 class _Visits:
-    """Where the robots of a policy were on a floor.
+    """Positions of the robots of a policy on a floor.
 
     Attributes
     ----------
@@ -112,7 +112,7 @@ def save_paths(path: Path, group: Group, floor: str, records: dict[Key, Entry]) 
 def visits_on(
     group: Group, floor: str, records: dict[Key, Entry]
 ) -> tuple[dict[str, _Visits], dict[str, Track]]:
-    """Return where the robots of each policy were on a floor, and a track.
+    """Return the positions of the robots of each policy on a floor, and a track.
 
     All recorded runs count; the track is for the map below.
     """
@@ -137,7 +137,7 @@ def visits_on(
 def save_visits(
     path: Path, group: Group, floor: str, visits: dict[str, _Visits], tracks: dict[str, Track]
 ) -> None:
-    """Draw where the robots of each policy spent their time on a floor."""
+    """Draw the positions of the robots of each policy over time on a floor."""
     extent = next(iter(visits.values())).extent
     figure, panels = _panels(len(visits), extent, 0.9)
     most = max(max(float(each.seconds.max()) for each in visits.values()), 0.2)
@@ -217,7 +217,7 @@ def _united(extents: list[Extent]) -> Extent:
 def _panels(count: int, extent: Extent, bar: float) -> tuple[Figure, list[Axes]]:
     """Arrange equal panels of a floor's shape, with room for a colour bar [inch].
 
-    The colour bar is besides the panels.
+    The colour bar is at the side of the panels.
     """
     aspect = (extent[1] - extent[0]) / (extent[3] - extent[2])
     most = 3 if aspect < 2.2 else 2 if aspect < 4.0 else 1
@@ -225,7 +225,7 @@ def _panels(count: int, extent: Extent, bar: float) -> tuple[Figure, list[Axes]]
     columns = -(-count // lines)
     width = min(4.2 * math.sqrt(aspect), (13.0 if columns > 1 else 11.0) / columns)
     height = min(max(width / aspect, 1.3), 8.0)
-    # Beside a floor stand the numbers of its axis, above it two lines of caption, around all of them title
+    # A floor has the numbers of its axis at its side, above it two lines of caption, around all of them title
     # and legend.
     size = (max(columns * (width + 0.55) + bar, 6.6), lines * (height + 0.75) + 1.1)
     figure = Figure(figsize=size, layout="constrained")

@@ -1,4 +1,4 @@
-"""Draws the maps of a team over each other: whose they are, and which are joined."""
+"""Draws the maps of a team over each other, with their owners and their merges."""
 
 from collections.abc import Collection, Sequence
 from typing import Any

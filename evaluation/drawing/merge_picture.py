@@ -28,7 +28,7 @@ from lidarium.mapping.merging.fusion import FusedMap, fuse
 from lidarium.mapping.merging.joining import Merged
 
 MOST_PANELS = 6
-"""Most panels of a picture."""
+"""Maximum number of panels of a picture."""
 
 MISS_M = 0.15
 """A wall contradicts if all within this distance is free [m]."""
@@ -43,9 +43,9 @@ class _Panel:
     Attributes
     ----------
     names : list of str
-        The maps, that in whose frame is drawn first.
+        The maps; the drawing is in the frame of the first.
     layers : list of Laid
-        Each map as it is laid in the cells of that frame, bent if it was.
+        Each map as drawn in the cells of that frame, bent if it was.
     title : str
         Text below them.
     matched : list of (n, 2, 2) float64
@@ -59,7 +59,7 @@ class _Panel:
 
 
 def panels_of(merged: Merged, deformed: Sequence[Deformed] = ()) -> list[_Panel]:
-    """Return the panels: joined groups, and refused pairs of maps that join none, else the maps alone."""
+    """Return the panels: joined groups and refused pairs of maps outside them, otherwise the maps alone."""
     known = {name for name, levels in merged.levels.items() if (levels != UNKNOWN).any()}
     groups = [group for group in merged.groups() if len(group) > 1]
     if deformed:
@@ -80,7 +80,7 @@ def panels_of(merged: Merged, deformed: Sequence[Deformed] = ()) -> list[_Panel]
 
 
 def contradicting(layers: Sequence[Laid], resolution: float) -> NDArray[np.float64]:
-    """Return the walls that stand where another map is free, in the common frame (n, 2) [m]."""
+    """Return the walls that lie in free space of another map, in the common frame (n, 2) [m]."""
     found = [
         one.common_from_cells.apply(_against(one, other, resolution))
         for one in layers
@@ -125,7 +125,7 @@ def _bent_panel(merged: Merged, group: list[str], deformed: Deformed) -> _Panel:
 
 
 def _against(one: Laid, other: Laid, resolution: float) -> NDArray[np.float64]:
-    """Return the walls of a map that stand where another one is free, in its own metres (n, 2)."""
+    """Return the walls of a map that lie in free space of another one, in its own metres (n, 2)."""
     walls = np.argwhere(one.levels == OCCUPIED)[:, ::-1] + 0.5
     other_from_one = other.common_from_cells.inverse() @ one.common_from_cells
     cells = np.floor(other_from_one.apply(walls * resolution) / resolution).astype(np.int64)
@@ -156,8 +156,8 @@ def save_merge_picture(
 ) -> None:
     """Draw each group of joined maps, and each refused pair as it would lie best.
 
-    Walls and free space have the colour of the map that saw them, walls that several saw are dark, and walls that
-    stand where another map is free are red. Lines join the matched corners of each pair, as far apart as the maps'
+    Walls and free space have the colour of the map that saw them, walls that several saw are dark, and walls that lie
+    in free space of another map are red. Lines join the matched corners of each pair, as far apart as the maps'
     frames leave them. Axes are those of the ROS frame of each panel's first map.
     """
     panels = panels_of(merged, deformed)

@@ -26,7 +26,7 @@ from lidarium.mapping.files.output import whole_file
 
 @contextmanager
 def plain_words(figure: Figure) -> Iterator[None]:
-    """Take all words of a figure as they are while it is drawn: a name with ``$`` is no formula."""
+    """Draw all texts of a figure literally: a name with ``$`` is no formula."""
     # Labels of ticks are made only when a figure is drawn.
     with rc_context({"text.parse_math": False}), warnings.catch_warnings():
         warnings.filterwarnings("ignore", "Glyph .* missing from", UserWarning)
@@ -66,7 +66,7 @@ class _Box:
 def box_around(free: NDArray[np.bool_], origin: tuple[float, float], resolution: float) -> _Box:
     """Return the part of a raster around the cells of a mask (rows, columns).
 
-    The mask marks the cells that are to be seen.
+    The mask marks the cells that should be visible.
     """
     spans, limits = [], []
     for axis in (1, 0):
@@ -81,7 +81,7 @@ def box_around(free: NDArray[np.bool_], origin: tuple[float, float], resolution:
 def page(aspect: float) -> tuple[Figure, Axes, Axes, Axes]:
     """Arrange a picture: the floor, the curve and the team.
 
-    The curve and the team are besides the floor, or below it if it is wide.
+    The curve and the team are at the side of the floor, or below it if it is wide.
     """
     if aspect > _WIDE:
         width = 14.0
@@ -191,7 +191,7 @@ def draw_trajectories(axes: Axes, track: NDArray[np.float64], radius: float) -> 
 
 
 def draw_start(axes: Axes, number: int, x: float, y: float, colour: str) -> None:
-    """Draw where robot ``number`` starts."""
+    """Draw the start of robot ``number``."""
     axes.plot(
         [x],
         [y],

@@ -29,7 +29,7 @@ def coverage_curves(group: Group, records: dict[Key, Entry]) -> Curves:
 
     It is of the policy's recorded runs, for the plot and ``report.json``.
 
-    A run that ends keeps its coverage. Ends of intervals that the runs do not bound (fewer than six) are None.
+    A run that ends keeps its coverage. Ends of intervals without a bound by the runs (fewer than six) are None.
     """
     times = np.linspace(0.0, group.horizon_s, CURVE_POINTS)
     curves: Curves = {}
@@ -109,7 +109,7 @@ def save_boxes(path: Path, group: Group, values: Sequence[Value]) -> None:
     ]
     panels = len(TIMES) + len(boxed)
     policies = list(group.runs)
-    # Names of policies stand aslant below the axes.
+    # Names of policies are written at an angle below the axes.
     height = 4.1 + 0.042 * max(map(len, policies))
     figure = Figure(figsize=(max(0.9 + 0.58 * len(policies), 2.5) * panels, height), layout="constrained")
     row_of_axes = [figure.add_subplot(1, panels, k + 1) for k in range(panels)]
@@ -169,7 +169,7 @@ def _draw_boxes(axes: Axes, samples: Sequence[NDArray[np.float64]]) -> None:
     A box is drawn if the sample is large enough for one.
     """
     chosen = colours(len(samples))
-    # Positions of dots say nothing; they come from a seed so that the picture is the same each time.
+    # Positions of dots have no meaning; they come from a seed so that the picture is reproducible.
     generator = np.random.default_rng(0)
     for place, (sample, colour) in enumerate(zip(samples, chosen, strict=True), 1):
         if len(sample) >= _FEWEST_FOR_BOX:

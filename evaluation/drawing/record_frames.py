@@ -129,7 +129,7 @@ class TrackFrames:
         return self._map.copy()
 
     def _with_panel(self, frame: Frame, camera: DepthCamera, poses: NDArray[np.float64]) -> Frame:
-        """Put the view of the first robot's camera beside a frame."""
+        """Put the view of the first robot's camera next to a frame."""
         assert self._views is not None
         level = np.zeros_like(poses)
         depth = self._views.depth(poses, level, 0, camera)
@@ -173,7 +173,7 @@ def save_track_picture(path: Path, record: EpisodeRecord) -> None:
     levels = without_small_components(display.map_at(math.inf))
     box = box_around(levels != UNKNOWN, display.origin, display.resolution)
     figure, floor_axes, curve_axes, team_axes = page(box.aspect)
-    # In the order of what shows if cells are drawn together.
+    # In order of priority if cells are drawn together.
     classes = np.zeros(levels.shape, np.uint8)
     classes[levels == FREE], classes[levels == OCCUPIED] = 1, 2
     palette = np.stack([rgb(colour) for colour in (_UNSEEN, "#ffffff", INK)])

@@ -37,7 +37,7 @@ class RegionMap:
     graph : RegionGraph
         Its regions and doors.
     corner : Transform
-        Of its lower left corner in its ROS frame.
+        Position of its lower left corner in its ROS frame.
     """
 
     levels: NDArray[np.uint8]

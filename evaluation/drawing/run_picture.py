@@ -150,7 +150,7 @@ def _draw_maps(axes: Axes, episode: Episode) -> None:
     rows, columns = np.flatnonzero(solid.any(axis=1))[-1] + 1, np.flatnonzero(solid.any(axis=0))[-1] + 1
     levels = without_small_components(three_levels(log_odds))
     solid, counted, levels = solid[:rows, :columns], counted[:rows, :columns], levels[:rows, :columns]
-    # In the order of what shows if cells are drawn together.
+    # In order of priority if cells are drawn together.
     classes = np.zeros(solid.shape, np.uint8)
     classes[solid] = 1
     classes[counted] = 2
@@ -171,7 +171,7 @@ def _draw_frontiers(axes: Axes, episode: Episode) -> tuple[bool, bool]:
 
 
 def _border_of_team_map(episode: Episode) -> tuple[NDArray[np.bool_], tuple[float, float]]:
-    """Return the border cells of the team's map as it is drawn, and its origin.
+    """Return the border cells of the team's map for drawing, and its origin.
 
     They lie within a cell of both free and unknown cells.
 
@@ -223,7 +223,7 @@ def _draw_legend(figure: Figure, has_left: bool, has_given_up: bool, more: list[
 
 
 def _list_robots(axes: Axes, episode: Episode) -> None:
-    """List each robot's ending, way and share of F, and below the frontiers given up."""
+    """List each robot's ending, path and share of F, and below the frontiers given up."""
     env, world = episode.env, episode.env.world
     counted = max(int(env.score.counted[0]), 1)
     endings = [env.scorer.ended_because.get(agent, "still at work") for agent in env.possible_agents]

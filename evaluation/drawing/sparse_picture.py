@@ -37,7 +37,7 @@ def save_sparse_pictures(
     graph: TopologicalGraph | None = None,
     way: NDArray[np.float64] | None = None,
 ) -> list[str]:
-    """Draw a sparse map besides its file, from above and in space.
+    """Draw a sparse map next to its file, from above and in space.
 
     Parameters
     ----------

@@ -59,7 +59,7 @@ def band(
     colour: str,
     step: Literal["pre", "post", "mid"] | None = None,
 ) -> None:
-    """Shade an interval, with thin edges that show where several overlap."""
+    """Shade an interval, with thin edges that show overlaps."""
     appearance: dict[str, Any] = {"facecolor": f"{colour}1f", "edgecolor": f"{colour}80", "linewidth": 0.7}
     axes.fill_between(np.asarray(x), np.asarray(low), np.asarray(high), step=step, **appearance)
 

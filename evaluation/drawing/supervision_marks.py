@@ -19,13 +19,13 @@ DrawOver = Callable[[ExplorationEnv, Frame, View], None]
 """Draws on a frame, given the environment and the view of the floor."""
 
 SHOWN_S = 4.0
-"""How long a film shows an order or a join [s]."""
+"""Time for which a film shows an order or a join [s]."""
 
 _JOIN_COLOUR = "#0f766e"
 
 
 def draw_supervision(axes: Axes, env: ExplorationEnv, policy: Policy) -> list[Line2D]:
-    """Draw where rules joined, redirected and stopped robots; return the legend.
+    """Draw the positions at which rules joined, redirected and stopped robots; return the legend.
 
     They are drawn on a map of the floor.
     """
@@ -113,7 +113,7 @@ def recent_supervision(policy: Policy) -> DrawOver:
 def _redirections(
     env: ExplorationEnv, orders: Iterable[GivenOrder]
 ) -> Iterator[tuple[str, tuple[float, float], tuple[float, float]]]:
-    """Yield who was redirected from where to where, in the floor's frame [m]."""
+    """Yield each redirected robot with its old and new target, in the floor's frame [m]."""
     for order in orders:
         if order.goal is not None:
             yield (

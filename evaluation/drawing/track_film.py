@@ -27,7 +27,7 @@ from lidarium.evaluation.drawing.record_frames import TrackFrames, known_at_end
 from lidarium.evaluation.record.episode_record import EpisodeRecord
 
 MOST_SIDE_BY_SIDE = 9
-"""Most records of one film."""
+"""Maximum number of records of one film."""
 
 GAP, LINE, BAR, TITLE = 6, 26, 6, 38
 """Between tiles; height of the line above a tile, of its bar, and of the line above all [pixels]."""
@@ -68,7 +68,7 @@ class _Tiles:
             (each.shape, *record.display.origin, record.display.resolution)
             for each, record in zip(known, records.values(), strict=True)
         }
-        # Maps of one grid are shown alike: what one has seen, all have room for.
+        # Maps of one grid have a common extent: all have room for the area that one has seen.
         shown = np.logical_or.reduce(known) if len(grids) == 1 else None
         self._frames = [TrackFrames(record, self._tile, shown=shown) for record in records.values()]
 

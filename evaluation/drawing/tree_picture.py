@@ -35,7 +35,7 @@ def _depth(tree: Node | Leaf) -> int:
 
 
 def _draw(axes: Axes, tree: Node | Leaf, level: int, first: int) -> float:
-    """Draw a part of the tree whose leaves begin at place ``first``.
+    """Draw a part of the tree with leaves from position ``first``.
 
     Return the place of its head.
     """

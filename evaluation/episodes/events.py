@@ -54,7 +54,7 @@ def _operating_event(env: ExplorationEnv, event: OperatingEvent) -> dict[str, An
 def merge_event(env: ExplorationEnv, merge: MergeEvent) -> dict[str, Any]:
     """Return a merge as an event of the record.
 
-    It has who was joined with whom, where, and how far off the truth.
+    It has the joined robots, the position, and the error relative to the truth.
     """
     distance, angle = transform_error(merge.found, merge.true, merge.at)
     place = place_of(env, merge.b, merge.at)
@@ -80,7 +80,7 @@ def joined_groups(
 ) -> tuple[list[set[int]], list[tuple[int, int]]]:
     """Return which robots' maps a station has joined, and by which pairs; robots are places in ``agents``.
 
-    Each robot is in one group; who is joined with nobody is alone in it, as all are without a station.
+    Each robot is in one group; a robot that is not joined is alone in it, as are all without a station.
     """
     groups, pairs = [{robot} for robot in range(len(agents))], list[tuple[int, int]]()
     for join in () if report.supervision is None else report.supervision.joins:

@@ -1,8 +1,8 @@
 """Watches an episode for the metrics over time.
 
-It keeps what the team and each robot knew, and how far they had driven by then. A sample is taken at the
-start, every decision period of simulated time and at the end; what a threshold of coverage asks for is noted
-in the very step that reaches it.
+It keeps the knowledge of the team and of each robot, and the lengths of their paths by then. A sample is taken at the
+start, every decision period of simulated time and at the end; the values for a threshold of coverage are recorded in
+the very step that reaches it.
 """
 
 from dataclasses import dataclass
@@ -63,7 +63,7 @@ def _count_footprints(table: Array, episode: int, windows: Array) -> tuple[int, 
     first = episode * robots
     if not _is_any_pair_near(world, first, robots):
         return 0, 0
-    # Of each window the rows and words of the masks that may hold bits, and where it begins.
+    # Of each window the rows and words of the masks that may hold bits, and its origin.
     boxes, spans, corners = (
         np.zeros((robots, 4), np.int64),
         np.zeros((robots, 4), np.int64),
@@ -140,7 +140,7 @@ class Milestone:
     overlap : float
         Share of the seen cells that two robots or more had seen.
     known_shares : (robots,) float64 or None
-        ``C_known`` of each robot's own map; None below `WHOLE`, before which nobody asks for it.
+        ``C_known`` of each robot's own map; None below `WHOLE`, because it is not used before.
     """
 
     time_s: float
@@ -168,8 +168,8 @@ class _Curves:
     lengths : (samples, robots) float64
         Length of each robot's path [m].
     seen_once, seen_twice : (decisions,) int64
-        Cells of F that a robot or more, and two or more, saw at once from where they stood, at the start and
-        every decision period; both 0 if no two footprints could meet.
+        Cells of F that one robot or more, and two or more, saw at once from their current poses, at the start and
+        every decision period; both 0 if no two footprints could overlap.
     """
 
     times: NDArray[np.float64]

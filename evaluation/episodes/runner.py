@@ -28,7 +28,7 @@ World = ExplorationEnv | SparsePlanning | MergedMaps
 
 @dataclass(slots=True)
 class Episode:
-    """The result of an episode, besides the environment itself.
+    """The result of an episode, and the environment itself.
 
     Attributes
     ----------
@@ -89,7 +89,7 @@ def run_episode(
         Whether ``KeyboardInterrupt`` is raised, True by default. If False, a first Ctrl-C ends the episode
         after the current step and the episode so far is returned; a second one is raised.
     merging : MergingSettings, optional
-        How the robots merge their maps (`MergedMaps`); by default they do not.
+        Settings of map merging (`MergedMaps`); no merging by default.
     plans_sparsely : bool, optional
         Whether robots drive along routes on their sparse maps (`SparsePlanning`); False by default.
 
@@ -144,7 +144,7 @@ def run_episode(
 
 
 def _note_merges(episode: Episode, merges: list[MergeEvent]) -> None:
-    """Take in which merges were used, and let who watches know."""
+    """Store the merges that were used, and notify the watchers."""
     env, episode.merges = episode.env, merges
     if isinstance(env, WatchedExploration):
         for merge in merges:
@@ -156,7 +156,7 @@ def _show_decision(
     policy: Policy,
     on_decision: Progress | None,
 ) -> None:
-    """Let who watches, and who is to be called, know of a decision that has been carried out."""
+    """Notify watchers and callbacks of a decision that has been carried out."""
     if isinstance(env, WatchedExploration):
         env.decided(None if env.driver is None else env.driver.orders(), policy.given_up)
     if on_decision is not None:
@@ -164,7 +164,7 @@ def _show_decision(
 
 
 def _merges_of(policy: Policy, env: ExplorationEnv) -> list[MergeEvent]:
-    """Return the joins that a policy's decisions were built on, besides the truth."""
+    """Return the joins that a policy's decisions were based on, compared with the truth."""
     station = policy.report().supervision
     used = [] if station is None else [join for join in station.joins if join.is_used]
     if not used:

@@ -1,6 +1,6 @@
 """Rules for when an episode of an evaluation ends, from other projects.
 
-They apply besides what the environment's settings say.
+They apply in addition to the environment's settings.
 """
 
 from collections.abc import Callable, Mapping

@@ -39,7 +39,7 @@ class Watcher:
 
 
 class WatchedExploration(ExplorationEnv):
-    """An exploration environment with watchers, whatever drives it."""
+    """An exploration environment with watchers, independent of what drives it."""
 
     def __init__(
         self,

@@ -56,7 +56,7 @@ class Metric:
     name, title, unit : str
         Key in ``result.json``, name in tables, unit (empty if it has none).
     direction : str or None
-        ``higher`` or ``lower`` if such values are better, else None.
+        ``higher`` or ``lower`` if such values are better, None by default.
     summary : str
         One line of documentation.
     digits : int

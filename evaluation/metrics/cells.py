@@ -135,12 +135,12 @@ def instant_overlap(seen_once: ArrayLike, seen_twice: ArrayLike) -> float:
 
     It is the mean of |footprint of two or more| / |footprint of one or more|.
 
-    Decisions at which nobody sees anything count as 0; 0 if there is no decision.
+    Decisions at which no robot sees anything count as 0; 0 without decisions.
 
     Parameters
     ----------
     seen_once, seen_twice : (decisions,) int
-        Cells that one robot or more, and two or more, see at each decision from where they stand.
+        Cells that one robot or more, and two or more, see at each decision from their current poses.
     """
     once, twice = np.asarray(seen_once, np.float64), np.asarray(seen_twice, np.float64)
     ratios = np.divide(twice, once, out=np.zeros_like(once), where=once > 0.0)
@@ -173,8 +173,8 @@ def occupied_f1(believed: Mask, occupied: Mask, tolerance: int = 1, wanted: Mask
     believed, occupied : (rows, columns) bool
         Occupied cells of the map and of the truth.
     wanted : (rows, columns) bool or None
-        The true cells that a map should hold, of which R is the share found: such as those on the surface of
-        what was sensed, as the inside of solids is true but cannot be seen. All if None.
+        The true cells that a map should hold, of which R is the share found: such as those on the surface of the
+        sensed area, as the inside of solids is true but cannot be seen. All by default.
     """
     wanted = occupied if wanted is None else wanted
     if not believed.any() and not wanted.any():
@@ -215,6 +215,6 @@ def free_error_rate(believed_free: Mask, occupied: Mask) -> float:
     Parameters
     ----------
     believed_free, occupied : (rows, columns) bool
-        Cells that the map says are free, and the truth's occupied cells.
+        Free cells of the map, and occupied cells of the truth.
     """
     return share(believed_free & occupied, believed_free, empty=0.0)

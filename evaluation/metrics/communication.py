@@ -1,6 +1,6 @@
 """Communication of a team: connection, data sent, and delay of knowledge.
 
-The delay is how late each robot knows what the team knows.
+The delay is the time until each robot has the team's knowledge.
 
 References
 ----------
@@ -41,7 +41,7 @@ def connected_share(links: NDArray[np.bool_]) -> float:
     Parameters
     ----------
     links : (times, robots, robots) bool
-        As for `largest_clusters`, at equal steps of time.
+        Links at equal steps of time, as for `largest_clusters`.
     """
     clusters = largest_clusters(links)
     return float((clusters == links.shape[1]).mean()) if clusters.size else 1.0
@@ -55,7 +55,7 @@ def largest_cluster_share(links: NDArray[np.bool_]) -> float:
     Parameters
     ----------
     links : (times, robots, robots) bool
-        As for `largest_clusters`, at equal steps of time.
+        Links at equal steps of time, as for `largest_clusters`.
     """
     clusters = largest_clusters(links)
     return float(clusters.mean()) / links.shape[1] if clusters.size else 1.0

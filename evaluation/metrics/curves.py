@@ -1,4 +1,4 @@
-"""How well a map of curves agrees with the true walls, and how small it is.
+"""Agreement of a map of curves with the true walls, and the map's size.
 
 References
 ----------
@@ -24,7 +24,7 @@ Edges = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class _WallError:
-    """How far points of curves lie from the nearest wall: mean and 95 % quantile [m].
+    """Distance of points of curves from the nearest wall: mean and 95 % quantile [m].
 
     Nan if there are no points.
     """
@@ -111,7 +111,7 @@ def seen_walls(edges: Edges, hits: Points, spacing: float = 0.02, reach: float =
 
 
 def hits_of_beams(edges: Edges, poses: Points, angles: NDArray[np.float64], range_max: float) -> Points:
-    """Return where the beams of scans from true poses end, before noise, (n, 2) [m].
+    """Return the end points of the beams of scans from true poses, before noise, (n, 2) [m].
 
     Parameters
     ----------

@@ -1,7 +1,9 @@
-"""Whether maps were merged where they should be, and how exactly.
+"""Correctness and accuracy of map merges.
 
-References ---------- Tolerances of correct merges: those of m-explore's own test of its map merging (Hörner,
-m-explore, BSD), 1e-2 rad and 2 cells.
+References
+----------
+Tolerances of correct merges: those of m-explore's own test of its map merging (Hörner, m-explore, BSD), 1e-2 rad
+and 2 cells.
 """
 
 import math
@@ -24,7 +26,7 @@ TRANSLATION_TOLERANCE = 2.0
 WRONG_TRANSLATION, WRONG_ROTATION = 0.3, math.radians(3.0)
 """Errors beyond which a merge is wrong [m, rad].
 
-A merge that errs by more than one of them puts a team's walls if there are none.
+A merge with a larger error places walls in free space of the team's map.
 """
 
 LEAST_OVERLAP = 0.10
@@ -78,7 +80,7 @@ def _is_wrong(translation_error: float, rotation_error: float) -> bool:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Trajectories:
-    """Where robots were and believed to be.
+    """True and believed poses of robots.
 
     Attributes
     ----------
@@ -114,7 +116,8 @@ def drifted_truth(event: MergeEvent, trajectories: Trajectories) -> tuple[float,
 
     It holds if they overlap.
 
-    Maps drift: the transform between starts is not the true one where two maps meet. A merger sees the maps alone.
+    Maps drift: if two maps overlap, their transform differs from the one between their starts. A merger sees the maps
+    alone.
     """
     at_a = Transform(*event.found).apply(event.at)
     floor_from_a = trajectories.floor_from_map(event.a, at_a, event.time_s)
@@ -170,7 +173,7 @@ def precision(accepted: NDArray[np.bool_], correct: NDArray[np.bool_]) -> float 
 def recall(accepted: NDArray[np.bool_], correct: NDArray[np.bool_], overlaps: ArrayLike) -> float | None:
     """Return |accepted and correct| / |attempts|; None without attempts.
 
-    Attempts are those whose maps overlap by ``LEAST_OVERLAP`` or more.
+    Attempts are those with maps that overlap by ``LEAST_OVERLAP`` or more.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""How far believed poses are from the true ones.
+"""Distance of believed poses from the true ones.
 
 Poses are x, y, theta [m, m, rad] of one robot at the same times.
 

@@ -23,7 +23,7 @@ from numpy.typing import ArrayLike, NDArray
 def _first_reached(coverage: ArrayLike, share: float) -> int | None:
     """Return the index of the first coverage that is at least ``share``.
 
-    It is None if there is none.
+    None without a value.
 
     Parameters
     ----------
@@ -164,7 +164,7 @@ def balance(shares: ArrayLike) -> float:
 def path_balance(lengths: ArrayLike) -> float:
     """Return the population standard deviation of the path lengths over their mean.
 
-    0 if nobody moved.
+    0 if no robot moved.
 
     Parameters
     ----------
@@ -178,7 +178,7 @@ def path_balance(lengths: ArrayLike) -> float:
 def jain_index(lengths: ArrayLike) -> float:
     """Return Jain's index ``(sum L_i)^2 / (n sum L_i^2)``.
 
-    It is 1 if all robots drive alike, 1/n if one drives alone, and 1 if nobody moved.
+    It is 1 if all robots drive alike, 1/n if one drives alone, and 1 if no robot moved.
 
     Parameters
     ----------
@@ -193,7 +193,7 @@ def jain_index(lengths: ArrayLike) -> float:
 def collisions_per_km(collisions: int, lengths: ArrayLike) -> float | None:
     """Return collisions over the kilometres that the team drove.
 
-    None if nobody moved.
+    None if no robot moved.
 
     Parameters
     ----------
@@ -212,7 +212,7 @@ def collisions_per_episode(collisions: Sequence[int]) -> float | None:
 def decision_percentiles(seconds: Sequence[float]) -> dict[str, float | None]:
     """Return the median and 95th percentile of decision times in milliseconds.
 
-    They are None if there was no decision.
+    None without decisions.
     """
     if not len(seconds):
         return {"p50": None, "p95": None}
@@ -223,7 +223,7 @@ def decision_percentiles(seconds: Sequence[float]) -> dict[str, float | None]:
 def peak_megabytes() -> float | None:
     """Return the most memory that this process has held so far [1e6 bytes].
 
-    None if the system does not say.
+    None if the system does not provide it.
     """
     try:
         import resource

@@ -1,4 +1,4 @@
-"""How well a trajectory keeps known motions between pairs of times.
+"""Agreement of a trajectory with known motions between pairs of times.
 
 References
 ----------
@@ -45,12 +45,12 @@ class Relations:
 
 @dataclass(frozen=True, slots=True)
 class RelationErrors:
-    """By how much a trajectory misses relations.
+    """Errors of a trajectory against known relations.
 
     Attributes
     ----------
     relations : int
-        How many there are.
+        Number of relations.
     translation_m, translation_sd_m : float
         Mean length of the difference and its standard deviation [m].
     rotation_rad, rotation_sd_rad : float

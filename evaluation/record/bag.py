@@ -29,7 +29,7 @@ def write_bag(path: Path, record: EpisodeRecord, floor: str | Floor | None = Non
     """Write a recorded episode as a bag, whole or not at all.
 
     Topics are ``/map`` (the sum of all maps), and of each robot ``/robot_0/scan``, ``odom`` (dead reckoning of its
-    wheels from its start), ``map`` (what it has mapped itself) and ``path`` (where it truly drove). ``/tf`` leads
+    wheels from its start), ``map`` (its own map) and ``path`` (its true path). ``/tf`` leads
     from ``map`` by ``robot_0/odom`` to ``robot_0/base_link`` at the true pose, ``/tf_static`` from there to
     ``robot_0/laser``.
     """
@@ -48,7 +48,7 @@ class _BagRecorder(Watcher):
         self._writer = writer
 
     def begin(self, env: ExplorationEnv) -> None:
-        """Write where lasers are on robots, and the first scans."""
+        """Write the mounts of the lasers, and the first scans."""
         self._times: list[float] = []
         self._poses: list[NDArray[np.float64]] = []
         for robot in env.possible_agents:

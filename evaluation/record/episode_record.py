@@ -127,7 +127,7 @@ class EpisodeRecord:
     Attributes
     ----------
     header : dict
-        Version, settings, what was drawn at the beginning, endings and the hash of the final state;
+        Version, settings, values drawn at the beginning, endings and the hash of the final state;
         docs/reference/files.md lists it all.
     commands : (steps, robots, 2) float64
         Speed and turn rate at which each robot was driven in each time step, to the bit [m/s, rad/s].
@@ -154,7 +154,7 @@ _SEED = Rule(int, bounds=within(0, math.inf))
 _ROBOTS = Rule(int, bounds=within(1, 64))
 
 MOST_MAP_WORDS = 1 << 22
-"""Most words of 64 cells of the map of a record."""
+"""Maximum number of words of 64 cells of the map of a record."""
 
 
 def _is_shape(value: Any) -> bool:  # noqa: ANN401

@@ -91,7 +91,7 @@ def _json(content: Any) -> bytes:  # noqa: ANN401
 
 
 def _packed(record: EpisodeRecord) -> dict[str, NDArray[Any]]:
-    """Return the arrays of a record as they are in the file.
+    """Return the arrays of a record unchanged from the file.
 
     Times are steps; poses and places are differences of whole numbers.
     """

@@ -44,7 +44,7 @@ def made_with(backend: str) -> dict[str, str]:
 
 
 FAR = 1e5
-"""How far from a robot a map may have changed that was rendered again [m]."""
+"""Maximum distance from a robot at which a map that was rendered again may have changed [m]."""
 
 
 class MapSampler:
@@ -78,7 +78,7 @@ class MapSampler:
         self._frame = np.array([*self.origin, self._resolution])
         self._known, self._occupied = np.zeros(self.shape, np.uint64), np.zeros(self.shape, np.uint64)
         self._buffer = np.empty((self.shape[0] * self.shape[1], 3), np.uint64)
-        # Between two samples a robot gets no further from both places than half of what it can drive.
+        # Between two samples a robot gets no farther from both positions than half of its maximum path.
         self._reach = (
             settings.lidar.range_max
             + 0.5 * settings.speed_limits[:, 0].max() * period_s
@@ -236,7 +236,7 @@ class Recorder(Watcher):
         self._events.append({"time_s": round(time_s, 6), "kind": kind, "agent": agent, **details})
 
     def finish(self, *, is_interrupted: bool = False) -> EpisodeRecord:
-        """Return the record of the episode so far; recording may go on."""
+        """Return the record of the episode so far; recording may continue."""
         env = self._env
         if env is None or env.floor is None:
             raise ValueError(
@@ -268,7 +268,7 @@ class Recorder(Watcher):
             "map_shape": list(self._maps.shape),
             "endings": [list(ending) for ending in self._endings],
             "interrupted": is_interrupted,
-            # Broken off within a step, the world is ahead of what was recorded.
+            # If broken off within a step, the world is ahead of the record.
             "final_sha256": state_sha256(env) if steps == len(commands) else None,
         }
         return EpisodeRecord(header, commands, self._display(env))

@@ -46,9 +46,9 @@ _ARRAYS = (
 def state_sha256(env: ExplorationEnv) -> str:
     """Return a hash of the state of an environment's world, to the bit.
 
-    It covers the number of steps; true and believed poses, velocities, scans, bumpers and contacts; ways,
+    It covers the number of steps; true and believed poses, velocities, scans, bumpers and contacts; paths,
     collisions and counts of seen cells; the scorer's masks and the robots' maps; and why each robot ended. It does
-    not cover what is made of these: observations, plans, clearance.
+    not cover derived data: observations, plans, clearance.
     """
     simulation = env.simulation
     owners = (simulation, simulation.world, simulation.beliefs, simulation.score)
@@ -117,7 +117,7 @@ def drive_again(
     there = find_floor(header, floor)
     tables = floor_tables(there, settings.raster_resolution, settings.lidar.height, settings.robot.height)
     goal = None if header["goal"] is None else (header["goal"][0], header["goal"][1])
-    # The recorded speeds have all pauses in them; nobody is there to end one that the re-run would make.
+    # The recorded speeds have all pauses in them; no station would end a pause of the re-run.
     env = WatchedExploration(there, replace(settings, pauses_when_blocked=False), watchers=watchers)
     env.start(EpisodeStart(there, tables, np.array(header["starts"], np.float64), header["noise_seed"], goal))
     endings: dict[int, list[tuple[str, str]]] = {}
@@ -136,7 +136,7 @@ def is_same(record: EpisodeRecord, env: ExplorationEnv) -> bool:
 
 
 def first_difference(record: EpisodeRecord, env: ExplorationEnv) -> str:
-    """Describe when and where a re-run first leaves the recorded paths.
+    """Describe the time and position at which a re-run first leaves the recorded paths.
 
     The versions of the record are included.
     """
@@ -176,7 +176,7 @@ def _settings_of(header: dict[str, Any]) -> ExplorationSettings:
 
 
 def find_floor(header: dict[str, Any], floor: str | Path | Floor | None = None) -> Floor:
-    """Return the floor of a record: the given one, else the one that the record names."""
+    """Return the floor of a record: the given one, by default the one that the record names."""
     names = (
         [floor]
         if floor is not None

@@ -25,7 +25,7 @@ class Wanted:
     robots, seed : int or None
         Size of the team, and seed.
     policies : sequence of str
-        The policies, in this order; all if there are none.
+        The policies, in this order; all by default.
     """
 
     floor: str | None = None

@@ -70,10 +70,10 @@ UNKNOWN, FREE, OCCUPIED = 0, 1, 2
 """Levels of a cell of the page."""
 
 FINEST_M = 0.05
-"""Least side of a cell of the page [m]."""
+"""Minimum side of a cell of the page [m]."""
 
 MOST_CELLS = 250_000
-"""Most cells of a map of the page; if there were more, cells are made larger."""
+"""Maximum number of cells of a map of the page; larger maps get larger cells."""
 
 _MARGIN_M = 0.15
 
@@ -135,7 +135,7 @@ def grid_around(shown: Mask, resolution: float) -> Grid:
 
 
 def coarse(occupied: Mask, free: Mask, block: int) -> NDArray[np.uint8]:
-    """Return levels of blocks: occupied where any cell is, else free if any is, else unknown."""
+    """Return levels of blocks: occupied if any cell is, otherwise free if any is, otherwise unknown."""
     levels = occupied.view(np.uint8) * np.uint8(OCCUPIED)
     np.maximum(levels, free.view(np.uint8), out=levels)
     rows, columns = (side // block for side in levels.shape)

@@ -225,7 +225,7 @@ def replay(
 
 
 def _json(content: Mapping[str, Any]) -> str:
-    """Return JSON in which nothing can end the script that it stands in."""
+    """Return JSON that cannot end the script that contains it."""
     text = json.dumps(content, allow_nan=False, ensure_ascii=False, separators=(",", ":"))
     return text.replace("<", "\\u003c").encode("utf-8", "backslashreplace").decode()
 

@@ -32,13 +32,13 @@ from lidarium.mapping.files.guarded_reading import printable
 from lidarium.mapping.grids.occupancy import FREE, OCCUPIED, UNKNOWN
 
 MAP_PERIOD_S, SCAN_PERIOD_S = 1.0, 0.4
-"""Least time between samples of maps, and of scans [s]; that of scans is a multiple of that of poses."""
+"""Minimum time between samples of maps, and of scans [s]; that of scans is a multiple of that of poses."""
 
 MOST_MAPS, MOST_SCANS = 600, 1500
-"""Most samples of an episode: those of a longer one are further apart."""
+"""Maximum number of samples of an episode; those of a longer one are further apart."""
 
 MOST_BEAMS = 60
-"""Most beams of a scan of the page."""
+"""Maximum number of beams of a scan of the page."""
 
 
 @dataclass(slots=True)
@@ -54,7 +54,7 @@ class _Samples:
     team : Layer
         The sum of all maps.
     own : list of Layer
-        Maps of each robot's own scans; none if there is one robot, whose map is the team's.
+        Maps of each robot's own scans; empty for a single robot, which has the team's map.
     map_times, scan_times : list of float
         When samples were taken [s].
     scans : list of (robots, beams) float32
@@ -127,7 +127,7 @@ class ReplaySampler(Watcher):
             samples.believed.append(believed_on_floor(env))
 
     def _places(self, env: ExplorationEnv) -> NDArray[np.float64]:
-        """Return if robots are and believe to be, (2 robots, 2) [m]."""
+        """Return the true and believed positions of the robots, (2 robots, 2) [m]."""
         return np.concatenate([env.world.poses[:, :2], believed_on_floor(env)[:, :2]])
 
     def _sample_maps(self, env: ExplorationEnv, *, is_whole: bool = False) -> None:
@@ -189,7 +189,7 @@ class Replay:
     text : str
         Output of `packed`.
     lacks : str
-        Why scans, the truth and own maps are not there; empty if they are.
+        Reason why scans, the truth and own maps are missing; empty if they are present.
     """
 
     title: str
@@ -233,7 +233,7 @@ def _title(header: dict[str, Any]) -> str:
 
 
 def _plain(event: dict[str, Any]) -> dict[str, Any]:
-    """Return an event whose words can be shown; numbers that JSON does not have become null."""
+    """Return an event with printable words; numbers that JSON does not have become null."""
     shown: dict[str, Any] = {}
     for key, value in event.items():
         is_number = isinstance(value, int | float) and math.isfinite(value)
@@ -242,7 +242,7 @@ def _plain(event: dict[str, Any]) -> dict[str, Any]:
 
 
 def _track(record: EpisodeRecord) -> Streams:
-    """Return paths and coverage, whose differences are small numbers."""
+    """Return paths and coverage, coded as small differences."""
     display = record.display
     poses = display.poses.reshape(len(display.times), -1, 3).copy()
     poses[..., 2] = np.unwrap(poses[..., 2], axis=0)

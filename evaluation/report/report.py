@@ -24,13 +24,13 @@ from lidarium.evaluation.report.tables import code, plain
 from lidarium.mapping.files.output import check_writable, check_written, write_text
 
 REPLAYS = 30
-"""Most episodes that the page replays."""
+"""Maximum number of episodes that the page replays."""
 
 PAGE = "report.html"
 """The page that a browser shows."""
 
 Progress = Callable[[Sequence[Row]], Iterable[Row]]
-"""Passes on episodes whose replays are being made, and reports how many there were."""
+"""Passes on episodes while their replays are made, and reports their number."""
 
 
 def write_report(
@@ -72,7 +72,7 @@ def write_report(
         "groups": [section.numbers for section in sections],
     }
     numbers: dict[str, Any] = jsonable(result)
-    # For programs: thousands of numbers, which would stand on a line each otherwise.
+    # For programs: thousands of numbers, which would otherwise take a line each.
     write_text(
         out / "report.json",
         json.dumps(numbers, allow_nan=False, ensure_ascii=False, separators=(",", ":")) + "\n",

@@ -15,7 +15,7 @@ _WRITTEN = re.compile(r"`([^`]*)`|\\([\\`*\[\]<>|$~])|&amp;")
 
 
 def plain(text: str) -> str:
-    """Return text in which nothing stands for anything but itself, links and tables among it."""
+    """Return text without any Markdown meaning, such as links and tables."""
     return _SPECIAL.sub(r"\\\1", printable(text).replace("&", "&amp;"))
 
 
@@ -88,7 +88,7 @@ def times_table(figures: dict[str, TimeFigure], horizon_s: float) -> str:
 
 
 def values_table(figures: dict[str, dict[str, ValueFigure]], values: Sequence[Value]) -> str:
-    """Return the median of every value by policy, or its mean if its column says so."""
+    """Return the median of every value by policy, or its mean if the column requires it."""
     columns = [value.column for value in values]
     header = [f"{_headed(each.title, each.unit)}, {'mean' if each.by_mean else 'median'}" for each in columns]
     rows = []
@@ -156,7 +156,7 @@ def comparisons_table(comparisons: Sequence[Comparison], values: Sequence[Value]
 def floors_table(group: Group, key: str) -> str:
     """Return the median time of each policy on each floor.
 
-    How many of its runs reached the share is given as well.
+    The number of its runs that reached the share is given as well.
     """
     rows = []
     for floor in group.floors:

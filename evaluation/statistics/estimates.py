@@ -1,11 +1,13 @@
 """Medians, means, interquartile means and shares of runs with confidence intervals, and paired comparisons.
 
 The interval of a median is from the d-th smallest to the d-th largest of n values, which holds the median
-with probability 1 - 2 P(Binomial(n, 1/2) < d), whatever the distribution. d is whole, so the best of these
+with probability 1 - 2 P(Binomial(n, 1/2) < d)for any distribution. d is whole, so the best of these
 intervals is wider than asked for; interpolation between it and the next narrower one brings the probability
 close to the one asked for. Intervals of means are studentised bootstrap intervals, those of shares Wilson's.
 
-References ---------- Hettmansperger and Sheather, Confidence intervals based on interpolated order
+References
+----------
+Hettmansperger and Sheather, Confidence intervals based on interpolated order
 statistics, Statistics and Probability Letters 4 (1986). Nyblom, Note on interpolated order statistics,
 Statistics and Probability Letters 14 (1992). Interquartile mean: Agarwal et al., Deep reinforcement learning
 at the edge of the statistical precipice (NeurIPS 2021). Its standard error: Tukey and McLaughlin (1963), from
@@ -110,7 +112,7 @@ def mean_interval(
 def interquartile_mean(values: ArrayLike) -> float:
     """Return the mean of the middle half.
 
-    Of the values at its ends only the part that lies within counts.
+    Values at its ends count only in part.
     """
     ordered = np.sort(checked_values(values))
     return float(_middle_means(np.ones((1, len(ordered)), np.uint16), ordered)[0][0])

@@ -24,7 +24,7 @@ class PairedTest:
     Attributes
     ----------
     p_value : float
-        How likely so much difference is by chance, two-sided; 1 if all pairs are ties.
+        Probability of this difference or a larger one by chance, two-sided; 1 if all pairs are ties.
     size : int
         Number of pairs.
     less, greater, ties : int

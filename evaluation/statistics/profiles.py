@@ -22,7 +22,7 @@ def ratio_profile(costs: ArrayLike, factors: ArrayLike) -> Values:
     ----------
     costs : (runs, policies) array_like
         Cost of each policy, 0 or more; inf if it did not succeed. Runs in which none succeeded count
-        for nobody.
+        do not count for any policy.
     factors : (k,) array_like
         Factors, 1 or more.
 

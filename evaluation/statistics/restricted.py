@@ -2,7 +2,7 @@
 
 Their intervals are studentised bootstrap intervals.
 
-A time that was cut before the event is censored: the event comes later than that, nobody knows when. The
+A time that was cut before the event is censored: the event comes later than thatat an unknown time. The
 restricted mean is the area below the Kaplan-Meier curve S up to a horizon. If all times are known or cut
 at the horizon itself, it is the plain mean of min(T, horizon). Standard errors come from each run's influence
 on the area, which also gives those of differences and ratios of paired runs: there the influences of both
@@ -70,7 +70,7 @@ class CensoredTimes:
         self.times: Values = np.minimum(known, horizon)
         self.is_observed: NDArray[np.bool_] = happened
         self.horizon = float(horizon)
-        # At equal times what happened comes before what was cut.
+        # At equal times events come before cuts.
         self.order: NDArray[np.int64] = np.lexsort((~happened, self.times))
 
     def __len__(self) -> int:
@@ -127,7 +127,7 @@ def restricted_mean(
         return _unzipped(_means_of(counts, sample.arrays))
 
     found = studentised_interval(replicates, len(sample), confidence, resamples, seed)
-    # The truth lies between 0 and the horizon whatever the sample.
+    # The truth lies between 0 and the horizon for any sample.
     return replace(found, low=max(found.low, 0.0), high=min(found.high, sample.horizon))
 
 
@@ -228,7 +228,7 @@ def _differences_of(counts: Array, a: _Sample, b: _Sample, is_logarithmic: bool)
 def _influences_on(counts: Array, sample: _Sample, areas: Array, influences: Array) -> float:
     """Return the restricted mean of a resample.
 
-    Write the influence of each run on it, whose squares sum to the variance.
+    Write the influence of each run on it; their squares sum to the variance.
 
     With c the counts, Y the runs at risk before a time and G the area right of it, the influence of run i is sum
     over events k up to i of c_k G_k / (Y_k (Y_k - c_k)), less G_i / (Y_i - c_i) if i is an event: the derivative of

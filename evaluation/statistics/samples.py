@@ -8,7 +8,7 @@ References
 Efron and Tibshirani, An Introduction to the Bootstrap (1993), section 12.5. Hall, Theoretical comparison of
 bootstrap confidence intervals, Annals of Statistics 16 (1988): with equal tails the studentised interval
 follows skewness. Hall, On symmetric bootstrap confidence intervals, Journal of the Royal Statistical Society
-B 50 (1988): the symmetric form suits what is nearly symmetric.
+B 50 (1988): the symmetric form suits nearly symmetric distributions.
 """
 
 from collections.abc import Callable
@@ -29,7 +29,7 @@ See docs/results/interval_coverage.md.
 
 @dataclass(frozen=True, slots=True)
 class Interval:
-    """An estimate and where the truth may lie.
+    """An estimate and its confidence interval.
 
     Attributes
     ----------
@@ -38,9 +38,9 @@ class Interval:
     low, high : float
         Ends of the interval, -inf or inf if the sample does not bound it.
     confidence : float
-        How often such an interval holds the truth.
+        Probability that such an interval holds the truth.
     size : int
-        How many values, pairs or runs it is made of.
+        Number of values, pairs or runs.
     """
 
     estimate: float
@@ -53,7 +53,7 @@ class Interval:
     def is_nominal(self) -> bool:
         """Whether the sample is large enough for the interval to be nominal.
 
-        The interval then holds the truth as often as it says.
+        The interval then holds the truth with the stated probability.
         """
         return self.size >= FEWEST_FOR_NOMINAL
 
@@ -94,7 +94,7 @@ def checked_confidence(confidence: float) -> float:
 Counts = NDArray[np.uint16]
 
 RESAMPLES = 10_000
-"""Resamples of an interval unless something else is asked for."""
+"""Number of resamples of an interval by default."""
 
 FEWEST_RESAMPLES = 100
 MOST_VALUES = 65_535

@@ -1,6 +1,6 @@
 """Runs a suite into a folder, and keeps every finished episode at once.
 
-An interrupted run continues where it stopped.
+An interrupted run continues after the last finished episode.
 
 A folder holds ``suite.json`` (the request), ``episodes.jsonl`` (a line per finished episode) and
 ``records/`` (a record per episode). Episodes depend on their trial alone, never on the worker or on those

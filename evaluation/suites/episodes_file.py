@@ -182,7 +182,7 @@ class EpisodesFile:
                 raise OSError(errno.ENOSPC, "the disk is full", str(self.path))
             os.fsync(self._handle)
         except OSError as error:
-            with suppress(OSError):  # what is cut off is seen, and left out, by who opens the file next
+            with suppress(OSError):  # the next reader detects and skips the cut-off line
                 os.ftruncate(self._handle, self._size)
             raise OSError(
                 error.errno,
@@ -231,7 +231,7 @@ def _check_ours(path: Path, whole: int) -> None:
     with path.open("rb") as file:
         file.seek(whole)
         rest = file.read(64).replace(b" ", b"").strip(b"\0\r\n\t")
-    # Some file systems leave zeros where writing was broken off.
+    # Some file systems leave zeros at the end of an interrupted write.
     if not (rest.startswith(_FIRST) or _FIRST.startswith(rest)):
         raise ValueError(
             f"{path} ends with {rest[:20]!r}, which no evaluation has written; move the file away, or choose "

@@ -1,6 +1,6 @@
-"""Episodes shared out among the machines of a Ray cluster, with results as they are ready.
+"""Episodes distributed to the machines of a Ray cluster, with results as they become ready.
 
-A task whose worker or machine is lost is done again elsewhere; its result comes once.
+A task with a lost worker or machine is repeated elsewhere; its result arrives once.
 """
 
 import logging
@@ -132,7 +132,7 @@ class _Recorded:
         self._suite, self._keeps_records = suite, keeps_records
 
     def __call__(self, trial: Trial) -> tuple[dict[str, Any], bytes | None]:
-        """Run a trial; its record is made in a folder of this machine that goes again."""
+        """Run a trial; its record is made in a temporary folder of this machine."""
         if not self._keeps_records:
             return run_trial(self._suite, trial), None
         with tempfile.TemporaryDirectory() as folder:

@@ -19,7 +19,7 @@ _CLOCK = "time is simulated, not that of a clock on the wall"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Preset:
-    """How a project evaluates.
+    """Evaluation protocol of a project.
 
     Attributes
     ----------
@@ -237,7 +237,7 @@ def preset_named(name: str) -> _Preset:
 def _preset_floors(preset: _Preset, data: Path | None) -> tuple[str, ...]:
     """Return the floors of a preset.
 
-    They are its files below a folder of real data, else their substitutes.
+    They are its files below a folder of real data, otherwise their substitutes.
     """
     files = (
         []

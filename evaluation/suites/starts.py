@@ -9,7 +9,7 @@ from lidarium.envs.settings.exploration import ExplorationSettings
 def drawn_starts(
     floor: str | Floor, settings: ExplorationSettings, seed: int, image_resolution: float | None = None
 ) -> list[list[float]] | None:
-    """Draw where robots start on a floor that has starts of its own.
+    """Draw start poses on a floor that has starts of its own.
 
     None on other floors, if a reset draws by the seed.
     """
@@ -28,7 +28,7 @@ def drawn_starts(
 def starts_in(
     floor: str, settings: ExplorationSettings, seed: int, image_resolution: float | None = None
 ) -> list[list[float]]:
-    """Return where a reset with a seed lets robots start on a floor, x, y, theta of each [m, rad]."""
+    """Return the start poses of a reset with a seed on a floor, x, y, theta of each [m, rad]."""
     from lidarium.envs.faces.parallel import ExplorationEnv
 
     env = ExplorationEnv(floor, settings, image_resolution=image_resolution)

@@ -21,10 +21,10 @@ MOST_SUITE_BYTES = 1 << 20
 """Longest file of a suite."""
 
 MOST_EACH = 1_000_000
-"""Most policies, floors, teams, seeds or variants."""
+"""Maximum number of policies, floors, teams, seeds or variants."""
 
 MOST_TRIALS = 10_000_000
-"""Most episodes of a suite."""
+"""Maximum number of episodes of a suite."""
 
 ROBOTS = Rule(int, bounds=within(1, 64))
 SEED = Rule(int, bounds=within(0, 2**63 - 1))
@@ -72,7 +72,7 @@ def check_trials(*lengths: int) -> None:
 
 
 def listed(content: Mapping[str, Any], name: str) -> tuple[Any, ...]:
-    """Return a list of a suite; a single name or number stands for a list of it."""
+    """Return a list of a suite; a single name or number counts as a list of one."""
     values = content[name]
     if isinstance(values, list | tuple):
         return tuple(values)
@@ -147,13 +147,13 @@ class Suite:
         Whether the seed draws starts also on floors that have starts of their own; these would be the same
         for every seed.
     bounds : bool
-        Whether each episode is set beside how soon a team that knew the floor could have seen it.
+        Whether each episode is compared with the time of a team that knows the floor. False by default.
     stop : dict or None
         Rule that ends episodes in addition to the settings, as ``StopRule``.
     image_resolution : float or None
         Metres per pixel, if floors are plain images.
     policy_settings : dict
-        By a name among the policies: options that the policy is made with, and ``policy``, which one it is,
+        By a name among the policies: options of the policy, and ``policy``, the policy itself,
         if the name is another.
     """
 

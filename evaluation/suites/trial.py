@@ -15,7 +15,7 @@ class Trial:
     variant : str
         Name of the settings.
     floor : str
-        As for ``load_floor``.
+        Name of the floor, as for ``load_floor``.
     robots : int
         Size of the team.
     start : int

@@ -1,1 +1,1 @@
-"""Ground truth of an episode: free and occupied cells, who sensed and knows them."""
+"""Ground truth of an episode: free and occupied cells, and the cells that robots have sensed and know."""

@@ -106,7 +106,7 @@ def held_maps(env: ExplorationEnv) -> list[NDArray[np.int8]]:
 def free_as_held(env: ExplorationEnv, maps: NDArray[np.int8]) -> NDArray[np.bool_]:
     """Return which cells each robot holds to be free.
 
-    A cell is free by its own map or, where the team's map reaches it, by the team's.
+    A cell is free by its own map or, if the team's map reaches it, by the team's.
 
     Parameters
     ----------

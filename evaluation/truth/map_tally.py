@@ -48,10 +48,9 @@ class CountedMaps(NamedTuple):
     truth : (3, rows, words) uint64
         The true masks.
     bits : (robots + 1, rows, words, 2) uint64
-        Which cells each robot's own map knows, and which of them it says are free; those of the team at the
-        end.
+        Cells that each robot's own map knows, and those of them that it has as free; the team's map comes last.
     disputed : (rows, words) uint64
-        Cells of F of which one map says that they are free, and another that they are not.
+        Cells of F that are free on one map, and not free on another.
     counts : (robots + 1, 3) int64
         Of the team, known cells within ``KNOWABLE`` and ``VALID``; free cells within ``COUNTED`` of the map
         that all robots share, else of each robot's.
@@ -144,7 +143,7 @@ class _LastVisit(NamedTuple):
     Attributes
     ----------
     poses, travelled : (robots, 3), (robots,) float64
-        Where each robot stood [m, rad], and how far it had driven by then [m].
+        True pose of each robot [m, rad], and length of its path by then [m].
     changes : (robots, 4) int64
         Changed part of each map, of ``note_changes``.
     """
@@ -167,7 +166,7 @@ def _box(
     resolution, frame = world.sensor[MAP_RESOLUTION], world.frames[episode]
     first_row, first_column = cells_beyond(world, row, episode)
     if not world.flags[row] & TRUE_POSE:
-        # Whoever does not know where he is may map what is far from there.
+        # A robot with a wrong believed pose may map cells that are far away.
         return (
             max(change[0] - first_row, 0),
             min(change[1] - first_row, shape[0]),
@@ -211,7 +210,7 @@ def _count_aligned(
                 own[i, j, FREE] = negative
             else:
                 recount_free(maps, robot, i, j, negative)
-            # What is disputed may be settled by another sum, though no map has changed its mind.
+            # A disputed cell may be settled by another sum, though no map has changed it.
             if has_changed or (team.shares and disputed[i, j] != np.uint64(0)):
                 sum_up(world, team, maps, i, j)
 
@@ -225,7 +224,7 @@ def _count_turned(
     Each cell that has changed is transformed to the floor's lattice.
 
     ``signs`` (rows, words, 2) are the bits on the map's own lattice. As in `beliefs.maps_on_floor`, a cell of the
-    floor is what the cell of the map says in which its centre lies.
+    floor has the value of the map's cell that contains its centre.
     """
     row, truth = team.first + robot, maps.truth
     belief, start, origin, frame = (
@@ -352,7 +351,7 @@ class MapTally:
         self.shares = shares_one_map(env)
 
     def note_step(self, env: ExplorationEnv) -> None:
-        """Note if maps have changed; wanted after every step."""
+        """Record changes of the maps; call this after every step."""
         note_changes(env.beliefs.windows, self._last.changes)
 
     def take_in(self, env: ExplorationEnv) -> None:

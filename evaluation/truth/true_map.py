@@ -54,7 +54,7 @@ def truth_of(env: ExplorationEnv) -> Truth:
 def left_by_failed(env: ExplorationEnv) -> Mask | None:
     """Return the part of F that the others can reach past failed robots' bodies.
 
-    They reach it from where they are now.
+    They reach it from their current positions.
 
     None if none has failed, or all have.
     """
@@ -66,7 +66,7 @@ def left_by_failed(env: ExplorationEnv) -> Mask | None:
     solid = body.solid.copy()
     rows, columns = np.indices(solid.shape)
     for x, y, _ in world.poses[failed]:
-        # A cell less than the body: a robot that touches it still fits beside it.
+        # A cell less than the body: a robot that touches it still fits next to it.
         near = np.hypot(
             body.origin[0] + (columns + 0.5) * resolution - x, body.origin[1] + (rows + 0.5) * resolution - y
         )
@@ -83,7 +83,7 @@ def left_by_failed(env: ExplorationEnv) -> Mask | None:
 def occupied_in_truth(env: ExplorationEnv) -> NDArray[np.bool_]:
     """Return the true occupied cells on the lattice of the maps.
 
-    A cell is occupied where any of the world's cells in it is solid, and free beyond the world's raster.
+    A cell is occupied if any of the world's cells in it is solid, and free beyond the world's raster.
     """
     tables = env.world.floors[0]
     assert tables is not None

@@ -1,1 +1,1 @@
-"""A run shown in a browser while it goes: scene, page, controls, pace."""
+"""Live view of a run in a browser: scene, page, controls, pace."""

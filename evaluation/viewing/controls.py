@@ -41,7 +41,7 @@ FIRST_SPEED = "5 x"
 NOBODY = "The whole floor"
 
 BEHIND = 0.0, -4.5, 6.0
-"""From where a robot is looked at that begins to be followed, as seen from it [m]."""
+"""Position of the camera relative to a robot when it begins to follow it [m]."""
 
 PAUSE, GO_ON = "Pause", "Go on"
 
@@ -93,7 +93,7 @@ class Controls:
 
     @property
     def speed(self) -> float:
-        """Simulated seconds per second, above 0; inf for as fast as it goes."""
+        """Simulated seconds per second, above 0; inf for the maximum speed."""
         return SPEEDS[str(self._speed.value)]
 
     @property
@@ -109,7 +109,7 @@ class Controls:
 
     @property
     def wall_height(self) -> float:
-        """Where walls are cut [m]."""
+        """Height at which walls are cut [m]."""
         return float(self._height.value)
 
     def write(self, status: str, events: str, coverage: float) -> None:

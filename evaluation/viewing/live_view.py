@@ -1,4 +1,4 @@
-"""Shows a run in a browser while it goes, in step with the wall clock."""
+"""Shows a run live in a browser, in step with the wall clock."""
 
 import time
 from collections.abc import Callable, Sequence
@@ -67,7 +67,7 @@ class Pace:
 
 
 MOST_EVENTS = 6
-"""Most events that are listed, the latest first."""
+"""Maximum number of events that are listed, the latest first."""
 
 
 def status_text(env: WatchedExploration, policy: str, report: PolicyReport, decisions: int) -> str:
@@ -106,7 +106,7 @@ _TABLE = '<table style="width:100%;margin-top:4px;border-collapse:collapse">{}</
 
 
 def _safe(text: str) -> str:
-    """Return text that HTML shows as it is."""
+    """Return text that HTML shows literally."""
     return escape(printable(text))
 
 
@@ -138,13 +138,13 @@ def _doing(env: WatchedExploration, row: int) -> str:
 
 
 FRAME_S, MAPS_S = 0.1, 0.5
-"""Least wall time between two frames, and between two drawings of maps and words [s]."""
+"""Minimum wall time between two frames, and between two drawings of maps and words [s]."""
 
 MAPS_SHARE = 0.1
-"""Most of the wall time that drawing maps takes."""
+"""Maximum share of the wall time for drawing maps."""
 
 LOW_WALLS_M = 0.4
-"""Height at which walls are cut at first if nobody looks at furniture [m]."""
+"""Height at which walls are cut by default if furniture is not shown [m]."""
 
 DEPTH_SIZE = 180, 240
 """Rows and columns of the depth image at the side [pixels]."""
@@ -215,7 +215,7 @@ class LiveView(Watcher):
             self._answer_controls()
 
     def _answer_controls(self) -> bool:
-        """Follow the controls; return whether nobody wants the run to end."""
+        """Follow the controls; return whether the run should continue."""
         layers = self._controls.layers
         self._scene.cut_walls(self._controls.wall_height)
         self._scene.show(layers)

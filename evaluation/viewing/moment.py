@@ -1,4 +1,4 @@
-"""The state of a run at one time that a page shows, besides maps: bodies, scans, paths, plans, boxes."""
+"""The state of a run at one time for a page, without maps: bodies, scans, paths, plans, boxes."""
 
 from dataclasses import dataclass
 
@@ -12,7 +12,7 @@ from lidarium.evaluation.episodes.watching import WatchedExploration
 from lidarium.evaluation.truth.beliefs import believed_on_floor
 
 MOST_TRAIL, MOST_BEAMS, MOST_POINTS = 1500, 360, 6000
-"""Most points of a path that was driven, of a scan, and of a depth image's cloud."""
+"""Maximum number of points of a driven path, of a scan, and of a depth image's cloud."""
 
 NO_POINTS = np.zeros((0, 2))
 NO_CLOUD = np.zeros((0, 3), np.float32)
@@ -32,9 +32,9 @@ class RobotMoment:
     has_ended : bool
         Whether it has left the episode.
     laser : (3,) float64
-        Where its laser is, in the floor's frame [m].
+        Position of its laser, in the floor's frame [m].
     ends : (beams, 3) float64
-        Where its beams end, in the floor's frame; those without a return end at the greatest range [m].
+        End points of its beams, in the floor's frame; those without a return end at the greatest range [m].
     is_hit : (beams,) bool
         Which of them met something.
     trail : (T, 2) float64
@@ -42,11 +42,11 @@ class RobotMoment:
     plan : (P, 2) float64
         Rest of the path that it drives, placed as ``believed`` [m].
     goal : (2,) float64 or None
-        Where it drives to, placed alike [m].
+        Target of its drive, placed alike [m].
     cloud : (C, 3) float32
         Points of its depth image, in the floor's frame [m].
     boxes : (B, 2, 3) float64
-        Low and high corners of its sparse map along the axes of that map [m]; none where it makes none.
+        Low and high corners of its sparse map along the axes of that map [m]; empty if it makes none.
     boxes_pose : (3,) float64
         x, y, theta of these axes in the floor's frame [m, rad].
     """
@@ -140,14 +140,14 @@ def _on_floor(env: ExplorationEnv, row: int, points: NDArray[np.float64]) -> NDA
 
 
 def _trails(env: ExplorationEnv) -> NDArray[np.float64]:
-    """Return if the robots have been, (T, robots, 2), thinned out."""
+    """Return the past positions of the robots, (T, robots, 2), thinned out."""
     track = env.scorer.track
     shown = track[:: max(-(-len(track) // MOST_TRAIL), 1)]
     return np.stack([*(poses[:, :2] for _, poses in shown), env.world.poses[:, :2]])
 
 
 def _scan(env: ExplorationEnv, row: int) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """Return where a robot's beams end on it, (beams, 3), and which met something."""
+    """Return the end points of a robot's beams on it, (beams, 3), and which beams met something."""
     lidar = env.settings.lidar
     stride = -(-lidar.beams // MOST_BEAMS)
     ranges = env.simulation.ranges[row, ::stride].astype(np.float64)
@@ -161,7 +161,7 @@ def _scan(env: ExplorationEnv, row: int) -> tuple[NDArray[np.float64], NDArray[n
 
 
 def _plan(env: WatchedExploration, row: int) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
-    """Return the path that a robot still has to drive, and where it drives to."""
+    """Return the rest of the path of a robot, and its target."""
     if env.driver is None or env.possible_agents[row] not in env.agents:
         return NO_POINTS, None
     drives = env.driver.drives

@@ -117,7 +117,7 @@ def boxes_mesh(boxes: NDArray[np.float64]) -> _Mesh:
 
 
 def segments(points: NDArray[np.float64], height: float) -> NDArray[np.float32]:
-    """Return the pieces of a path (P, 2) at a height, (P - 1, 2, 3); none of fewer than two points."""
+    """Return the pieces of a path (P, 2) at a height, (P - 1, 2, 3); empty for fewer than two points."""
     if len(points) < 2:
         return np.zeros((0, 2, 3), np.float32)
     lifted = np.column_stack([points, np.full(len(points), height)]).astype(np.float32)
@@ -140,7 +140,7 @@ class TeamMaps:
     corner : (x, y)
         Lower left corner of the grid in the floor's frame [m].
     size : (width, height)
-        Of the grid [m].
+        Size of the grid [m].
     """
 
     def __init__(self, env: ExplorationEnv) -> None:
@@ -177,7 +177,7 @@ class TeamMaps:
         return np.ascontiguousarray(picture[::-1])
 
     def frontiers(self, maps: Sequence[Levels]) -> NDArray[np.float64]:
-        """Return the middles of free cells beside unknown ones, of any of the maps, (N, 2) [m]."""
+        """Return the middles of free cells next to unknown ones, of any of the maps, (N, 2) [m]."""
         found = [self._frontier(levels) for levels in maps]
         if not found:
             return np.zeros((0, 2))
@@ -223,7 +223,7 @@ class RobotNodes:
         scene.add_label(
             f"{root}/name", agent, position=(0.0, 0.0, robot.height + 0.25), anchor="bottom-center"
         )
-        # In the floor's frame: a slow browser shows an old scan if it was, not turned with the body.
+        # In the floor's frame: a slow browser shows an old scan at its own pose, not turned with the body.
         self._scans = scene.add_frame(f"/scans/{agent}", show_axes=False)
         self._scan = scene.add_frame(f"/scans/{agent}/last", show_axes=False)
         self._hits = self._points(f"/scans/{agent}/last/hits", colour, 0.035)
@@ -324,7 +324,7 @@ FIELD_OF_VIEW = math.radians(50.0)
 """Upright angle that a browser sees at first [rad]."""
 
 PANEL_SHARE = 0.13
-"""How far to the right of the floor a browser looks at first, as a share of its distance."""
+"""Distance to the right of the floor at which the camera looks at first, as a share of its own distance."""
 
 BACKGROUND: Colour = (246, 247, 249)
 

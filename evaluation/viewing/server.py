@@ -11,17 +11,17 @@ if TYPE_CHECKING:
     from viser import ViserServer
 
 HOST = "127.0.0.1"
-"""Where browsers reach it: from this machine."""
+"""Address at which browsers reach it: this machine only."""
 
 LONGEST_STOP_S = 1.0
-"""How long the end of a server is waited for [s]."""
+"""Maximum wait for the end of a server [s]."""
 
 MISSING = 'a view needs the package viser; pip install "lidarium[viewer]"'
 
 
 @contextmanager
 def view_server(port: int) -> Iterator["ViserServer"]:
-    """Serve a page at a port, any free one where 0."""
+    """Serve a page at a port; 0 selects a free one."""
     try:
         import rich
         import viser
@@ -29,10 +29,10 @@ def view_server(port: int) -> Iterator["ViserServer"]:
         raise ValueError(MISSING) from error
     _check_free(port)
     console = rich.get_console()
-    was_quiet, console.quiet = console.quiet, True  # viser writes to standard output, where results go
+    was_quiet, console.quiet = console.quiet, True  # viser writes to standard output as results do
 
     class LocalServer(viser.ViserServer):
-        """A server that nobody can ask, from a page of others either, to be shared by a public one."""
+        """A server that does not share its page through a public server, even if a client asks it to."""
 
         def request_share_url(self, verbose: bool = True) -> str | None:
             """Share nothing."""
@@ -45,12 +45,12 @@ def view_server(port: int) -> Iterator["ViserServer"]:
         console.quiet = was_quiet
 
     try:
-        if port not in (0, server.get_port()):  # taken since; viser goes on to the next
+        if port not in (0, server.get_port()):  # taken since; viser continues with the next
             raise OSError(_unusable(port, "Address already in use"))
         yield server
     finally:
-        # Nobody can connect any more at once. Browsers keep spare connections open, for whose end viser waits
-        # some seconds: that goes on by itself, and ends with the process.
+        # New connections are refused at once. Browsers keep spare connections open, and viser waits some seconds for
+        # their end: that continues in the background, and ends with the process.
         ending = threading.Thread(target=stop, daemon=True)
         ending.start()
         ending.join(LONGEST_STOP_S)
@@ -63,7 +63,7 @@ def address_of(server: "ViserServer") -> str:
 
 def _check_free(port: int) -> None:
     with socket.socket() as probe:
-        if os.name == "posix":  # what a server that has just ended leaves behind does not count as use
+        if os.name == "posix":  # connections left by a server that has just ended do not count as use
             probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
             probe.bind((HOST, port))

@@ -239,8 +239,8 @@ def _retracted_nodes(nodes: NDArray[np.float64], index: BoxIndex, body: SweptBod
     Returns
     -------
     (N, 3) float64
-        The nodes; each is if it was, or at most the body's radius away. Those under boxes, and those that
-        find no place, are left if they were.
+        The nodes, unchanged or moved by at most the body's radius. Those under boxes, and those without a free
+        position, are left unchanged.
     """
     return np.asarray(_retract(index, np.ascontiguousarray(nodes, np.float64).reshape(-1, 3), body.numbers))
 

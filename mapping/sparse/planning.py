@@ -148,7 +148,7 @@ def _shortened(index: BoxIndex, path: Array, body: Array) -> Any:  # noqa: ANN40
     Returns
     -------
     (Q, 3) float64
-        Points of the shorter path; it begins and ends if the other does.
+        Points of the shorter path; it has the same ends as the other one.
     """
     points = _skipped(index, path, body)
     for _ in range(PULLS):

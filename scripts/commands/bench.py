@@ -1,4 +1,4 @@
-"""`lidarium bench`: measure speed on this machine, besides other simulators that are installed."""
+"""`lidarium bench`: measure speed on this machine, with other simulators that are installed for comparison."""
 
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal
@@ -10,7 +10,7 @@ from lidarium.scripts.common import INTERRUPTED, Answer, Command, notify, table
 class _Bench(Command):
     """Measure the lines of the speed budget on this machine.
 
-    The other simulators that are installed are measured besides it.
+    Other simulators that are installed are measured, too.
     """
 
     compiles: ClassVar[bool] = True

@@ -24,7 +24,7 @@ class _Bound(TeamCommand):
     robots: Annotated[int, arg()] = 1
     """number of robots"""
     coverage: float = 0.99
-    """share of the floor that has to be seen"""
+    """share of the floor to be seen"""
     rounds: int = 300
     """how often the tours are changed to be shorter"""
     resolution: float | None = None

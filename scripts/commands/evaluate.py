@@ -25,7 +25,7 @@ DEFAULT_FOLDER = Path("runs/evaluation")
 class _Evaluate(TeamCommand):
     """Run policies x floors x robots x seeds.
 
-    Finished episodes are kept, and the same command goes on where it stopped.
+    Finished episodes are kept, and the same command continues after the last finished one.
     """
 
     compiles: ClassVar[bool] = True
@@ -41,7 +41,7 @@ class _Evaluate(TeamCommand):
     data: Path | None = None
     """folder of real floors, for presets"""
     policies: tuple[str, ...] = ("nearest_frontier", "utility_frontier", "explore_lite")
-    """who decides; `lidarium show policies` lists them; module:Class for your own"""
+    """policies to compare; `lidarium show policies` lists them; module:Class for your own"""
     policy_set: tuple[str, ...] = ()
     """settings of policies as POLICY.KEY=VALUE, such as learned.weights=FILE"""
     floors: tuple[str, ...] = ()
@@ -69,7 +69,7 @@ class _Evaluate(TeamCommand):
     shard: str | None = None
     """part of the episodes that runs, as K/N: the K-th of N, for machines that do not know each other"""
     bounds: bool = False
-    """set each episode beside how soon a team that knew the floor could have seen it (extra `bounds`)"""
+    """compare each episode with the time of a team that knows the floor (extra `bounds`)"""
     records: bool = True
     """keep a record of every episode, for replays and for the pictures of the report"""
 

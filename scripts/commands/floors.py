@@ -78,12 +78,12 @@ class _Prepare(Command):
     name: Positional[str]
     """set:NAME, or any floor"""
     robot: str = "kobuki"
-    """body of the robots that will be there, whose height counts.
+    """body of the robots, which determines the height of obstacles.
 
     `lidarium show robots` lists them
     """
     lidar: str = "urg"
-    """laser of the robots, whose height counts; `lidarium show lidars` lists them"""
+    """laser of the robots, which determines the height of the scan; `lidarium show lidars` lists them"""
     raster_resolution: float = 0.025
     """side of a cell of the world [m]"""
     workers: int = 1

@@ -24,14 +24,14 @@ if TYPE_CHECKING:
 DEFAULT_FOLDER = Path("merged")
 
 LEAST_SCALE = 0.01
-"""Least scale that can be given, and one over the greatest."""
+"""Minimum scale that can be given, and one over the maximum."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class _Merge(Command):
     """Merge maps into one; writes the fused map, transforms.json and a picture.
 
-    If maps do not join, it says why of each pair; transforms.json and the picture say more.
+    If maps do not join, the reason for each pair is printed; transforms.json and the picture say more.
     """
 
     compiles: ClassVar[bool] = True
@@ -60,14 +60,14 @@ class _Merge(Command):
     For two maps; right to 2 m and 20 degrees
     """
     force: bool = False
-    """join two maps by the best transform, whatever speaks against it"""
+    """join two maps by the best transform, even if the maps contradict it"""
     scale: str = "fixed"
     """fixed, auto, or a number by which the second of two maps has to grow.
 
     auto seeks it, as for a drawn plan
     """
     deform: bool = False
-    """bend the maps of each group until they agree; the first of each stays as it is"""
+    """bend the maps of each group until they agree; the first of each is unchanged"""
 
     def __post_init__(self) -> None:
         Command.__post_init__(self)
@@ -85,7 +85,7 @@ class _Merge(Command):
 
     @property
     def factor(self) -> float | None:
-        """By how much the second map has to grow; None if that is sought."""
+        """Scale of the second map; None to search for it."""
         if self.scale in ("fixed", "auto"):
             return 1.0 if self.scale == "fixed" else None
         try:

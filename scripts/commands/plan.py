@@ -31,7 +31,7 @@ class _Plan(Command):
     height: float = 1.2
     """height of the robot [m]"""
     clearance_weight: float = 0.0
-    """by how much paths beside obstacles cost more, as a share"""
+    """additional cost of paths near obstacles, as a share"""
 
 
 def _execute(command: _Plan) -> Answer:

@@ -36,7 +36,7 @@ LONE_POLICY, TEAM_POLICY = "nearest_frontier", "supervised"
 """Default policies of one robot and of a team."""
 
 TEAM_WORLD: dict[str, Any] = {"noise": "datasheet", "odometry": "typical", "localization": "slam"}
-"""How real the world of a team is by default."""
+"""Default realism of the world of a team."""
 
 CAMERA = "xtion_tilted"
 """Camera of the robots by default and the policy needs one."""
@@ -82,7 +82,7 @@ class Run(FilmOptions, TeamCommand, ViewOptions):
     0.99 by default, and none on a floor with a goal or if the policy explores by camera
     """
     starts: str | None = None
-    """where the robots start: fixed, drawn, or x,y,theta of each.
+    """start poses of the robots: fixed, drawn, or x,y,theta of each.
 
     In metres and radians, separated by semicolons. Fixed starts are those of the floor, and the default but
     for sets of floors
@@ -99,7 +99,7 @@ class Run(FilmOptions, TeamCommand, ViewOptions):
     film_shows: str = "auto"
     """content of films, such as maps or scans; `lidarium show films` lists the choices.
 
-    By default maps if robots do not know their starts and have no cameras, else scans
+    By default maps if robots do not know their starts and have no cameras, otherwise scans
     """
 
     @property

@@ -44,9 +44,9 @@ class _Slam(Command):
     range: float = 30.0
     """longest range that is used [m]"""
     match_distance: float = 0.02
-    """a scan is matched after so much motion [m]; 0 for every scan"""
+    """motion after which a scan is matched [m]; 0 for every scan"""
     match_angle: float = 1.0
-    """or after so much of a turn [degrees]"""
+    """or turn after which a scan is matched [degrees]"""
     beam_interval: float = 0.0
     """time from beam to beam if the log does not say [s]; 0 for scans taken at once"""
     field_of_view: float | None = None
@@ -59,7 +59,7 @@ class _Slam(Command):
     clear_without_return: bool = False
     """a beam without return says that its way is free, as in simulation.
 
-    Else it says nothing
+    Otherwise it prints nothing
     """
     reference: Path | None = None
     """true trajectory (TUM); ATE and RPE are computed against it"""

@@ -26,7 +26,7 @@ SUFFIXES = (".smap", ".txt")
 class _SparseMapping(Command):
     """Make a sparse map of a cloud, or of frames with their poses.
 
-    Writes the map and pictures of it beside, from above in the plane and in space.
+    Writes the map and pictures of it, from above in the plane and in space.
     """
 
     compiles: ClassVar[bool] = True

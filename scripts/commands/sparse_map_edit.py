@@ -28,15 +28,15 @@ class _EditSparseMap(Command):
     compiles: ClassVar[bool] = True
 
     map: Positional[Path]
-    """the map, as `lidarium sparse-map` writes it; it is left as it is"""
+    """the map, as `lidarium sparse-map` writes it; it is not changed"""
     remove: UseAppendAction[tuple[str, ...]] = ()
-    """x,y,z,x,y,z: low and high corner of a space in which nothing stands [m]; may be given again"""
+    """x,y,z,x,y,z: low and high corner of a space to clear [m]; may be given again"""
     add: UseAppendAction[tuple[str, ...]] = ()
     """x,y,z,x,y,z: low and high corner of another obstacle [m]; may be given again"""
     join: Path | None = None
     """another map, which is joined to this one"""
     at: str = "0,0,0"
-    """x,y,yaw or x,y,z,yaw: where the other map's origin is in this one [m, rad]"""
+    """x,y,yaw or x,y,z,yaw: origin of the other map in this one [m, rad]"""
 
     @property
     def map_path(self) -> Path:

@@ -26,10 +26,10 @@ EXTRA = ("torch", "stable_baselines3", "sb3_contrib", "tensorboard")
 
 @dataclass(frozen=True, kw_only=True)
 class _Train(Command):
-    """Train explorers as a TOML file says.
+    """Train explorers by the settings of a TOML file.
 
     A teacher that knows the floors rates each choice, a network is fitted to that, and goes on by rewards if
-    the file says so. Finished parts are kept, and the same command goes on where it stopped. The best weights
+    the file says so. Finished parts are kept, and the same command continues after the last one. The best weights
     and a card with all that made them are written to --out, runs/training by default.
     """
 
@@ -86,7 +86,7 @@ def _check_extra() -> None:
 class _Shown:
     """Shows how far a training has come.
 
-    A bar for each part on a terminal, else lines: the first and last of a part, and one every few seconds.
+    A bar for each part on a terminal, otherwise lines: the first and last of a part, and one every few seconds.
     """
 
     def __init__(self, is_quiet: bool, clock: Callable[[], float] = time.monotonic) -> None:

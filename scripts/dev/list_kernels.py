@@ -2,8 +2,8 @@
 
 Usage: python scripts/dev/list_kernels.py [--check]
 
-It runs ``lidarium run`` with empty caches, which takes minutes, then again: what the second run takes from
-the cache is what Python calls. With ``--check`` it runs with the caches there are, and only compares.
+It runs ``lidarium run`` with empty caches, which takes minutes, then again: kernels that the second run loads from
+the cache are those that Python calls. With ``--check`` it runs with the existing caches, and only compares.
 """
 
 import json
@@ -46,7 +46,7 @@ def _code_size(kernel: Any) -> int:  # noqa: ANN401
 def _run_and_list(caches: Path | None) -> list[dict[str, Any]]:
     """Run ``lidarium run`` in a process of its own and return the kernels that it called."""
     with tempfile.TemporaryDirectory() as folder:
-        # A floor that is not in the user's cache: what draws floors is among the kernels.
+        # A floor that is not in the user's cache: some kernels draw floors.
         environment = {**os.environ, "XDG_CACHE_HOME": f"{folder}/floors"}
         if caches is not None:
             environment["NUMBA_CACHE_DIR"] = str(caches)

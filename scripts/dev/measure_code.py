@@ -27,7 +27,7 @@ def length(function: ast.FunctionDef) -> int:
 
 
 def parameters(function: ast.FunctionDef) -> int:
-    """Return how many parameters a function has, besides ``self``."""
+    """Return the number of parameters of a function, without ``self``."""
     given = function.args.posonlyargs + function.args.args + function.args.kwonlyargs
     return sum(each.arg not in ("self", "cls") for each in given)
 

@@ -105,7 +105,7 @@ def load_floor(spec: str | Path | Floor, resolution: float | None = None) -> Flo
     ----------
     spec : str, Path or Floor
         A name of `floor_names`; ``building:SEED``, ``apartment:SEED``, ``office:SEED`` or ``corridors:SEED``;
-        a path to a file of a format that the importers know; or a floor, which is returned as it is.
+        a path to a file of a format that the importers know; or a floor, which is returned unchanged.
     resolution : float, optional
         Side of a cell [m] of files that do not state it; files only.
 
@@ -244,7 +244,7 @@ def _load_named(spec: str) -> Floor:
 
 
 def _generated(kind: str, seed: int) -> Floor:
-    """Return a generated floor: that of the store, else a new one."""
+    """Return a generated floor: that of the store if present, otherwise a new one."""
     store, key = floor_store(), f"floor {kind}:{seed} {hash_of_code(*MADE_BY)}"
     kept = store.load(key)
     if kept is not None:

@@ -2,14 +2,14 @@
 
 It has arrays that are expensive to make and small to keep, found by their inputs.
 
-An entry is one file of compressed arrays. It is written beside and renamed, so that it appears whole; it
+An entry is one file of compressed arrays. It is written to a temporary file and renamed, so that it appears whole; it
 carries a hash of its key and content, so that one that is damaged, cut short or another's is seen and made
 again. Keys hold a hash of the code and libraries that make the arrays, so that a stale entry is never found.
 Only files with names of entries are read and removed, and nothing is reached through links.
 
 The entries lie in a few folders, each bounded by its share of the whole: a process that writes makes room in
 one of them without reading the others, independent of what other processes write. The entry used
-longest ago goes first; who reads it meanwhile reads on.
+longest ago goes first; a process that is reading it can continue.
 """
 
 import contextlib
@@ -78,7 +78,7 @@ class Store:
     def load(self, key: str) -> Arrays | None:
         """Return the arrays of a key, read-only.
 
-        None if there are none that are whole.
+        None if no complete arrays are stored.
         """
         if self.folder is None:
             return None
@@ -219,7 +219,7 @@ def _content(path: Path) -> bytes:
 def _files(folder: Path) -> list[tuple[float, int, Path]]:
     """Return time of last use, size and path of a folder's entries.
 
-    Unfinished writes of broken processes are included; what else lies there is nobody's to remove, and what a link
+    Unfinished writes of broken processes are included; other files are never removed, nor is the target of a link
     leads to is another's.
     """
     files: list[tuple[float, int, Path]] = []

@@ -80,7 +80,7 @@ MARGIN = 0.05
 """Clearance beyond that radius [m]."""
 
 START_CLEARANCE = 0.5
-"""Least distance of a start from all obstacles [m]."""
+"""Minimum distance of a start from all obstacles [m]."""
 
 STARTS = 3
 """Number of starts a floor has."""
@@ -128,7 +128,7 @@ def _guilty(
 ) -> int:
     """Return the index of the last piece of furniture that obstructs the floor.
 
-    Such a piece is beside a part cut off or in a room that is not reached. Without one, the last piece is returned.
+    Such a piece is next to a part cut off or in a room that is not reached. Otherwise the last piece is returned.
     """
     reach = ROBOT_RADIUS + 3 * MARGIN
     corner = np.tile(origin, 2) + np.array([reach, reach, -reach, -reach])
@@ -198,7 +198,7 @@ class BuildingSettings:
         Share of the possible openings beyond those that join all rooms, 0 (a tree of rooms, but for ring
         corridors of offices) to 1. Drawn: 0 to 0.5.
     clutter : float or None
-        Share of that area under furniture, 0 to 0.3. What finds no place is left out, so that about 0.2 is
+        Share of that area under furniture, 0 to 0.3. Furniture without enough room is left out, so that about 0.2 is
         reached if more is asked for. Drawn: 0.08 to 0.24; 0 to 0.1 for corridors.
     door_width : float
         Clear width of doors [m], 0.8 to 1.0.
@@ -206,14 +206,14 @@ class BuildingSettings:
         Width of hall or corridors between the middles of their walls [m], 1.2 to 4. Drawn: 1.3 to 1.6 for an
         apartment, 1.7 to 2.3 for an office, 1.5 to 2.4 for corridors.
     wall_thickness : float
-        Of the walls between rooms [m], 0.05 to 0.3.
+        Thickness of the walls between rooms [m], 0.05 to 0.3.
     outer_wall_thickness : float
-        Of the walls around the floor [m], 0.1 to 1; rounded to 0.1.
+        Thickness of the walls around the floor [m], 0.1 to 1; rounded to 0.1.
     room_size : (float, float)
         Smallest and largest frontage of a usual room [m]; baths and kitchens of apartments are narrower. The
         smallest is at least 2, the largest at least 1.5 times that.
     rotation : float
-        By which the floor is turned counter-clockwise [rad].
+        Counter-clockwise rotation of the floor [rad].
     """
 
     kind: str = "any"

@@ -30,7 +30,7 @@ class _Piece:
     Attributes
     ----------
     width, depth : (float, float)
-        Smallest and largest size [m]; drawn floors take the middle unless they say otherwise.
+        Smallest and largest size [m]; drawn floors take the middle by default.
     parts : callable
         Boxes of a piece of a given width and depth [m].
     """
@@ -349,7 +349,7 @@ def _room_wishes(
     Parameters
     ----------
     areas : (rooms,) float64
-        Of the rooms [m²]; their use follows from these.
+        Areas of the rooms [m²]; their use follows from these.
     """
     if kind == "corridors":
         return [CORRIDORS["hall"]]
@@ -412,7 +412,7 @@ class FurniturePlaces:
     doors : list of Door
         Areas to keep clear.
     wall_thickness : float
-        Of the walls between rooms [m].
+        Thickness of the walls between rooms [m].
     """
 
     def __init__(self, labels: Labels, doors: list[Door], wall_thickness: float) -> None:
@@ -442,7 +442,7 @@ class FurniturePlaces:
     def draw(
         self, room: int, name: str, width: float, depth: float, generator: np.random.Generator
     ) -> Furnished | None:
-        """Try a few places for a piece; None if none of them is free."""
+        """Try a few positions for a piece; None if all are occupied."""
         for _ in range(ATTEMPTS):
             wall: Boundary | None = None
             if name in FREE:
@@ -567,7 +567,7 @@ def furnish(
     labels : (rows, columns) int32
         The plan.
     wall_thickness : float
-        Of the walls between rooms [m].
+        Thickness of the walls between rooms [m].
     """
     areas = room_areas(labels)
     wishes = _room_wishes(kind, areas, generator)

@@ -17,10 +17,10 @@ HALL = 0
 """Label of the space from which the rooms are reached: hall or corridors."""
 
 JAMB = 0.15
-"""Least distance of a door from the end of its wall [m]."""
+"""Minimum distance of a door from the end of its wall [m]."""
 
 SMALL_ROOM_M2 = 5.0
-"""Rooms below this area have one door only: nobody walks through a bathroom."""
+"""Rooms below this area have one door only: people do not walk through a bathroom."""
 
 Labels = NDArray[np.int32]
 Rectangle = tuple[float, float, float, float]

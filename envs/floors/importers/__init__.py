@@ -31,7 +31,7 @@ class Format:
     Attributes
     ----------
     suffixes : tuple of str
-        How the names of its files end.
+        Suffixes of its files.
     matches : callable
         Whether a file with such a name is of this format, by its content.
     load : callable
@@ -105,7 +105,7 @@ def load_file(path: Path, resolution: float | None = None) -> Floor:
 
 
 def takes_resolution(path: Path) -> bool:
-    """Whether a file needs a resolution besides it, because it does not state its scale."""
+    """Whether a file needs a resolution in addition, because it does not state its scale."""
     with reading(path, "a floor"):
         known = _format_of(path)
         return known is not None and not known.has_scale(path)

@@ -14,7 +14,7 @@ from lidarium.envs.floors.importers.common import floor_of_lines, read_text, ref
 def matches(path: Path) -> bool:
     """Return whether a file is an AMRL vector map.
 
-    Its name says so, or its first line of text is four numbers with commas.
+    The format is recognised by the file's name, or by four numbers with commas in the first line of text.
     """
     if ".vectormap." in path.name.lower():
         return True

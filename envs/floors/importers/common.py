@@ -22,11 +22,11 @@ MAX_TEXT_BYTES = 32 << 20
 """Longest text of a floor, unpacked: parsed it takes some twenty times as much."""
 
 MAX_POINTS = 250_000
-"""Most points of a drawing."""
+"""Maximum number of points of a drawing."""
 
 Part = TypeVar("Part")
 
-# Where a drawing has walls without thickness [m].
+# Wall thickness for drawings that give none [m].
 WALL_THICKNESS = 0.1
 
 # Gaps in the outer wall of a drawing that are tried until it is closed [m], and the share of the largest area

@@ -1,6 +1,6 @@
 """Reads DXF drawings as floors: lines, polylines and curves are walls.
 
-Inserted blocks are taken apart. The drawing's unit says how large it is.
+Inserted blocks are taken apart. The drawing's unit gives its scale.
 
 References
 ----------
@@ -24,7 +24,7 @@ from lidarium.envs.floors.importers.common import MAX_POINTS, MAX_TEXT_BYTES, fl
 from lidarium.mapping.files.guarded_reading import READING_ERRORS, read_bytes
 
 KINDS = frozenset(("LINE", "LWPOLYLINE", "POLYLINE", "ARC", "CIRCLE", "ELLIPSE", "SPLINE"))
-"""Entities that are walls; texts, dimensions, hatches and the like are none."""
+"""Entities that are walls; texts, dimensions, hatches and the like are not."""
 
 COMPOUND = frozenset(("INSERT", "MLINE"))
 """Entities that are made of others."""
@@ -130,7 +130,7 @@ def _sifted_entities(codes: list[str], values: list[str]) -> Iterator[_Entity]:
 
 
 def _wall(entities: list[_Entity], place: int) -> tuple[int, Polyline | None]:
-    """Return of how many entities one is made, and the wall that it is if it can be read here."""
+    """Return the number of entities that form one, and the wall that it is if it can be read here."""
     entity, count = entities[place], 1
     if entity.kind == "POLYLINE":
         while place + count < len(entities) and entities[place + count].kind in ("VERTEX", "SEQEND"):
@@ -174,13 +174,13 @@ def _polyline(x: list[float], y: list[float], flags: str, plain: tuple[int, ...]
 _READERS = {"LINE": _line, "LWPOLYLINE": _light_polyline, "POLYLINE": _heavy_polyline}
 
 
-logging.getLogger("ezdxf").addHandler(logging.NullHandler())  # else it writes each repair to the console
+logging.getLogger("ezdxf").addHandler(logging.NullHandler())  # otherwise it writes each repair to the console
 
 CURVE_ERROR_M = 0.01
-"""How far the straight parts of a curve may be off it [m]."""
+"""Maximum deviation of the straight parts from a curve [m]."""
 
 CURVE_SHARE = 1e-4
-"""How far they may be off at least, as a share of the size of the curve."""
+"""Minimum of that deviation, as a share of the size of the curve."""
 
 _METRES = {1: 0.0254, 2: 0.3048, 4: 0.001, 5: 0.01, 6: 1.0, 10: 0.9144, 14: 0.1}
 """Metres of a unit by the number that $INSUNITS has for it."""
@@ -258,7 +258,7 @@ def _document(path: Path, sifted: _Sifted) -> Any:  # noqa: ANN401
     except ImportError as error:
         raise ValueError('DXF drawings need ezdxf; pip install "lidarium[dxf]"') from error
     try:
-        # Repairs take twice as long as reading what is whole.
+        # Repairs take twice as long as reading an undamaged file.
         return ezdxf.read(io.StringIO(sifted.text))
     except (AssertionError, DXFError, *READING_ERRORS):
         pass
@@ -307,7 +307,7 @@ def _walls(
 def _flattened(path: Path, part: Any, error: float) -> NDArray[np.float64]:  # noqa: ANN401
     """Return points (n, 2) of a curve."""
     corners = np.array([tuple(point) for point in part.control_vertices()]).reshape(-1, 3)
-    # Where numbers are too coarse for it, parts of a curve never come near enough, and there is no end.
+    # If numbers are too coarse for it, parts of a curve never come near enough, and the loop does not end.
     farthest = MAX_COORDINATE_M / CURVE_ERROR_M * error
     if not (np.abs(corners) <= farthest).all():
         raise ValueError(f"{path} has a curve that reaches beyond {MAX_COORDINATE_M:,.0f} m; want a plan")

@@ -21,14 +21,14 @@ OPENING_WIDTH = 0.8
 MAX_PIXEL = 1e9
 """Farthest coordinate of an annotation [pixels]."""
 
-# Shorter pieces of wall than this beside an opening are slips of the annotation [m].
+# Shorter pieces of wall than this next to an opening are annotation errors [m].
 _SLIP = 0.02
 
 
 def load(path: Path, resolution: float | None) -> Floor:
     """Read an annotation of an apartment as a floor.
 
-    Walls stand, doors are open, and everything outside the outer walls is solid.
+    Walls are solid, doors are open, and everything outside the outer walls is solid.
     """
     refuse_resolution(path, resolution)
     lines = _lines(path)

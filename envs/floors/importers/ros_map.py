@@ -12,7 +12,7 @@ from lidarium.mapping.files.images import MAX_PIXELS
 from lidarium.mapping.files.map_files import FREE, MapImage, read_ros_map
 
 SUFFIXES = (".yaml", ".yml")
-"""How the names of descriptions end; a picture of the same name belongs to each."""
+"""Suffixes of descriptions; a picture of the same name belongs to each."""
 
 # Indices of a whole map would take sixteen times its memory.
 _BLOCK_ROWS = 256

@@ -39,7 +39,7 @@ Pose = NDArray[np.float64]
 def load(path: Path, resolution: float | None) -> Floor:
     """Read a world or a model.
 
-    Models whose collisions are meshes are refused, as are included models that are not besides the world.
+    Models whose collisions are meshes are refused, as are included models that are not next to the world file.
     """
     refuse_resolution(path, resolution)
     solids = [solid for solid in _solids(path, _root(path), np.eye(4), 0) if solid is not None]
@@ -81,7 +81,7 @@ def _solids(path: Path, element: Element, around: Pose, depth: int) -> Iterator[
     """Yield the solids of an element and of its children."""
     if depth > _MAX_NESTED:
         raise ValueError(f"{path} has models nested more than {_MAX_NESTED} deep; want a world")
-    # A world that was saved while it ran says beside its models where they were then.
+    # A world saved while it ran lists the current poses of its models separately.
     saved = {model.get("name"): model for model in element.findall("state/model")}
     for child in element:
         if child.tag in ("world", "model", "link"):
@@ -103,7 +103,7 @@ def _model_name(include: Element) -> str:
 
 
 def _included(path: Path, include: Element) -> Path:
-    """Return the file of an included model, besides the world or in a folder ``models`` besides it."""
+    """Return the file of an included model, next to the world file or in a folder ``models`` next to it."""
     name = _model_name(include)
     for folder in (path.parent, path.parent / "models", path.parent.parent, path.parent.parent / "models"):
         for file in (folder / name / "model.sdf", folder / name):

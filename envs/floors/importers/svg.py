@@ -35,7 +35,7 @@ _SHARES = np.arange(1, CURVE_PARTS + 1) / CURVE_PARTS
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _NUMBERS = re.compile(_NUMBER)
 _COMMANDS = re.compile(r"([MmZzLlHhVvCcSsQqTtAa])([^MmZzLlHhVvCcSsQqTtAa]*)")
-# Flags are single digits that may stand together with what follows.
+# Flags are single digits that may be joined with the following number.
 _ARCS = re.compile(
     rf"({_NUMBER})[\s,]*({_NUMBER})[\s,]*({_NUMBER})[\s,]*([01])[\s,]*([01])[\s,]*({_NUMBER})[\s,]*({_NUMBER})"
 )
@@ -104,7 +104,7 @@ def _commands(text: str) -> Iterator[tuple[str, list[float]]]:
             )
         yield command, given[:wants]
         for place in range(wants, len(given), wants):
-            # What follows a first point without a command of its own are lines.
+            # Coordinates after a first point without a command of their own are lines.
             yield {"M": "L", "m": "l"}.get(command, command), given[place : place + wants]
 
 
@@ -178,7 +178,7 @@ def _along(curve: PathSegment, shares: NDArray[np.float64]) -> list[complex]:
 
 RESOLUTION = 0.025
 MIN_WIDTH = 0.05
-"""Least width of a line [m]."""
+"""Minimum width of a line [m]."""
 
 _MARGIN = 0.5
 _FREE_ABOVE = 127 / 255
@@ -261,7 +261,7 @@ def load(path: Path, resolution: float | None) -> Floor:
             "a smaller --resolution"
         )
     solid, origin = np.zeros((rows, columns), np.uint8), (float(low[0]), float(low[1]))
-    # One over the other, as they are painted; those of one colour at once.
+    # One over the other, in the order of painting; those of one colour at once.
     for value, layers in itertools.groupby(itertools.chain.from_iterable(map(_layers, shapes)), _VALUE):
         _, insides, lines, widths = zip(*layers, strict=True)
         fill_shapes(solid, origin, RESOLUTION, [each for each in insides if each is not None], value)
@@ -319,7 +319,7 @@ def _kind(element: Element) -> str:
 def _style(element: Element, inherited: Style, classes: dict[str, Style]) -> Style:
     """Return the style of an element.
 
-    Its own goes before those of its classes, these before its attributes, these before inherited ones.
+    Its own style takes precedence over its classes, these over its attributes, these over inherited ones.
     """
     if not classes and _HAS_STYLE.isdisjoint(element.attrib):
         return inherited

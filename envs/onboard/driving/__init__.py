@@ -1,1 +1,1 @@
-"""How a robot drives to a target among others."""
+"""Driving of a robot to a target among other robots."""

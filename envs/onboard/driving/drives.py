@@ -22,7 +22,7 @@ from lidarium.envs.onboard.radio.messages import DriveState
 from lidarium.mapping.kernels.compilation import Array, kernel
 
 STATE_IDLE, STATE_DRIVING, STATE_ARRIVED, STATE_BLOCKED, STATE_NO_PATH, STATE_GIVING_WAY = range(6)
-"""Numbers of what ``DriveState`` names, in its order."""
+"""Numbers of the members of ``DriveState``, in its order."""
 
 DRIVE_STATES = tuple(DriveState)
 """``DriveState`` by number."""
@@ -40,9 +40,9 @@ class Drives(NamedTuple):
     has_path : (rows,) bool
         Whether there is a path to drive.
     is_given : (rows,) bool
-        Whether the path was given: then it is followed as it is, and none is planned.
+        Whether the path was given: if so, it is followed unchanged and not planned.
     paths, room : (rows, points, 2), (rows, points) float64
-        Points x, y in the frame of the believed pose [m], and the room besides the body on the piece that
+        Points x, y in the frame of the believed pose [m], and the room around the body on the piece that
         leads to each [m].
     cells : (rows, points, 2) int64
         The cells (row, column) of the points.
@@ -55,7 +55,7 @@ class Drives(NamedTuple):
     passing : (rows,) int64
         The row that a robot has moved aside for, -1 if it has not.
     stations : (rows, 2) float64
-        Where a robot that moved aside stood in the way [m].
+        Position of a robot that moved aside, while it was in the way [m].
     since : (rows,) int64
         The step at which it moved aside.
     """
@@ -80,20 +80,20 @@ class Drives(NamedTuple):
 
 
 class Following(NamedTuple):
-    """What following paths needs to know of the robots of a team.
+    """Arrays for following the paths of a team.
 
     Attributes
     ----------
     unit_vectors : (2, beams) float64
         Directions of the beams.
     radii : (robots,) float64
-        Of the bodies [m].
+        Radius of the bodies [m].
     limits : (4,) float64
         Cruise speed, greatest turn rate, braking and length of a step [m/s, rad/s, m/s2, s].
     knows_teammates : bool
         Whether all teammates' poses are known at once.
     contact, heard : (rows, robots) uint8, (rows, robots * 3) float64
-        Where they are not: of whom each robot heard lately, and where they were then [m, rad].
+        If not all poses are known: from which robots each heard lately, and their poses then [m, rad].
     present : (robots,) uint8
         Which robots are bodies to keep clear of.
     foresight : (K,) float64
@@ -135,13 +135,13 @@ def no_drives(rows: int) -> Drives:
 
 @kernel(nrt=False)
 def drop_path(drives: Drives, row: int) -> None:
-    """Forget a robot's path: it stands (kernel)."""
+    """Forget the path of a robot, which then stops (kernel)."""
     drives.has_path[row], drives.states[row], drives.stood[row], drives.counts[row] = False, IDLE, 0, 0
 
 
 @kernel(nrt=False)
 def drive_state(drives: Drives, row: int) -> int:
-    """Return the number of what a robot's driving is about (kernel)."""
+    """Return the number of the drive state of a robot (kernel)."""
     if drives.passing[row] >= 0:
         return STATE_GIVING_WAY
     if drives.is_ordered[row] and not drives.has_path[row]:
@@ -156,7 +156,7 @@ def drive_state(drives: Drives, row: int) -> int:
 
 @kernel
 def drive_states(drives: Drives) -> NDArray[np.int8]:
-    """Return the numbers of what all robots' driving is about, (rows,) int8 (kernel)."""
+    """Return the numbers of the drive states of all robots, (rows,) int8 (kernel)."""
     numbers = np.empty(len(drives.states), np.int8)
     for row in range(len(numbers)):
         numbers[row] = drive_state(drives, row)

@@ -26,33 +26,33 @@ IDLE, DRIVING, ARRIVED, BLOCKED = range(4)
 """States of a drive."""
 
 MAX_POINTS = MOST_POINTS
-"""Most points of a path."""
+"""Maximum number of points of a path."""
 
 LEAST_LOOKAHEAD, MOST_LOOKAHEAD = 0.08, 0.25
 """Distance ahead on its line at which a robot aims [m].
 
-The first is where it is tight, the second where there is room.
+The first holds in tight passages, the second in open space.
 """
 
 LOOKAHEAD_PER_ROOM = 2.0
-"""How much farther ahead it aims per room beside its body [m/m]."""
+"""Additional look-ahead distance per room around the body [m/m]."""
 
 TURN_GAIN = 3.0
 """Turn rate per radian of heading error [1/s]."""
 
 TURN_IN_A_STEP = 0.5
-"""Most of a heading error that a robot turns away in one step, as a share."""
+"""Maximum share of a heading error that a robot corrects in one step."""
 
 PASSING_PER_ROOM, LEAST_PASSING, MOST_PASSING = 0.5, 0.015, 0.12
 """Distance at which a point of a path counts as passed.
 
-Per room beside the body [m/m], at least and at most [m].
+Per room around the body [m/m], minimum and maximum [m].
 """
 
 TOLERANCE_PER_ROOM, LEAST_TOLERANCE, MOST_TOLERANCE = 2.0, 0.01, 0.6
 """Heading error with which a robot drives.
 
-Per room beside the body [rad/m], at least and at most [rad].
+Per room around the body [rad/m], minimum and maximum [rad].
 """
 
 SLOWING = 0.7
@@ -68,7 +68,7 @@ LEAST_SPEED_AT_END = 0.02
 """Speed with which a robot comes up to the end of its path at least [m/s]."""
 
 STANDING_SPEED = 0.01
-"""A robot that is slower than this stands [m/s]."""
+"""A slower robot counts as standing [m/s]."""
 
 ROUNDING_S = 1e-9
 """Times that differ by less than this are the same [s]."""
@@ -87,12 +87,12 @@ BLOCKED_S = 1.0
 
 
 class Courses(NamedTuple):
-    """Where the robots of a team drive.
+    """The paths that the robots of a team follow.
 
     Attributes
     ----------
     paths, margins : (robots, points, 2), (robots, points) float64
-        Points x, y [m], and the room besides the body on the piece that leads to each [m].
+        Points x, y [m], and the room around the body on the piece that leads to each [m].
     counts, places : (robots,) int64
         Number of points, and the point that each robot drives to now.
     headings : (robots,) float64
@@ -144,7 +144,7 @@ def follow_paths(sensed: Sensed, courses: Courses, bodies: Bodies, commands: Arr
 
 @kernel(forceinline=True, nrt=False)
 def _drive_on(sensed: Sensed, courses: Courses, bodies: Bodies, robot: int, commands: Array) -> None:
-    """Turn a robot to the next piece of its path, and drive where it faces it."""
+    """Turn a robot to the next piece of its path, and drive if it faces it."""
     aim_x, aim_y = _aim(sensed, courses, robot)
     x, y, heading = sensed.poses[robot, 0], sensed.poses[robot, 1], sensed.poses[robot, 2]
     error = _wrap(math.atan2(aim_y - y, aim_x - x) - heading)
@@ -196,14 +196,14 @@ def _remaining(sensed: Sensed, courses: Courses, robot: int) -> float:
 
 @kernel(forceinline=True, nrt=False)
 def _is_at_end(sensed: Sensed, courses: Courses, robot: int) -> bool:
-    """Whether a robot is where its path ends."""
+    """Whether a robot is at the end of its path."""
     is_last = courses.places[robot] == courses.counts[robot] - 1
     return bool(is_last and _remaining(sensed, courses, robot) <= ARRIVAL)
 
 
 @kernel(forceinline=True, nrt=False)
 def _turn_at_end(sensed: Sensed, courses: Courses, bodies: Bodies, robot: int) -> float:
-    """Return the turn rate towards the wanted heading; note where it is reached."""
+    """Return the turn rate towards the wanted heading; note when it is reached."""
     wanted = courses.headings[robot]
     error = _wrap(wanted - sensed.poses[robot, 2]) if wanted == wanted else 0.0
     if abs(error) > FACING:
@@ -237,7 +237,7 @@ def _aim(sensed: Sensed, courses: Courses, robot: int) -> tuple[float, float]:
 def _speed_to_next(sensed: Sensed, courses: Courses, limits: Array, robot: int, tolerance: float) -> float:
     """Return the speed that still brakes for the next bend or the end [m/s].
 
-    At a bend it slows down to what it can turn with.
+    At a bend it slows down to a speed at which it can turn.
     """
     remaining, braking = _remaining(sensed, courses, robot), limits[BRAKING]
     paths, place = courses.paths, courses.places[robot]

@@ -20,13 +20,13 @@ BODY_MARGIN = 0.002
 """Paths keep the body this far from occupied cells [m]."""
 
 PREFERRED_MARGIN = 0.15
-"""Paths keep this far off walls where there is room [m]."""
+"""Preferred distance of paths from walls [m]."""
 
 
 def footprint_of(radius: float) -> Footprint:
     """Return the footprint by which a robot of this radius plans.
 
-    It just fits through where it must, and keeps off the walls if it can.
+    Its small margin lets it pass narrow gaps; the preferred margin keeps off walls if possible.
     """
     return Footprint(radius + BODY_MARGIN, radius + PREFERRED_MARGIN, 3.0)
 
@@ -39,21 +39,20 @@ class PathPlanner:
     Parameters
     ----------
     perception : Perception
-        What the robots know.
+        The beliefs of the robots.
     settings : ExplorationSettings
         The team of every episode.
     drives : Drives
-        What every robot's drive is at; row = episode * robots + robot.
+        The drives of all robots; row = episode * robots + robot.
     footprint : Footprint
-        By which the robots plan.
+        Footprint by which the robots plan.
     shares_map : bool
         Whether robots plan on the team's map, if it reaches them.
 
     Attributes
     ----------
     held : (rows,) bool
-        Robots that stand still whatever their drives are about, and are driven round like those that have
-        ended.
+        Robots that stand still in any drive state; others drive around them as around robots that have ended.
     """
 
     def __init__(
@@ -70,7 +69,7 @@ class PathPlanner:
 
     @property
     def passage(self) -> Passage:
-        """How the robots pass over a map.
+        """Parameters of the robots' passage over a map.
 
         Read-only and shared, so not kept here: copies would be other types to kernels.
         """
@@ -78,7 +77,7 @@ class PathPlanner:
         return passage_of(self.footprint, resolution, limit_of(CLEARANCE_LIMIT, resolution))
 
     def planning(self, rows: NDArray[np.int64], *, with_frontiers: bool = False) -> Planning:
-        """Return what planning needs in kernels.
+        """Return the arrays that kernels plan with.
 
         It has the maps that the given rows plan on, with frontiers if wanted.
         """
@@ -109,7 +108,7 @@ class PathPlanner:
         )
 
     def fresh_planning(self, row: int) -> Planning:
-        """Return what planning needs for one robot, with its map up to date."""
+        """Return the planning arrays of one robot, with its map up to date."""
         self._perception.planning_map(row, self.shares_map)
         return self.planning(np.array([row]))
 
@@ -135,7 +134,7 @@ class PathPlanner:
     ) -> bool:
         """Plan a path round the bodies of ``avoided`` and start on it.
 
-        False if there is none.
+        False if no path exists.
         """
         chosen = np.zeros(self._settings.robots, np.bool_)
         chosen[np.array(avoided, np.int64) % self._settings.robots] = True
@@ -146,7 +145,7 @@ class PathPlanner:
     def remaining(self, row: int) -> NDArray[np.float64]:
         """Return the rest of a robot's path, shape (N, 2) [m].
 
-        It begins if the robot is.
+        It begins at the robot's position.
         """
         place, count = int(self._drives.places[row]), int(self._drives.counts[row])
         here = self._perception.beliefs.believed[row : row + 1, :2]

@@ -22,7 +22,7 @@ from lidarium.mapping.planning.search.search_state import Passage, Terrain
 
 
 class Planning(NamedTuple):
-    """What planning needs to know of the robots, their maps and the world.
+    """Robots, maps and world for planning in kernels.
 
     Attributes
     ----------
@@ -31,9 +31,9 @@ class Planning(NamedTuple):
     knows_teammates : bool
         Whether all teammates' poses are known at once.
     contact, heard : (rows, robots) uint8, (rows, robots * 3) float64
-        Where they are not: of whom each robot heard lately, and where they were then [m, rad].
+        If not all poses are known: from which robots each heard lately, and their poses then [m, rad].
     radius : float
-        Of every body [m].
+        Radius of every body [m].
     resolution : float
         Side of a map cell [m].
     tight : float
@@ -41,15 +41,15 @@ class Planning(NamedTuple):
     farthest : float
         Clearance is measured up to this [m].
     limit, half_costs, roomy, least_clearance, preferred : as of ``Passage``
-        How a body passes over a map; written out, because loops on threads take no tuples within tuples.
+        Parameters of a body's passage over a map; written out, because loops on threads take no tuples within tuples.
     records, sharing : (maps, 10) int64 and int
         Records of the maps that the robots plan on, and how many rows share one.
     memory : (pieces, 6) int64
-        For searches, a piece for each thread.
+        Scratch of the searches, one for each thread.
     believed, origins, offsets : (rows, 3), (rows, 2), (rows, 2) float64
         Believed poses, lower left corners of the maps and origins of the map frames [m, rad].
     has_ended : (rows,) bool
-        Which robots have ended and stand where they are.
+        Robots that have ended and no longer move.
     """
 
     robots: int
@@ -75,18 +75,18 @@ class Planning(NamedTuple):
 
 
 class Destination(NamedTuple):
-    """Where a robot is to go.
+    """The destination of a robot.
 
     Attributes
     ----------
     row, column : int
         The cell to go to; outside of the map there is no path.
     x, y : float
-        Where to end within that cell, if there is room [m]; nan for its centre.
+        Final position within that cell, if there is room [m]; nan for its centre.
     heading : float
         Wanted heading at the end [rad], nan for any.
     maximum_cost : float
-        Most that the path may cost [m].
+        Maximum cost of the path [m].
     """
 
     row: int
@@ -124,7 +124,7 @@ def _place_along(first: int, last: int, step: int, steps: int, is_straight: bool
 
 @kernel
 def _room_before(cells: Array, k: int, closeness: Array, planning: Planning) -> float:
-    """Least room besides the body on the piece of a path that leads to its point k [m]."""
+    """Minimum room around the body on the piece of a path that leads to its point k [m]."""
     before = max(k - 1, 0)
     row, column, to_row, to_column = cells[before, 0], cells[before, 1], cells[k, 0], cells[k, 1]
     steps = max(abs(to_row - row), abs(to_column - column)) // 2 + 1
@@ -167,7 +167,7 @@ def drive_to(
     Parameters
     ----------
     avoided : (robots,) bool
-        Whose bodies to go round.
+        Robots to drive around.
     """
     record, goal = planning.records[row // planning.sharing], (destination.row, destination.column)
     if not (0 <= goal[0] < record[ROWS] and 0 <= goal[1] < record[COLUMNS]):
@@ -225,7 +225,7 @@ def _end_within_cell(
 
 @kernel
 def _path_is_clear(planning: Planning, drives: Drives, row: int) -> bool:
-    """Whether the rest of a robot's path still keeps clear of what is known by now."""
+    """Whether the rest of a robot's path is still clear on the current map."""
     record = planning.records[row // planning.sharing]
     log_odds, closeness, cells = log_odds_of(record), closeness_of(record), drives.cells[row]
     needed = planning.radius / planning.resolution
@@ -248,7 +248,7 @@ def _path_is_clear(planning: Planning, drives: Drives, row: int) -> bool:
 def prepare_robot(planning: Planning, drives: Drives, row: int, piece: int) -> None:
     """Drop a robot's path that is not clear, and plan one if it has none.
 
-    The plan leads to its target; a path that was given is left as it is (kernel).
+    The plan leads to its target; a path that was given is kept (kernel).
     """
     if drives.passing[row] >= 0 or not drives.is_ordered[row] or drives.is_given[row]:
         return
@@ -268,7 +268,7 @@ def prepare_robot(planning: Planning, drives: Drives, row: int, piece: int) -> N
         int(goal_row), int(goal_column), place_x, place_y, drives.target_headings[row], np.inf
     )
     avoided, ended = _standing(planning, drives, row)
-    # First round all that stand; of these only those that have ended can never give way.
+    # First plan round all standing robots; if that fails, only round those that have ended and never give way.
     for _ in range(2):
         if drive_to(planning, drives, row, destination, avoided, piece):
             return
@@ -279,7 +279,7 @@ def prepare_robot(planning: Planning, drives: Drives, row: int, piece: int) -> N
 
 @kernel
 def _standing(planning: Planning, drives: Drives, row: int) -> tuple[Array, Array]:
-    """Return which teammates stand, and which of them for good, (robots,) bool each."""
+    """Return which teammates stand still, and which of them for good, (robots,) bool each."""
     first = row // planning.robots * planning.robots
     avoided, ended = np.zeros(planning.robots, np.bool_), np.zeros(planning.robots, np.bool_)
     for teammate in range(planning.robots):

@@ -1,4 +1,4 @@
-"""Who of two robots that block each other gives way."""
+"""Right of way: decides which of two robots that block each other gives way."""
 
 import itertools
 import math
@@ -19,7 +19,7 @@ from lidarium.mapping.planning.footprint import Footprint
 from lidarium.mapping.planning.grid_planning import Cell, Disc, Until, centres_of, discs_of, search
 
 FARTHEST_REFUGE = (3.0, 12.0, 40.0)
-"""How far a robot searches a place aside, in turn [m]."""
+"""Distances at which a robot searches a position aside, in this order [m]."""
 
 SAMPLE = 0.05
 """Distance between the points at which a path is compared with places [m]."""
@@ -35,7 +35,7 @@ def _sampled(path: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def obstructing(place: NDArray[np.float64], path: NDArray[np.float64], distance: float) -> bool:
-    """Whether a body at a place (2,) stands within ``distance`` of a path (N, 2) [m]."""
+    """Whether a body at a position (2,) is within ``distance`` of a path (N, 2) [m]."""
     return bool((np.hypot(*(_sampled(path) - place).T) < distance).any())
 
 
@@ -55,18 +55,18 @@ def find_refuge(
     origin : (x, y)
         Its lower left corner [m].
     start : (row, column)
-        Where the robot is.
+        Cell of the robot.
     discs : list of (row, column, radius)
         Bodies of the others, in cells.
     path : (N, 2) float64
         The path to keep off [m].
     distance : float
-        How far off [m].
+        Required distance [m].
 
     Returns
     -------
     (row, column) or None
-        The cell that costs least to reach; None if there is none.
+        The cell with the lowest path cost; None if no cell is suitable.
     """
     tree = cKDTree(_sampled(path))
     for farthest in FARTHEST_REFUGE:
@@ -92,31 +92,31 @@ def find_refuge(
 
 
 DETOUR = 4.0
-"""Most extra cost at which a robot drives round a blocking teammate [m]."""
+"""Maximum extra cost at which a robot drives round a blocking teammate [m]."""
 
 NEAR = 0.6
-"""Teammates within this gap may be what blocks a robot [m]."""
+"""Maximum gap to a teammate that may block a robot [m]."""
 
 BACKING_STEPS = 10
-"""How many steps a robot backs out where a wall blocks it."""
+"""Number of steps that a robot backs out if a wall blocks it."""
 
 REFUGE_STAY_S = 15.0
 """Longest time that a robot waits aside [s]."""
 
 
 class RightOfWay:
-    """Settles who gives way where robots of a team block each other.
+    """Decides which robot gives way if robots of a team block each other.
 
     Parameters
     ----------
     perception : Perception
-        What the robots know.
+        The beliefs of the robots.
     settings : ExplorationSettings
         The team of every episode.
     drives : Drives
-        What every robot's drive is at; row = episode * robots + robot.
+        The drives of all robots; row = episode * robots + robot.
     planner : PathPlanner
-        What plans their paths.
+        Planner of their paths.
     """
 
     def __init__(
@@ -125,7 +125,7 @@ class RightOfWay:
         self._perception, self._settings, self._drives, self._planner = perception, settings, drives, planner
 
     def end_refuges(self, episode: int) -> None:
-        """Let robots of a team that gave way go on, if the others have passed."""
+        """Let robots of a team that gave way continue, if the others have passed."""
         for row in self._live(episode):
             self._end_refuge(row)
             if self._drives.passing[row] < 0 and self._drives.is_ordered[row]:
@@ -140,7 +140,7 @@ class RightOfWay:
         ]
 
     def _teammates(self, row: int) -> list[int]:
-        """Return the rows of a robot's teammates, of those that it knows where they are."""
+        """Return the rows of a robot's teammates with known positions."""
         first, contact = (
             row // self._settings.robots * self._settings.robots,
             self._perception.beliefs.contact[row],
@@ -153,7 +153,7 @@ class RightOfWay:
         ]
 
     def _end_refuge(self, row: int) -> None:
-        """Let a robot that gave way go on.
+        """Let a robot that gave way continue.
 
         This is once the other has passed or enough time has gone by.
         """
@@ -174,9 +174,9 @@ class RightOfWay:
             drop_path(self._drives, row)
 
     def _rank(self, row: int) -> int:
-        """Return who passes first, lower ranks before higher.
+        """Return the rank of a robot; lower ranks pass first.
 
-        Who gives way to another has its rank.
+        A robot that gives way to another takes its rank.
         """
         for _ in range(self._settings.robots):
             if self._drives.passing[row] < 0:
@@ -185,7 +185,7 @@ class RightOfWay:
         return row
 
     def settle_team(self, episode: int) -> None:
-        """Resolve what blocks robots, one after the other.
+        """Resolve blockages of robots, one after the other.
 
         To one that knows of no teammate it is a wall.
         """

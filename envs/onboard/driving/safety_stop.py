@@ -1,4 +1,4 @@
-"""The safety stop: the speed from which a robot still stops before what is ahead of it.
+"""The safety stop: limits the speed so that a robot can stop before an obstacle ahead.
 
 Returns of the laser are obstacles in the swath of the body. Teammates whose poses are known are met with half
 the room, because they brake as well; of two robots whose paths cross, the one with the higher number lets the
@@ -15,7 +15,7 @@ from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.kernels.views import scratch_grid
 
 STANDSTILL = 0.006
-"""Gap to a return at which a robot stands [m]."""
+"""Gap to a return at which a robot stops [m]."""
 
 TEAMMATE_GAP = 0.03
 """Gap that robots keep to each other [m]."""
@@ -23,7 +23,7 @@ TEAMMATE_GAP = 0.03
 LEAST_TEAMMATE_GAP = 0.004
 """Gap that the lower-numbered robot keeps in passing [m].
 
-It holds where two robots stand nearer than the usual gap.
+It applies to two robots that are closer than the usual gap.
 """
 
 SIDE_GAP = 0.0003
@@ -33,14 +33,14 @@ The swath is this much wider than the body.
 """
 
 FORESIGHT_TIMES = np.array([0.0, 0.4, 0.8])
-"""How far ahead the robot with the higher number predicts where another will be [s]."""
+"""Times at which the robot with the higher number predicts the other's position [s]."""
 
 CRUISE, TURN_LIMIT, BRAKING, TIME_STEP = range(4)
 """Places in ``Bodies.limits``."""
 
 
 class Sensed(NamedTuple):
-    """What is known of the robots of a team now.
+    """Current state of the robots of a team for the safety stop.
 
     Attributes
     ----------
@@ -49,8 +49,7 @@ class Sensed(NamedTuple):
     ranges : (robots, beams) float32
         Scans [m].
     contact, heard : (robots, robots) uint8, (robots, robots * 3) float64
-        Where not all teammates' poses are known: of whom each robot heard lately, and where they were then
-        [m, rad].
+        If not all teammates' poses are known: from which robots each heard lately, and their poses then [m, rad].
     """
 
     poses: NDArray[np.float64]
@@ -61,14 +60,14 @@ class Sensed(NamedTuple):
 
 
 class Bodies(NamedTuple):
-    """What the robots of a team are, and what they go by.
+    """Bodies and limits of the robots of a team.
 
     Attributes
     ----------
     unit_vectors : (2, beams) float64
         Directions of the beams.
     radii : (robots,) float64
-        Of the bodies [m].
+        Radius of the bodies [m].
     limits : (4,) float64
         Cruise speed, greatest turn rate, braking and length of a step [m/s, rad/s, m/s2, s].
     knows_teammates : bool
@@ -89,7 +88,7 @@ class Bodies(NamedTuple):
 
 @kernel(nrt=False)
 def _gap_in_scan(ranges: Array, unit_vectors: Array, radius: float) -> float:
-    """How far the disc can go straight ahead before it meets a return [m]."""
+    """Distance that the disc can move straight ahead before it meets a return [m]."""
     gap = np.inf
     for beam in range(ranges.shape[0]):
         distance = ranges[beam]
@@ -106,7 +105,7 @@ def _gap_in_scan(ranges: Array, unit_vectors: Array, radius: float) -> float:
 def _gap_to_teammates(robot: int, poses: Array, velocities: Array, bodies: Bodies, present: Array) -> float:
     """Return how far the disc can go straight to a known teammate [m].
 
-    The teammate counts now or where it will be soon.
+    The teammate counts at its current or its predicted position.
     """
     gap, radii, foresight = np.inf, bodies.radii, bodies.foresight
     cosine, sine = math.cos(poses[robot, 2]), math.sin(poses[robot, 2])
@@ -122,8 +121,8 @@ def _gap_to_teammates(robot: int, poses: Array, velocities: Array, bodies: Bodie
             gap_y = poses[other, 1] + drift * math.sin(poses[other, 2]) - poses[robot, 1]
             x, y = cosine * gap_x + sine * gap_y, cosine * gap_y - sine * gap_x
             if x * x + y * y <= reach * reach:
-                # Nearer than robots should be: the one with the lower number may pass where it does not
-                # touch, else apart.
+                # Closer than robots should be: the one with the lower number may pass without touching; otherwise
+                # they separate.
                 touching = radii[robot] + radii[other] + LEAST_TEAMMATE_GAP
                 if x > 0.0 and (robot > other or -touching < y < touching):
                     gap = 0.0
@@ -145,7 +144,7 @@ def _hears_any(contact: Array, robot: int) -> bool:
 def _gap_to_heard(robot: int, sensed: Sensed, bodies: Bodies) -> float:
     """Return how far the disc can go straight to a teammate heard of [m].
 
-    The teammate is taken to stand where it was.
+    The teammate is assumed to stay at its last position.
     """
     robots = sensed.poses.shape[0]
     known, still = scratch_grid(robots, 3, np.float64), scratch_grid(robots, 2, np.float64)

@@ -1,6 +1,6 @@
 """A driver of teams to their targets.
 
-It plans the robots' paths, keeps them while they are good, and settles who gives way.
+It plans the robots' paths, keeps them as long as they are clear, and decides which robot gives way.
 """
 
 import math
@@ -40,14 +40,14 @@ class TeamDriver:
 
     Positions inside are in the frames of the believed poses.
 
-    What most robots do most of the time, keeping to a path or planning one, runs in kernels over many
+    The usual work, following and planning paths, runs in kernels over many
     episodes. A robot that is blocked or has moved aside concerns its teammates: such episodes are settled one
     by one.
 
     Parameters
     ----------
     perception : Perception
-        What the robots know.
+        The beliefs of the robots.
     settings : ExplorationSettings
         The team of every episode.
     shares_map : bool
@@ -56,11 +56,11 @@ class TeamDriver:
     Attributes
     ----------
     drives : Drives
-        What every robot's drive is at; row = episode * robots + robot.
+        The drives of all robots; row = episode * robots + robot.
     following : Following
-        What ``follow_team`` needs besides it.
+        Further arrays for ``follow_team``.
     planner : PathPlanner
-        What plans the paths.
+        Planner of the paths.
     """
 
     def __init__(
@@ -107,7 +107,7 @@ class TeamDriver:
     def assign(self, rows: NDArray[np.bool_], orders: Orders) -> None:
         """Give robots, those chosen by ``rows`` (rows,), their targets.
 
-        Who has the same one already goes on with it.
+        A robot that already has this target continues.
         """
         drives = self.drives
         is_same_place = (drives.targets == orders.targets).all(axis=1)
@@ -132,7 +132,7 @@ class TeamDriver:
         )
 
     def follow(self, row: int, route: Route | None) -> None:
-        """Let a robot follow a route to its target as it is; who does already goes on.
+        """Let a robot follow a route to its target unchanged; a robot that already follows it continues.
 
         None leaves it without a path.
         """
@@ -154,9 +154,9 @@ class TeamDriver:
         drives.states[row], drives.stood[row], drives.has_path[row] = DRIVING, 0, True
 
     def route_left(self, row: int) -> NDArray[np.float64] | None:
-        """Return what is left of the route that a robot follows, from the last point that it has passed.
+        """Return the rest of the route that a robot follows, from the last point that it has passed.
 
-        It is (P, 2) in its map frame [m]; None if it follows none.
+        It is (P, 2) in its map frame [m]; None without a route.
         """
         drives = self.drives
         if not (drives.is_given[row] and drives.has_path[row]):
@@ -169,21 +169,21 @@ class TeamDriver:
         return Orders(self.drives.is_ordered, self.drives.targets, self.drives.target_headings)
 
     def target(self, row: int) -> Target | None:
-        """Return where a robot drives to, None if it has no target."""
+        """Return the target of a robot, None if it has no target."""
         if not self.drives.is_ordered[row]:
             return None
         (x, y), heading = self.drives.targets[row].tolist(), float(self.drives.target_headings[row])
         return Target(x, y, None if math.isnan(heading) else heading)
 
     def states(self) -> NDArray[np.int8]:
-        """Return the numbers of what all robots' driving is about, (rows,).
+        """Return the numbers of the drive states of all robots, (rows,).
 
         ``DRIVE_STATES`` names them.
         """
         return np.asarray(drive_states(self.drives))
 
     def state(self, row: int) -> DriveState:
-        """Return what a robot's driving is about."""
+        """Return the drive state of a robot."""
         return DRIVE_STATES[int(drive_state(self.drives, row))]
 
     def is_done(self, row: int) -> bool:
@@ -233,10 +233,10 @@ class TeamDriver:
     def path(self, row: int) -> NDArray[np.float64]:
         """Return the rest of a robot's path, in its map frame, shape (N, 2) [m].
 
-        It begins if the robot is.
+        It begins at the robot's position.
         """
         return self.planner.remaining(row) - self._perception.poses.offset(row)
 
     def planning(self, rows: NDArray[np.int64], *, with_frontiers: bool = False) -> Planning:
-        """Return what planning needs in kernels, see ``PathPlanner``."""
+        """Return the arrays that kernels plan with, see ``PathPlanner``."""
         return self.planner.planning(rows, with_frontiers=with_frontiers)

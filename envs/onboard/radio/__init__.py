@@ -1,1 +1,1 @@
-"""What robots send each other, with the links that carry it."""
+"""Messages between robots, and the links that carry them."""

@@ -1,14 +1,14 @@
 """Messages that robots of a team exchange over a radio that is not ideal.
 
-The module also keeps what has reached whom.
+The module also keeps track of the data that each robot has received.
 
-In every step each robot sends its pose; once a period, over each link, what the other does not have of any
-map that it holds: its own, and copies of others that reached it. So maps travel on over robots that meet
-later. A message carries blocks of 64 cells.
+In every step each robot sends its pose. Once a period it sends, over each link, the parts that the receiver lacks of
+all maps that it holds: its own, and copies received from others. Maps thus spread through robots that meet later. A
+message carries blocks of 64 cells.
 
-Where robots report, a station listens at the place where the first of them started. With every map goes what
-its robot reported of itself when the map was as it is. The station gets both over the same links, from the
-robots themselves or from those that hold copies.
+If robots report, a station listens at the start position of the first robot. Each map is sent with the status that
+its robot reported at that time. The station receives both over the same links, from the robots themselves or from
+robots that hold copies.
 """
 
 from collections.abc import Callable
@@ -39,7 +39,7 @@ class RadioLinks:
     Parameters
     ----------
     world : World
-        Where the robots are.
+        The world with the robots.
     settings : ExplorationSettings
         The team and its radio.
     episode : int
@@ -48,9 +48,9 @@ class RadioLinks:
     Attributes
     ----------
     links : (robots, robots) bool
-        Who reached whom when links were found last: sender, receiver.
+        Links that worked at the last check: sender, receiver.
     station_links : (robots,) bool
-        Who reached the station, and was reached by it, when that was found last.
+        Robots with a link to and from the station at the last check.
     """
 
     def __init__(self, world: World, settings: ExplorationSettings, episode: int) -> None:
@@ -70,7 +70,7 @@ class RadioLinks:
     def find(self, step: int, *, draws: bool) -> None:
         """Find out which robots reach each other.
 
-        The shadowing is drawn again where ``draws``.
+        The shadowing is drawn again if ``draws``.
         """
         if draws and self._is_shadowed:
             self._chance = self._generator.standard_normal(self._chance.shape)
@@ -84,7 +84,7 @@ class RadioLinks:
         self.links &= works[:, None] & works[None, :]
 
     def find_station(self, *, draws: bool = False) -> None:
-        """Find out which robots reach the place where the first of them started."""
+        """Find the robots that reach the station, at the start of the first robot."""
         if draws and self._is_shadowed:
             self._station_chance = self._station_generator.standard_normal(len(self.station_links))
         world, team = self._world, slice(self._rows.start, self._rows.stop)
@@ -113,7 +113,7 @@ class RadioLinks:
         return self._settings.loss > 0.0 and bool(generator.random() < self._settings.loss)
 
     def _works(self, step: int) -> NDArray[np.bool_]:
-        """Return whose radio works, (robots,)."""
+        """Return which robots' radios work, (robots,)."""
         world = self._world
         return np.array(
             [
@@ -130,7 +130,7 @@ POSE_BYTES = 32
 """A message with a pose: x, y, theta and the time, 8 bytes each."""
 
 HEADER_BYTES, BLOCK_BYTES = 32, 4 + BLOCK
-"""A message with a part of a map: sender, whose map, when, and how many blocks.
+"""A message with a part of a map: sender, owner of the map, step, number of blocks.
 
 Each block is its number and a byte for each cell.
 """
@@ -169,7 +169,7 @@ class _Message:
     arrives : int
         The step at which it is there.
     receiver, source : int
-        Who gets it, and whom it is about.
+        The receiving robot, and the robot that the data describe.
     step : int
         The step at which it was true.
     pose : (3,) float64 or None
@@ -179,7 +179,7 @@ class _Message:
     blocks, cells : (blocks,) int64, (blocks, 64) int8
         Blocks of the source's map.
     status : Status or None
-        What the source reported of itself with its map.
+        The status that the source reported with its map.
     """
 
     arrives: int
@@ -227,7 +227,7 @@ class Exchange:
     Parameters
     ----------
     simulation : Simulation
-        Whose robots talk.
+        The simulation with the robots.
     settings : ExplorationSettings
         The team and its radio.
     episode : int
@@ -239,26 +239,23 @@ class Exchange:
         The last pose of each robot that reached each other (receiver, source), and the step at which it was
         true.
     heard_ended : (robots, robots) bool
-        Whether the source said that it has ended.
+        Whether the source reported that it has ended.
     copies : list of list of (rows, columns) int8 arrays
-        What each robot, and last the station, holds of each map (receiver, source), the map itself where it
-        is its own.
+        Copy of each map held by each robot and, last, the station (receiver, source); a robot's own map is not a
+        copy.
     copied_at : (robots + 1, robots) int64
         The step at which each copy was true.
     statuses : list of list of Status or None
-        What each robot, and last the station, holds of what each robot reported of itself with its map
-        (receiver, source).
+        Last status of each robot with its map, as held by each robot and, last, the station (receiver, source).
     report_of : callable or None
-        Takes the number of a robot and returns what it reports of itself; if None, nobody reports and
-        there is no station.
+        Takes the number of a robot and returns its status; if None, robots do not report and there is no station.
     windows : (robots, 4) int64
-        What part of the copies that each robot holds has changed since it was last taken: rows and
-        columns, low and high.
+        Part of the copies held by each robot that has changed since it was last taken: rows and columns, low and
+        high.
     bytes_sent : (robots,) int64
         Bytes that each robot has sent to others, lost ones included.
     bytes_reported : (robots,) int64
-        Bytes that each robot has sent for the station's sake beside: to it, and as what goes with maps to
-        others.
+        Additional bytes that each robot has sent for the station: to the station, and with maps to other robots.
     """
 
     def __init__(self, simulation: Simulation, settings: ExplorationSettings, episode: int = 0) -> None:
@@ -274,16 +271,16 @@ class Exchange:
 
     @property
     def links(self) -> NDArray[np.bool_]:
-        """Who reached whom in the last step, (robots, robots): sender, receiver."""
+        """Links that worked in the last step, (robots, robots): sender, receiver."""
         return self._radio.links
 
     @property
     def station_links(self) -> NDArray[np.bool_]:
-        """Who reached the station at its last maps or order, (robots,)."""
+        """Robots that reached the station at its last maps or order, (robots,)."""
         return self._radio.station_links
 
     def start(self, seed: int) -> None:
-        """Begin an episode in which nobody knows anything of the others.
+        """Begin an episode in which no robot knows anything of the others.
 
         Chance comes from ``seed``.
         """
@@ -340,7 +337,7 @@ class Exchange:
     def order_delay(self, receiver: int) -> int | None:
         """Return the delay in steps of an order of the station sent now to a robot.
 
-        An order goes over links that stand now, from robot to robot; None if there are none, or it is lost by
+        An order goes over links that work now, from robot to robot; None if the links do not exist, or it is lost by
         chance.
         """
         self._radio.find_station()
@@ -370,7 +367,7 @@ class Exchange:
         if self.report_of is not None:
             for robot in range(robots):
                 self.statuses[robot][robot] = self.report_of(robot)
-        # What is sent is what was held when the exchange began: nothing goes on over two links at once.
+        # Only data held when the exchange began are sent: no data pass two links at once.
         chosen = [
             (self._best_sender(receiver, source), receiver, source)
             for receiver in range(robots if self.report_of is None else robots + 1)
@@ -394,7 +391,7 @@ class Exchange:
     def _best_sender(self, receiver: int, source: int) -> int | None:
         """Return which of the robots that reach a receiver holds the latest copy of a map.
 
-        None if none has a later one, or it is being sent.
+        None if no robot has a later one, or it is being sent.
         """
         if any(
             message.pose is None and (message.receiver, message.source) == (receiver, source)
@@ -408,7 +405,7 @@ class Exchange:
         return best if held_at[best] > self.copied_at[receiver, source] else None
 
     def _part_to_send(self, sender: int, receiver: int, source: int, step: int) -> _Message:
-        """Return what a sender holds of a map that the receiver does not."""
+        """Return the part of a map that a sender holds and the receiver lacks."""
         held, copy = self.copies[sender][source], self._copy_of(receiver, source)
         true_at, status = int(self.copied_at[sender, source]), self.statuses[sender][source]
         arrives = step + self._latency
@@ -416,7 +413,7 @@ class Exchange:
         return _Message(arrives, receiver, source, true_at, None, False, blocks, cells, status)
 
     def _copy_of(self, receiver: int, source: int) -> NDArray[np.int8]:
-        """Return what a robot holds of another's map, blank at first."""
+        """Return a robot's copy of another's map, blank at first."""
         if self.copies[receiver][source].size == 0:
             self.copies[receiver][source] = np.zeros(
                 self._beliefs.log_odds[self._first + source].shape, np.int8

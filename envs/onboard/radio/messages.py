@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 from lidarium.mapping.geometry.rigid import Transform
 
 MOST_POINTS = 512
-"""Most points of a path."""
+"""Maximum number of points of a path."""
 
 
 class DriveState(Enum):
-    """What a robot's driving is about."""
+    """State of a robot's driving."""
 
     IDLE = "idle"
     DRIVING = "driving"
@@ -28,7 +28,7 @@ class DriveState(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Target:
-    """Where a robot should drive to, in its map frame.
+    """A target position for a robot, in its map frame.
 
     Attributes
     ----------
@@ -51,14 +51,14 @@ class Target:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Route:
-    """A path that a robot should follow as it is, in its map frame.
+    """A path that a robot should follow unchanged, in its map frame.
 
     Attributes
     ----------
     points : (P, 2) float64
-        x, y from where the robot is to where it should come [m].
+        x, y from the robot's position to the target [m].
     room : (P,) float64
-        Room besides the body on the piece that leads to each point: if there is more of it, the robot cuts
+        Room around the body on the piece that leads to each point: if there is more of it, the robot cuts
         corners a little and drives faster through them [m].
     heading : float or None
         Heading to turn to at the end [rad]; None for any.
@@ -88,7 +88,7 @@ class Route:
 
     @property
     def target(self) -> Target:
-        """Where the route ends."""
+        """The end of the route."""
         x, y = self.points[-1].tolist()
         return Target(x, y, self.heading)
 
@@ -109,7 +109,7 @@ class OperatingState(Enum):
 
 
 class OrderKind(Enum):
-    """What a robot can be ordered to do."""
+    """Types of orders to a robot."""
 
     PAUSE = "pause"
     RESUME = "resume"
@@ -126,16 +126,16 @@ class OrderKind(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Order:
-    """What a robot is ordered to do.
+    """An order to a robot.
 
     Attributes
     ----------
     kind : OrderKind
-        What; its name is taken, too.
+        Type of the order; its name is accepted, too.
     target : Target or None
-        Where to, in the robot's map frame, with ``GO_TO``; None with all others.
+        The target in the robot's map frame, with ``GO_TO``; None with all other orders.
     reason : str
-        Why, for the records; with ``STOP`` what the robot ends with.
+        Reason, for the records; with ``STOP`` the reason with which the robot ends.
     """
 
     kind: OrderKind
@@ -158,26 +158,26 @@ class Order:
 
 @dataclass(frozen=True, slots=True)
 class Status:
-    """What a robot reports of itself besides its map; positions are in its map frame.
+    """State that a robot reports in addition to its map; positions are in its map frame.
 
     Attributes
     ----------
     pose : Transform
-        Where it believes to be.
+        Believed pose.
     state : OperatingState
-        Whether it takes part in the work.
+        Its operating state.
     drive : DriveState
-        What its driving is about.
+        State of its driving.
     target : Target or None
-        Where it drives to.
+        Target of its drive.
     path_left_m : float
-        What is left of its path, 0 without one [m].
+        Length of the rest of its path, 0 without one [m].
     travelled_m : float
-        How far it has come by its own odometry [m].
+        Length of its path by its own odometry [m].
     energy_left_j : float or None
-        What is left in its battery; None if it has no limit [J].
+        Energy left in its battery; None if it has no limit [J].
     pause_cause : str
-        Why it is paused: ``order``, ``contact`` or ``blocked``; empty if it is not.
+        Reason of a pause: ``order``, ``contact`` or ``blocked``; empty if the robot is not paused.
     """
 
     pose: Transform
@@ -196,9 +196,9 @@ class Orders(NamedTuple):
     Attributes
     ----------
     is_ordered : (rows,) bool
-        Whether the robot has a target; otherwise it stays if it is and gives way.
+        Whether the robot has a target; otherwise it keeps its position and gives way.
     targets : (rows, 2) float64
-        Positions in the robots' map frames, finite where ordered [m].
+        Positions in the robots' map frames, finite if ordered [m].
     headings : (rows,) float64
         Headings to turn to at the end [rad], nan for any.
     """

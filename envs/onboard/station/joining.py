@@ -1,7 +1,7 @@
-"""When the maps of a team's robots are joined: as `lidarium merge` finds them, and twice.
+"""Criteria for joining the maps of a team's robots: two matches as `lidarium merge` finds them.
 
-Maps of a few rooms that robots have just begun can agree without being of one place, and who is joined acts
-on it at once. So what was found is found once more on maps that have grown, and has to convince.
+Maps of a few rooms from a short exploration can match by accident, and joined robots act on the result at once. A
+match is therefore repeated on grown maps, with stricter criteria.
 """
 
 from lidarium.mapping.merging.agreement import Confirmation, ValidationSettings
@@ -15,11 +15,11 @@ Rooms of one plan, corridors and halls agree well enough to be found, but hardly
 """
 
 GROWTH_M2, OWN_M2, WALL_M = 2.0, 6.0, 3.5
-"""What maps know more at the second finding, what each knows alone [m2], mean length of a wall [m]."""
+"""Additional area at the second match, area known to each map alone [m2], mean length of a wall [m]."""
 
 
 def team_confirmation(
     own_m2: float = OWN_M2, wall_m: float = WALL_M, validation: ValidationSettings | None = TEAM_CONFIRMATION
 ) -> Confirmation:
-    """Return what convinces a team; see `Confirmation`."""
+    """Return the confirmation that a team requires; see `Confirmation`."""
     return Confirmation(validation=validation, own_m2=own_m2, wall_m=wall_m)

@@ -1,12 +1,12 @@
 """Operating states and orders of the robots of an episode.
 
-They hold whether each robot takes part in the work, its last order, and what came of it.
+They hold whether each robot operates, its last order, and the outcome.
 
-A robot that operates takes any order. One that is paused stands still and takes only the orders to resume and
-to stop; one that was stopped or has failed takes none. A robot pauses when it is ordered to, and, where
-``pauses_when_blocked`` is set, by itself when its bumper touches anything or its way is blocked. What it
-touched it cannot see, else it had not driven there: ordered to resume after that, it first backs out a little
-the way it came, and then goes on with the target that it had.
+A robot that operates takes any order. A paused robot stands still and takes only the orders to resume and to stop; a
+robot that was stopped or has failed takes none. A robot pauses if it is ordered to and, if ``pauses_when_blocked`` is
+set, by itself if its bumper touches anything or its way is blocked. A robot cannot see the obstacle that it touched,
+otherwise it would not have driven there: when it resumes, it first backs out a little the way it came, and then
+continues to its target.
 """
 
 from collections.abc import Mapping
@@ -66,7 +66,7 @@ class OperatingEvent:
         the order; of a refused one the robot's state, ``no_driver`` (its level of decision knows no targets),
         ``outside`` or ``occupied`` (the target on its map).
     target : Target or None
-        Of an order to go somewhere, in the robot's map frame.
+        Target of an order to drive, in the robot's map frame.
     """
 
     time_s: float
@@ -83,16 +83,16 @@ class Operating:
     Parameters
     ----------
     perception : Perception
-        What the robots know.
+        The beliefs of the robots.
     settings : ExplorationSettings
         The team of every episode.
 
     Attributes
     ----------
     driver : TeamDriver or None
-        Who drives the robots to targets; None at the level of velocities.
+        Drives the robots to targets; None at the velocity level.
     states : list of OperatingState
-        Of each row.
+        State of each row.
     orders : list of Order or None
         The last order that each robot took.
     events : list of list of OperatingEvent
@@ -100,14 +100,14 @@ class Operating:
     stopping : dict of int to str
         Rows that end at the next outcome, with their reasons.
     held : (rows,) bool
-        Who is paused.
+        Robots that are paused.
     sent : dict of int to Target
         Targets that robots were ordered to since `take_sent` was last called, by row.
     interrupting : (episodes,) bool
-        Where a robot has paused by itself or got a late order since the last outcome, so that the basis of its
-        decision has changed.
+        Episodes in which a robot has paused by itself or got a late order since the last outcome, so that the basis
+        of its decision has changed.
     is_active : bool
-        Whether anything has to be done in a step.
+        Whether a step changes anything.
     state_names, order_names : (rows,) object
         Names of states and last orders for infos; replaced, never changed.
     """
@@ -137,7 +137,7 @@ class Operating:
         self._note_activity()
 
     def start(self, episode: int = 0) -> None:
-        """Begin an episode: all robots operate, and nobody has got an order."""
+        """Begin an episode: all robots operate, and no robot has an order."""
         rows = range(episode * self._robots, (episode + 1) * self._robots)
         for row in rows:
             self.states[row] = OperatingState.OPERATING
@@ -158,21 +158,21 @@ class Operating:
         self._note_activity()
 
     def attach(self, driver: TeamDriver | None) -> None:
-        """Let a driver drive the robots to the targets of their orders; it leaves alone who is paused."""
+        """Let a driver drive the robots to the targets of their orders, except paused robots."""
         self.driver = driver
         if driver is not None:
             driver.planner.held = self.held
 
     def is_addressed(self, row: int) -> bool:
-        """Whether a robot was ever given an order: it then goes on without actions of its policy."""
+        """Whether a robot was ever given an order: it then drives without actions of its policy."""
         return row in self._addressed
 
     def pause_cause(self, row: int) -> str:
-        """Return why a robot is paused, empty if it is not."""
+        """Return the reason of a robot's pause, empty if it is not paused."""
         return self._why_paused[row] if self.states[row] is OperatingState.PAUSED else ""
 
     def take_sent(self) -> dict[int, Target]:
-        """Return if robots have been ordered to go since the last call, by row."""
+        """Return the targets ordered since the last call, by row."""
         sent, self.sent = self.sent, {}
         return sent
 
@@ -288,7 +288,7 @@ class Operating:
         self._note_activity()
 
     def _resume(self, row: int) -> None:
-        """Let a paused robot go on, off what it touched or what was in its way."""
+        """Resume a paused robot, away from an obstacle that it touched or that blocked it."""
         self.held[row] = False
         self._retreating[row] = self._retreat_steps if self._why_paused[row] in ("contact", "blocked") else 0
         if self.driver is not None and self.driver.drives.states[row] == BLOCKED:
@@ -316,7 +316,7 @@ class Operating:
         self.is_active = self._settings.pauses_when_blocked or is_busy
 
     def _rename(self, names: str, rows: slice | int, value: str) -> None:
-        """Replace names for infos: arrays that were handed out stay as they are."""
+        """Replace names for infos: arrays that were handed out do not change."""
         changed = getattr(self, names).copy()
         changed[rows] = value
         setattr(self, names, frozen(changed))

@@ -1,7 +1,7 @@
-"""What robots report to their station.
+"""Reports of the robots to their station.
 
-With the ideal radio the station knows at any time what is now. With any other it stands where the first robot
-started, and knows what has reached it there (`Exchange`); its orders reach a robot as long as the links do.
+With the ideal radio the station always has the current state. With any other radio it is at the start of the first
+robot and has only received data (`Exchange`); its orders reach a robot as long as the links work.
 """
 
 from collections.abc import Callable
@@ -25,7 +25,7 @@ from lidarium.mapping.merging.incremental import GrowingMap
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Report(Status):
-    """What a robot reports to the station: of itself (`Status`), and its map.
+    """A report of a robot to the station: its `Status` and its map.
 
     It is of the robot's own belief throughout.
 
@@ -34,11 +34,11 @@ class Report(Status):
     time_s : float
         When it was true [s].
     map : GrowingMap
-        Its own map, cut to what is known.
+        Its own map, cut to the known area.
     start : Transform
-        Where it began, in its map frame.
+        Start pose, in its map frame.
     frame : Transform or None
-        How its map frame lies in the floor's; None if it does not know: with unknown starts that are not
+        Transform of its map frame to the floor's; None if it does not know: with unknown starts that are not
         revealed to the station.
     """
 
@@ -49,7 +49,7 @@ class Report(Status):
 
 
 def known_map(perception: Perception, row: int) -> GrowingMap:
-    """Return what a robot's own map knows, cut out."""
+    """Return the known area of a robot's own map, cut out."""
     return _cut(perception, row, perception.own_map(row).log_odds, perception.known_window(row))
 
 
@@ -79,16 +79,16 @@ def _window_of(log_odds: NDArray[np.int8]) -> tuple[int, int, int, int]:
 
 
 class Station:
-    """Where the reports of an episode's robots come in, and their orders come from.
+    """The station of an episode's robots: receives their reports and sends their orders.
 
     Robots are given by number within their team.
 
     Parameters
     ----------
     perception : Perception
-        What the robots know.
+        The beliefs of the robots.
     meters : Meters
-        What they measure of themselves.
+        Measurements of the robots' own state.
     operating : Operating
         Their operating states.
     episode : int, optional
@@ -105,7 +105,7 @@ class Station:
         self._first = episode * perception.settings.robots
         self._received: dict[int, Report] = {}
         if self._exchange is not None:
-            # A weak reference: else the maps of an environment that is dropped stay until garbage is collected.
+            # A weak reference: otherwise the maps of a discarded environment stay until garbage is collected.
             self._exchange.report_of = partial(_call, WeakMethod(self._status))
         self.start()
 
@@ -119,12 +119,12 @@ class Station:
         return int(self._perception.world.steps[self._episode])
 
     def start(self) -> None:
-        """Begin an episode, after its robots were placed: nobody has reported."""
+        """Begin an episode, after its robots were placed; there are no reports yet."""
         self._starts = [self._pose(self._first + robot) for robot in range(self._perception.settings.robots)]
         self._received = {}
 
     def report(self, robot: int) -> Report | None:
-        """Return what last reached the station of a robot, None if nothing ever did."""
+        """Return the last report of a robot that reached the station, None if no report has."""
         perception, exchange = self._perception, self._exchange
         row = self._first + robot
         time_step = perception.settings.time_step
@@ -142,9 +142,9 @@ class Station:
         return self._received[robot]
 
     def send_map(self, robot: int, others: FusedMap | None) -> bool:
-        """Send a robot what others know, and return whether the links to it stand.
+        """Send a robot the map of the others, and return whether the links to it work.
 
-        It takes effect at once, however long the radio takes: what a station knows changes slowly.
+        It takes effect at once even if the radio is slow: the knowledge of a station changes slowly.
         """
         row = self._first + robot
         if order_delay(self._perception, row) is None:
@@ -153,7 +153,7 @@ class Station:
         return True
 
     def forget_walls(self, robot: int, trail: NDArray[np.float64]) -> bool:
-        """Let a robot forget the walls along a trail (`ForgottenTrails`); return whether the links to it stand."""
+        """Let a robot forget the walls along a trail (`ForgottenTrails`); return whether the links to it work."""
         row = self._first + robot
         if order_delay(self._perception, row) is None:
             return False
@@ -175,7 +175,7 @@ class Station:
         return Transform(*perception.world.starts[row].tolist()) if is_revealed else None
 
     def _status(self, robot: int) -> Status:
-        """Return what a robot reports of itself now."""
+        """Return the current status of a robot."""
         row, meters = self._first + robot, self._meters
         meters.advance()
         drive, target, path_left_m = self._drive(row)
@@ -204,7 +204,7 @@ class Station:
 
 
 def _call(method: WeakMethod[Callable[[int], Status]], robot: int) -> Status:
-    """Call a method of an object that is there as long as what calls it."""
+    """Call a method of an object that lives as long as its caller."""
     called = method()
     assert called is not None
     return called(robot)

@@ -23,18 +23,18 @@ from lidarium.mapping.merging.joining import placed
 from lidarium.mapping.merging.settings import MergeSettings
 
 Frames = dict[tuple[str, str], Transform]
-"""By a robot and another: the transform of the other's map frame into its own."""
+"""Transforms by pairs of robots: from the second one's map frame to the first one's."""
 
 
 class _Joined(NamedTuple):
-    """How the frames of two robots lie.
+    """Relation between the frames of two robots.
 
     Attributes
     ----------
     a_from_b : Transform
         Maps points of the second robot's map frame into the first's.
     at : (x, y)
-        Middle of what both maps know, or where the second robot is if their maps have nothing in common, in
+        Middle of the area known to both maps, or the position of the second robot if their maps do not overlap, in
         its frame [m].
     is_direct : bool
         Whether these two maps were laid on each other; otherwise those of others lie between them.
@@ -47,14 +47,14 @@ class _Joined(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _TeammateMap:
-    """What a robot has last got of another.
+    """The latest map that a robot has received from another.
 
     Attributes
     ----------
     map : GrowingMap
         Its map.
     pose : Transform
-        Where it believed to be in that map's frame.
+        Believed pose in that map's frame.
     own_from_other : Transform
         Its map frame in that of the robot that received it.
     time_s : float
@@ -69,23 +69,24 @@ class _TeammateMap:
 
 @dataclass(slots=True)
 class TeamMapping:
-    """What the robots of a team hold of each other.
+    """The maps that the robots of a team hold of each other.
 
     Parameters
     ----------
     perception : Perception
         The onboard software with the robots' own maps and poses.
     settings : MergeSettings
-        How maps are merged.
+        Settings of map merging.
     episode : int
-        Of which episode.
+        Number of the episode.
     confirms : bool
-        Whether maps are joined only as `joining` says; else by the first finding.
+        Whether maps are joined only by the criteria of `joining`; otherwise by the first match.
 
     Attributes
     ----------
     received : dict of (str, str) to _TeammateMap
-        By a robot and another: what the one has last got of the other, while it knew how their frames lie.
+        By a robot and another: the latest map that the first received from the second while their frames were
+        aligned.
     fused : dict of str to FusedMap
         Each robot's own map and all that it has got, in its own frame.
     """
@@ -173,9 +174,9 @@ class TeamMapping:
         return joined
 
     def _compared(self, agent: str, one: GrowingMap) -> GrowingMap:
-        """Return a robot's map as it is compared with others.
+        """Return a robot's map in the form that is compared with others.
 
-        It claims nothing of where the robot was: others may have drawn its body there.
+        Cells at the robot's positions are left open: others may have drawn its body there.
         """
         settings = self.perception.settings
         trail = np.array(self._trails[agent], np.float64)

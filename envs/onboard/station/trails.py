@@ -2,8 +2,8 @@
 
 Other robots may have mapped the robots themselves as walls.
 
-Robots that do not know where the others are draw their bodies into their maps. To a merger these are walls
-that contradict the free floor on which the other one drove, and on a merged map they bar the way.
+Robots that do not know the poses of the others draw their bodies into their maps. To a merger these are walls
+that contradict the free floor on which the other one drove, and on a merged map they block the path.
 """
 
 from collections.abc import Iterable
@@ -26,9 +26,9 @@ def without_own_trail(
     Parameters
     ----------
     trail : (N, 2) float64
-        Where the robot was, in its map frame [m].
+        Positions of the robot, in its map frame [m].
     radius, resolution : float
-        Of its body, and side of a cell [m].
+        Radius of its body, and side of a cell [m].
     """
     levels = one.levels.copy()
     levels[footprint_mask(one.levels.shape, one.origin, trail, radius, resolution)] = UNKNOWN
@@ -38,14 +38,14 @@ def without_own_trail(
 def without_bodies(
     one: GrowingMap, trails: Iterable[NDArray[np.float64]], radius: float, resolution: float
 ) -> GrowingMap:
-    """Return a map without walls where other robots have been.
+    """Return a map without walls along the trails of other robots.
 
     Parameters
     ----------
     trails : iterable of (N, 2) float64
-        Where the others were, in the frame of the map [m].
+        Positions of the others, in the frame of the map [m].
     radius, resolution : float
-        Of their bodies, and side of a cell [m].
+        Radius of their bodies, and side of a cell [m].
     """
     levels = one.levels.copy()
     for trail in trails:

@@ -1,1 +1,1 @@
-"""The world whose bodies PyBullet moves."""
+"""The world with bodies simulated by PyBullet."""

@@ -19,17 +19,17 @@ OUTER_WALL = 1.0
 """Thickness of the walls around the bounds [m]."""
 
 _STRAIGHT = 1e-6
-"""By how much the corners of a box may be off [m]."""
+"""Tolerance of the corners of a box [m]."""
 
 
 @dataclass(frozen=True, slots=True)
 class _Box:
-    """A box that stands upright.
+    """An upright box.
 
     Attributes
     ----------
     centre, size : (3,) of float
-        Of the box [m].
+        Centre and size of the box [m].
     turn : float
         Direction of its first side [rad].
     """
@@ -41,7 +41,7 @@ class _Box:
 
 @dataclass(frozen=True, slots=True)
 class FloorShapes:
-    """What stands on a floor.
+    """The solids of a floor.
 
     Attributes
     ----------
@@ -88,7 +88,7 @@ class FloorShapes:
 
     @property
     def obj(self) -> str:
-        """The prisms as the text of an OBJ file, an object each; empty if there are none."""
+        """The prisms as the text of an OBJ file, an object each; empty without prisms."""
         lines, first = [], 1
         for number, (outline, low, high) in enumerate(self.prisms):
             count = len(outline)
@@ -111,7 +111,7 @@ def _outer_walls(floor: Floor) -> Iterator[_Box]:
 
 
 def _box_of(solid: Solid, low: float, high: float) -> _Box | None:
-    """Return the box that a solid is; None if it is none."""
+    """Return the box of a solid; None if the solid is not a box."""
     corners = solid.polygon
     if len(corners) != 4 or solid.holes:
         return None
@@ -142,7 +142,7 @@ SUBSTEP = 1.0 / 240.0
 """Length of a substep, at most [s]."""
 
 GRAVITY = 9.81
-"""Of the Earth [m/s2]."""
+"""Gravity of the Earth [m/s2]."""
 
 RAYS_AT_ONCE = 16_000
 """Rays of a call, of which PyBullet takes 16,384 at most."""
@@ -152,16 +152,16 @@ _JOINTS = (LEFT, RIGHT)
 
 @dataclass(frozen=True, slots=True)
 class Motion:
-    """Where a body is and how it moves.
+    """Position and motion of a body.
 
     Attributes
     ----------
     place : (3,) float64
-        Of its frame, which lies on the ground between its wheels [m].
+        Position of its frame, which lies on the ground between its wheels [m].
     axes : (3, 3) float64
         Its axes x, y, z in the columns.
     velocity, turning : (3,) of float
-        Of its centre of mass [m/s], and around the axes of the world [rad/s].
+        Velocity of its centre of mass [m/s], and angular velocity around the axes of the world [rad/s].
     """
 
     place: NDArray[np.float64]
@@ -262,7 +262,7 @@ class Bodies:
         return np.asarray(turned * self._wheel_radii / self._time_step)
 
     def motion(self, robot: int) -> Motion:
-        """Return if a robot is and how it moves."""
+        """Return the position and motion of a robot."""
         body, client = self._robots[robot], self.client
         centre, turn = client.call("getBasePositionAndOrientation", body)
         velocity, turning = client.call("getBaseVelocity", body)

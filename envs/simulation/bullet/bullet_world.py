@@ -27,7 +27,7 @@ LEAN = math.radians(2.0)
 """From this on a scan is taken along the tilted plane [rad]."""
 
 _OWN_BODY = 1e-3
-"""How far outside of its own body a ray begins [m]."""
+"""Distance outside its own body at which a ray begins [m]."""
 
 
 def scan_leaning(bodies: Bodies, robot: int, lidar: Lidar, ranges: NDArray[np.float32]) -> None:
@@ -55,11 +55,11 @@ FALL = 0.05
 
 
 class BulletWorld(KinematicWorld):
-    """Robots whose bodies PyBullet moves, with sensors and faults of the kinematic world; a ``World``.
+    """Robots with bodies simulated by PyBullet, and the sensors and faults of the kinematic world; a ``World``.
 
-    Motors drive the wheels at what the limits of the drive make of commands. What the wheels did is what
-    encoders read, so a wheel that slips makes odometry differ from the truth. Scans are those of the
-    kinematic world at the body's pose; where a robot leans, rays of PyBullet look along its tilted plane.
+    Motors drive the wheels at the commanded speeds, within the limits of the drive. Encoders read the actual motion
+    of the wheels, so a wheel that slips makes odometry differ from the truth. Scans are those of the kinematic world
+    at the body's pose; if a robot leans, rays of PyBullet look along its tilted plane.
 
     Parameters
     ----------
@@ -145,7 +145,7 @@ class BulletWorld(KinematicWorld):
             bodies.close()
 
     def _move(self, episode: int, kidnapped: NDArray[np.bool_]) -> None:
-        """Move the bodies of an episode by what ``drive`` made of the commands."""
+        """Move the bodies of an episode by the wheel speeds from ``drive``."""
         first, bodies = episode * self.robots, self._physics[episode]
         rows = range(first, first + self.robots)
         was_in_contact = self.contacts[first : first + self.robots] != 0
@@ -170,7 +170,7 @@ class BulletWorld(KinematicWorld):
             self.collisions[row] += self.contacts[row] != 0 and not was_in_contact[robot]
 
     def _within_limits(self, row: int, robot: int) -> tuple[float, float]:
-        """Return speed and turn rate that the drive goes for in this step, as kernels have it."""
+        """Return the speed and turn rate that the drive aims at in this step, as kernels compute them."""
         body, wanted = self.team[robot], self.driven[row].tolist()
         limits, now = (body.max_speed, body.max_turn_rate), self.velocities[row].tolist()
         gains = (body.max_acceleration * self.time_step, body.max_turn_acceleration * self.time_step)
@@ -220,7 +220,7 @@ class BulletWorld(KinematicWorld):
 
 
 def _floor_of(tables: FloorTables) -> Floor:
-    """Return the floor of tables; that of the bodies' cells if they know none."""
+    """Return the floor of tables; by default the floor of the bodies' cells."""
     if tables.floor is not None:
         return tables.floor
     rows, columns = tables.body.solid.shape

@@ -1,4 +1,4 @@
-"""A client of PyBullet: one physics server, closed when nobody holds it any more."""
+"""A client of PyBullet: one physics server, closed when its last user releases it."""
 
 import importlib
 import os

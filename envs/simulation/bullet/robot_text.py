@@ -1,7 +1,7 @@
 """Robots as URDF text: a cylinder on two driven wheels and two casters.
 
 The frame of a robot lies on the ground between its wheels. Wheels touch the ground in one point each, as
-spheres do: a wheel as wide as it is would turn about a point that nobody knows.
+spheres do: a wheel with width would turn about an unknown point.
 """
 
 import math
@@ -12,7 +12,7 @@ LEFT, RIGHT = 0, 1
 """Joints of the driven wheels."""
 
 CASTER_GAP = 5e-4
-"""Gap between the casters and the ground where a robot stands upright, so that wheels carry it [m]."""
+"""Gap between the casters and the ground if a robot is upright, so that wheels carry it [m]."""
 
 _CASTER_MASS = 1e-3
 
@@ -60,7 +60,7 @@ def _link(
     shapes: str,
     place: Numbers = (0.0, 0.0, 0.0),
 ) -> str:
-    """Return a link whose centre of mass is at a place of its frame [m]."""
+    """Return a link with its centre of mass at a position of its frame [m]."""
     along = " ".join(
         f'{axis}="{value!r}"' for axis, value in zip(("ixx", "iyy", "izz"), inertia, strict=True)
     )

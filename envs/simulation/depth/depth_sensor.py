@@ -1,4 +1,4 @@
-"""The depth cameras of a world: what they see, image by image."""
+"""The depth cameras of a world, image by image."""
 
 from typing import Any
 
@@ -26,7 +26,7 @@ class DepthSensor:
     Parameters
     ----------
     world : World
-        Whose robots; their poses and attitudes are read when an image is taken.
+        The world with the robots; their poses and attitudes are read when an image is taken.
     camera : DepthCamera
         The camera of every robot.
     time_step : float
@@ -41,7 +41,7 @@ class DepthSensor:
     frames : (rows, image rows, image columns) float32
         The last image of each robot [m]; 0 if nothing was measured.
     taken_at : (rows,) int64
-        After how many steps of its episode each was taken, -1 if none was yet.
+        Step of its episode in which each image was taken, -1 before the first.
     """
 
     def __init__(self, world: World, camera: DepthCamera, time_step: float, threads: int = 1) -> None:
@@ -95,7 +95,7 @@ class DepthSensor:
         self.taken_at[takes] = (np.repeat(steps, world.robots) + 1)[takes]
 
     def _point_at(self, episode: int) -> None:
-        """Note where the faces of an episode lie, for kernels."""
+        """Store the addresses of the faces of an episode, for kernels."""
         faces = self._faces[episode]
         if faces is not None:
             arrays = (faces.corners, faces.planes, faces.spheres)

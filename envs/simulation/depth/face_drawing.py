@@ -1,7 +1,7 @@
 """Faces drawn into inverse depths, scan line by scan line, exact at pixel centres.
 
 Over the pixels of an image the inverse depth of a plane is linear. So is the product of a pixel's ray with
-the normal of the plane through the camera and an edge of a face. What a face covers on a scan line is
+the normal of the plane through the camera and an edge of a face. The part of a scan line that a face covers is
 therefore an interval whose ends are linear in the row; nothing needs to be clipped in front of the camera.
 
 References
@@ -26,7 +26,7 @@ NEAR = 1e-3
 """Depth of the plane at which the rows of a face are bounded [m]."""
 
 OVERLAP = 1e-7
-"""By how much faces overlap beyond their edges, so that rounding leaves no gap between two [pixels]."""
+"""Overlap of faces beyond their edges, so that rounding leaves no gap between two [pixels]."""
 
 LEVEL = 1e-12
 """An edge whose line hardly changes along a row bounds rows, not columns."""
@@ -51,16 +51,16 @@ class FaceArrays(NamedTuple):
 
 
 class Span(NamedTuple):
-    """What a face covers: scratch of one face.
+    """Pixels that a face covers: scratch of one face.
 
     Attributes
     ----------
     camera_corners : (4, 3) float64
         Corners in the optical frame [m].
     bounds : (2, rows) float64
-        Where the face begins and ends on each row [columns].
+        First and last column position of the face on each row [columns].
     columns : (2, rows) int64
-        First and last column of each row whose centre it covers; none if the first is greater.
+        First and last column of each row with its centre in the face; empty if the first is greater.
     """
 
     camera_corners: Array
@@ -76,7 +76,7 @@ def new_span(rows: int) -> Span:
 
 @kernel(nrt=False)
 def is_in_view(faces: FaceArrays, face: int, axes: Array, eye: Array, view: Array, sides: Array) -> bool:
-    """Whether a face looks at the camera and its sphere touches what the camera sees.
+    """Whether a face looks at the camera and its sphere is in the camera's view.
 
     ``axes`` (3, 3) are the optical axes in the world, ``eye`` (3,) is the optical centre [m]. ``sides`` (4, 3) are
     the inward normals of the four planes around the view, in the world.

@@ -1,4 +1,4 @@
-"""Depth images of robots: where their cameras are, what these see, and with which noise."""
+"""Depth images of robots: poses of the cameras, true depths, noise."""
 
 import math
 from typing import Annotated, NamedTuple
@@ -38,7 +38,7 @@ FACE_CORNERS, FACE_PLANES, FACE_SPHERES, FACE_COUNT = range(4)
 
 
 class Cameras(NamedTuple):
-    """What the kernels know of the cameras of all robots; row = episode * robots + robot.
+    """The cameras of all robots for kernels; row = episode * robots + robot.
 
     Attributes
     ----------
@@ -51,7 +51,7 @@ class Cameras(NamedTuple):
     pinhole, mount, noise : (7,), (5,), (3,) float64
         Numbers of the camera.
     seeds, steps : (episodes,) uint64, (episodes,) int64
-        Where the noise comes from.
+        Seeds of the noise.
     noise_table : (4096,) float32
         ``GAUSSIAN_TABLE``.
     """
@@ -69,7 +69,7 @@ class Cameras(NamedTuple):
 
 
 def view_numbers(camera: DepthCamera) -> NDArray[np.float64]:
-    """Return what the drawing kernels know of a camera, shape (7,)."""
+    """Return the parameters of a camera for the drawing kernels, shape (7,)."""
     pinhole = camera.intrinsics
     return np.array(
         [
@@ -119,7 +119,7 @@ def place_camera(pose: Array, attitude: Array, mount: Array, axes: Array, eye: A
 
 @kernel(nrt=False)
 def _measure_depth(inverse: Array, view: Array, depth: Array) -> None:
-    """Write depths of inverse depths; 0 for what is out of range."""
+    """Write depths of inverse depths; 0 if out of range."""
     nearest, farthest = np.float32(1.0 / max(view[DEPTH_MIN], 1e-9)), np.float32(1.0 / view[DEPTH_MAX])
     one, nothing = np.float32(1.0), np.float32(0.0)
     for row in range(depth.shape[0]):

@@ -1,1 +1,1 @@
-"""What makes a world real: noise, odometry, faults, radio links."""
+"""Disturbances of the world: noise, odometry errors, faults, radio links."""

@@ -31,11 +31,11 @@ PLACE_X, PLACE_Y, PLACE_THETA = 3, 4, 5
 FAULT_NUMBERS = 6
 """Numbers of a fault: kind, first step, end step and parameters.
 
-The end step is the one after the last; the parameters are what the kind needs.
+The end step is the one after the last; the parameters depend on the kind.
 """
 
 LONGEST_DRAWN_S = 24 * 3600.0
-"""Faults are drawn for this long where an episode has no horizon [s]."""
+"""Time for which faults are drawn if an episode has no horizon [s]."""
 
 
 def plan_faults(
@@ -53,14 +53,14 @@ def plan_faults(
     time_step : float
         Length of a step [s].
     horizon_s : float or None
-        How long the episode lasts at most [s].
+        Maximum duration of the episode [s].
     places : (places, 2) float64
-        Where a kidnapped robot may be put [m]; needed if one may be.
+        Positions to which a robot may be kidnapped [m]; required if kidnapping is possible.
 
     Returns
     -------
     (robots, capacity * 6) float64
-        Kind, first step, step after the last, and what the kind needs, of each fault; kind 0 for none.
+        Kind, first step, step after the last, and the parameters of each fault; kind 0 for no fault.
     """
     table = np.zeros((robots, settings.capacity, FAULT_NUMBERS))
     generator = np.random.default_rng([seed, FAULT_STREAM])
@@ -73,7 +73,7 @@ def plan_faults(
             table[robot, k, KIND] = KINDS.index(fault.kind)
             table[robot, k, FIRST_STEP] = math.ceil(fault.at_s / time_step - 1e-9)
             is_for_ever = fault.lasts_s is None or fault.kind == "dead_robot"
-            # What lasts less than a step lasts one.
+            # A fault shorter than a step lasts one step.
             table[robot, k, END_STEP] = (
                 math.inf
                 if is_for_ever
@@ -141,7 +141,7 @@ def has_fault(faults: Array, kind: int, step: int) -> bool:
 def stick_wheels(faults: Array, step: int, wheel_base: float, command: Array) -> None:
     """Reduce a robot's speed and turn rate (2,) if a wheel does not turn.
 
-    The command becomes what is left of it.
+    The command is replaced by the part that remains.
     """
     for k in range(0, faults.shape[0], FAULT_NUMBERS):
         if _is_active(faults, k, STUCK_WHEEL, step):
@@ -155,7 +155,7 @@ def stick_wheels(faults: Array, step: int, wheel_base: float, command: Array) ->
 def kidnap(faults: Array, step: int, robot: int, bodies: Array, poses: Array) -> bool:
     """Put a robot elsewhere if it is time to and the place is free.
 
-    Where a teammate stands there it is put as soon as that has left.
+    If a teammate is at that position, the robot is put there as soon as the teammate has left.
     """
     for k in range(0, faults.shape[0], FAULT_NUMBERS):
         if faults[k + KIND] != KIDNAPPING or step < faults[k + FIRST_STEP]:

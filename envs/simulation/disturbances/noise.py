@@ -1,6 +1,6 @@
 """Noise from a counter: one draw for each (key, robot, step, beam).
 
-It is the same whatever the order of threads or rows.
+It does not depend on the order of threads or rows.
 
 A 32-bit hash of the counter picks one entry from each of two tables; the sum of the two entries is Gaussian.
 """

@@ -1,11 +1,11 @@
-"""Wheel odometry: what encoders count, with bias, noise and whole ticks.
+"""Wheel odometry: encoder counts with bias, noise and whole ticks.
 
-And what the drive makes of a command.
+The module also has the noise of the drives.
 
 Biases belong to a robot and an episode: their signs are drawn at its beginning. Noise follows the odometry
 motion model (turn and distance, each from turn and distance) and the velocity motion model of Thrun, Burgard
 and Fox, "Probabilistic Robotics", chapter 5, with variances that grow with the path driven, so that a model
-means the same whatever the time step.
+has the same effect for any time step.
 """
 
 import math
@@ -71,7 +71,7 @@ def disturb_commands(numbers: Array, noise_table: Array, seed: np.uint64, step: 
 
 
 class Encoders(NamedTuple):
-    """Wheels of one robot, and what is known from them.
+    """Wheels of one robot, and their measured motion.
 
     Attributes
     ----------

@@ -24,7 +24,7 @@ RADIO_STREAM = 0x72616469
 OBSTACLE_UNIT = 0.1
 """Unit of the obstacle length in the path-loss formula [m].
 
-It is the length of wall that costs nothing beside the fixed loss of a wall.
+It is the length of wall that adds no loss to the fixed loss of a wall.
 """
 
 
@@ -83,13 +83,13 @@ def _wall_lengths(solid: Array, places: Array, lengths: Array) -> None:
 def path_loss(
     settings: RadioSettings, distance: NDArray[np.float64], walls: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Return the loss over a distance of which a part runs through what is solid [dB].
+    """Return the loss over a distance, part of which is through solids [dB].
 
     Parameters
     ----------
     distance, walls : (...) float64
-        Length of the whole way, and of what is solid of it [m]. Less than ``reference_distance`` of free way
-        loses no less than it does.
+        Length of the whole path, and of its part in solids [m]. A free path shorter than ``reference_distance`` has
+        the loss at that distance.
     """
     free = np.maximum(distance - walls, 0.0)
     loss = settings.reference_loss + 10.0 * settings.free_exponent * np.log10(
@@ -133,14 +133,14 @@ def links(
     raster: Raster,
     chance: NDArray[np.float64] | None = None,
 ) -> NDArray[np.bool_]:
-    """Return which robots reach each other, (robots, robots), none itself.
+    """Return which robots reach each other, (robots, robots), False on the diagonal.
 
     Parameters
     ----------
     places : (robots, 2 or more) float64
         True places of the robots [m].
     chance : (robots, robots) float64 or None
-        Standard Gaussian draws for the shadowing, of which those above the diagonal count; none if None.
+        Standard Gaussian draws for the shadowing, used above the diagonal; None for no shadowing.
     """
     robots = len(places)
     distance = np.hypot(places[:, None, 0] - places[None, :, 0], places[:, None, 1] - places[None, :, 1])
@@ -167,9 +167,9 @@ def links_to(
     Parameters
     ----------
     place : (2,) float64
-        Where the other end is [m].
+        Position of the other end [m].
     chance : (robots,) float64 or None
-        Standard Gaussian draws for the shadowing; none if None.
+        Standard Gaussian draws for the shadowing; None for no shadowing.
     """
     distance = np.hypot(places[:, 0] - place[0], places[:, 1] - place[1])
     walls = np.zeros(len(places))

@@ -16,9 +16,9 @@ from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.kernels.views import arrays_at, table_of
 
 TRUE_POSE, KNOWN_TEAMMATES, ENDED, OWN_FRAME, DEAD_RECKONING, SOME_TEAMMATES = 1, 2, 4, 8, 16, 32
-"""Flags of a row: what the robot knows of poses, and whether it has ended.
+"""Flags of a row: the poses that the robot knows, and whether it has ended.
 
-In order: the localizer knows the true pose; teammates' poses are known; the robot has ended (its body stands
+In order: the localizer knows the true pose; teammates' poses are known; the robot has ended (its body stays
 there, its sensors are off). Then: it believes in the frame of its own start; its localizer uses its odometry
 alone; poses of teammates that the radio reported are known.
 """
@@ -82,7 +82,7 @@ class WorldArrays(NamedTuple):
     floor_rows, frames : (episodes, 10) int64, (episodes, 3) float64
         ``FloorTables.row`` and ``FloorTables.frame`` of each episode's floor.
     seeds, steps : (episodes,) uint64, (episodes,) int64
-        Where the noise comes from, and the step that comes next.
+        Seeds of the noise, and the next step.
     team_seen : (episodes,) int64
         Cells of F that the team has seen.
     moves, flags : (rows,) uint8, (rows,) int64
@@ -90,12 +90,12 @@ class WorldArrays(NamedTuple):
     poses, velocities, starts, believed : (rows, 3), (rows, 2), (rows, 3), (rows, 3) float64
         True poses and velocities, poses at the start, and poses as the localizers believe.
     ranges, true_ranges : (rows, beams) float32
-        Scans as measured, and without noise where stages run one by one [m]; inf for no return.
+        Scans as measured, and without noise if stages run one by one [m]; inf for no return.
     belief_rows, origins : (rows, 5) int64, (rows, 2) float64
         Address, rows and columns of each robot's log-odds, address and rows (0 for none) of the words of each
-        row that have changed since the pooled maps took them in, and where cell (0, 0) begins.
+        row that have changed since the pooled maps took them in, and the corner of cell (0, 0).
     windows : (rows, 4) int64
-        What part of each map has changed since planning took it in.
+        Part of each map that has changed since planning last used it.
     mask_rows : (rows, 5) int64
         Addresses of the robot's mask, the team's and F's, and their rows and words.
     boxes : (rows, 4) int64
@@ -108,17 +108,16 @@ class WorldArrays(NamedTuple):
     travelled, collisions : (rows,) float64, (rows,) int64
         Length of each robot's path [m], and how often it came into contact.
     reward_weights : (4,) float64
-        What a new cell earns, and what a step, a contact and a metre cost.
+        Reward of a new cell, and costs of a step, a contact and a metre.
     reward_terms : (rows, 4) float64
-        What each term has brought each robot since rewards were last taken.
+        Sum of each term for each robot since rewards were last taken.
     rewarded, rewards : (rows,) float64
-        Length of each robot's path at its last reward [m], and what it has earned since rewards were last
-        taken.
+        Length of each robot's path at its last reward [m], and its reward since rewards were last taken.
     odometry_model : (7,) float64
-        ``OdometrySettings.numbers``; nothing (0,) where wheels measure exactly and nobody uses them.
+        ``OdometrySettings.numbers``; empty (0,) if wheels measure exactly and odometry is not used.
     wheels, odometry, measured : (rows, 7), (rows, 3), (rows, 2) float64
-        What the encoders are at, poses by dead reckoning since the start, and speeds and turn rates as the
-        encoders measure; the last is ``velocities`` itself where wheels measure exactly.
+        Encoder states, poses by dead reckoning since the start, and speeds and turn rates as the
+        encoders measure; the last is ``velocities`` itself if wheels measure exactly.
     faults, failed : (rows, numbers) float64, (rows,) uint8
         Faults of each robot, see ``faults``, and whether it is dead.
     driven : (rows, 2) float64
@@ -181,7 +180,7 @@ def world_at(table: Array) -> WorldArrays:
 def table_of_owners(*owners: object) -> NDArray[np.int64]:
     """Return the table of a world's arrays, each an attribute of the first owner that has it.
 
-    What no owner has is empty. The owners keep the arrays alive.
+    Arrays without an owner are empty. The owners keep the arrays alive.
     """
     hints = get_type_hints(WorldArrays, include_extras=True)
     arrays = []
@@ -200,7 +199,7 @@ def table_of_owners(*owners: object) -> NDArray[np.int64]:
 
 
 def sensor_numbers(lidar: Lidar, time_step: float, map_resolution: float) -> NDArray[np.float64]:
-    """Return what kernels know of the laser, the step [s] and the maps' cells [m], shape (10,)."""
+    """Return the parameters of the laser, the step [s] and the maps' cells [m] for kernels, shape (10,)."""
     numbers = np.zeros(10)
     numbers[ANGLE_FIRST], numbers[ANGLE_INCREMENT] = lidar.angle_first, lidar.angle_increment
     numbers[FULL_CIRCLE] = float(lidar.is_full_circle)

@@ -1,6 +1,6 @@
 """Contact of discs with solid cells and with each other, exact.
 
-A disc is pushed out of what it has entered along the shortest path, so that it slides along walls.
+A disc is pushed out of a solid along the shortest path, so that it slides along walls.
 """
 
 import math
@@ -55,7 +55,7 @@ class TeamBodies(NamedTuple):
     bodies : (robots, 8) float64
         ``Robot.numbers`` of each robot.
     moves : (robots,) uint8
-        Whether the robot drives; the others stand where they are.
+        Whether the robot drives; the others keep their positions.
     poses, velocities : (robots, 3), (robots, 2) float64
         x, y, theta and speed, turn rate.
     bumpers : (robots, 3) int8
@@ -65,7 +65,7 @@ class TeamBodies(NamedTuple):
     travelled : (robots,) float64
         Length of each robot's path [m].
     collisions : (robots,) int64
-        How often each robot came into contact.
+        Number of contacts of each robot.
     """
 
     bodies: Array

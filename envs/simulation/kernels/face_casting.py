@@ -3,7 +3,7 @@
 The nearest face that a beam meets is its range.
 
 Which beams a face can meet is found by a fast angle and rounded up to whole lanes of eight; whether each of
-them meets it, and where, is exact.
+them meets it, and at which distance, is exact.
 """
 
 import math
@@ -65,7 +65,7 @@ def _draw_face(
 ) -> None:
     """Lower the ranges of the beams that meet a face.
 
-    The beams are those from ``first`` to ``last`` and some besides them. The face spans low to high along its run.
+    The beams are those from ``first`` to ``last`` and a few next to them. The face spans low to high along its run.
     """
     if first > last:
         return
@@ -94,7 +94,7 @@ def _list_faces(
 
     They face the laser. For each, distance, low and high end are listed.
 
-    Most branches on a single face could not be foreseen, so each is written down and counted if it is one.
+    A branch for each face would often be mispredicted, so every face is written, and counted only if it is in reach.
     """
     faces, starts, reach = table.faces, table.starts, beams.reach
     forward = direction & 1 == 0
@@ -121,7 +121,7 @@ def _list_faces(
 def _find_spans(listed: Array, count: int, direction: int, beams: Beams, spans: Array) -> None:
     """Find the beams that may meet each of the listed faces.
 
-    These are the first, the last, and the last from 0 on where they go on there (or -1).
+    These are the first, the last, and the last of those that continue from beam 0 (or -1).
 
     The fast angle is good to a hundredth of a beam: one more beam on each side holds all that meet the face.
     """

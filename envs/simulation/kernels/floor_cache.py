@@ -2,7 +2,7 @@
 
 The environments of a process share them in memory, all processes on disk.
 
-On disk lies what is dear to make and small: the rasters as bits and the distance bound
+The disk stores data that are expensive to make and small: the rasters as bits and the distance bound
 (`FloorTables.packed`), some 20 kB a floor. The tables of the rays, four bytes a cell, are made from them in
 the time that it would take to read or unpack them.
 """
@@ -26,7 +26,7 @@ from lidarium.envs.simulation.kernels.contact import distance_bound
 from lidarium.envs.simulation.kernels.ray_tables import RayTables
 
 LIMITLESS_BODY = 0.05
-"""The body touches what stands higher than this above the floor [m]."""
+"""Minimum height of objects that the body touches [m]."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class FloorTables:
     bound : (rows, columns) uint8
         Lower bound of the distance to the bodies' solid cells [cells].
     floor : Floor or None
-        What stands there; None if the tables were made of rasters alone.
+        The floor itself; None if the tables were made of rasters alone.
     """
 
     laser: Raster
@@ -75,7 +75,7 @@ class FloorTables:
 
     @classmethod
     def unpacked(cls, arrays: Mapping[str, NDArray[Any]], floor: Floor) -> "FloorTables":
-        """Make the tables of a floor of what `packed` returned."""
+        """Make the tables of a floor from the result of `packed`."""
         x, y, resolution = arrays["frame"].tolist()
         rasters = [
             Raster(_cells(arrays[name], arrays["bound"].shape), (x, y), resolution)
@@ -105,7 +105,7 @@ class FloorTables:
 
     @property
     def nbytes(self) -> int:
-        """How much memory the arrays take, and what episodes have made the rasters keep."""
+        """Memory of the arrays and of the data that episodes have added to the rasters."""
         rasters = [self.body] if self.laser is self.body else [self.body, self.laser]
         tables: list[NDArray[Any]] = [self.rays.squares, self.rays.faces, self.rays.face_starts, self.bound]
         return sum(raster.nbytes for raster in rasters) + sum(array.nbytes for array in tables)
@@ -154,10 +154,10 @@ Unused tables are those that no episode uses.
 """
 
 DEFAULT_MIB = 256.0
-"""The most that they take where nothing is said [MiB]."""
+"""Maximum size by default [MiB]."""
 
 REMEMBERED_SHARE = 0.125
-"""Share of it for what was made of floors whose tables had to go."""
+"""Share of it for data of floors whose tables were removed."""
 
 Value = TypeVar("Value")
 
@@ -175,16 +175,16 @@ MADE_BY = (
     "mapping/files/output.py",
     "mapping/kernels",
 )
-"""Sources that determine what the store holds for a floor."""
+"""Sources that determine the stored data of a floor."""
 
 
 class TablesCache:
     """Tables used last, bounded in bytes.
 
-    Tables in use elsewhere are found, too, and never made twice. Of tables that had to go, what episodes have
-    made their rasters keep stays for longer: it is small, and takes longer to make than the tables.
+    Tables in use elsewhere are found, too, and never made twice. Data that episodes added to the rasters of removed
+    tables stay longer: they are small, and take longer to make than the tables.
 
-    Tables grow by what episodes make their rasters keep: how large they are is asked whenever they are used.
+    Tables grow as episodes add data to their rasters, so their size is read at each use.
 
     Parameters
     ----------
@@ -194,7 +194,7 @@ class TablesCache:
     Attributes
     ----------
     nbytes : int
-        How much it keeps alive.
+        Maximum size of the kept values [bytes].
     """
 
     def __init__(self, max_bytes: int) -> None:
@@ -207,11 +207,11 @@ class TablesCache:
 
     @property
     def nbytes(self) -> int:
-        """How much the cache keeps alive."""
+        """Size of the kept values [bytes]."""
         return self._kept.nbytes + self._remembered.nbytes
 
     def get(self, key: str, make: Callable[[], FloorTables]) -> FloorTables:
-        """Return the tables of a key; ``make`` is called if nobody has them."""
+        """Return the tables of a key; ``make`` is called if they are not in memory."""
         tables = self._alive.get(key)
         if tables is None:
             tables = make()
@@ -233,13 +233,13 @@ class _UsedLast(Generic[Value]):
         self._values: OrderedDict[str, tuple[Value, int]] = OrderedDict()
 
     def pop(self, key: str) -> Value | None:
-        """Take a value out, None if it is not there."""
+        """Remove and return a value, None if it is not stored."""
         value, size = self._values.pop(key, (None, 0))
         self.nbytes -= size
         return value
 
     def put(self, key: str, value: Value, size: int) -> list[tuple[str, Value]]:
-        """Keep a value of that many bytes; return what had to go, with its key."""
+        """Keep a value of that many bytes; return the removed values with their keys."""
         self.pop(key)
         self._values[key] = value, size
         self.nbytes += size
@@ -256,7 +256,7 @@ def floor_tables(
 ) -> FloorTables:
     """Return the kernels' tables of a floor.
 
-    They are those of this process, else those of the store, else new ones.
+    They are those of this process, otherwise those of the store, otherwise new ones.
 
     Parameters
     ----------

@@ -2,7 +2,7 @@
 
 It is the second stage of a robot's step. The first one senses and scores, after all bodies have moved. The
 fused step runs both in one call; both forms call the same functions for each robot, so they agree to the bit.
-Where a robot's believed pose is the true one, its map has the floor's lattice and ranges carry no noise, the
+If a robot's believed pose is the true one, its map has the floor's lattice and ranges carry no noise, the
 area seen is computed once for the scorer and the map.
 """
 
@@ -86,7 +86,7 @@ def _filter_teammates(
 def invalidate_teammates(world: WorldArrays, row: int, first: int, robots: int, ranges: Array) -> None:
     """Make the beams of a scan (beams,) invalid that met teammates.
 
-    This holds as far as the robot knows where they are.
+    This holds as far as the robot knows their positions.
     """
     beams, scale = ranges.shape[0], 1.0 / world.sensor[MAP_RESOLUTION]
     directions, ends, is_hit = np.empty((4, beams)), np.empty((2, beams)), np.empty(beams, np.bool_)
@@ -114,8 +114,8 @@ def _update_map(
 ) -> None:
     """Update one robot's map from its scan, whose beams' directions ``scratch`` holds.
 
-    Where ``is_filled``, its ends and first window hold the seen area, of this ``box``, already; whatever window is
-    not filled is zero.
+    If ``is_filled``, its ends and first window already hold the seen area, of this ``box``; a window that is not
+    filled is zero.
     """
     directions, lengths, ends, bits = scratch.directions, scratch.lengths, scratch.ends, scratch.windows[0]
     sensor, believed, origin = world.sensor, world.believed[row], world.origins[row]
@@ -125,7 +125,7 @@ def _update_map(
     reach = sensor[RANGE_MAX] * scale
     x, y = (believed[0] - origin[0]) * scale, (believed[1] - origin[1]) * scale
     if not (0.0 <= x < belief[MAP_COLUMNS] and 0.0 <= y < belief[MAP_ROWS]):
-        # Whoever takes himself to be beyond his map is lost.
+        # A robot that believes to be outside its map is lost.
         world.failed[row] = 1
         return
     is_hit = scratch_vector(beams, np.bool_)
@@ -181,7 +181,7 @@ def perceive_robot(world: WorldArrays, row: int, first: int, robots: int, scratc
 def sense_and_perceive(
     world: WorldArrays, row: int, first: int, robots: int, perceives: bool, scratch: ScanScratch
 ) -> None:
-    """Run both stages for one robot (or the first alone, where not ``perceives``).
+    """Run both stages for one robot (or the first alone, unless ``perceives``).
 
     ``first`` is the first row of its episode.
     """

@@ -1,4 +1,4 @@
-"""What a robot has truly seen, in kernels: the area of its true beams, added to its mask."""
+"""Areas that robots have truly seen, in kernels: the area of the true beams, added to a mask."""
 
 import math
 
@@ -27,7 +27,7 @@ from lidarium.mapping.kernels.views import grid_at
 
 @kernel(inline="always")
 def score_robot(world: WorldArrays, row: int, first: int, robots: int, scratch: ScanScratch) -> None:
-    """Add what a robot's true ranges see to its mask."""
+    """Add the area seen by a robot's true ranges to its mask."""
     scratch.windows[:] = np.uint64(0)
     beam_directions(world.poses[row, 2], world.unit_vectors, scratch.directions)
     true_lengths(world.true_ranges[row], world.sensor, scratch.lengths)
@@ -66,7 +66,7 @@ def _seen_area(
 ) -> tuple[tuple[int, int, int, int], int, int]:
     """Fill the area that the true beams have seen.
 
-    Returns the box that holds bits, and the row and word of the masks where it begins.
+    Returns the box that holds bits, and its first row and word in the masks.
     """
     sensor, frame = world.sensor, world.frames[first // robots]
     scale = 1.0 / sensor[MAP_RESOLUTION]
@@ -106,7 +106,7 @@ def score_area(
 def footprint(
     world: WorldArrays, row: int, first: int, robots: int, bits: Array
 ) -> tuple[tuple[int, int, int, int], int, int]:
-    """Fill the area that a robot's true beams see from where it stands now.
+    """Fill the area that a robot's true beams see from its current pose.
 
     Nothing in the world changes.
 

@@ -1,7 +1,7 @@
 """Motion of bodies: differential drives with limits, and contact.
 
 Far from everything a robot drives its arc in one piece. Near contact the arc is cut into short pieces, and
-after each the disc is pushed out of what it entered; if there is no way out the piece is undone. No robot
+after each the disc is pushed out of solids; if there is no way out the piece is undone. No robot
 ever ends a step inside a solid cell or another robot.
 """
 
@@ -128,7 +128,7 @@ def move_robots(grids: BodyGrids, team: TeamBodies, commands: Array, duration: f
                 if is_free:
                     x, y = next_x, next_y
             if contacts[robot] != 0:
-                # What the body could not do, the wheels did not do either.
+                # The wheels moved only as far as the body did.
                 advance = (x - start_x) * math.cos(heading) + (y - start_y) * math.sin(heading)
                 speed = min(max(advance / duration, -abs(speed)), abs(speed))
                 team.collisions[robot] += 0 if was_in_contact else 1

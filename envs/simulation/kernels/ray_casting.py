@@ -2,12 +2,12 @@
 
 Two casters give the same ranges. The *quadrant caster* jumps, from the ray's cell, to the border of the
 largest free square that opens in the ray's direction; a byte per cell and quadrant holds its side. The *face
-caster* draws the wall faces in reach into the beams, nearest first wins; it is the faster one where walls are
+caster* draws the wall faces in reach into the beams, nearest first wins; it is faster if walls are
 long and straight. Which one runs is decided for each pose by the number of faces in reach, so a scan depends
 on the pose and the floor alone.
 
-A ray ends where it enters a solid cell. A ray that runs exactly through a corner of the lattice enters the
-cell besides it in x first.
+A ray ends as soon as it enters a solid cell. A ray that runs exactly through a corner of the lattice enters the
+cell next to it in x first.
 """
 
 import math
@@ -99,7 +99,7 @@ def _travel_together(squares: Array, offset: int, columns: int, beams: Beams, fi
     The beams are those from ``first`` to ``last``, of one quadrant.
 
     The beams between the two outer ones lie within the box of these two at every distance. A square that opens from
-    the box's nearest corner and holds the box is free for all, up to where the first of the outer beams leaves it.
+    the box's nearest corner and holds the box is free for all, until the first of the outer beams leaves it.
     """
     x, y, directions = beams.x, beams.y, beams.directions
     first_x, first_y = directions[0, first], directions[1, first]
@@ -158,9 +158,9 @@ def cast_one_by_one(squares: Array, rows: int, columns: int, beams: Beams, range
 
 @kernel(forceinline=True, nrt=False)
 def _list_bundles(beams: Beams, count: int, listed: Array) -> None:
-    """List what ``travel_bundles`` takes of each bundle of a scan of that many beams.
+    """List the parameters of ``travel_bundles`` for each bundle of a scan of ``count`` beams.
 
-    Bundles that are none stay where they begin: a border at no distance is the next for them.
+    Unused bundles stay at their start: their next border is at no distance.
     """
     directions = beams.directions
     for bundle in range(listed.shape[1]):
@@ -220,10 +220,10 @@ def cast_by_squares(squares: Array, rows: int, columns: int, beams: Beams, range
 
 
 FACES, FACES_PER_BEAM = 300, 1.4
-"""Most faces in reach for which the face caster runs, alone and for each beam.
+"""Maximum number of faces in reach for which the face caster runs, alone and for each beam.
 
-A face costs the same whatever the number of beams, a beam that travels does not: the two casters took equal
-time at about 550 faces with 180 beams and at 1,300 with 720, over drawn, generated and real floors. Both give
+The cost of a face is independent of the number of beams, the cost of travelling beams is not: the two casters took
+equal time at about 550 faces with 180 beams and at 1,300 with 720, over drawn, generated and real floors. Both give
 the same ranges. """
 
 

@@ -13,7 +13,7 @@ TILE = 128
 """Side of the square tiles that group the faces [cells]."""
 
 MAX_SQUARE = 255
-"""Largest side of a free square that is kept [cells]: what a byte holds."""
+"""Largest side of a free square that is kept [cells]: the maximum of a byte."""
 
 
 @kernel
@@ -47,7 +47,7 @@ def _faces(solid: NDArray[np.uint8], tile_columns: int) -> list[tuple[NDArray[np
         width = lines.shape[1]
         changes = np.flatnonzero(lines[:-1] != lines[1:])
         is_free = lines.ravel()[changes] == 0
-        # The free cell is before the change where the face is met on the way up, else behind it.
+        # The free cell is before the change if the face is met on the way up, otherwise behind it.
         for direction, cells in ((first, changes[is_free]), (first + 1, changes[~is_free] + width)):
             line, place = np.divmod(cells, width)
             begins = (np.diff(cells, prepend=-2) != 1) | (place % TILE == 0)
@@ -60,7 +60,7 @@ def _faces(solid: NDArray[np.uint8], tile_columns: int) -> list[tuple[NDArray[np
 
 
 class RayTables:
-    """What the casters look up for one raster of solid cells.
+    """Lookup tables of the casters for one raster of solid cells.
 
     Shared by all episodes on that floor.
 
@@ -103,7 +103,7 @@ class RayTables:
 
     @property
     def addresses(self) -> NDArray[np.int64]:
-        """Row of the kernels' table of floors: where the arrays lie, and their sizes."""
+        """Row of the kernels' table of floors: addresses and sizes of the arrays."""
         return np.array(
             [
                 self.squares.ctypes.data,

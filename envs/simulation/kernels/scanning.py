@@ -1,4 +1,4 @@
-"""The scan of a robot in kernels: true ranges by ray casting, noise, what is invalid."""
+"""The scan of a robot in kernels: true ranges by ray casting, noise, invalid ranges."""
 
 from typing import NamedTuple
 
@@ -28,7 +28,7 @@ from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.kernels.views import scratch_grid, scratch_vector
 
 RANGE_GAP = 1e-3
-"""Least difference between the range of a hit and the longest range [m].
+"""Minimum difference between the range of a hit and the maximum range [m].
 
 The longest range means no return in an observation.
 """
@@ -42,12 +42,12 @@ The end of a beam then lies in the cell that it met.
 
 
 class ScanScratch(NamedTuple):
-    """What a scan is worked out in; one serves robot after robot.
+    """Scratch arrays of a scan; one set serves robot after robot.
 
     Attributes
     ----------
     directions, lengths, ends : (4, beams), (beams,), (2, beams) float64
-        Of the beams, see ``beam_directions`` and ``scan_ends``.
+        Directions, lengths and ends of the beams, see ``beam_directions`` and ``scan_ends``.
     windows : (2, window rows, words) uint64
         Bits of the cells around the robot: those seen, and those in which beams ended.
     """

@@ -77,7 +77,7 @@ def _believe_odometry(odometry: Array, start: Array, is_relative: bool, believed
 
 @kernel(nrt=False)
 def _drive(world: WorldArrays, episode: int, robots: int, commands: Array) -> None:
-    """Apply faults and write what the drives make of ``commands`` (rows, 2).
+    """Apply faults and write the driven speeds for ``commands`` (rows, 2).
 
     The faults are those of the episode's robots; the result is written to ``world.driven``.
     """
@@ -100,7 +100,7 @@ def _drive(world: WorldArrays, episode: int, robots: int, commands: Array) -> No
 
 @kernel(inline="always")
 def _encode(world: WorldArrays, episode: int, robots: int, velocities: Array) -> None:
-    """Read the encoders of an episode, whose wheels drove at ``velocities`` (rows, 2)."""
+    """Read the encoders of an episode after its wheels drove at ``velocities`` (rows, 2)."""
     first = episode * robots
     for row in range(first, first + robots):
         read_encoders(
@@ -131,7 +131,7 @@ def _move(world: WorldArrays, episode: int, robots: int, commands: Array, moves_
 
 @kernel(inline="always")
 def _localize(world: WorldArrays, episode: int, robots: int) -> None:
-    """Localize the robots whose localizer is in the kernels, and forget what was new in the step before."""
+    """Localize the robots with a localizer in the kernels, and clear the changes of the last step."""
     for row in range(episode * robots, (episode + 1) * robots):
         world.boxes[row] = 0
         is_relative = world.flags[row] & OWN_FRAME != 0
@@ -173,7 +173,7 @@ def _share(world: WorldArrays, episode: int, robots: int) -> None:
 def step_episode(
     table: Array, episode: int, robots: int, commands: Array, moves_bodies: bool, perceives: bool
 ) -> None:
-    """Run a step of one episode: move, sense, score and (where ``perceives``) map."""
+    """Run a step of one episode: move, sense, score and (if ``perceives``) map."""
     world = world_at(table)
     _move(world, episode, robots, commands, moves_bodies)
     _localize(world, episode, robots)
@@ -213,7 +213,7 @@ def _perceive_row(table: Array, row: int, robots: int, runs: Array) -> None:
 
 @kernel
 def drive(table: Array, robots: int, commands: Array, runs: Array) -> None:
-    """Write into ``driven`` what faults and drives make of ``commands``.
+    """Write into ``driven`` the result of faults and drives for ``commands``.
 
     ``commands`` is (rows, 2), ``runs`` (episodes,). A kidnapped robot is put elsewhere.
     """
@@ -234,7 +234,7 @@ def encode(table: Array, robots: int, velocities: Array, runs: Array) -> None:
 
 @kernel
 def sense(table: Array, robots: int, runs: Array) -> None:
-    """Take the scans of all robots that have not ended, if they are."""
+    """Take the scans of all robots that have not ended, at their current poses."""
     world = world_at(table)
     scratch = scan_scratch(world)
     for episode in range(runs.shape[0]):
@@ -268,7 +268,7 @@ def move_and_sense(table: Array, robots: int, commands: Array, runs: Array, move
 
 @kernel
 def score_and_localize(table: Array, robots: int, runs: Array) -> None:
-    """Localize the robots of the episodes with ``runs``, score what they sensed, and count the step."""
+    """Localize the robots of the episodes with ``runs``, score their measurements, and count the step."""
     world = world_at(table)
     scratch = scan_scratch(world)
     for episode in range(runs.shape[0]):
@@ -289,7 +289,7 @@ def render_row(table: Array, row: int, robots: int, poses: Array, ranges: Array)
     """
     world = world_at(table)
     flags, pose, scan = world.flags[row], world.believed[row].copy(), world.ranges[row].copy()
-    # Where teammates were at the time is not known any more.
+    # Teammates' poses at that time are not known any more.
     world.flags[row] = flags & ~(KNOWN_TEAMMATES | SOME_TEAMMATES)
     scratch = scan_scratch(world)
     for k in range(poses.shape[0]):
