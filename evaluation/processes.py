@@ -118,8 +118,7 @@ def heard_termination() -> Iterator[Any]:
     """
     termination = Termination()
     is_ours = (
-        threading.current_thread() is threading.main_thread()
-        and signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
+        threading.current_thread() is threading.main_thread() and signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
     )
     if is_ours:
         signal.signal(signal.SIGTERM, termination)

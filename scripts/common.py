@@ -170,10 +170,7 @@ def _aligned(cell: str, width: int, is_number: bool) -> str:
 
 def file_name(name: str) -> str:
     """Return a name in which letters unfit for file names are replaced."""
-    return (
-        "".join(letter if letter.isalnum() or letter in "._-" else "-" for letter in name).strip(".-")
-        or "floor"
-    )
+    return "".join(letter if letter.isalnum() or letter in "._-" else "-" for letter in name).strip(".-") or "floor"
 
 
 def counted(
@@ -209,9 +206,7 @@ class Progress:
             from tqdm import tqdm
 
             bar_format = "explored {percentage:5.1f} %|{bar:40}| {desc} [{elapsed}]"
-            self._bar = tqdm(
-                total=100.0, file=sys.stderr, bar_format=bar_format, leave=False, dynamic_ncols=True
-            )
+            self._bar = tqdm(total=100.0, file=sys.stderr, bar_format=bar_format, leave=False, dynamic_ncols=True)
 
     def show(self, env: "ExplorationEnv") -> None:
         """Show the progress of the episode."""

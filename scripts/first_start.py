@@ -36,9 +36,7 @@ def compile_first(is_quiet: bool) -> None:
     if folder is None or processes == 1 or 2 * count_compiled(folder) > listed["compiled"]:
         return
     notify(f"the first start compiles kernels in {processes} processes; later starts find them")
-    for _ in counted(
-        _compiled(folder, listed["kernels"], processes), listed["compiled"], "kernels compiled", is_quiet
-    ):
+    for _ in counted(_compiled(folder, listed["kernels"], processes), listed["compiled"], "kernels compiled", is_quiet):
         pass
 
 

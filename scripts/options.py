@@ -103,9 +103,7 @@ def check_supervised(name: str) -> None:
 
     if not is_supervised(name):
         led = ", ".join(filter(_can_be_led, policy_names()))
-        raise ValueError(
-            f"settings of the supervisor are given, and policy {name!r} has none; want one of {led}"
-        )
+        raise ValueError(f"settings of the supervisor are given, and policy {name!r} has none; want one of {led}")
 
 
 def _can_be_led(name: str) -> bool:

@@ -113,9 +113,7 @@ def write_team(folder: Path, episode: "Episode") -> list[str]:
     files = [f"{name}.{kind}" for name in names for kind in ("yaml", "pgm")]
     if env.settings.robots == 1:
         return files
-    placed = PlacedMaps(
-        [group.frames for group in known.groups], known.pairs, known.corners, known.used, known.dropped
-    )
+    placed = PlacedMaps([group.frames for group in known.groups], known.pairs, known.corners, known.used, known.dropped)
     write_json(folder / "transforms.json", transforms(placed))
     return [*files, "transforms.json"]
 
@@ -131,9 +129,7 @@ def _write_own_map(folder: Path, env: "ExplorationEnv", robot: int) -> None:
     one = known_map(env.perception, robot)
     # A robot that has seen nothing leaves one cell, as a map has to have some.
     levels = one.levels if one.levels.size else np.full((1, 1), UNKNOWN, np.uint8)
-    write_ros_map(
-        folder, env.possible_agents[robot], levels, (*one.origin, 0.0), env.settings.occupancy.resolution
-    )
+    write_ros_map(folder, env.possible_agents[robot], levels, (*one.origin, 0.0), env.settings.occupancy.resolution)
 
 
 def _team_maps(episode: "Episode") -> "TeamMaps":
@@ -222,16 +218,12 @@ NAMED_JOINS = 10
 """Maximum number of joins that are listed in the summary."""
 
 
-def run_summary(
-    policy: str, episode: "Episode", result: dict[str, Any], folder: Path, files: list[str]
-) -> str:
+def run_summary(policy: str, episode: "Episode", result: dict[str, Any], folder: Path, files: list[str]) -> str:
     """Return the summary of an episode as text."""
     env = episode.env
     area = float(env.score.counted[0]) * env.settings.occupancy.resolution**2
     thresholds = [
-        f"{share} % at {result[f't{share}_s']:.1f} s"
-        for share in (85, 90, 95, 99)
-        if result[f"t{share}_s"] is not None
+        f"{share} % at {result[f't{share}_s']:.1f} s" for share in (85, 90, 95, 99) if result[f"t{share}_s"] is not None
     ]
     counted = max(int(env.score.counted[0]), 1)
     ended = [
@@ -243,14 +235,12 @@ def run_summary(
     facts = [
         (
             "explored",
-            f"{100.0 * result['coverage_final']:.2f} % of {area:.1f} m2 in {result['time_s']:.1f} s of "
-            "simulated time",
+            f"{100.0 * result['coverage_final']:.2f} % of {area:.1f} m2 in {result['time_s']:.1f} s of simulated time",
         ),
         ("reached", ", ".join(thresholds) or "not 85 %"),
         (
             "together",
-            f"{sum(result['path_m']):.1f} m driven, overlap {result['overlap']:.2f}, {result['collisions']} "
-            "collisions",
+            f"{sum(result['path_m']):.1f} m driven, overlap {result['overlap']:.2f}, {result['collisions']} collisions",
         ),
         ("map", f"IoU of occupied cells {result['iou_occupied']:.3f}"),
         ("given up", _given_up(result["given_up"])),
@@ -311,8 +301,7 @@ def _given_up(entries: list[dict[str, Any]]) -> str:
         return "nothing"
     longest = sorted(entries, key=lambda entry: -float(entry["size_m"]))[:NAMED_GIVEN_UP]
     named = ", ".join(
-        f"{entry['reason']} at ({entry['x']:.1f}, {entry['y']:.1f}) {entry['size_m']:.2f} m"
-        for entry in longest
+        f"{entry['reason']} at ({entry['x']:.1f}, {entry['y']:.1f}) {entry['size_m']:.2f} m" for entry in longest
     )
     more = len(entries) - len(longest)
     return f"{len(entries)} on the way: {named}{f', and {more} shorter' if more else ''}"

@@ -131,14 +131,9 @@ class Browser:
     def column(self, section, place):
         """Return the cells of a column of a section's table as text, from above."""
         return [
-            row.find_elements("css selector", "th, td")[place].text
-            for row in self.find_all(f"#{section} tbody tr")
+            row.find_elements("css selector", "th, td")[place].text for row in self.find_all(f"#{section} tbody tr")
         ]
 
     def complaints(self):
         """Return what the browser's console says of errors and warnings."""
-        return [
-            entry["message"]
-            for entry in self.driver.get_log("browser")
-            if entry["level"] in ("SEVERE", "WARNING")
-        ]
+        return [entry["message"] for entry in self.driver.get_log("browser") if entry["level"] in ("SEVERE", "WARNING")]

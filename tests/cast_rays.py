@@ -79,9 +79,7 @@ def rooms(generator, rows=150, columns=180):
     solid = walled(rows, columns)
     for _ in range(8):
         row, column = generator.integers(2, rows - 6), generator.integers(2, columns - 6)
-        height, width = (int(generator.integers(2, 60)), int(generator.integers(1, 4)))[
-            :: generator.choice([-1, 1])
-        ]
+        height, width = (int(generator.integers(2, 60)), int(generator.integers(1, 4)))[:: generator.choice([-1, 1])]
         solid[row : row + height, column : column + width] = 1
     return solid
 
@@ -103,9 +101,9 @@ def turned(generator, rows=150, columns=180):
 
 
 def speckled(generator, rows=90, columns=100):
-    return walled(rows, columns) | (
-        generator.random((rows, columns)) < generator.choice([0.003, 0.02, 0.1])
-    ).astype(np.uint8)
+    return walled(rows, columns) | (generator.random((rows, columns)) < generator.choice([0.003, 0.02, 0.1])).astype(
+        np.uint8
+    )
 
 
 FLOORS = {"rooms": rooms, "turned": turned, "speckled": speckled}

@@ -28,8 +28,6 @@ def lines_of(points):
 
 
 def ply(form, rows, kinds="float float float", names="x y z", before="", count=3, after=b""):
-    properties = "".join(
-        f"property {kind} {name}\n" for kind, name in zip(kinds.split(), names.split(), strict=True)
-    )
+    properties = "".join(f"property {kind} {name}\n" for kind, name in zip(kinds.split(), names.split(), strict=True))
     header = f"ply\nformat {form} 1.0\ncomment by hand\n{before}element vertex {count}\n{properties}"
     return f"{header}element face 0\nproperty list uchar int i\nend_header\n".encode() + rows + after

@@ -13,9 +13,7 @@ from lidarium.mapping.splines.spline_map import SplineMap
 LASER = ScanGeometry()
 
 
-ROOM = np.vstack(
-    [ring((-2, -1.5), (3, -1.5), (3, 2), (-2, 2)), ring((0.5, 0.5), (1.1, 0.5), (1.1, 1.0), (0.5, 1.0))]
-)
+ROOM = np.vstack([ring((-2, -1.5), (3, -1.5), (3, 2), (-2, 2)), ring((0.5, 0.5), (1.1, 0.5), (1.1, 1.0), (0.5, 1.0))])
 
 
 ROUND = [(0.3 * k, -0.8 + 0.1 * math.sin(0.7 * k), 0.6 * k) for k in range(8)]

@@ -123,9 +123,7 @@ class Teams:
 
     def driven_to_targets(self, decisions):
         targets = [np.array(place) for floor in self.floors for place in TARGETS[floor.name]]
-        orders = Orders.of(
-            [Target(*(place - offset)) for place, offset in zip(targets, self.offsets, strict=True)]
-        )
+        orders = Orders.of([Target(*(place - offset)) for place, offset in zip(targets, self.offsets, strict=True)])
         return [self.drive(orders) for _ in range(decisions)]
 
     def explored(self, decisions):

@@ -120,10 +120,7 @@ class Ledger:
 
     def summary(self) -> dict[str, Any]:
         """Return what the JSON file keeps of an episode."""
-        parts = {
-            part: [running.hexdigest()[:32], *self._marks.get(part, [])]
-            for part, running in self._hashes.items()
-        }
+        parts = {part: [running.hexdigest()[:32], *self._marks.get(part, [])] for part, running in self._hashes.items()}
         return {
             "steps": self.steps,
             "block": self.block,

@@ -12,9 +12,7 @@ def box_points(low, high, spacing):
     found = []
     for axis in range(3):
         others = [other for other in range(3) if other != axis]
-        sides = [
-            np.linspace(low[k], high[k], max(round((high[k] - low[k]) / spacing), 1) + 1) for k in others
-        ]
+        sides = [np.linspace(low[k], high[k], max(round((high[k] - low[k]) / spacing), 1) + 1) for k in others]
         first, second = np.meshgrid(*sides, indexing="ij")
         for value in (low[axis], high[axis]):
             side = np.empty((first.size, 3))
@@ -51,8 +49,6 @@ def pose_at(x, y, z=0.8, yaw=0.0, pitch=0.0):
     """Pose of a frame whose x axis looks ahead, by so much downwards."""
     cy, sy, cp, sp = np.cos(yaw), np.sin(yaw), np.cos(pitch), np.sin(pitch)
     pose = np.eye(4)
-    pose[:3, :3] = np.array([[cy, -sy, 0], [sy, cy, 0], [0, 0, 1]]) @ np.array(
-        [[cp, 0, sp], [0, 1, 0], [-sp, 0, cp]]
-    )
+    pose[:3, :3] = np.array([[cy, -sy, 0], [sy, cy, 0], [0, 0, 1]]) @ np.array([[cp, 0, sp], [0, 1, 0], [-sp, 0, cp]])
     pose[:3, 3] = (x, y, z)
     return pose

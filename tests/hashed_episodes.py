@@ -113,9 +113,7 @@ def team(
     """Return an episode of ``lidarium.parallel_env`` with drawn actions."""
 
     def run(ledger: Ledger) -> None:
-        env = lidarium.parallel_env(
-            floor() if callable(floor) else floor, level=level, **built(options, level)
-        )
+        env = lidarium.parallel_env(floor() if callable(floor) else floor, level=level, **built(options, level))
         if merged is not None:
             env = named("MergedMaps")(env, named("MergingSettings")(period_s=2.0, known_starts=merged))
         draws, actions = np.random.default_rng(SEED), {}
@@ -128,9 +126,7 @@ def team(
             if ordered:
                 order(env, step)
             actions = {
-                agent: choose(
-                    level, draws, step, outcome[0][agent].get("action_mask"), actions.get(agent, np.zeros(2))
-                )
+                agent: choose(level, draws, step, outcome[0][agent].get("action_mask"), actions.get(agent, np.zeros(2)))
                 for agent in env.agents
             }
             outcome = env.step(actions)
@@ -258,9 +254,7 @@ def formed(face: str, level: str, seed: int, steps: int, solves: bool = False, *
                 if not env.agents:
                     outcome = env.reset()
                     ledger.told(outcome)
-                masks = {
-                    agent: mask_in(outcome[0][agent], outcome[-1].get(agent, {})) for agent in env.agents
-                }
+                masks = {agent: mask_in(outcome[0][agent], outcome[-1].get(agent, {})) for agent in env.agents}
                 outcome = env.step({agent: drawn(agent, step, masks[agent]) for agent in env.agents})
                 ledger.told(outcome)
             env.close()
@@ -334,9 +328,7 @@ class Overheard:
         """Hash what is seen, and who ends and why; then decide."""
         self._ledger.add("observations", observations)
         actions = self._policy.act(observations)
-        self._ledger.add(
-            "stops", {agent: act.reason for agent, act in actions.items() if isinstance(act, Stop)}
-        )
+        self._ledger.add("stops", {agent: act.reason for agent, act in actions.items() if isinstance(act, Stop)})
         return actions
 
 

@@ -98,9 +98,7 @@ class PlainWorld:
         # The chord of an arc points halfway between its headings.
         half = 0.5 * turn_rate * duration
         chord = speed * duration * np.sinc(half / math.pi)
-        place, is_free = self._pushed_out(
-            row, self.poses[row, :2] + chord * _direction(heading - half), heading
-        )
+        place, is_free = self._pushed_out(row, self.poses[row, :2] + chord * _direction(heading - half), heading)
         self.poses[row, 2] = heading
         if is_free:
             self.poses[row, :2] = place

@@ -26,9 +26,9 @@ def scan(walls, pose, geometry, noise=0.0, seed=0):
         shares = (offset[..., 0] * directions[..., 1] - offset[..., 1] * directions[..., 0]) / across
     is_met = (ranges > 0.0) & (shares >= 0.0) & (shares <= 1.0)
     nearest = np.where(is_met, ranges, np.inf).min(axis=1)
-    noisy = nearest + noise * np.maximum(
-        1.0, np.where(np.isfinite(nearest), nearest, 1.0)
-    ) * np.random.default_rng(seed).standard_normal(geometry.beams)
+    noisy = nearest + noise * np.maximum(1.0, np.where(np.isfinite(nearest), nearest, 1.0)) * np.random.default_rng(
+        seed
+    ).standard_normal(geometry.beams)
     return np.where(noisy <= geometry.range_max, noisy, np.inf).astype(np.float32)
 
 

@@ -62,9 +62,7 @@ class Gui:
         return self._add(label)
 
     def add_dropdown(self, label, options, initial_value=None):
-        return self._add(
-            label, options=options, value=self._choices.get(label) or initial_value or options[0]
-        )
+        return self._add(label, options=options, value=self._choices.get(label) or initial_value or options[0])
 
     def add_checkbox(self, label, value):
         return self._add(label, value=value)

@@ -72,10 +72,7 @@ def oracle(belief, footprint, start, closed=None):
                 tails.append(row * columns + column)
                 heads.append(to_row * columns + to_column)
                 costs.append(
-                    math.hypot(up, right)
-                    * RESOLUTION
-                    * 0.5
-                    * (factor[row, column] + factor[to_row, to_column])
+                    math.hypot(up, right) * RESOLUTION * 0.5 * (factor[row, column] + factor[to_row, to_column])
                 )
     graph = coo_matrix((costs, (tails, heads)), shape=(belief.size, belief.size)).tocsr()
     return dijkstra(graph, indices=start[0] * columns + start[1]).reshape(belief.shape), open_cells

@@ -11,9 +11,7 @@ HERE = np.zeros(2)
 
 def box_view(half=2.0, door=None):
     """What is seen from the middle of a square room; through a door, between two angles, nothing is met."""
-    view = np.minimum(
-        half / np.maximum(np.abs(UNIT[:, 0]), 1e-9), half / np.maximum(np.abs(UNIT[:, 1]), 1e-9)
-    )
+    view = np.minimum(half / np.maximum(np.abs(UNIT[:, 0]), 1e-9), half / np.maximum(np.abs(UNIT[:, 1]), 1e-9))
     if door is not None:
         view[(door[0] <= ANGLES) & (door[1] >= ANGLES)] = np.inf
     return view

@@ -45,9 +45,7 @@ CASES: dict[str, Case] = {
     # Levels of decision, floors, bodies, lasers, sizes of teams.
     "velocity": team("apartment", 300, robots=3),
     "velocity_one_robot": team("building:5", 300, robots=1, noise="thesis", observe=ALL_SEEN),
-    "velocity_nine_robots": team(
-        "scene_loop", 50, robots=9, noise="datasheet", threads=THREADS, lidar="lidar_360_6m"
-    ),
+    "velocity_nine_robots": team("scene_loop", 50, robots=9, noise="datasheet", threads=THREADS, lidar="lidar_360_6m"),
     "velocity_unknown_starts": team(
         "clinic",
         300,
@@ -66,9 +64,7 @@ CASES: dict[str, Case] = {
     "goal": team("srt_l_room", 300, robots=1, goal_radius=4.5),
     "covered": team("scene_room", 30, "frontier", robots=3, stop_coverage=0.6),
     "waypoint": team("apartment", 60, "waypoint", robots=3),
-    "waypoint_unknown_starts": team(
-        "building:5", 40, "waypoint", robots=2, known_starts=False, noise="datasheet"
-    ),
+    "waypoint_unknown_starts": team("building:5", 40, "waypoint", robots=2, known_starts=False, noise="datasheet"),
     "waypoint_orders": team("clinic", 30, "waypoint", ordered=True, robots=2),
     "frontier": team("apartment", 60, "frontier", robots=3, stop_coverage=0.99),
     "frontier_one_robot": team("building:17", 50, "frontier", robots=1, observe=ALL_SEEN),
@@ -78,22 +74,16 @@ CASES: dict[str, Case] = {
     "odometry_ideal": team("apartment", 200, robots=2, localization="odometry"),
     "odometry_good": team("apartment", 200, robots=2, localization="odometry", odometry="good"),
     "odometry_typical": team("clinic", 40, "frontier", robots=2, localization="odometry", odometry="typical"),
-    "odometry_poor": team(
-        "clinic", 200, robots=2, localization="odometry", odometry="poor", known_starts=False
-    ),
+    "odometry_poor": team("clinic", 200, robots=2, localization="odometry", odometry="poor", known_starts=False),
     "slam_ideal": team("apartment", 200, solves=True, robots=2, localization="slam"),
     "slam_typical": team("apartment", 14, "frontier", solves=True, robots=2, **REAL),
     "splines_ideal": team("srt_l_room", 100, solves=True, robots=1, localization="splines"),
     "splines_typical": team("clinic", 100, solves=True, robots=2, **{**REAL, "localization": "splines"}),
     "splines_ekf_ideal": team("srt_l_room", 150, solves=True, robots=1, localization="splines_ekf"),
-    "splines_ekf_typical": team(
-        "clinic", 80, solves=True, robots=2, **{**REAL, "localization": "splines_ekf"}
-    ),
+    "splines_ekf_typical": team("clinic", 80, solves=True, robots=2, **{**REAL, "localization": "splines_ekf"}),
     # Radios, faults, energy, pauses, all of it.
     "radio_none": team("apartment", 30, "frontier", robots=3, radio="none"),
-    "radio_range": team(
-        "apartment", 40, "frontier", robots=3, radio=part("RadioSettings", kind="range", reach=4.0)
-    ),
+    "radio_range": team("apartment", 40, "frontier", robots=3, radio=part("RadioSettings", kind="range", reach=4.0)),
     "radio_line_of_sight": team("clinic", 40, "frontier", robots=3, radio="line_of_sight"),
     "radio_signal": team("clinic", 40, "frontier", robots=3, radio="signal"),
     "radio_weak": team("office:3", 40, "frontier", robots=4, radio=WEAK),
@@ -107,24 +97,16 @@ CASES: dict[str, Case] = {
     "field": team("apartment", 10, "frontier", solves=True, robots=3, realism="field"),
     # Merged maps.
     "merged_velocity": team("scene_room", 150, merged=False, robots=2, known_starts=False),
-    "merged_frontier": team(
-        "apartment", 30, "frontier", merged=False, robots=3, known_starts=False, noise="datasheet"
-    ),
-    "merged_told": team(
-        "clinic", 30, "waypoint", merged=True, robots=3, known_starts=False, radio="line_of_sight"
-    ),
+    "merged_frontier": team("apartment", 30, "frontier", merged=False, robots=3, known_starts=False, noise="datasheet"),
+    "merged_told": team("clinic", 30, "waypoint", merged=True, robots=3, known_starts=False, radio="line_of_sight"),
     # One robot by Gymnasium, turns by PettingZoo, rows.
     "solo_velocity": solo("Exploration", "velocity", 200, floor="building:3", max_cycles=180),
     "solo_waypoint": solo("WaypointExploration", "waypoint", 30, floor="srt_t_junction"),
     "solo_frontier": solo("FrontierExploration", "frontier", 40, floor="scene_loop_corridor"),
     "turns": turns("clinic", 300, robots=2, max_cycles=100),
-    "rows_velocity": rows(
-        "set:train", 200, robots=2, max_cycles=90, observe=ALL_SEEN, threads=THREADS, starts="fixed"
-    ),
+    "rows_velocity": rows("set:train", 200, robots=2, max_cycles=90, observe=ALL_SEEN, threads=THREADS, starts="fixed"),
     "rows_waypoint": rows("apartment", 30, "waypoint", robots=2, noise="datasheet", copy=False),
-    "rows_frontier": rows(
-        "building:5", 30, "frontier", robots=3, threads=THREADS, max_cycles=400, known_starts=False
-    ),
+    "rows_frontier": rows("building:5", 30, "frontier", robots=3, threads=THREADS, max_cycles=400, known_starts=False),
     "rows_faults": rows("clinic", 20, "frontier", robots=3, threads=1, faults=faults, radio="range"),
     "rows_field": rows("clinic", 6, "frontier", solves=True, threads=1, robots=2, realism="field"),
     "rows_registered": rows("clinic", 20, "waypoint", made_rows),
@@ -136,9 +118,7 @@ CASES: dict[str, Case] = {
         "nearest_frontier", "clinic", 300, each=True, robots=2, radio="range", noise="datasheet"
     ),
     "nearest_frontier_own_map": policy("nearest_frontier_own_map", "clinic", 1200, robots=2),
-    "nearest_frontier_merged": policy(
-        "nearest_frontier", "apartment", 400, merged=True, robots=2, known_starts=False
-    ),
+    "nearest_frontier_merged": policy("nearest_frontier", "apartment", 400, merged=True, robots=2, known_starts=False),
     "utility_frontier": policy("utility_frontier", "building:17", 1000, robots=3),
     "explore_lite": policy("explore_lite", "office:3", 1000, robots=2, noise="thesis"),
     "srt": policy("srt", "srt_l_room", 300, robots=1, solves=True),
@@ -256,9 +236,7 @@ def difference(kept: dict[str, Any], found: dict[str, Any]) -> list[str]:
             )
             first = block * kept["block"]
             where = (
-                f"steps {first} to {first + kept['block']}"
-                if block < len(marks)
-                else f"what comes after step {first}"
+                f"steps {first} to {first + kept['block']}" if block < len(marks) else f"what comes after step {first}"
             )
             said.append(f"{part_name} differ, first in {where}")
     return said

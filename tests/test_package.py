@@ -148,9 +148,7 @@ def test_every_public_function_and_class_is_documented():
                     f"{module.__name__}.{name}.{attribute}"
                     for attribute, value in vars(plain).items()
                     if not attribute.startswith("_")
-                    and (
-                        inspect.isfunction(value) or isinstance(value, (property, classmethod, staticmethod))
-                    )
+                    and (inspect.isfunction(value) or isinstance(value, (property, classmethod, staticmethod)))
                     and not inspect.getdoc(getattr(value, "__func__", value))
                 ]
     assert not missing
@@ -164,9 +162,7 @@ def test_every_public_function_outside_of_kernels_has_type_hints():
                 "kernel" in ast.unparse(each) for each in node.decorator_list
             ):
                 arguments = [
-                    each
-                    for each in (*node.args.args, *node.args.kwonlyargs)
-                    if each.arg not in ("self", "cls")
+                    each for each in (*node.args.args, *node.args.kwonlyargs) if each.arg not in ("self", "cls")
                 ]
                 if not node.name.startswith("_") and (
                     node.returns is None or any(each.annotation is None for each in arguments)

@@ -28,9 +28,7 @@ def test_an_item_is_found_by_its_name_and_imported_when_asked_for(shapes):
 
 
 def test_an_unknown_name_is_refused_with_the_nearest_one(shapes):
-    with pytest.raises(
-        ValueError, match=r"unknown shape 'squar'; did you mean 'square'\? \(known: square, triangle\)"
-    ):
+    with pytest.raises(ValueError, match=r"unknown shape 'squar'; did you mean 'square'\? \(known: square, triangle\)"):
         shapes["squar"]
     with pytest.raises(KeyError):
         shapes["squar"]

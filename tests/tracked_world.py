@@ -35,9 +35,7 @@ SCANS = [scan(WORLD_2, pose, LASER, noise=0.01, seed=k) for k, pose in enumerate
 
 def follow(localizer, odometry, seed=0, scans=SCANS):
     localizer.reset(POSES[0], seed)
-    return np.array(
-        [localizer.localize(Sensing(0.1 * k, odometry[k], ranges)) for k, ranges in enumerate(scans)]
-    )
+    return np.array([localizer.localize(Sensing(0.1 * k, odometry[k], ranges)) for k, ranges in enumerate(scans)])
 
 
 def gap(first, second):

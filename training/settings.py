@@ -160,8 +160,7 @@ class _ValidationSettings:
         check_settings(self, "validation")
         if not self.floors or not all(isinstance(floor, str) for floor in self.floors):
             raise ValueError(
-                f"floors of validation is {shown(self.floors)}; want names of floors, as in "
-                '["set:validation:16"]'
+                f'floors of validation is {shown(self.floors)}; want names of floors, as in ["set:validation:16"]'
             )
         _check_sizes(self.robots, "validation")
 
@@ -193,9 +192,7 @@ class TrainingSettings:
         check_settings(self, "training")
         if "robots" in self.settings:
             raise ValueError("settings has 'robots'; want them in [[rounds]] and [validation]")
-        for size in sorted(
-            {*self.validation.robots, *(size for each in self.rounds for size in each.robots)}
-        ):
+        for size in sorted({*self.validation.robots, *(size for each in self.rounds for size in each.robots)}):
             self.team(size)
 
     @property
@@ -222,9 +219,7 @@ def read_training(path: Path) -> TrainingSettings:
     """Read the settings of a training from a TOML file."""
     path = Path(path)
     if not path.exists():
-        raise FileNotFoundError(
-            f"no training {path}; want a TOML file, as docs/tutorials/train_a_team.md shows one"
-        )
+        raise FileNotFoundError(f"no training {path}; want a TOML file, as docs/tutorials/train_a_team.md shows one")
     text = read_text(path, MOST_BYTES)
     with reading(path, "TOML"):
         content = tomllib.loads(text)

@@ -107,9 +107,7 @@ class Seen:
     """
 
     def __init__(self, decisions: Decisions) -> None:
-        self._take(
-            {field.name: torch.from_numpy(getattr(decisions, field.name)) for field in fields(decisions)}
-        )
+        self._take({field.name: torch.from_numpy(getattr(decisions, field.name)) for field in fields(decisions)})
 
     @classmethod
     def of(cls, tensors: Mapping[str, Tensor]) -> "Seen":

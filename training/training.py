@@ -91,9 +91,7 @@ class Training:
         if path.exists():
             return path
         parts = [load_weights(file) for file in files]
-        mean = {
-            name: np.asarray(np.mean([part[name] for part in parts], axis=0), np.float32) for name in parts[0]
-        }
+        mean = {name: np.asarray(np.mean([part[name] for part in parts], axis=0), np.float32) for name in parts[0]}
         save_weights(path, mean)
         return path
 
@@ -115,9 +113,7 @@ class Training:
         if not path.exists():
             clear_unfinished(self.folder, ".json")
             if self.folder.exists() and any(self.folder.iterdir()):
-                raise ValueError(
-                    f"{self.folder} has files, and no training has written them; choose another folder"
-                )
+                raise ValueError(f"{self.folder} has files, and no training has written them; choose another folder")
             write_json(path, asked)
             return
         with reading(path, "what a training was asked for"):
@@ -155,8 +151,7 @@ class Training:
         best = self._best(candidates)
         digest = save_weights(self.folder / WEIGHTS_FILE, load_weights(candidates[best]))
         fits = {
-            f"round-{number}": _fitted(RoundFolder(self.folder, number))
-            for number in range(len(self.settings.rounds))
+            f"round-{number}": _fitted(RoundFolder(self.folder, number)) for number in range(len(self.settings.rounds))
         }
         card = {
             "sha256": digest,

@@ -86,9 +86,7 @@ def times(pythons: list[str], threads: int, rounds: int, blocks: int) -> dict[st
                 for k, process in enumerate(processes):
                     answer = _answer(process, f"{kind}{place}\n")
                     if not answer:
-                        raise RuntimeError(
-                            f"{pythons[k]} has ended; is lidarium with its benchmarks installed there?"
-                        )
+                        raise RuntimeError(f"{pythons[k]} has ended; is lidarium with its benchmarks installed there?")
                     found[kind][k, block] = float(answer)
     finally:
         for process in processes:
@@ -110,9 +108,7 @@ def _answer(process: "subprocess.Popen[str]", question: str) -> str:
 def main() -> None:
     """Compare two checkouts and print medians with quartiles."""
     parser = argparse.ArgumentParser(description="Steps of this code beside those of another checkout.")
-    parser.add_argument(
-        "other", nargs="?", help="interpreter of a virtual environment with the other checkout"
-    )
+    parser.add_argument("other", nargs="?", help="interpreter of a virtual environment with the other checkout")
     parser.add_argument("--threads", type=int, default=1)
     parser.add_argument("--rounds", type=int, default=3, help="each begins with blank maps")
     parser.add_argument("--blocks", type=int, default=40, help=f"blocks of {STEPS} steps in a round")

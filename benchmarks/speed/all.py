@@ -100,9 +100,7 @@ def result_of(names: Sequence[str], lines: Sequence[Line], command: str, effort:
 def main() -> None:
     """Measure, print and write."""
     parser = with_effort(argparse.ArgumentParser(description="All speed benchmarks in one run."))
-    parser.add_argument(
-        "--out", type=Path, default=Path("docs/results"), help="folder of speed.md and speed.json"
-    )
+    parser.add_argument("--out", type=Path, default=Path("docs/results"), help="folder of speed.md and speed.json")
     chosen = parser.parse_args()
     effort = EFFORTS[chosen.effort]
     lines: list[Line] = []

@@ -104,9 +104,7 @@ def _map(
         log_odds = grid_at(maps[row, 0], maps[row, 1], maps[row, 2], np.int8)
         box = (boxes[row, 0], boxes[row, 1], boxes[row, 2], boxes[row, 3])
         touched = grid_at(maps[row, 3], maps[row, 4], touched_words(maps[row, 2]), np.uint64)
-        seen = SeenScan(
-            bits[row], hit_bits[row], box, ends[row], is_hit[row], corners[row, 0], corners[row, 1]
-        )
+        seen = SeenScan(bits[row], hit_bits[row], box, ends[row], is_hit[row], corners[row, 0], corners[row, 1])
         integrate_scan(log_odds, seen, increments, touched)
 
 
@@ -179,9 +177,7 @@ class StepParts:
         self.parts: dict[str, Callable[[], object]] = {
             "motion and contact": move,
             "directions of the beams": partial(_directions, poses, lidar.unit_vectors, directions),
-            "ray casting": partial(
-                _rays, floor_row, places, directions, lidar.angle_first, increment, reach, lengths
-            ),
+            "ray casting": partial(_rays, floor_row, places, directions, lidar.angle_first, increment, reach, lengths),
             "noise": partial(_noise, GAUSSIAN_TABLE, np.empty((ROBOTS, beams), np.float32)),
             "area seen by the true beams": partial(
                 _fill, lengths, directions, inside, increment, clean_ends, clean_bits, clean_boxes
@@ -243,8 +239,7 @@ def profile_table(profiles: Mapping[str, tuple[Mapping[str, float], float, float
     lines = [f"| part |{header}", f"|---|{'---:|---:|' * len(profiles)}"]
     for name in names:
         cells = "".join(
-            f" {spent[name]:.2f} | {100.0 * spent[name] / spent[WHOLE]:.0f} % |"
-            for spent, _, _ in profiles.values()
+            f" {spent[name]:.2f} | {100.0 * spent[name] / spent[WHOLE]:.0f} % |" for spent, _, _ in profiles.values()
         )
         lines.append(f"| {name} |{cells}")
     return "\n".join(lines)
@@ -275,8 +270,7 @@ def main() -> None:
     straight = straight_floor()
     with on_cores(1):
         profiles = {
-            name: profile(floor, effort)
-            for name, floor in (("straight", straight), ("turned", turned_floor(straight)))
+            name: profile(floor, effort) for name, floor in (("straight", straight), ("turned", turned_floor(straight)))
         }
     print(profile_table(profiles), *rates(profiles), sep="\n")
     if chosen.out is not None:
@@ -285,9 +279,7 @@ def main() -> None:
         write_text(chosen.out / "profile.md", profile_page(profiles, effort, command))
 
 
-def profile_page(
-    profiles: Mapping[str, tuple[Mapping[str, float], float, float]], effort: Effort, command: str
-) -> str:
+def profile_page(profiles: Mapping[str, tuple[Mapping[str, float], float, float]], effort: Effort, command: str) -> str:
     """Write the page of the profile."""
     return "\n".join(
         [

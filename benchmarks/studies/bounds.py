@@ -102,9 +102,7 @@ class Team:
 
 def settings_of(robots: int) -> ExplorationSettings:
     """Return the settings of all teams."""
-    return make_settings(
-        robots=robots, starts="drawn", resolution=0.05, stop_coverage=GOAL, horizon_s=HORIZON_S
-    )
+    return make_settings(robots=robots, starts="drawn", resolution=0.05, stop_coverage=GOAL, horizon_s=HORIZON_S)
 
 
 def measure_small(small: Small) -> dict[str, Any]:

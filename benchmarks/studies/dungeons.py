@@ -225,8 +225,7 @@ def _all_maps(ours: Ways) -> str:
         names = sorted(episodes)
         ways, others = ([way(found[name], "d99_m") for name in names] for found in (episodes, baseline))
         times, base = (
-            [float(found[name]["t99_s"] or SETTINGS["horizon_s"]) for name in names]
-            for found in (episodes, baseline)
+            [float(found[name]["t99_s"] or SETTINGS["horizon_s"]) for name in names] for found in (episodes, baseline)
         )
         reached = sum(episodes[name]["t99_s"] is not None for name in names)
         ratios = ["1", "1"] if policy == POLICIES[0] else [_interval(ways, others), _interval(times, base)]
@@ -250,9 +249,7 @@ def _by_ariadne(ours: Ways) -> str:
         ended = sum(STOP_REASON in each["ended_because"].values() for each in episodes.values())
         ratio = "1" if policy == POLICIES[0] else _interval(ways, others)
         on_own = np.mean([sum(episodes[name]["path_m"]) for name in own]) if own else np.nan
-        rows.append(
-            f"| `{policy}` | {ended} of {len(episodes)} | {np.mean(ways):.1f} | {ratio} | {on_own:.1f} |"
-        )
+        rows.append(f"| `{policy}` | {ended} of {len(episodes)} | {np.mean(ways):.1f} | {ratio} | {on_own:.1f} |")
     return "\n".join(rows)
 
 

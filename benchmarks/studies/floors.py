@@ -156,9 +156,7 @@ def _all_runs(runs: Sequence[Row]) -> list[str]:
     for row in runs:
         by_floor[row["kind"], row["floor"]][row["robots"]] = row
     lines = ["| floor | m2 | 1 robot | 2 robots | 3 robots |", "|---|---|---|---|---|"]
-    for (_, floor), cells in sorted(
-        by_floor.items(), key=lambda item: (list(KINDS).index(item[0][0]), item[0][1])
-    ):
+    for (_, floor), cells in sorted(by_floor.items(), key=lambda item: (list(KINDS).index(item[0][0]), item[0][1])):
         area = next(iter(cells.values()))["area_m2"]
         shown = [
             f"{cells[robots]['coverage']:.3f} / {cells[robots]['time_s']:.0f} / {cells[robots]['path_m']:.0f}"

@@ -164,15 +164,11 @@ def cases(resamples: int) -> Iterator[Case]:
         yield Case("success rate", f"true rate {share:g}", share, partial(_share, share), is_asked_for=False)
 
 
-def _on_first(
-    family: Family, figure: Callable[..., Interval]
-) -> Callable[[np.random.Generator, int, int], Interval]:
+def _on_first(family: Family, figure: Callable[..., Interval]) -> Callable[[np.random.Generator, int, int], Interval]:
     return lambda generator, size, seed: figure(family.pairs(generator, size)[0], seed=seed)
 
 
-def _on_both(
-    family: Family, figure: Callable[..., Interval]
-) -> Callable[[np.random.Generator, int, int], Interval]:
+def _on_both(family: Family, figure: Callable[..., Interval]) -> Callable[[np.random.Generator, int, int], Interval]:
     return lambda generator, size, seed: figure(*family.pairs(generator, size), seed=seed)
 
 
@@ -306,11 +302,7 @@ def page(folder: Path, command: str) -> str:
         "before a fifth of its times, and the horizon is its upper quartile.",
         "",
         f"**Reached in {asked - len(missed)} of {asked} rows that are asked for.**"
-        + (
-            ""
-            if not missed
-            else " Missed: " + "; ".join(f"{line['figure']}, {line['data']}" for line in missed) + "."
-        ),
+        + ("" if not missed else " Missed: " + "; ".join(f"{line['figure']}, {line['data']}" for line in missed) + "."),
         *_tables(lines),
         "",
         "*refused*: trials in which the longest time was cut before the horizon, so that the mean up to "
@@ -332,12 +324,9 @@ def _tables(lines: Sequence[Line]) -> list[str]:
                 f"| data | {' | '.join(f'n = {size}' for size in SIZES)} | 93 to 97 from n = 50 |",
                 "|---|" + "---|" * (len(SIZES) + 1),
             ]
-        verdict = ("yes" if is_reached(line["shares"]) else "**no**") + (
-            "" if line["is_asked_for"] else " (beyond)"
-        )
+        verdict = ("yes" if is_reached(line["shares"]) else "**no**") + ("" if line["is_asked_for"] else " (beyond)")
         cells = [
-            f"{100.0 * share:.1f}{f' ({refused} refused)' if refused else ''}"
-            for share, refused in line["shares"]
+            f"{100.0 * share:.1f}{f' ({refused} refused)' if refused else ''}" for share, refused in line["shares"]
         ]
         rows.append(f"| {line['data']} | {' | '.join(cells)} | {verdict} |")
     return rows

@@ -120,9 +120,7 @@ def senders_table(episodes: Mapping[str, Times]) -> str:
             counts = [run["decided_by"] for run in runs if run.get("decided_by")]
             if not counts:
                 continue
-            sums = [
-                sum(count.get(sender, 0) for count in counts) for sender in (BY_TOURS, CORRECTED, NEAREST)
-            ]
+            sums = [sum(count.get(sender, 0) for count in counts) for sender in (BY_TOURS, CORRECTED, NEAREST)]
             shares = " | ".join(f"{100 * each / sum(sums):.1f} %" for each in sums)
             ending = np.mean([NEAREST in count for count in counts])
             often = f"{sum(sums) / len(counts):.1f}"
@@ -247,9 +245,7 @@ def suites(data: Path | None, every: int = 1) -> dict[str, Suite]:
     floors = {"test": list(set_floors("test"))[::every]}
     if data is not None:
         real = {kind: paths for kind, paths in real_floors(data).items() if kind in KINDS}
-        floors |= {
-            kind: [str(path) for path in paths[REAL_FLOORS[kind]][::every]] for kind, paths in real.items()
-        }
+        floors |= {kind: [str(path) for path in paths[REAL_FLOORS[kind]][::every]] for kind, paths in real.items()}
     found = {}
     for kind, names in floors.items():
         found[kind] = _suite((TOURS, LEARNED), names)

@@ -330,9 +330,7 @@ def page(folder: Path, command: str) -> str:
         group=MOST_VALUES,
         limit=round(MAX_FILE_BYTES / line_bytes, -4),
         mb_each=1e3 * again["report_mb"] / again["episodes"],
-        gains="\n".join(
-            _gain_row(count, compared) for count in sorted({each["episodes"] for each in compared})
-        ),
+        gains="\n".join(_gain_row(count, compared) for count in sorted({each["episodes"] for each in compared})),
         killed=killed["killed"],
         killed_episodes=killed["episodes"],
     )

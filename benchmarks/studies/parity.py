@@ -86,8 +86,7 @@ def measure(drive: Drive) -> dict[str, Any]:
         "localization": "odometry",
     }
     envs = [
-        ExplorationEnv(drive.floor, make_settings(backend=backend, **options))
-        for backend in ("bullet", "kinematic")
+        ExplorationEnv(drive.floor, make_settings(backend=backend, **options)) for backend in ("bullet", "kinematic")
     ]
     bullet, kinematic = (env.world for env in envs)
     assert isinstance(bullet, BulletWorld)

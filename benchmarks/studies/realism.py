@@ -186,9 +186,7 @@ def aligned_iou(env: ExplorationEnv, believed: NDArray[np.float64], true: NDArra
     rows, columns = np.indices(log_odds.shape)
     centres = np.stack([columns, rows], axis=-1) * resolution + 0.5 * resolution + np.array(origin)
     cells = (
-        np.floor((there.apply(centres.reshape(-1, 2)) - origin) / resolution)
-        .astype(np.int64)
-        .reshape(centres.shape)
+        np.floor((there.apply(centres.reshape(-1, 2)) - origin) / resolution).astype(np.int64).reshape(centres.shape)
     )
     is_inside = ((cells >= 0) & (cells < log_odds.shape[::-1])).all(axis=-1)
     laid = np.zeros(log_odds.shape, np.bool_)
@@ -322,9 +320,7 @@ def rows_of(episodes: list[dict[str, Any]]) -> Iterator[str]:
         own = [one for one in episodes if (one["floor"], one["robots"]) == key]
         names = ("ate_m", "aligned_m", "last_m", "wheels_m", "way_m")
         ate, aligned, last, wheels, way = (np.concatenate([one[name] for one in own]) for name in names)
-        coverage, iou, fitted = (
-            np.array([one[name] for one in own]) for name in ("coverage", "iou", "aligned_iou")
-        )
+        coverage, iou, fitted = (np.array([one[name] for one in own]) for name in ("coverage", "iou", "aligned_iou"))
         yield (
             f"| {key[0]} | {key[1]} | {np.median(way):.0f} | {np.median(coverage):.3f} | "
             f"{np.median(aligned):.3f} ({aligned.max():.3f}) "

@@ -111,9 +111,7 @@ def view_around(shown: NDArray[np.bool_], origin: tuple[float, float], resolutio
     resolution : float
         Side of a cell [m].
     """
-    rows, columns = (
-        _span(np.asarray(shown.any(axis=axis)), math.ceil(_MARGIN / resolution)) for axis in (1, 0)
-    )
+    rows, columns = (_span(np.asarray(shown.any(axis=axis)), math.ceil(_MARGIN / resolution)) for axis in (1, 0))
     tall, wide = ((span.stop - span.start) * resolution for span in (rows, columns))
     scale = size / max(tall, wide)
     corner = (origin[0] + columns.start * resolution, origin[1] + rows.start * resolution)
@@ -179,12 +177,8 @@ def draw_robots(
         centre, tip = view.pixels(np.stack([(x, y), (x + ahead[0], y + ahead[1])]))
         place = (int(centre[0]), int(centre[1]))
         cv2.circle(frame, place, round((shown + 1.5) * fixed), EXPLORED, -1, cv2.LINE_AA, SHIFT)
-        cv2.circle(
-            frame, place, round(shown * fixed), _paler(colour) if is_over else colour, -1, cv2.LINE_AA, SHIFT
-        )
-        cv2.line(
-            frame, place, (int(tip[0]), int(tip[1])), EXPLORED, max(round(shown / 4), 1), cv2.LINE_AA, SHIFT
-        )
+        cv2.circle(frame, place, round(shown * fixed), _paler(colour) if is_over else colour, -1, cv2.LINE_AA, SHIFT)
+        cv2.line(frame, place, (int(tip[0]), int(tip[1])), EXPLORED, max(round(shown / 4), 1), cv2.LINE_AA, SHIFT)
 
 
 def pale(colour: Colour) -> Colour:
@@ -224,9 +218,7 @@ def _header(name: str, share: float, time_s: float, width: int) -> Frame:
     return header
 
 
-def line_of_text(
-    words: str, size: tuple[int, int], colour: Colour, background: Colour, right: str = ""
-) -> Frame:
+def line_of_text(words: str, size: tuple[int, int], colour: Colour, background: Colour, right: str = "") -> Frame:
     """Return a line of words, and others at its right end.
 
     It has as many letters of the first as there is room for. The size is (width, height) [pixels].
@@ -273,6 +265,4 @@ def _framed(picture: Frame, width: int) -> Frame:
 def even(picture: Frame) -> Frame:
     """Return a picture both sides of which are even, as video codecs want them."""
     rows, columns = picture.shape[0] % 2, picture.shape[1] % 2
-    return np.asarray(
-        cv2.copyMakeBorder(picture, 0, rows, 0, columns, cv2.BORDER_CONSTANT, value=BACKGROUND), np.uint8
-    )
+    return np.asarray(cv2.copyMakeBorder(picture, 0, rows, 0, columns, cv2.BORDER_CONSTANT, value=BACKGROUND), np.uint8)

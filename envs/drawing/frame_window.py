@@ -60,9 +60,7 @@ class FrameWindow:
         try:
             # Making a figure settles which backend there is; each toolkit has an error of its own for want of
             # a display.
-            figure = pyplot.figure(
-                self._title, figsize=(frame.shape[1] / 100.0, frame.shape[0] / 100.0), dpi=100
-            )
+            figure = pyplot.figure(self._title, figsize=(frame.shape[1] / 100.0, frame.shape[0] / 100.0), dpi=100)
             has_display = figure.canvas.required_interactive_framework is not None
         except Exception:
             has_display = False

@@ -88,9 +88,7 @@ def view_of(tables: FloorTables, size: int) -> View:
     return view_around(raster.solid == 0, raster.origin, raster.resolution, size)
 
 
-def draw_frame(
-    scene: Scene, size: int = SIZE, draw_over: Callable[[Frame, View], None] | None = None
-) -> Frame:
+def draw_frame(scene: Scene, size: int = SIZE, draw_over: Callable[[Frame, View], None] | None = None) -> Frame:
     """Draw an environment from above.
 
     True state: free floor is faint if unexplored and white if the team has sensed it, walls are dark if the
@@ -169,9 +167,7 @@ def _shrunk(cells: NDArray[np.uint8], block: int) -> NDArray[np.uint8]:
         return cells
     rows, columns = (side // block for side in cells.shape)
     whole = cells[: rows * block, : columns * block]
-    return np.asarray(
-        whole.reshape(rows, block, columns * block).max(axis=1).reshape(rows, columns, block).max(axis=2)
-    )
+    return np.asarray(whole.reshape(rows, block, columns * block).max(axis=1).reshape(rows, columns, block).max(axis=2))
 
 
 def classify(

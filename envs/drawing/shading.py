@@ -66,17 +66,13 @@ class Viewpoint:
     field_of_view: float
 
     @classmethod
-    def towards(
-        cls, eye: NDArray[np.float64], target: NDArray[np.float64], field_of_view: float
-    ) -> "Viewpoint":
+    def towards(cls, eye: NDArray[np.float64], target: NDArray[np.float64], field_of_view: float) -> "Viewpoint":
         """Return the viewpoint that sees a target (3,) [m] in the middle of its picture."""
         ahead = (target - eye) / np.linalg.norm(target - eye)
         upward = np.array((0.0, 0.0, 1.0) if abs(ahead[2]) < 0.999 else (0.0, 1.0, 0.0))
         right = np.cross(ahead, upward)
         right /= np.linalg.norm(right)
-        return cls(
-            np.asarray(eye, np.float64), np.stack([right, np.cross(ahead, right), ahead]), field_of_view
-        )
+        return cls(np.asarray(eye, np.float64), np.stack([right, np.cross(ahead, right), ahead]), field_of_view)
 
 
 @kernel
@@ -174,12 +170,8 @@ def shade(
             numbers,
             len(faces) + 2 * number,
         )
-    sides_and_tops = [
-        [share * part for part in colour] for colour in colours for share in (_SIDE_BRIGHTNESS, 1.0)
-    ]
-    palette = np.concatenate(
-        [_face_colours(faces, walls), np.array(sides_and_tops).reshape(-1, 3), [_BACKGROUND]]
-    )
+    sides_and_tops = [[share * part for part in colour] for colour in colours for share in (_SIDE_BRIGHTNESS, 1.0)]
+    palette = np.concatenate([_face_colours(faces, walls), np.array(sides_and_tops).reshape(-1, 3), [_BACKGROUND]])
     return np.asarray(_with_edges(palette[numbers], numbers), np.uint8)
 
 

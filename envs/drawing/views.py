@@ -85,9 +85,7 @@ class FloorViews:
         """Return the view of a robot's camera in colours."""
         axes, eye = np.empty((3, 3)), np.empty(3)
         place_camera(poses[robot], attitudes[robot], camera.mount, axes, eye)
-        return self._picture(
-            self._whole, Viewpoint(eye, axes, camera.field_of_view), size, poses, without=robot
-        )
+        return self._picture(self._whole, Viewpoint(eye, axes, camera.field_of_view), size, poses, without=robot)
 
     def depth(
         self, poses: NDArray[np.float64], attitudes: NDArray[np.float64], robot: int, camera: DepthCamera

@@ -357,9 +357,7 @@ class Engine:
             self.stations[episode].start()
         self.level.start(episode)
 
-    def _advance(
-        self, modes: NDArray[np.int8], seen: NDArray[np.bool_], after_step: AfterStep | None
-    ) -> None:
+    def _advance(self, modes: NDArray[np.int8], seen: NDArray[np.bool_], after_step: AfterStep | None) -> None:
         """Run the episodes and write observations: all in one kernel call, or step by step."""
         is_stepped = (
             after_step is not None
@@ -373,9 +371,7 @@ class Engine:
         else:
             self.run_kernel(modes, self._commands, seen)
 
-    def run_kernel(
-        self, modes: NDArray[np.int8], commands: NDArray[np.float64], seen: NDArray[np.bool_]
-    ) -> None:
+    def run_kernel(self, modes: NDArray[np.int8], commands: NDArray[np.float64], seen: NDArray[np.bool_]) -> None:
         """Run episodes by the kernel alone, without beginnings, endings and infos.
 
         ``modes`` (episodes,) int8 are the modes of the episodes, ``commands`` (rows, 2) are the speeds of those that
@@ -386,9 +382,7 @@ class Engine:
         self._orders.reverse()
         run = run_parallel if threads > 1 else run_serial
         sources, observed = self._writer.arguments(self.observations)
-        call = Run(
-            self.simulation.table, self.robots, modes, commands, self.level.steps, self._waiting, seen, sources
-        )
+        call = Run(self.simulation.table, self.robots, modes, commands, self.level.steps, self._waiting, seen, sources)
         work = new_work(self._orders[0], threads)
         run(call, self.level.drives, self.level.following, self._rules, observed, work)
         self._writer.copy_sensors(self.observations, seen)

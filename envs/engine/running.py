@@ -85,9 +85,7 @@ def follow_some(
     for episode in range(decides.shape[0]):
         if decides[episode]:
             first, last = episode * robots, (episode + 1) * robots
-            follow_team(
-                drives, following, first, last, world.believed, world.measured, world.ranges, commands
-            )
+            follow_team(drives, following, first, last, world.believed, world.measured, world.ranges, commands)
 
 
 @kernel
@@ -95,9 +93,7 @@ def note_ends(modes: Array, robots: int, table: Array, drives: Drives, rules: Ru
     """Mark the episodes as waiting that end their run with the last step."""
     world = world_at(table)
     for episode in range(modes.shape[0]):
-        if modes[episode] != WAITS and _ends(
-            world, episode, robots, drives, rules, waiting, modes[episode] == DECIDES
-        ):
+        if modes[episode] != WAITS and _ends(world, episode, robots, drives, rules, waiting, modes[episode] == DECIDES):
             modes[episode] = WAITS
 
 
@@ -114,17 +110,13 @@ def _run_episode(run: Run, episode: int, drives: Drives, following: Following, r
         mark_waiting(drives, first, last, run.waiting)
     for _ in range(run.longest if mode == DECIDES else 1):
         if mode == DECIDES:
-            follow_team(
-                drives, following, first, last, world.believed, world.measured, world.ranges, commands
-            )
+            follow_team(drives, following, first, last, world.believed, world.measured, world.ranges, commands)
         step_episode(run.table, episode, robots, commands, mode != SENSES, True)
         if _ends(world, episode, robots, drives, rules, run.waiting, mode == DECIDES):
             break
 
 
-def _run_episodes(
-    run: Run, drives: Drives, following: Following, rules: Rules, observed: Arrays, work: Work
-) -> None:
+def _run_episodes(run: Run, drives: Drives, following: Following, rules: Rules, observed: Arrays, work: Work) -> None:
     """Run the episodes by their modes, in the order of the work's items.
 
     An episode's observations are written right after its run, while its maps are in the thread's cache.
@@ -144,4 +136,3 @@ def _run_episodes(
 
 run_serial = kernel(_run_episodes)
 run_parallel = kernel(parallel=True)(_run_episodes)
-

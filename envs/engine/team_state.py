@@ -27,9 +27,7 @@ def state_space(settings: ExplorationSettings) -> spaces.Box:
     return spaces.Box(low, high, dtype=np.float32)
 
 
-def team_state(
-    simulation: Simulation, settings: ExplorationSettings, episode: int = 0
-) -> NDArray[np.float32]:
+def team_state(simulation: Simulation, settings: ExplorationSettings, episode: int = 0) -> NDArray[np.float32]:
     """Return the true state of a team.
 
     Numbers of each robot (``ROBOT_NUMBERS``), then of the team (``TEAM_NUMBERS``), then two pictures of S x S

@@ -146,9 +146,7 @@ class ObservationForm:
         if self.is_plain:
             return observation
         rest: Any = (
-            np.concatenate(
-                [observation[name].reshape(*rows, -1) for name in self._boxes], axis=-1, dtype=np.float32
-            )
+            np.concatenate([observation[name].reshape(*rows, -1) for name in self._boxes], axis=-1, dtype=np.float32)
             if self._is_flat
             else {name: observation[name] for name in self._boxes}
         )
@@ -196,9 +194,7 @@ def flat_row_infos(infos: Mapping[str, Any], rows: int) -> dict[str, Any]:
     """
     found = _rows(infos, "")
     reasons = infos.get("ended_because")
-    found[ENDED] = np.array(
-        [0.0] * rows if reasons is None else [float(ending_number(reason)) for reason in reasons]
-    )
+    found[ENDED] = np.array([0.0] * rows if reasons is None else [float(ending_number(reason)) for reason in reasons])
     everyone = np.ones(rows, np.bool_)
     return {**found, **{f"_{name}": everyone for name in found}}
 
@@ -222,9 +218,7 @@ TEAM = "team"
 """The term of the reward due to the team's share, in addition to the terms of a robot's own reward."""
 
 
-def shared_rewards(
-    rewards: NDArray[np.float64], acted: NDArray[np.bool_], share: float
-) -> NDArray[np.float64]:
+def shared_rewards(rewards: NDArray[np.float64], acted: NDArray[np.bool_], share: float) -> NDArray[np.float64]:
     """Return rewards (episodes, robots) of which a share, 0 to 1, is the mean over the robots that acted."""
     counts = np.maximum(acted.sum(axis=1, keepdims=True), 1)
     means = np.where(acted, rewards, 0.0).sum(axis=1, keepdims=True) / counts

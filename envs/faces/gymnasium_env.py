@@ -52,12 +52,9 @@ class SoloExploration(gymnasium.Env[Observation, Any]):
     ) -> None:
         if options.setdefault("robots", 1) != 1:
             raise ValueError(
-                f"robots is {options['robots']}; the Gymnasium form has one robot, use lidarium.parallel_env "
-                "for a team"
+                f"robots is {options['robots']}; the Gymnasium form has one robot, use lidarium.parallel_env for a team"
             )
-        self.parallel: Any = make_team(
-            floor, options, None, level, render_mode, image_resolution, curriculum
-        )
+        self.parallel: Any = make_team(floor, options, None, level, render_mode, image_resolution, curriculum)
         self.metadata = {**type(self).metadata, "render_fps": self.parallel.metadata["render_fps"]}
         self.render_mode = render_mode
         self.observation_space = self.parallel.observation_space(AGENT)

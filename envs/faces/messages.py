@@ -122,9 +122,7 @@ class MessageBoard:
         steps = self._perception.world.steps[:, None, None]
         is_known = self._heard_at >= 0
         age = np.where(is_known, (steps - self._heard_at) * self._settings.time_step, 0.0)
-        table = np.concatenate(
-            [self._heard, np.minimum(age, OLDEST_S)[..., None], is_known[..., None]], axis=-1
-        )
+        table = np.concatenate([self._heard, np.minimum(age, OLDEST_S)[..., None], is_known[..., None]], axis=-1)
         others = ~np.eye(robots, dtype=np.bool_)
         return table[:, others].reshape(episodes * robots, robots - 1, -1).astype(np.float32)
 

@@ -31,9 +31,7 @@ if TYPE_CHECKING:
 
 Observation = dict[str, NDArray[Any]]
 
-Outcome = tuple[
-    dict[str, Observation], dict[str, float], dict[str, bool], dict[str, bool], dict[str, dict[str, Any]]
-]
+Outcome = tuple[dict[str, Observation], dict[str, float], dict[str, bool], dict[str, bool], dict[str, dict[str, Any]]]
 """Observations, rewards, terminations, truncations, infos, each by agent."""
 
 _NAMES = {"velocity": "lidarium_exploration_v1"}
@@ -111,9 +109,7 @@ class ExplorationEnv(ParallelEnv[str, Any, Any]):
         self.render_mode = render_mode
         self.possible_agents = self.settings.agents
         self.agents: list[str] = []
-        self.engine = Engine(
-            1, floor, self.settings, level, image_resolution, curriculum=curriculum, reports=True
-        )
+        self.engine = Engine(1, floor, self.settings, level, image_resolution, curriculum=curriculum, reports=True)
         self.simulation = self.engine.simulation
         self.world = self.simulation.world
         self.beliefs = self.simulation.beliefs
@@ -255,9 +251,7 @@ class ExplorationEnv(ParallelEnv[str, Any, Any]):
             action = actions.get(agent, self)
             if action is self or (action is None and not takes_none):
                 if row not in operating.stopping and not operating.is_addressed(row):
-                    raise ValueError(
-                        f"no action for {agent}; step() needs one for every agent in env.agents"
-                    )
+                    raise ValueError(f"no action for {agent}; step() needs one for every agent in env.agents")
                 continue
             given[row] = action
         return given
@@ -423,9 +417,7 @@ class ExplorationEnv(ParallelEnv[str, Any, Any]):
         """
         masks = self.engine.observations.get("action_mask")
         if masks is None:
-            raise AttributeError(
-                "action_masks are there at the level of frontiers only; use level='frontier'"
-            )
+            raise AttributeError("action_masks are there at the level of frontiers only; use level='frontier'")
         return np.asarray(masks[self._row(agent)] != 0)
 
     def _row(self, agent: str) -> int:
@@ -488,9 +480,7 @@ class ExplorationEnv(ParallelEnv[str, Any, Any]):
 def _of_row(values: Any, row: int) -> Any:  # noqa: ANN401
     if type(values) is not dict:
         return values[row]
-    return {
-        name: each[row] if type(each) is not dict else _of_row(each, row) for name, each in values.items()
-    }
+    return {name: each[row] if type(each) is not dict else _of_row(each, row) for name, each in values.items()}
 
 
 def _listed(values: Any) -> list[Any]:  # noqa: ANN401

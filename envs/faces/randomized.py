@@ -100,11 +100,7 @@ def _draw(distribution: Distribution, generator: np.random.Generator) -> Any:  #
     if isinstance(distribution, tuple):
         low, high = distribution
         is_whole = isinstance(low, int) and isinstance(high, int)
-        return (
-            int(generator.integers(int(low), int(high) + 1))
-            if is_whole
-            else float(generator.uniform(low, high))
-        )
+        return int(generator.integers(int(low), int(high) + 1)) if is_whole else float(generator.uniform(low, high))
     return distribution(generator)
 
 
@@ -370,8 +366,7 @@ class RandomizedRows:
     def infos(self) -> dict[str, Any]:
         """Infos of all rows; if an episode lacks one, its mask is False there."""
         infos = [
-            {name: self._padded_info(values, part.rows) for name, values in part.infos.items()}
-            for part in self.parts
+            {name: self._padded_info(values, part.rows) for name, values in part.infos.items()} for part in self.parts
         ]
         return _joined_infos(infos, self.robots)
 
@@ -404,9 +399,7 @@ class RandomizedRows:
         space = state_space(self.settings)
         return np.stack(
             [
-                _padded_state(
-                    team_state(part.engine.simulation, part.engine.settings), part.robots, space
-                )
+                _padded_state(team_state(part.engine.simulation, part.engine.settings), part.robots, space)
                 for part in self.parts
             ]
         )
@@ -441,8 +434,7 @@ def _of_rows(actions: Any, rows: slice, count: int) -> Any:  # noqa: ANN401
     array = np.asarray(actions)
     if array.ndim == 0 or len(array) != count:
         raise ValueError(
-            f"actions have shape {array.shape}; want one for each of the {count} rows, row = episode * "
-            "robots + robot"
+            f"actions have shape {array.shape}; want one for each of the {count} rows, row = episode * robots + robot"
         )
     return array[rows]
 
@@ -529,6 +521,5 @@ def _is_size(value: Any) -> bool:  # noqa: ANN401
 
 def _are_numbers(values: Sequence[Any]) -> bool:
     return all(
-        isinstance(value, int | float) and not isinstance(value, bool) and np.isfinite(value)
-        for value in values
+        isinstance(value, int | float) and not isinstance(value, bool) and np.isfinite(value) for value in values
     )

@@ -15,9 +15,7 @@ from lidarium.envs.settings.reset_options import (
 )
 
 
-def seeds_of(
-    seed: int | Sequence[int | None] | NDArray[np.integer] | None, episodes: int
-) -> list[int | None]:
+def seeds_of(seed: int | Sequence[int | None] | NDArray[np.integer] | None, episodes: int) -> list[int | None]:
     """Return a seed for each episode.
 
     Parameters
@@ -60,9 +58,7 @@ def episodes_of(options: dict[str, Any] | None, episodes: int) -> NDArray[np.int
         return np.arange(episodes)
     chosen = np.asarray(mask)
     if chosen.shape != (episodes,) or chosen.dtype != np.bool_ or not chosen.any():
-        raise ValueError(
-            f"option episodes is {mask!r}; want a mask of {episodes} booleans, at least one of them True"
-        )
+        raise ValueError(f"option episodes is {mask!r}; want a mask of {episodes} booleans, at least one of them True")
     return np.flatnonzero(chosen)
 
 
@@ -100,8 +96,7 @@ def _entry(name: str, value: Any, episode: int, episodes: int) -> Any:  # noqa: 
         return value
     if len(value) != episodes:
         raise ValueError(
-            f"option {name} has {len(value)} entries; want one for all, or one for each of the {episodes} "
-            "episodes"
+            f"option {name} has {len(value)} entries; want one for all, or one for each of the {episodes} episodes"
         )
     return value[episode]
 

@@ -21,9 +21,7 @@ from lidarium.envs.settings.reset_options import Curriculum, ResetOptions, read_
 try:
     from stable_baselines3.common.vec_env import VecEnv
 except ImportError as error:
-    raise ImportError(
-        'sb3_vec_env needs stable-baselines3; install it with: pip install "lidarium[rl]"'
-    ) from error
+    raise ImportError('sb3_vec_env needs stable-baselines3; install it with: pip install "lidarium[rl]"') from error
 
 Infos = list[dict[str, Any]]
 
@@ -117,8 +115,7 @@ class ExplorationVecEnv(VecEnv):
                 f"options has {len(options)} entries; want one dict, or one for each of the {batch.rows} rows"
             )
         self._chosen = {
-            episode: read_options(chosen, batch.robots)
-            for episode, chosen in enumerate(options[:: batch.robots])
+            episode: read_options(chosen, batch.robots) for episode, chosen in enumerate(options[:: batch.robots])
         }
 
     def _reset_options(self) -> None:
@@ -185,8 +182,7 @@ class ExplorationVecEnv(VecEnv):
         masks = self.batch.masks
         if masks is None:
             raise AttributeError(
-                "action_masks are there at the level of frontiers only; make the environment with "
-                "level='frontier'"
+                "action_masks are there at the level of frontiers only; make the environment with level='frontier'"
             )
         return masks
 
@@ -204,8 +200,7 @@ class ExplorationVecEnv(VecEnv):
     def set_attr(self, attr_name: str, value: Any, indices: int | Iterable[int] | None = None) -> None:  # noqa: ANN401
         """Refuse: rows share everything."""
         raise AttributeError(
-            f"{attr_name} cannot be set for single rows: all rows share one batch; make a new environment "
-            "instead"
+            f"{attr_name} cannot be set for single rows: all rows share one batch; make a new environment instead"
         )
 
     def env_method(
@@ -224,9 +219,7 @@ class ExplorationVecEnv(VecEnv):
         masks = self.action_masks
         return [masks[row] for row in self._get_indices(indices)]
 
-    def env_is_wrapped(
-        self, wrapper_class: type[Any], indices: int | Iterable[int] | None = None
-    ) -> list[bool]:
+    def env_is_wrapped(self, wrapper_class: type[Any], indices: int | Iterable[int] | None = None) -> list[bool]:
         """Return False for each row: there are no environments below to be wrapped."""
         return [False for _ in self._get_indices(indices)]
 
@@ -241,8 +234,4 @@ class ExplorationVecEnv(VecEnv):
 
 def _of_row(values: Any, row: int) -> Any:  # noqa: ANN401
     """Return the entry of a row; of values by name, an entry of each."""
-    return (
-        {name: _of_row(each, row) for name, each in values.items()}
-        if isinstance(values, dict)
-        else values[row]
-    )
+    return {name: _of_row(each, row) for name, each in values.items()} if isinstance(values, dict) else values[row]

@@ -37,9 +37,7 @@ def check_links(links: NDArray[Any], robots: int) -> NDArray[np.bool_]:
         If they are of another shape.
     """
     if links.shape != (robots, robots):
-        raise ValueError(
-            f"can_talk has shape {links.shape}; want ({robots}, {robots}): which robots reach each other"
-        )
+        raise ValueError(f"can_talk has shape {links.shape}; want ({robots}, {robots}): which robots reach each other")
     found = np.asarray(links, np.bool_)
     return found | found.T
 
@@ -59,10 +57,7 @@ def clusters_of(agents: Sequence[str], links: NDArray[np.bool_]) -> list[list[st
     for _ in range(robots.bit_length()):
         reached = ((reached @ reached) > 0).astype(np.int64)
     rows = {tuple(row) for row in (reached > 0).tolist()}
-    return [
-        [agent for agent, is_in in zip(agents, row, strict=True) if is_in]
-        for row in sorted(rows, reverse=True)
-    ]
+    return [[agent for agent, is_in in zip(agents, row, strict=True) if is_in] for row in sorted(rows, reverse=True)]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -184,18 +179,14 @@ class TeamExchange:
             return []
         self._due = steps - steps % self._steps + self._steps
         time_s, truth = self.time_s, frames_of(self._perception, self._episode)
-        joined = self.team.exchange(
-            self._clusters(time_s), time_s, truth if self._merging.known_starts else None
-        )
+        joined = self.team.exchange(self._clusters(time_s), time_s, truth if self._merging.known_starts else None)
         news = []
         for (a, b), (found, at, is_direct) in joined.items():
             if (a, b) in self._joined:
                 continue
             true = truth[a, b]
             news.append(
-                MergeEvent(
-                    time_s, a, b, (found.x, found.y, found.theta), (true.x, true.y, true.theta), at, is_direct
-                )
+                MergeEvent(time_s, a, b, (found.x, found.y, found.theta), (true.x, true.y, true.theta), at, is_direct)
             )
         self.events += news
         self._joined = set(joined)
@@ -260,10 +251,7 @@ def frames_of(perception: Perception, episode: int) -> Frames:
         frames = [Transform(*start) for start in perception.world.starts[rows.start : rows.stop].tolist()]
     agents = settings.agents
     return {
-        (a, b): frames[i].inverse() @ frames[j]
-        for i, a in enumerate(agents)
-        for j, b in enumerate(agents)
-        if i != j
+        (a, b): frames[i].inverse() @ frames[j] for i, a in enumerate(agents) for j, b in enumerate(agents) if i != j
     }
 
 
@@ -308,9 +296,7 @@ class MergedRows:
     ) -> None:
         self._engine = engine
         self._robots = engine.robots
-        self.teams = [
-            TeamExchange(engine.perception, merging, can_talk, episode) for episode in range(engine.episodes)
-        ]
+        self.teams = [TeamExchange(engine.perception, merging, can_talk, episode) for episode in range(engine.episodes)]
         self.boxes = team_boxes(engine.robots, engine.settings.map_cells)
         self.arrays: dict[str, NDArray[Any]] = {
             name: np.zeros((engine.rows, *(box.shape or ())), box.dtype) for name, box in self.boxes.items()

@@ -145,9 +145,7 @@ class TeamRows:
         engine.run(decoded, given=given, after_step=after_step)
         self.came_out(masked, given)
 
-    def came_out(
-        self, masked: NDArray[np.bool_], spoke: NDArray[np.bool_] | None = None, is_step: bool = True
-    ) -> None:
+    def came_out(self, masked: NDArray[np.bool_], spoke: NDArray[np.bool_] | None = None, is_step: bool = True) -> None:
         """Take in the results of a run; ``masked`` are the rows of robots that had ended before it."""
         engine = self.engine
         self._kept = masked
@@ -250,9 +248,7 @@ class TeamRows:
                 self._endings[row] = word
         if form == "full":
             nobody = np.full(self.rows, None, object)
-            of_live = {
-                name: infos[name] & ~kept if name.startswith("_") else infos[name] for name in infos
-            }
+            of_live = {name: infos[name] & ~kept if name.startswith("_") else infos[name] for name in infos}
             of_live["ended_because"] = np.where(kept, self._endings, infos.get("ended_because", nobody))
             of_live["_ended_because"] = kept | infos.get("_ended_because", np.False_)
             return of_live
@@ -295,9 +291,7 @@ class TeamRows:
     def states(self) -> NDArray[np.float32]:
         """Return the true state of each team, (episodes, numbers); see `team_state`."""
         engine = self.engine
-        return np.stack(
-            [team_state(engine.simulation, engine.settings, episode) for episode in range(self.episodes)]
-        )
+        return np.stack([team_state(engine.simulation, engine.settings, episode) for episode in range(self.episodes)])
 
     def scenes(self) -> list[Any]:
         """Return the scene of each episode, for pictures."""

@@ -206,7 +206,6 @@ def make_vector_env(num_envs: int, **options: Any) -> ExplorationVectorEnv:  # n
     """
     if options.setdefault("robots", 1) != 1:
         raise ValueError(
-            f"robots is {options['robots']}; the Gymnasium form has one robot, use lidarium.vector_env for "
-            "teams"
+            f"robots is {options['robots']}; the Gymnasium form has one robot, use lidarium.vector_env for teams"
         )
     return ExplorationVectorEnv(num_envs, **options)

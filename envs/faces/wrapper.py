@@ -97,7 +97,6 @@ def exploration_below(env: Any, wrapper: str) -> ExplorationEnv:  # noqa: ANN401
     if not isinstance(env, ExplorationEnv):
         kind = "a batch of many episodes" if isinstance(env, VectorEnv) else "no team's environment"
         raise ValueError(
-            f"{wrapper} is put around {type(env).__name__}, {kind}; want an environment of "
-            "lidarium.parallel_env"
+            f"{wrapper} is put around {type(env).__name__}, {kind}; want an environment of lidarium.parallel_env"
         )
     return env

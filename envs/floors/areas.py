@@ -41,9 +41,7 @@ def floor_of_area(
     starts : (K, 3) float64 or None
         Starts that the file proposes [m, rad].
     """
-    count, *found, _ = cv2.connectedComponentsWithStats(
-        free.astype(np.uint8), connectivity=4, ltype=cv2.CV_32S
-    )
+    count, *found, _ = cv2.connectedComponentsWithStats(free.astype(np.uint8), connectivity=4, ltype=cv2.CV_32S)
     labels, statistics = (np.asarray(each) for each in found)
     statistics[0] = 0
     label, remark = (int(labels[seed_cell]), "") if seed_cell is not None else _chosen(labels, statistics)
@@ -53,9 +51,7 @@ def floor_of_area(
     solid = (labels[bottom : bottom + height, left : left + width] != label).astype(np.uint8)
     corner = (origin[0] + left * resolution, origin[1] + bottom * resolution)
     bounds = (*corner, corner[0] + width * resolution, corner[1] + height * resolution)
-    cells = Raster(
-        np.pad(solid, 1, constant_values=1), (corner[0] - resolution, corner[1] - resolution), resolution
-    )
+    cells = Raster(np.pad(solid, 1, constant_values=1), (corner[0] - resolution, corner[1] - resolution), resolution)
     others = np.delete(statistics[1:count, cv2.CC_STAT_AREA], label - 1)
     has_others = others.max(initial=0) * resolution**2 >= MIN_OTHER_M2
     areas = Raster((~free).astype(np.uint8), origin, resolution) if has_others else None
@@ -78,9 +74,7 @@ def around(floor: Floor, places: NDArray[np.float64]) -> Floor:
     rows, columns = areas.solid.shape
     if not (0 <= row < rows and 0 <= column < columns) or areas.solid[row, column] != 0:
         return floor
-    return floor_of_area(
-        floor.name, areas.solid == 0, areas.origin, areas.resolution, (row, column), floor.starts
-    )
+    return floor_of_area(floor.name, areas.solid == 0, areas.origin, areas.resolution, (row, column), floor.starts)
 
 
 def _chosen(labels: NDArray[Any], statistics: NDArray[Any]) -> tuple[int, str]:

@@ -138,9 +138,7 @@ def strip_edges(
 
 
 @kernel
-def _fill(
-    cells: NDArray[np.uint8], edges: NDArray[np.float64], ends: NDArray[np.int64], value: np.uint8
-) -> None:
+def _fill(cells: NDArray[np.uint8], edges: NDArray[np.float64], ends: NDArray[np.int64], value: np.uint8) -> None:
     rows, columns = cells.shape
     first = 0
     for last in ends:

@@ -55,9 +55,7 @@ class Faces:
         normals = normals[has_area] / areas[has_area, None]
         centres = corners.mean(axis=1)
         offsets = np.einsum("ij,ij->i", normals, centres)
-        radii = (
-            np.linalg.norm(corners - centres[:, None], axis=2).max(axis=1) if len(corners) else np.zeros(0)
-        )
+        radii = np.linalg.norm(corners - centres[:, None], axis=2).max(axis=1) if len(corners) else np.zeros(0)
         return cls(
             np.ascontiguousarray(corners),
             np.ascontiguousarray(np.column_stack([normals, offsets])),

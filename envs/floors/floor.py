@@ -164,8 +164,7 @@ def _ring(kind: str, ring: NDArray[np.float64]) -> NDArray[np.float64]:
     corners = np.ascontiguousarray(ring, dtype=np.float64)
     if corners.ndim != 2 or corners.shape[0] < 3 or corners.shape[1] != 2 or not np.isfinite(corners).all():
         raise ValueError(
-            f"{kind} has shape {corners.shape} or values that are not finite; want at least 3 points (x, y) "
-            "in metres"
+            f"{kind} has shape {corners.shape} or values that are not finite; want at least 3 points (x, y) in metres"
         )
     return corners
 
@@ -217,8 +216,7 @@ class Floor:
         x_min, y_min, x_max, y_max = self.bounds
         if not np.isfinite(self.bounds).all() or x_min >= x_max or y_min >= y_max:
             raise ValueError(
-                f"floor {self.name!r} has bounds {self.bounds}; want finite x_min < x_max and y_min < y_max "
-                "in metres"
+                f"floor {self.name!r} has bounds {self.bounds}; want finite x_min < x_max and y_min < y_max in metres"
             )
         check_extent(
             f"floor {self.name!r}",
@@ -226,13 +224,9 @@ class Floor:
             (ring for solid in self.solids for ring in (solid.polygon, *solid.holes)),
         )
         if not (math.isfinite(self.ceiling) and self.ceiling > 0.0):
-            raise ValueError(
-                f"floor {self.name!r} has its ceiling at {self.ceiling} m; want a positive height"
-            )
+            raise ValueError(f"floor {self.name!r} has its ceiling at {self.ceiling} m; want a positive height")
         if self.solids and self.cells is not None:
-            raise ValueError(
-                f"floor {self.name!r} has {len(self.solids)} solids and cells too; want one or the other"
-            )
+            raise ValueError(f"floor {self.name!r} has {len(self.solids)} solids and cells too; want one or the other")
         if self.cells is not None and (self.cells.solid.ndim != 2 or not self.cells.resolution > 0.0):
             raise ValueError(
                 f"floor {self.name!r} has cells of shape {self.cells.solid.shape} at {self.cells.resolution} "
@@ -241,8 +235,7 @@ class Floor:
         starts = np.asarray(self.starts, dtype=np.float64)
         if starts.ndim != 2 or starts.shape[1] != 3 or not np.isfinite(starts).all():
             raise ValueError(
-                f"floor {self.name!r} has starts of shape {starts.shape} or not finite; want (K, 3): x, y, "
-                "theta"
+                f"floor {self.name!r} has starts of shape {starts.shape} or not finite; want (K, 3): x, y, theta"
             )
         if self.goal is not None and (len(self.goal) != 2 or not np.isfinite(self.goal).all()):
             raise ValueError(f"floor {self.name!r} has goal {self.goal}; want (x, y) in metres")
@@ -311,9 +304,7 @@ class Floor:
             for ring in (solid.polygon, *solid.holes):
                 _hash_numbers(digest, "ring", ring)
         if self.cells is not None:
-            _hash_numbers(
-                digest, "cells", (*self.cells.origin, self.cells.resolution, *self.cells.solid.shape)
-            )
+            _hash_numbers(digest, "cells", (*self.cells.origin, self.cells.resolution, *self.cells.solid.shape))
             digest.update(np.packbits(self.cells.solid != 0).tobytes())
         _hash_numbers(digest, "starts", self.starts)
         _hash_numbers(digest, "goal", self.goal or ())
@@ -334,9 +325,7 @@ class Floor:
                 digest.update(len(ring).to_bytes(8, "little") + ring.tobytes())
         if self.cells is not None:
             digest.update(
-                np.array(
-                    (*self.cells.origin, self.cells.resolution, *self.cells.solid.shape), np.float64
-                ).tobytes()
+                np.array((*self.cells.origin, self.cells.resolution, *self.cells.solid.shape), np.float64).tobytes()
             )
             digest.update(np.packbits(self.cells.solid != 0).tobytes())
         if self.ceiling != CEILING:
@@ -344,9 +333,7 @@ class Floor:
         return digest.hexdigest()
 
 
-def _hash_numbers(
-    digest: "hashlib._Hash", label: str, numbers: "NDArray[np.float64] | tuple[float, ...]"
-) -> None:
+def _hash_numbers(digest: "hashlib._Hash", label: str, numbers: "NDArray[np.float64] | tuple[float, ...]") -> None:
     """Add numbers in millionths; infinite ones keep their sign."""
     scaled = np.clip(np.rint(np.asarray(numbers, dtype=np.float64).ravel() * 1e6), -(2.0**62), 2.0**62)
     digest.update(f"{label}:{scaled.size};".encode())

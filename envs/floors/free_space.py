@@ -97,10 +97,7 @@ def reachable_free_space(raster: Raster, radius: float, starts: NDArray[np.float
     """
     found = components(raster, radius)
     kept = sorted(
-        {
-            component_near(raster, found.labels, start, radius)
-            for start in np.asarray(starts, dtype=np.float64)
-        }
+        {component_near(raster, found.labels, start, radius) for start in np.asarray(starts, dtype=np.float64)}
     )
 
     def make() -> NDArray[np.bool_]:
@@ -145,8 +142,7 @@ def component_near(
         if labels[near]:
             return int(labels[near])
     raise ValueError(
-        f"a robot of radius {radius} m does not fit at start ({start[0]:.3f}, {start[1]:.3f}) m; want more "
-        "room"
+        f"a robot of radius {radius} m does not fit at start ({start[0]:.3f}, {start[1]:.3f}) m; want more room"
     )
 
 
@@ -268,9 +264,7 @@ def measure_building(floor: Floor) -> _BuildingMeasures:
     """Measure a floor at a resolution of 0.05 m."""
     walls = floor
     if floor.solids:
-        walls = Floor(
-            floor.name, floor.bounds, tuple(solid for solid in floor.solids if solid.z_high == np.inf)
-        )
+        walls = Floor(floor.name, floor.bounds, tuple(solid for solid in floor.solids if solid.z_high == np.inf))
     empty = walls.raster(_RESOLUTION, 0.0, _BODY_HEIGHT)
     full = floor.raster(_RESOLUTION, 0.0, _BODY_HEIGHT)
     space = configuration_space(empty, MEASURED_RADIUS)
@@ -278,9 +272,7 @@ def measure_building(floor: Floor) -> _BuildingMeasures:
         raise ValueError(f"floor {floor.name!r} has no room for a robot of radius {MEASURED_RADIUS} m")
     largest = _largest_part(space)
     inside = _containing(empty.solid == 0, largest)
-    wide = (
-        cv2.distanceTransform(1 - empty.solid, cv2.DIST_L2, cv2.DIST_MASK_PRECISE) * _RESOLUTION > HALF_DOOR
-    )
+    wide = cv2.distanceTransform(1 - empty.solid, cv2.DIST_L2, cv2.DIST_MASK_PRECISE) * _RESOLUTION > HALF_DOOR
     between_walls = int(inside.sum())
     free = int((inside & (full.solid == 0)).sum())
     return _BuildingMeasures(

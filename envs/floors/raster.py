@@ -93,9 +93,7 @@ def frame_of(
     margin = math.ceil(resolution / LATTICE - 1e-9)
     # Divided, not multiplied: 3 / 10 is the double nearest to 0.3, and 3 * 0.1 is not.
     x, y = ((math.floor(low / LATTICE + 1e-9) - margin) / round(1.0 / LATTICE) for low in bounds[:2])
-    columns, rows = (
-        math.ceil((high - low) / resolution - 1e-9) + 1 for low, high in ((x, bounds[2]), (y, bounds[3]))
-    )
+    columns, rows = (math.ceil((high - low) / resolution - 1e-9) + 1 for low, high in ((x, bounds[2]), (y, bounds[3])))
     return (x, y), (-(-rows // _PADDING) * _PADDING, -(-columns // _PADDING) * _PADDING)
 
 
@@ -117,9 +115,7 @@ def sampled(
     indices = []
     for axis in (0, 1):
         centres = origin[1 - axis] + (np.arange(inside[axis].start, inside[axis].stop) + 0.5) * resolution
-        indices.append(
-            np.floor((centres - cells.origin[1 - axis]) / cells.resolution + 1e-6).astype(np.int64)
-        )
+        indices.append(np.floor((centres - cells.origin[1 - axis]) / cells.resolution + 1e-6).astype(np.int64))
     framed = np.pad((cells.solid != 0).astype(np.uint8), 1, constant_values=1)
     rows, columns = (np.clip(index + 1, 0, framed.shape[axis] - 1) for axis, index in enumerate(indices))
     return np.take(framed[rows], columns, axis=1)

@@ -50,8 +50,7 @@ def draw_starts(
     labels = found.labels
     if found.areas.size == 1:
         raise ValueError(
-            f"a robot of radius {radius} m does not fit anywhere on this floor; want a smaller robot or a "
-            "larger floor"
+            f"a robot of radius {radius} m does not fit anywhere on this floor; want a smaller robot or a larger floor"
         )
     taken = _fitting(raster, labels, radius, count, np.asarray(proposed, dtype=np.float64).reshape(-1, 3))
     component = labels[cell_of(raster, taken[0])] if taken else 1 + int(np.argmax(found.areas[1:]))
@@ -96,8 +95,7 @@ def check_starts(raster: Raster, radius: float, starts: NDArray[np.float64]) -> 
             apart = math.dist(start[:2], starts[other][:2])
             if apart < 2.0 * radius:
                 raise ValueError(
-                    f"starts of robots {other} and {robot} are {apart:.3f} m apart; want at least "
-                    f"{2.0 * radius} m"
+                    f"starts of robots {other} and {robot} are {apart:.3f} m apart; want at least {2.0 * radius} m"
                 )
 
 
@@ -195,9 +193,7 @@ def _without_discs(
         )
         dy = raster.origin[1] + (rows + 0.5) * raster.resolution - y
         dx = raster.origin[0] + (columns + 0.5) * raster.resolution - x
-        left[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1] &= (
-            np.hypot(dx[None, :], dy[:, None]) >= apart - 1e-9
-        )
+        left[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1] &= np.hypot(dx[None, :], dy[:, None]) >= apart - 1e-9
     return left
 
 
@@ -214,9 +210,7 @@ def _reaches_into_solid(raster: Raster, start: NDArray[np.float64], radius: floa
     """
     reach = math.ceil(radius / raster.resolution) + 1
     i, j = cell_of(raster, start)
-    rows, columns = np.nonzero(
-        raster.solid[max(i - reach, 0) : i + reach + 1, max(j - reach, 0) : j + reach + 1]
-    )
+    rows, columns = np.nonzero(raster.solid[max(i - reach, 0) : i + reach + 1, max(j - reach, 0) : j + reach + 1])
     low_x = raster.origin[0] + (columns + max(j - reach, 0)) * raster.resolution
     low_y = raster.origin[1] + (rows + max(i - reach, 0)) * raster.resolution
     gap_x = start[0] - np.clip(start[0], low_x, low_x + raster.resolution)

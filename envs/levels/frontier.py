@@ -260,9 +260,7 @@ class FrontierLevel(WaypointLevel):
             operating.stopping[row] = self.offers.why_without_work(row)
         super().carry_out(Ways(orders, {}), turn)
 
-    def observe(
-        self, acted: Mask, live: Mask, seen: Mask, out: dict[str, NDArray[Any]], infos: dict[str, Any]
-    ) -> None:
+    def observe(self, acted: Mask, live: Mask, seen: Mask, out: dict[str, NDArray[Any]], infos: dict[str, Any]) -> None:
         """Give up unreachable or unproductive choices, offer again, and report both."""
         reasons = self.offers.renew(live, seen)
         for name, array in self.offers.observed.items():

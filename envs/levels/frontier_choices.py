@@ -337,9 +337,7 @@ def _offer(
 
 
 @kernel
-def _leave_and_spread(
-    planning: Planning, swept: SweptCosts, record: Array, row: int, column: int, piece: int
-) -> None:
+def _leave_and_spread(planning: Planning, swept: SweptCosts, record: Array, row: int, column: int, piece: int) -> None:
     """Find the costs of paths from a cell if the body does not fit.
 
     It leaves towards cells with no less room. Few robots are in such a place: a search cell by cell is enough.

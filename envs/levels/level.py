@@ -169,8 +169,7 @@ def check_rows(actions: Any, shape: tuple[int, ...], live: Mask, wanted: str) ->
         raise ValueError(f"actions are {actions!r}; want an array {shape}: {wanted} for each row") from error
     if array.shape != shape:
         raise ValueError(
-            f"actions have shape {array.shape}; want {shape}: {wanted} for each row, row = episode * robots "
-            "+ robot"
+            f"actions have shape {array.shape}; want {shape}: {wanted} for each row, row = episode * robots + robot"
         )
     if array.dtype.kind not in "biuf":
         raise ValueError(f"actions are of type {array.dtype}; want {wanted} for each row")

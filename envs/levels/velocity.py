@@ -61,8 +61,7 @@ class VelocityLevel(Level):
         if not _scale_shares(commands, self._limits):
             given = {names[row % len(names)]: action for row, action in actions.items()}
             raise ValueError(
-                f"an action is nan or infinite ({given}); want two finite numbers within [-1, 1] for each "
-                "agent"
+                f"an action is nan or infinite ({given}); want two finite numbers within [-1, 1] for each agent"
             )
         return commands
 

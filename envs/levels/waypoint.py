@@ -112,8 +112,7 @@ class WaypointLevel(Level):
         share = numbers_of(action)
         if share.shape != (2,) or not np.isfinite(share).all():
             raise ValueError(
-                f"waypoint of {name} is {shown(action)}; want two finite numbers within [-1, 1], a Target "
-                "or None"
+                f"waypoint of {name} is {shown(action)}; want two finite numbers within [-1, 1], a Target or None"
             )
         here = self.perception.poses.pose_in_frame(row, row)[:2]
         x, y = here + np.clip(share, -1.0, 1.0) * self._half_side
@@ -143,9 +142,7 @@ class WaypointLevel(Level):
                 modes[episode] = STEPS
                 turn.commands[episode * self.settings.robots : (episode + 1) * self.settings.robots] = 0.0
 
-    def observe(
-        self, acted: Mask, live: Mask, seen: Mask, out: dict[str, NDArray[Any]], infos: dict[str, Any]
-    ) -> None:
+    def observe(self, acted: Mask, live: Mask, seen: Mask, out: dict[str, NDArray[Any]], infos: dict[str, Any]) -> None:
         """Report the states of the robots' drives."""
         if acted.any():
             states = self.driver.states()[acted].tolist()

@@ -88,9 +88,7 @@ def _write_maps(row: int, world: WorldArrays, given: _Sources, maps: Array, egoc
             touched_words(beliefs[row, MAP_COLUMNS]),
             np.uint64,
         )
-        pools = grid_at(
-            given.pools.ctypes.data + row * given.pools.shape[1] * 8, given.scales.shape[0], 3, np.int64
-        )
+        pools = grid_at(given.pools.ctypes.data + row * given.pools.shape[1] * 8, given.scales.shape[0], 3, np.int64)
         for k in range(given.scales.shape[0]):
             if given.scales[k] > 1:
                 pool_touched(
@@ -121,9 +119,7 @@ def write_row(row: int, sources: Array, observed: Arrays) -> None:
         for beam in range(ranges.shape[1]):
             value = ranges[row, beam]
             hit = min(value, longest)
-            scans[row, beam] = (
-                no_return if value > no_return else (hit if value == value else np.float32(0.0))
-            )
+            scans[row, beam] = no_return if value > no_return else (hit if value == value else np.float32(0.0))
     if poses.size > 0:
         for axis in range(2):
             local = np.float32(believed[row, axis] - offsets[row, axis])
@@ -138,9 +134,7 @@ def write_row(row: int, sources: Array, observed: Arrays) -> None:
     if observed_goals.size > 0:
         for axis in range(2):
             local = np.float32(goals[row, axis] - offsets[row, axis])
-            observed_goals[row, axis] = (
-                min(max(local, -farthest), farthest) if local == local else np.float32(0.0)
-            )
+            observed_goals[row, axis] = min(max(local, -farthest), farthest) if local == local else np.float32(0.0)
     if maps.size > 0 or egocentric_maps.size > 0:
         _write_maps(row, world, given, maps, egocentric_maps)
 

@@ -38,9 +38,7 @@ class Rows:
         Robots of a team, and number of episodes.
     """
 
-    def __init__(
-        self, simulation: Simulation, settings: ExplorationSettings, poses: KnownPoses | None = None
-    ) -> None:
+    def __init__(self, simulation: Simulation, settings: ExplorationSettings, poses: KnownPoses | None = None) -> None:
         self._simulation, self._poses = simulation, poses
         self._world, self._beliefs, self._score = simulation.world, simulation.beliefs, simulation.score
         self.settings, self.robots, self.episodes = settings, settings.robots, simulation.episodes

@@ -40,9 +40,7 @@ def observed_keys(settings: ExplorationSettings, has_goal: bool) -> tuple[str, .
 def observation_space(settings: ExplorationSettings, has_goal: bool) -> spaces.Dict:
     """Return the space of one robot's observation; every box is bounded."""
     boxes = boxes_of(settings)
-    return spaces.Dict(
-        {name: boxes[name] for name in (*observed_keys(settings, has_goal), *computed(settings))}
-    )
+    return spaces.Dict({name: boxes[name] for name in (*observed_keys(settings, has_goal), *computed(settings))})
 
 
 def boxes_of(settings: ExplorationSettings) -> dict[str, spaces.Box]:
@@ -58,9 +56,7 @@ def boxes_of(settings: ExplorationSettings) -> dict[str, spaces.Box]:
         "velocity": spaces.Box(-velocity_limit, velocity_limit, dtype=np.float32),
         "bumper": spaces.Box(0, 1, (3,), np.int8),
         "map": spaces.Box(0, 255, (1, cells, cells), np.uint8),
-        "egocentric_map": spaces.Box(
-            0, 255, (len(settings.egocentric_scales), own_cells, own_cells), np.uint8
-        ),
+        "egocentric_map": spaces.Box(0, 255, (len(settings.egocentric_scales), own_cells, own_cells), np.uint8),
         "goal": spaces.Box(-FARTHEST, FARTHEST, (2,), np.float32),
         **{name: SENSED[name].box(settings) for name in settings.observe if name in SENSED},
     }

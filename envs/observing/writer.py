@@ -59,9 +59,7 @@ class ObservationWriter:
         self.rows = len(simulation.beliefs.believed)
         for name, array in (("offsets", offsets), ("goals", offsets if goals is None else goals)):
             if array.shape != (self.rows, 2) or array.dtype != np.float64 or not array.flags.c_contiguous:
-                raise ValueError(
-                    f"{name} are {array.dtype} {array.shape}; want float64 {(self.rows, 2)}, contiguous"
-                )
+                raise ValueError(f"{name} are {array.dtype} {array.shape}; want float64 {(self.rows, 2)}, contiguous")
         if "egocentric_map" in self.keys and simulation.beliefs.scales != settings.egocentric_scales:
             raise ValueError(
                 f"the world pools its maps at scales {simulation.beliefs.scales}; want those of the "
@@ -72,18 +70,13 @@ class ObservationWriter:
         self._sensed = [(place, name) for place, name in enumerate(self.keys) if name not in KEYS]
         missing = [name for _, name in self._sensed if name not in simulation.sensors]
         if missing:
-            raise ValueError(
-                f"the world has no sensor {missing[0]!r}; it has {', '.join(simulation.sensors)}"
-            )
+            raise ValueError(f"the world has no sensor {missing[0]!r}; it has {', '.join(simulation.sensors)}")
         # The kernel takes the arrays of all its keys, in order; keys that are not observed come last.
         absent = [name for name in KEYS if name not in self.keys]
         self._absent = [np.empty((0,) * len(kinds[name][0]), kinds[name][1]) for name in absent]
         self._in_order = itemgetter(*((*self.keys, *absent).index(name) for name in KEYS))
         # The space's bounds are float32, and so are those to which values are clipped.
-        limits = [
-            float(np.float32(limit))
-            for limit in (settings.lidar.range_max, *settings.speed_limits.max(axis=0))
-        ]
+        limits = [float(np.float32(limit)) for limit in (settings.lidar.range_max, *settings.speed_limits.max(axis=0))]
         self._simulation = simulation
         self._arrays = (
             offsets,

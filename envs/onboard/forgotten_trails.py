@@ -36,9 +36,7 @@ class ForgottenTrails:
     ) -> None:
         self._world, self._beliefs, self._settings = simulation.world, simulation.beliefs, settings
         self._poses, self._fresh_at = poses, fresh_at
-        self._trails: list[list[NDArray[np.float64]]] = [
-            [] for _ in range(settings.robots * simulation.episodes)
-        ]
+        self._trails: list[list[NDArray[np.float64]]] = [[] for _ in range(settings.robots * simulation.episodes)]
 
     def start(self, rows: range) -> None:
         """Begin the episode of some rows: their robots have received no trails."""
@@ -58,8 +56,7 @@ class ForgottenTrails:
         """
         if trail.ndim != 2 or trail.shape[1] != 2 or not len(trail) or not np.isfinite(trail).all():
             raise ValueError(
-                f"the trail has shape {trail.shape} and may not be finite; want places (N, 2) in metres, at "
-                "least one"
+                f"the trail has shape {trail.shape} and may not be finite; want places (N, 2) in metres, at least one"
             )
         self._trails[row].append(trail)
         self._forget(row, trail)
@@ -87,7 +84,5 @@ class ForgottenTrails:
         (left, bottom), (right, top) = low.tolist(), high.tolist()
         part = whole[bottom:top, left:right]
         x, y = (origin + low * resolution).tolist()
-        self._beliefs.forget(
-            row, passed(part.shape, (x, y), trail, radius, resolution) & (part > 0), (bottom, left)
-        )
+        self._beliefs.forget(row, passed(part.shape, (x, y), trail, radius, resolution) & (part > 0), (bottom, left))
         self._fresh_at[row // self._settings.robots] = STALE

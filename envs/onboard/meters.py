@@ -75,9 +75,7 @@ class Meters:
         headings, travelled = world.poses[rows, 2], world.travelled[rows]
         turning = np.abs((headings - self._headings[rows] + math.pi) % (2.0 * math.pi) - math.pi)
         driven = travelled - self._travelled[rows]
-        used = (
-            battery.idle_w * self._time_step + battery.per_metre_j * driven + battery.per_radian_j * turning
-        )
+        used = battery.idle_w * self._time_step + battery.per_metre_j * driven + battery.per_radian_j * turning
         # Robots that have ended are switched off.
         self.used_j[rows] += np.where(world.flags[rows] & ENDED, 0.0, used)
         self._headings[rows], self._travelled[rows] = headings, travelled

@@ -104,9 +104,7 @@ class NavigationMap:
     def _point(self) -> None:
         """Write the addresses of the arrays into the record."""
         frontiers = self._frontiers
-        flags, tiles = (
-            (0, 0) if frontiers is None else (frontiers.flags.ctypes.data, frontiers.tiles.ctypes.data)
-        )
+        flags, tiles = (0, 0) if frontiers is None else (frontiers.flags.ctypes.data, frontiers.tiles.ctypes.data)
         addresses = (
             self._log_odds.ctypes.data,
             *self._log_odds.shape,
@@ -173,9 +171,7 @@ def refresh_map(record: Array, limit: int, stamp: Array, window: Array) -> None:
     The window is the changed part of the map; frontiers are updated if they are kept.
     """
     inside = is_inside(record, window)
-    take_in(
-        record, limit, stamp, inside, changed_cells(log_odds_of(record), closeness_of(record), limit, inside)
-    )
+    take_in(record, limit, stamp, inside, changed_cells(log_odds_of(record), closeness_of(record), limit, inside))
 
 
 @kernel

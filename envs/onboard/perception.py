@@ -67,9 +67,7 @@ class Perception:
         Odometers and battery gauges of the robots of a lone episode; None in batches.
     """
 
-    def __init__(
-        self, simulation: Simulation, settings: ExplorationSettings, offsets: NDArray[np.float64]
-    ) -> None:
+    def __init__(self, simulation: Simulation, settings: ExplorationSettings, offsets: NDArray[np.float64]) -> None:
         self.simulation, self.settings, self.offsets = simulation, settings, offsets
         self.world, self.beliefs = simulation.world, simulation.beliefs
         self._robots, self._episodes = settings.robots, simulation.episodes
@@ -108,9 +106,7 @@ class Perception:
                 navigation.keep_record_in(np.zeros(RECORD, np.int64))
         self._own[first:last], self._shared[episode] = [None] * self._robots, None
         self._own_records[first:last], self._shared_records[episode] = 0, 0
-        self._known[first:last] = [
-            (rows, 0, columns, 0) for rows, columns in self.beliefs.belief_rows[first:last, 1:3]
-        ]
+        self._known[first:last] = [(rows, 0, columns, 0) for rows, columns in self.beliefs.belief_rows[first:last, 1:3]]
         self.received.start(range(first, last))
         self.trails.start(range(first, last))
         self.sparse_maps.start(range(first, last))

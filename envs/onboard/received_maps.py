@@ -101,16 +101,11 @@ class ReceivedMaps:
         received = self._others[row]
         if self.hears:
             copies = self._exchanges[episode].copies[robot]
-            held = [
-                copy.ctypes.data for teammate, copy in enumerate(copies) if teammate != robot and copy.size
-            ]
+            held = [copy.ctypes.data for teammate, copy in enumerate(copies) if teammate != robot and copy.size]
         else:
             held = [] if received is None else [received.ctypes.data]
         beliefs = np.array(
-            [
-                (address, *self._beliefs.log_odds[row].shape)
-                for address in (self._beliefs.belief_rows[row, 0], *held)
-            ],
+            [(address, *self._beliefs.log_odds[row].shape) for address in (self._beliefs.belief_rows[row, 0], *held)],
             np.int64,
         )
         limit = limit_of(CLEARANCE_LIMIT, self._settings.occupancy.resolution)
@@ -129,8 +124,7 @@ class ReceivedMaps:
             )
         if others is not None and others.resolution != resolution:
             raise ValueError(
-                f"the map that is sent has cells of {others.resolution} m; want {resolution} m, as the "
-                "robots' own maps"
+                f"the map that is sent has cells of {others.resolution} m; want {resolution} m, as the robots' own maps"
             )
         if others is None and self._others[row] is None:
             return

@@ -54,9 +54,7 @@ class Software:
         if self._localizes:
             for robot in range(robots):
                 row = episode * robots + robot
-                localizer = make_localizer(
-                    self._settings.localization, self._settings.lidar, self._settings.localizer
-                )
+                localizer = make_localizer(self._settings.localization, self._settings.lidar, self._settings.localizer)
                 draws = np.random.default_rng([seed, LOCALIZER_STREAM, robot])
                 localizer.reset(self._perception.beliefs.believed[row].copy(), int(draws.integers(2**63)))
                 self._perception.poses.localizers[row] = localizer

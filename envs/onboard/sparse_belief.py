@@ -92,9 +92,7 @@ class SparseBelief:
         """Return which points (N, 2) lie on unknown ground, (N,) bool."""
         return self.navigation.ground.are_unknown(self._own(points))
 
-    def best_view(
-        self, pose: NDArray[np.float64], frontier: NDArray[np.float64], sight: Sight
-    ) -> View | None:
+    def best_view(self, pose: NDArray[np.float64], frontier: NDArray[np.float64], sight: Sight) -> View | None:
         """Return the best view of unknown ground (F, 2), for a robot at x, y, theta (3,).
 
         Its position is (2,) and the points it shows (K, 2); None if the robot cannot reach a sufficient view.

@@ -232,9 +232,7 @@ class ExplorationSettings:
         if self.kinds:
             object.__setattr__(self, "robot", envelope_of(self.team))
         if self.localization not in _localizations():
-            raise ValueError(
-                f"localization is {self.localization!r}; want one of {', '.join(_localizations())}"
-            )
+            raise ValueError(f"localization is {self.localization!r}; want one of {', '.join(_localizations())}")
         if self.starts is not None and self.starts not in STARTS:
             raise ValueError(f"starts is {shown(self.starts)}; want {', '.join(STARTS)} or None")
         if self.localizer is not None:
@@ -255,8 +253,7 @@ class ExplorationSettings:
             )
         if not self.time_step <= self.decision_period_s:
             raise ValueError(
-                f"decision_period_s is {self.decision_period_s} s; want at least the time step of "
-                f"{self.time_step} s"
+                f"decision_period_s is {self.decision_period_s} s; want at least the time step of {self.time_step} s"
             )
         if self.camera is not None:
             self._check_camera(self.camera)
@@ -278,14 +275,11 @@ class ExplorationSettings:
 
     def _check_localizer(self) -> None:
         if self.localization not in LOCALIZERS:
-            raise ValueError(
-                f"localizer is given, but localization is {self.localization!r}, which has no settings"
-            )
+            raise ValueError(f"localizer is given, but localization is {self.localization!r}, which has no settings")
         wanted = LOCALIZERS[self.localization].Settings
         if not isinstance(self.localizer, wanted):
             raise ValueError(
-                f"localizer is {shown(self.localizer)}; want {wanted.__name__} for localization "
-                f"{self.localization!r}"
+                f"localizer is {shown(self.localizer)}; want {wanted.__name__} for localization {self.localization!r}"
             )
         check_anything(self.localizer, f"localizer {self.localization!r}")
 
@@ -332,10 +326,7 @@ class ExplorationSettings:
 _KINDS = {name: (kind, *get_args(kind)) for name, kind in get_type_hints(ExplorationSettings).items()}
 
 PARTS: dict[str, type] = {
-    name: kind
-    for name, kinds in _KINDS.items()
-    for kind in kinds
-    if isinstance(kind, type) and is_dataclass(kind)
+    name: kind for name, kinds in _KINDS.items() for kind in kinds if isinstance(kind, type) and is_dataclass(kind)
 }
 """Settings that are made of others."""
 
@@ -351,9 +342,7 @@ def _localizations() -> tuple[str, ...]:
 def localizer_settings(localization: str, values: Mapping[str, Any]) -> Any:  # noqa: ANN401
     """Return the own settings of a localizer."""
     if localization not in LOCALIZERS:
-        raise ValueError(
-            f"localization {localization!r} has no settings; choose one of {', '.join(LOCALIZERS)}"
-        )
+        raise ValueError(f"localization {localization!r} has no settings; choose one of {', '.join(LOCALIZERS)}")
     try:
         return with_parts(LOCALIZERS[localization].Settings, values)
     except TypeError as error:
@@ -364,9 +353,7 @@ def with_parts(kind: type, values: Mapping[str, Any]) -> Any:  # noqa: ANN401
     """Make a dataclass from values; those of parts that are dataclasses may be mappings."""
     hints = get_type_hints(kind)
     made = {
-        name: with_parts(hints[name], value)
-        if isinstance(value, Mapping) and is_dataclass(hints.get(name))
-        else value
+        name: with_parts(hints[name], value) if isinstance(value, Mapping) and is_dataclass(hints.get(name)) else value
         for name, value in values.items()
     }
     return kind(**made)

@@ -115,9 +115,7 @@ class FaultSettings:
     def capacity(self) -> int:
         """Maximum number of faults of one robot in an episode."""
         robots = [fault.robot for fault in self.schedule]
-        return max((robots.count(robot) for robot in robots), default=0) + (
-            MOST_DRAWN if any(self.rates) else 0
-        )
+        return max((robots.count(robot) for robot in robots), default=0) + (MOST_DRAWN if any(self.rates) else 0)
 
 
 def _place(place: Any) -> tuple[float, float, float]:  # noqa: ANN401

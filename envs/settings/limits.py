@@ -65,9 +65,7 @@ class _Product:
 
 def _pieces(settings: Any) -> float:  # noqa: ANN401
     """Pieces of a quarter of a cell that a robot can drive in a step."""
-    return (
-        float(settings.speed_limits[:, 0].max() * settings.time_step / settings.raster_resolution) * 4.0 + 1.0
-    )
+    return float(settings.speed_limits[:, 0].max() * settings.time_step / settings.raster_resolution) * 4.0 + 1.0
 
 
 def _drive(settings: Any) -> float:  # noqa: ANN401
@@ -134,9 +132,7 @@ def check_workload(settings: Any) -> None:  # noqa: ANN401
     for product in PRODUCTS:
         found = product.of(settings)
         if found > product.most:
-            raise ValueError(
-                f"{product.what} is {found:,.0f}; want at most {product.most:,.0f}: choose {product.cure}"
-            )
+            raise ValueError(f"{product.what} is {found:,.0f}; want at most {product.most:,.0f}: choose {product.cure}")
 
 
 def observed_names(names: Iterable[str]) -> tuple[str, ...]:
@@ -172,11 +168,7 @@ def egocentric_scales_of(scales: Iterable[int]) -> tuple[int, ...]:
     if len(scales) > MAX_SCALES:
         raise ValueError(f"egocentric_scales has {len(scales)} scales; want at most {MAX_SCALES}")
     for scale in scales:
-        if (
-            isinstance(scale, bool)
-            or not isinstance(scale, Integral)
-            or not 1 <= scale <= MAX_EGOCENTRIC_SCALE
-        ):
+        if isinstance(scale, bool) or not isinstance(scale, Integral) or not 1 <= scale <= MAX_EGOCENTRIC_SCALE:
             raise ValueError(f"egocentric_scales is {shown(scales)}; {wanted}")
     if not scales:
         raise ValueError(f"egocentric_scales is empty ({scales}); {wanted}")

@@ -76,9 +76,5 @@ RADIO: Registry[RadioSettings] = Registry("radio")
 RADIO.register("all", RadioSettings(kind="all"), "every message reaches everybody")
 RADIO.register("none", RadioSettings(kind="none"), "nothing reaches anybody")
 RADIO.register("range", RadioSettings(kind="range"), "reaches within a distance")
-RADIO.register(
-    "line_of_sight", RadioSettings(kind="line_of_sight"), "reaches within a distance, not through walls"
-)
-RADIO.register(
-    "signal", RadioSettings(kind="signal"), "reaches as far as the signal does, weaker through walls"
-)
+RADIO.register("line_of_sight", RadioSettings(kind="line_of_sight"), "reaches within a distance, not through walls")
+RADIO.register("signal", RadioSettings(kind="signal"), "reaches as far as the signal does, weaker through walls")

@@ -38,9 +38,7 @@ def check_options(options: Any, known: Iterable[str] = OPTIONS) -> None:  # noqa
     Other unknown names are no error: wrappers and trainers pass options of their own.
     """
     if options is not None and not isinstance(options, Mapping):
-        raise ValueError(
-            f"options of reset are {shown(options)}; want a dict of any of {', '.join(known)}, or None"
-        )
+        raise ValueError(f"options of reset are {shown(options)}; want a dict of any of {', '.join(known)}, or None")
     for name in options or ():
         near = difflib.get_close_matches(str(name)[:100], known, n=1, cutoff=SIMILARITY)
         if near and near[0] != name:
@@ -94,9 +92,7 @@ def of_number(curriculum: Curriculum | None, number: int) -> Mapping[str, Any]:
     return {} if curriculum is None else curriculum(number)
 
 
-def of_curriculum(
-    curriculum: Curriculum | None, number: int, chosen: ResetOptions, robots: int
-) -> ResetOptions:
+def of_curriculum(curriculum: Curriculum | None, number: int, chosen: ResetOptions, robots: int) -> ResetOptions:
     """Return the options of an episode: the chosen ones, and in addition those of a curriculum."""
     if curriculum is None:
         return chosen

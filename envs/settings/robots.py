@@ -122,8 +122,7 @@ class Robot:
             )
         if self.cruise_speed > self.max_speed:
             raise ValueError(
-                f"cruise_speed is {self.cruise_speed} m/s, above max_speed {self.max_speed} m/s; "
-                "want at most that"
+                f"cruise_speed is {self.cruise_speed} m/s, above max_speed {self.max_speed} m/s; want at most that"
             )
 
     def wheel_speeds(self, speed: float, turn_rate: float) -> tuple[float, float]:

@@ -59,9 +59,7 @@ def _documented_attributes(kind: type) -> dict[str, tuple[str, str]]:
     found: dict[str, tuple[str, str]] = {}
     for each in reversed(kind.__mro__):
         text = inspect.cleandoc(each.__doc__ or "")
-        section = re.search(
-            r"^Attributes\n-+\n(.*?)(?=^\w[^\n]*\n-{3,}\n|\Z)", text, re.DOTALL | re.MULTILINE
-        )
+        section = re.search(r"^Attributes\n-+\n(.*?)(?=^\w[^\n]*\n-{3,}\n|\Z)", text, re.DOTALL | re.MULTILINE)
         entries = re.finditer(
             r"^(\S[^\n]*) : ([^\n]*)\n((?:[ ]+[^\n]*\n?|\n)*)", section[1] if section else "", re.MULTILINE
         )
@@ -77,10 +75,7 @@ def markdown_table(settings: Any = None, prefix: str = "") -> str:  # noqa: ANN4
         f"| `{row.name}` | {row.kind} | `{_shown(row.default)}` | {row.bounds} | {row.summary} |"
         for row in settings_table(settings, prefix)
     ]
-    return (
-        "\n".join(["| setting | type | default | bounds | what it is |", "|---|---|---|---|---|", *rows])
-        + "\n"
-    )
+    return "\n".join(["| setting | type | default | bounds | what it is |", "|---|---|---|---|---|", *rows]) + "\n"
 
 
 def _shown(value: Any) -> str:  # noqa: ANN401

@@ -28,9 +28,7 @@ def kinematic_world(settings: ExplorationSettings, episodes: int = 1) -> Kinemat
     )
 
 
-def simulation_of(
-    world: World, settings: ExplorationSettings, kind: type[Simulation] = Simulation
-) -> Simulation:
+def simulation_of(world: World, settings: ExplorationSettings, kind: type[Simulation] = Simulation) -> Simulation:
     """Return the simulation of a world, with the beliefs and the score that settings ask for."""
     simulation = kind(
         world,

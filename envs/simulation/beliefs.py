@@ -36,9 +36,7 @@ def _map_with_margin(pages: ArrayPool, floor: FloorTables, rows: int, columns: i
 
     It has ``rows`` x ``columns`` cells, for poses that drift.
     """
-    margin = (
-        math.ceil(max(LEAST_MARGIN, 0.5 * math.hypot(rows, columns) * resolution) / resolution / WORD) * WORD
-    )
+    margin = math.ceil(max(LEAST_MARGIN, 0.5 * math.hypot(rows, columns) * resolution) / resolution / WORD) * WORD
     x, y = floor.laser.origin
     return pages.blank((rows + 2 * margin, columns + 2 * margin), np.int8), (
         x - margin * resolution,
@@ -71,9 +69,7 @@ def blank(
 
     The first cell of the mask lies at ``corner`` (row, column).
     """
-    rows, columns = (
-        np.flatnonzero(where.any(axis=axis)) + first for axis, first in zip((1, 0), corner, strict=True)
-    )
+    rows, columns = (np.flatnonzero(where.any(axis=axis)) + first for axis, first in zip((1, 0), corner, strict=True))
     if not rows.size:
         return
     log_odds[corner[0] : corner[0] + where.shape[0], corner[1] : corner[1] + where.shape[1]][where] = 0
@@ -177,9 +173,7 @@ class Beliefs:
         height, width = self.log_odds[row].shape
         # At scale 1 a map is its own pooled map.
         self._pools[row] = [
-            pages.blank((-(-height // scale), -(-width // scale)), np.int8)
-            if scale > 1
-            else self.log_odds[row]
+            pages.blank((-(-height // scale), -(-width // scale)), np.int8) if scale > 1 else self.log_odds[row]
             for scale in self.scales
         ]
         self._touched[row] = pages.blank(untouched(height if self.scales else 0, width).shape, np.uint64)

@@ -30,18 +30,14 @@ def pack_bits(cells: NDArray[np.bool_]) -> NDArray[np.uint64]:
 
 def unpack_bits(bits: NDArray[np.uint64], columns: int) -> NDArray[np.bool_]:
     """Unpack (rows, words) uint64 into a (rows, columns) mask."""
-    return np.unpackbits(bits.astype("<u8").view(np.uint8), axis=1, bitorder="little")[:, :columns].astype(
-        np.bool_
-    )
+    return np.unpackbits(bits.astype("<u8").view(np.uint8), axis=1, bitorder="little")[:, :columns].astype(np.bool_)
 
 
 @kernel(forceinline=True)
 def count_bits(value: np.uint64) -> int:
     """Count the set bits of a uint64."""
     value = value - ((value >> np.uint64(1)) & np.uint64(0x5555555555555555))
-    value = (value & np.uint64(0x3333333333333333)) + (
-        (value >> np.uint64(2)) & np.uint64(0x3333333333333333)
-    )
+    value = (value & np.uint64(0x3333333333333333)) + ((value >> np.uint64(2)) & np.uint64(0x3333333333333333))
     value = (value + (value >> np.uint64(4))) & np.uint64(0x0F0F0F0F0F0F0F0F)
     return int((value * np.uint64(0x0101010101010101)) >> np.uint64(56))
 

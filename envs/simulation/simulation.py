@@ -193,8 +193,7 @@ class Simulation:
         multiple = round(map_resolution / resolution)
         if multiple < 1 or abs(multiple * resolution - map_resolution) > 1e-9:
             raise ValueError(
-                f"a map cell of {map_resolution} m is not a whole multiple of the floor's raster cell of "
-                f"{resolution} m"
+                f"a map cell of {map_resolution} m is not a whole multiple of the floor's raster cell of {resolution} m"
             )
         return multiple
 

@@ -66,16 +66,13 @@ def read_episodes(directory: Path) -> Episodes:
     """Read ``episodes.jsonl``."""
     path = Path(directory) / FILE
     if not path.is_file():
-        raise FileNotFoundError(
-            f"no {FILE} in {directory}; want a folder that `lidarium evaluate --out` wrote"
-        )
+        raise FileNotFoundError(f"no {FILE} in {directory}; want a folder that `lidarium evaluate --out` wrote")
     lines = read_lines(path)
     numbered, warnings = lines.numbered, []
     if lines.cut_off is not None:
         number, size = lines.cut_off
         warnings = [
-            f"Line {number} of {path.name} breaks off ({size} bytes) and was left out: its episode was not "
-            "finished."
+            f"Line {number} of {path.name} breaks off ({size} bytes) and was left out: its episode was not finished."
         ]
     for number, row in numbered:
         _check_row(row, f"{path}, line {number}")
@@ -133,26 +130,20 @@ def _check_row(row: Row, where: str) -> None:
         ("ended_because", isinstance(row["ended_because"], dict)),
     ):
         if not is_good:
-            raise ValueError(
-                f"{where} has {key} {shown(row[key])}; want what `lidarium run` writes to result.json"
-            )
+            raise ValueError(f"{where} has {key} {shown(row[key])}; want what `lidarium run` writes to result.json")
     for key in _MAY_BE_NULL:
         if row[key] is not None and not _FIGURE.hold(row[key]):
             raise ValueError(f"{where} has {key} {shown(row[key])}; want seconds or null")
 
 
-def _without_doubles(
-    numbered: Iterable[tuple[int, Row]], path: Path
-) -> tuple[list[tuple[int, Row]], list[str]]:
+def _without_doubles(numbered: Iterable[tuple[int, Row]], path: Path) -> tuple[list[tuple[int, Row]], list[str]]:
     kept: dict[tuple[Any, ...], tuple[int, Row]] = {}
     warnings = []
     for number, row in numbered:
         known = kept.setdefault((*_key_of(row), row["version"], row["settings_sha256"]), (number, row))
         if known[1] is row:
             continue
-        differing = [
-            key for key in sorted({*known[1], *row} - set(TIMINGS)) if known[1].get(key) != row.get(key)
-        ]
+        differing = [key for key in sorted({*known[1], *row} - set(TIMINGS)) if known[1].get(key) != row.get(key)]
         if differing:
             raise ValueError(
                 f"{path}, lines {known[0]} and {number} tell of the same episode ({name_of(row)}) but differ "
@@ -184,9 +175,7 @@ def _check_alike(numbered: Iterable[tuple[int, Row]], path: Path) -> None:
         known_number, known = alike.setdefault((variant_of(row), row["robots"]), (number, row))
         if row["settings_sha256"] != known["settings_sha256"]:
             seen = [
-                f"{key} {known.get(key)} and {row.get(key)}"
-                for key in _OF_SETTINGS
-                if known.get(key) != row.get(key)
+                f"{key} {known.get(key)} and {row.get(key)}" for key in _OF_SETTINGS if known.get(key) != row.get(key)
             ]
             differing = (
                 ", ".join(seen)

@@ -32,9 +32,7 @@ from lidarium.evaluation.statistics import (
 def over_bound(rows: Sequence[Row], horizon_s: float) -> float | None:
     """Return the median of the times to 99 % over their bounds."""
     multiples = [
-        (horizon_s if row["t99_s"] is None else row["t99_s"]) / row["bound_s"]
-        for row in rows
-        if row.get("bound_s")
+        (horizon_s if row["t99_s"] is None else row["t99_s"]) / row["bound_s"] for row in rows if row.get("bound_s")
     ]
     return float(np.median(multiples)) if multiples else None
 
@@ -187,9 +185,7 @@ def compared(group: Group, values: Sequence[Value], baseline: str, seed: int) ->
         if policy != baseline and ours:
             found += [_compared_times(policy, key, ours, theirs, group.horizon_s, seed) for key in TIMES]
             found += [
-                _compared_values(policy, value, ours, theirs, seed)
-                for value in values
-                if value.column.is_compared
+                _compared_values(policy, value, ours, theirs, seed) for value in values if value.column.is_compared
             ]
     if not found:
         return []
@@ -224,9 +220,7 @@ def _compared_times(
     return _tested(policy, key, a.up_to_horizon, b.up_to_horizon, difference, ratio)
 
 
-def _compared_values(
-    policy: str, value: Value, ours: Sequence[Row], theirs: Sequence[Row], seed: int
-) -> Comparison:
+def _compared_values(policy: str, value: Value, ours: Sequence[Row], theirs: Sequence[Row], seed: int) -> Comparison:
     a, b = (np.array([value.of(row) for row in rows]) for rows in (ours, theirs))
     ratio = paired_ratio(a, b, seed=seed) if min(a.min(), b.min()) > 0.0 else None
     return _tested(policy, value.column.key, a, b, paired_difference(a, b, seed=seed), ratio)

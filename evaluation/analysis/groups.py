@@ -54,9 +54,9 @@ class Group:
     def slug(self) -> str:
         """Part of names of files."""
         settings = "" if self.variant in ("", DEFAULT_VARIANT) else f"{self.variant}_"
-        return "".join(
-            letter if letter.isalnum() else "_" for letter in f"{settings}{self.robots}_{self.floor_set}"
-        )[-100:]
+        return "".join(letter if letter.isalnum() else "_" for letter in f"{settings}{self.robots}_{self.floor_set}")[
+            -100:
+        ]
 
     @property
     def floors(self) -> list[str]:

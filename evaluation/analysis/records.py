@@ -83,9 +83,7 @@ def read_records(directory: Path, rows: Iterable[Row]) -> tuple[dict[Key, Entry]
             continue
         differing = [name for name in _SAME if record.header.get(name, row[name]) != row[name]]
         if differing:
-            warnings.append(
-                f"The record {path.name} was left out: it is of an episode with another {differing[0]}."
-            )
+            warnings.append(f"The record {path.name} was left out: it is of an episode with another {differing[0]}.")
             continue
         found[key] = Entry(path, np.asarray(record.display.coverage, np.float64))
     return found, warnings
@@ -100,9 +98,7 @@ def read_track(entry: Entry) -> Track:
     """Read the paths and the last map of a record."""
     display = read_record(entry.path).display
     levels = without_small_components(display.map_at(float(display.times[-1])))
-    return Track(
-        display.times, display.poses, levels, (display.origin[0], display.origin[1]), display.resolution
-    )
+    return Track(display.times, display.poses, levels, (display.origin[0], display.origin[1]), display.resolution)
 
 
 def coverage_at(coverage: NDArray[np.float64], times: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -120,9 +120,7 @@ def _pieces(walk: Walk, offset: NDArray[np.float64]) -> list[Route]:
         if math.isnan(heading) and at < last and at - start < MOST_POINTS - 1:
             continue
         part = np.s_[start : at + 1]
-        pieces.append(
-            Route(walk.points[part] - offset, walk.room[part], None if math.isnan(heading) else heading)
-        )
+        pieces.append(Route(walk.points[part] - offset, walk.room[part], None if math.isnan(heading) else heading))
         start = at
     return pieces
 
@@ -218,9 +216,7 @@ def graph_of(
     """Return a floor as places, paths and views, for the robots of some settings."""
     tables = floor_tables(floor, settings.raster_resolution, settings.lidar.height, settings.robot.height)
     begin = np.asarray(starts, np.float64)
-    return view_graph(
-        tables.body, tables.laser, settings.robot.radius, settings.lidar.range_max, begin, spacing
-    )
+    return view_graph(tables.body, tables.laser, settings.robot.radius, settings.lidar.range_max, begin, spacing)
 
 
 def known_floor_bound(
@@ -340,9 +336,7 @@ def _team_of(settings: ExplorationSettings) -> ExplorationSettings:
     )
 
 
-def _key(
-    floor: Floor, settings: ExplorationSettings, starts: Sequence[Sequence[float]], rounds: int, seed: int
-) -> str:
+def _key(floor: Floor, settings: ExplorationSettings, starts: Sequence[Sequence[float]], rounds: int, seed: int) -> str:
     about = repr((settings, [[round(float(x), 9) for x in start] for start in starts], rounds, seed))
     digest = hashlib.sha256(about.encode()).hexdigest()
     return f"bound {floor.sha256} {digest} {hash_of_code(*MADE_BY)}"

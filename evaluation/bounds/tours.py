@@ -71,9 +71,7 @@ def plan_tours(graph: ViewGraph, share: float, rounds: int, seed: int = 0) -> To
     if cost_of(graph, again) < cost and _seen_count(graph, again) >= wanted:
         stops = again
     walks = [walk_of(graph, robot, tour) for robot, tour in enumerate(stops)]
-    return TourPlan(
-        stops, walks, lengths_of(graph, stops), _seen_count(graph, stops) / max(len(graph.points), 1)
-    )
+    return TourPlan(stops, walks, lengths_of(graph, stops), _seen_count(graph, stops) / max(len(graph.points), 1))
 
 
 def walk_of(graph: ViewGraph, robot: int, tour: list[int]) -> list[int]:
@@ -187,9 +185,7 @@ def ordered(graph: ViewGraph, stops: Stops) -> Stops:
     table = np.zeros((end + 1, end + 1), np.int64)
     lengths = graph.lengths[np.ix_(nodes, nodes)]
     table[:end, :end] = np.where(np.isfinite(lengths), np.rint(100.0 * lengths), 10**8)
-    manager = pywrapcp.RoutingIndexManager(
-        end + 1, graph.robots, list(range(graph.robots)), [end] * graph.robots
-    )
+    manager = pywrapcp.RoutingIndexManager(end + 1, graph.robots, list(range(graph.robots)), [end] * graph.robots)
     routing = pywrapcp.RoutingModel(manager)
     transit = routing.RegisterTransitMatrix(table.tolist())
     routing.SetArcCostEvaluatorOfAllVehicles(transit)

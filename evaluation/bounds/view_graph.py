@@ -239,9 +239,7 @@ def _seen_bits(
 
 
 @kernel
-def _see(
-    levels: Array, cells: Array, headings: Array, points: Array, reach: tuple[float, float], views: Array
-) -> None:
+def _see(levels: Array, cells: Array, headings: Array, points: Array, reach: tuple[float, float], views: Array) -> None:
     for i in range(len(cells)):
         for k in range(len(points)):
             rise, run = points[k, 0] - cells[i, 0], points[k, 1] - cells[i, 1]

@@ -31,9 +31,7 @@ def save_bound_picture(
     tables = floor_tables(floor, settings.raster_resolution, settings.lidar.height, settings.robot.height)
     raster = tables.laser
     box = box_around(raster.solid == 0, raster.origin, raster.resolution)
-    cells = np.where(raster.solid[box.rows, box.columns, None] > 0, rgb(SOLID), np.uint8(255)).astype(
-        np.uint8
-    )
+    cells = np.where(raster.solid[box.rows, box.columns, None] > 0, rgb(SOLID), np.uint8(255)).astype(np.uint8)
     x_min, x_max, y_min, y_max = box.extent
     width = 9.0
     figure = Figure(
@@ -60,6 +58,4 @@ def save_bound_picture(
         draw_start(axes, robot, float(walk.points[0, 0]), float(walk.points[0, 1]), colour)
     seen = f"{100.0 * bound.share:.1f} % seen"
     time = f"{bound.time_s:.0f} s" if math.isfinite(bound.time_s) else "not in time"
-    save_titled_figure(
-        path, figure, name, f"a team that knows the floor: {seen}, {time}, {bound.total_m:.0f} m"
-    )
+    save_titled_figure(path, figure, name, f"a team that knows the floor: {seen}, {time}, {bound.total_m:.0f} m")

@@ -79,9 +79,7 @@ FORMATS = {
         20.0,
         lambda content: b"moov" in content,
     ),
-    ".gif": _FilmFormat(
-        "gif", "pal8", _LOOP, 640, 10.0, lambda content: content.endswith(b";"), has_palette=True
-    ),
+    ".gif": _FilmFormat("gif", "pal8", _LOOP, 640, 10.0, lambda content: content.endswith(b";"), has_palette=True),
     # Without loss: frames are drawn in few colours, which takes less than a lossy file and is sharp.
     ".webp": _FilmFormat(
         "libwebp_anim",
@@ -123,9 +121,7 @@ class FilmSettings:
 
     def __post_init__(self) -> None:
         if not 0.0 < self.speed < float("inf"):
-            raise ValueError(
-                f"speed of the film is {self.speed}; want more than 0 simulated seconds per second"
-            )
+            raise ValueError(f"speed of the film is {self.speed}; want more than 0 simulated seconds per second")
         least, most = WIDTHS
         if self.width is not None and not least <= self.width <= most:
             raise ValueError(f"width of the film is {self.width} pixels; want {least} to {most}")
@@ -246,9 +242,7 @@ def _is_done(*arguments: str | Path) -> bool:
     """
     words = [str(word.absolute()) if isinstance(word, Path) else word for word in arguments]
     command = [imageio_ffmpeg.get_ffmpeg_exe(), "-y", "-v", "quiet", *words]
-    done = subprocess.run(
-        command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, check=False, process_group=0
-    )
+    done = subprocess.run(command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, check=False, process_group=0)
     return done.returncode == 0
 
 

@@ -109,9 +109,7 @@ def save_paths(path: Path, group: Group, floor: str, records: dict[Key, Entry]) 
     )
 
 
-def visits_on(
-    group: Group, floor: str, records: dict[Key, Entry]
-) -> tuple[dict[str, _Visits], dict[str, Track]]:
+def visits_on(group: Group, floor: str, records: dict[Key, Entry]) -> tuple[dict[str, _Visits], dict[str, Track]]:
     """Return the positions of the robots of each policy on a floor, and a track.
 
     All recorded runs count; the track is for the map below.
@@ -134,9 +132,7 @@ def visits_on(
     return visits, {policy: found[0] for policy, found in tracks.items()}
 
 
-def save_visits(
-    path: Path, group: Group, floor: str, visits: dict[str, _Visits], tracks: dict[str, Track]
-) -> None:
+def save_visits(path: Path, group: Group, floor: str, visits: dict[str, _Visits], tracks: dict[str, Track]) -> None:
     """Draw the positions of the robots of each policy over time on a floor."""
     extent = next(iter(visits.values())).extent
     figure, panels = _panels(len(visits), extent, 0.9)
@@ -154,14 +150,10 @@ def save_visits(
         }
         axes.imshow(shown, origin="lower", extent=each.extent, **appearance)
         _caption(axes, policy, f"{each.runs} run{'s' if each.runs != 1 else ''}")
-    bar = figure.colorbar(
-        ScalarMappable(scale, _COLOUR_MAP), ax=panels, alpha=0.92, shrink=0.85, pad=0.015, aspect=28
-    )
+    bar = figure.colorbar(ScalarMappable(scale, _COLOUR_MAP), ax=panels, alpha=0.92, shrink=0.85, pad=0.015, aspect=28)
     bar.set_label(f"robots' time per run in a cell of {VISIT_CELL_M:g} m [s]", fontsize=9, color=FAINT)
     bar.ax.tick_params(labelsize=8.5, colors=FAINT)
-    ticks = [
-        digit * 10.0**power for power in range(-1, 5) for digit in (1, 2, 5) if digit * 10.0**power <= most
-    ]
+    ticks = [digit * 10.0**power for power in range(-1, 5) for digit in (1, 2, 5) if digit * 10.0**power <= most]
     bar.set_ticks(ticks, labels=[f"{tick:g}" for tick in ticks])
     bar.minorticks_off()
     bar.outline.set_visible(False)

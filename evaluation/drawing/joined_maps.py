@@ -20,9 +20,7 @@ def shades_of(group: Collection[int], colours: Sequence[Colour]) -> Shades:
     return colours[robot], pale(colours[robot])
 
 
-def overlaid(
-    picture: Frame, maps: Sequence[NDArray[np.signedinteger[Any]]], shades: Sequence[Shades]
-) -> Frame:
+def overlaid(picture: Frame, maps: Sequence[NDArray[np.signedinteger[Any]]], shades: Sequence[Shades]) -> Frame:
     """Return a picture with maps over it; if several know a cell, their shades are mixed evenly.
 
     Parameters

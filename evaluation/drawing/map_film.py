@@ -190,9 +190,7 @@ class MapFrames:
         return groups, [pair for pair in pairs if not any(set(pair) <= group for group in self._shown)]
 
 
-def _floor(
-    env: ExplorationEnv, width: int, groups: Sequence[set[int]], joined: list[tuple[int, int]]
-) -> Frame:
+def _floor(env: ExplorationEnv, width: int, groups: Sequence[set[int]], joined: list[tuple[int, int]]) -> Frame:
     """Draw the known part of the floor, the robots, and pairs that were just joined."""
     colours, scene = team_colours(env.settings.robots), env.scene()
     tables = env.world.floors[0]
@@ -207,9 +205,7 @@ def _floor(
     draw_robots(frame, view, scene.poses, radii, scene.has_ended, colours)
     left = (width - view.width) // 2  # of a tall floor
     return np.asarray(
-        cv2.copyMakeBorder(
-            frame, 0, 0, left, width - left - view.width, cv2.BORDER_CONSTANT, value=BACKGROUND
-        ),
+        cv2.copyMakeBorder(frame, 0, 0, left, width - left - view.width, cv2.BORDER_CONSTANT, value=BACKGROUND),
         np.uint8,
     )
 

@@ -115,8 +115,7 @@ def _bent_panel(merged: Merged, group: list[str], deformed: Deformed) -> _Panel:
     for (a, b), result in merged.pairs.items():
         if result.is_accepted and a in group and b in group:
             ends = [
-                deformed.places(group.index(name), points)
-                for name, points in zip((a, b), result.joined, strict=True)
+                deformed.places(group.index(name), points) for name, points in zip((a, b), result.joined, strict=True)
             ]
             matched.append(np.stack(ends, axis=1))
     walls_m, most_m = sum(one.agreement.agreeing_m for one in bent), max(one.most_m for one in bent)

@@ -235,13 +235,9 @@ def draw_curve(
     """
     times, shares = [time for time, _ in curve], [100.0 * share for _, share in curve]
     end = max(end_s, 1.0)
-    axes.fill_between(
-        [*times, end], [*shares, shares[-1]], step="post", color=_COVERAGE, alpha=0.15, linewidth=0
-    )
+    axes.fill_between([*times, end], [*shares, shares[-1]], step="post", color=_COVERAGE, alpha=0.15, linewidth=0)
     axes.step([*times, end], [*shares, shares[-1]], where="post", color=_COVERAGE, linewidth=1.8)
-    axes.plot(
-        list(reached.values()), [100.0 * share for share in reached], "o", color=_COVERAGE, markersize=4
-    )
+    axes.plot(list(reached.values()), [100.0 * share for share in reached], "o", color=_COVERAGE, markersize=4)
     words = "\n".join(f"{100 * share:.0f} % at {time:.1f} s" for share, time in reached.items())
     axes.text(0.97, 0.05, words, transform=axes.transAxes, ha="right", va="bottom", fontsize=8.5, color=INK)
     axes.set_xlim(0.0, end)
@@ -255,9 +251,7 @@ def draw_curve(
     axes.spines[["left", "bottom"]].set_color("#d1d5db")
 
 
-def list_robots(
-    axes: Axes, columns: Sequence[str], robots: Sequence[Sequence[str]], below: Sequence[str]
-) -> None:
+def list_robots(axes: Axes, columns: Sequence[str], robots: Sequence[Sequence[str]], below: Sequence[str]) -> None:
     """List each robot's ending and some figures.
 
     Below them is the text on the team.

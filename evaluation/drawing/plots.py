@@ -38,9 +38,7 @@ def coverage_curves(group: Group, records: dict[Key, Entry]) -> Curves:
         if not entries:
             continue
         bands = 100.0 * median_bands(np.array([coverage_at(entry.coverage, times) for entry in entries]))
-        median, low, high = (
-            [float(value) if np.isfinite(value) else None for value in line] for line in bands
-        )
+        median, low, high = ([float(value) if np.isfinite(value) else None for value in line] for line in bands)
         curves[policy] = {
             "runs": len(entries),
             "times_s": times.tolist(),
@@ -76,15 +74,11 @@ def save_coverage(path: Path, group: Group, curves: Curves) -> None:
     axes.set_xlim(0.0, _end_of(curves, group.horizon_s))
     axes.set_ylim(0.0, 101.0)
     handles = [
-        Line2D([], [], color=colours(len(shown))[k], linestyle=dash(k), linewidth=1.9)
-        for k in map(shown.index, curves)
+        Line2D([], [], color=colours(len(shown))[k], linestyle=dash(k), linewidth=1.9) for k in map(shown.index, curves)
     ]
     legend(
         figure,
-        [
-            f"{policy} ({curve['runs']} run{'s' if curve['runs'] != 1 else ''})"
-            for policy, curve in curves.items()
-        ],
+        [f"{policy} ({curve['runs']} run{'s' if curve['runs'] != 1 else ''})" for policy, curve in curves.items()],
         handles,
     )
     has_bands = any(None not in curve["low_percent"] for curve in curves.values())
@@ -139,9 +133,7 @@ def save_boxes(path: Path, group: Group, values: Sequence[Value]) -> None:
         axes.set_ylim(bottom=0.0)
     for axes in row_of_axes:
         axes.grid(visible=False, axis="x")
-        axes.set_xticks(
-            range(1, len(policies) + 1), policies, rotation=35, ha="right", rotation_mode="anchor"
-        )
+        axes.set_xticks(range(1, len(policies) + 1), policies, rotation=35, ha="right", rotation_mode="anchor")
         axes.tick_params(axis="x", labelsize=8.5, labelcolor=INK, length=0)
         axes.set_xlim(0.4, len(policies) + 0.6)
     note = (
@@ -291,9 +283,7 @@ def _paired_costs(group: Group, key: str) -> NDArray[np.float64]:
         for rows in group.runs.values()
     ]
     shared = [pair for pair in by_policy[0] if all(pair in times for times in by_policy)]
-    return np.array([[times[pair] for times in by_policy] for pair in shared]).reshape(
-        len(shared), len(by_policy)
-    )
+    return np.array([[times[pair] for times in by_policy] for pair in shared]).reshape(len(shared), len(by_policy))
 
 
 def _draw_share(

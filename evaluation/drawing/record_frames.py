@@ -103,14 +103,10 @@ class TrackFrames:
         frame = self._map_at(time_s)
         recent = (display.times >= time_s - RECENT_S) & (display.times <= time_s + 1e-9)
         poses = display.poses_at(time_s)
-        draw_paths(
-            frame, view, np.concatenate([display.poses[recent, :, :2], poses[None, :, :2]]), self._colours
-        )
+        draw_paths(frame, view, np.concatenate([display.poses[recent, :, :2], poses[None, :, :2]]), self._colours)
         self._draw_targets(frame, time_s, poses)
         ended = {
-            event["agent"]
-            for event in display.events
-            if event["kind"] == "ended" and event["time_s"] <= time_s + 1e-9
+            event["agent"] for event in display.events if event["kind"] == "ended" and event["time_s"] <= time_s + 1e-9
         }
         has_ended = [agent in ended for agent in self._agents]
         draw_robots(frame, view, poses, radius_of(self._record), has_ended, self._colours)
@@ -151,8 +147,7 @@ class TrackFrames:
             target = targets.get(agent)
             if target is not None:
                 here, there = (
-                    tuple(int(value) for value in point)
-                    for point in self.view.pixels(np.array([pose[:2], target]))
+                    tuple(int(value) for value in point) for point in self.view.pixels(np.array([pose[:2], target]))
                 )
                 cv2.line(frame, here, there, colour, 1, cv2.LINE_AA, SHIFT)
                 cv2.circle(frame, there, radius << SHIFT, EXPLORED, -1, cv2.LINE_AA, SHIFT)
@@ -190,8 +185,7 @@ def save_track_picture(path: Path, record: EpisodeRecord) -> None:
     lengths = path_lengths(display.poses)
     endings = {event["agent"]: event["reason"] for event in display.events if event["kind"] == "ended"}
     robots = [
-        (endings.get(f"robot_{robot}", "still at work"), f"{length:.1f} m")
-        for robot, length in enumerate(lengths)
+        (endings.get(f"robot_{robot}", "still at work"), f"{length:.1f} m") for robot, length in enumerate(lengths)
     ]
     below = [f"{kind}: {count}" for kind, count in _counts(display.events).items()]
     list_robots(team_axes, ("drove",), robots, below)

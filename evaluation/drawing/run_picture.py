@@ -69,10 +69,7 @@ def save_run_picture(path: Path, episode: Episode, policy: str) -> None:
     area = float(env.score.counted[0]) * env.settings.occupancy.resolution**2
     robots = "1 robot" if env.settings.robots == 1 else f"{env.settings.robots} robots"
     how = ", interrupted" if episode.is_interrupted else ""
-    title = (
-        f"{env.floor.name}: {100 * scorer.coverage:.1f} % of {area:.0f} m² explored in {scorer.time:.1f} "
-        f"s{how}"
-    )
+    title = f"{env.floor.name}: {100 * scorer.coverage:.1f} % of {area:.0f} m² explored in {scorer.time:.1f} s{how}"
     subtitle = f"{robots}, {policy}, seed {episode.seed}, {float(env.world.travelled.sum()):.1f} m driven"
     save_titled_figure(path, figure, title, subtitle)
 

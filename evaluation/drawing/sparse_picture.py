@@ -86,9 +86,7 @@ def _save_plane(
         figure.savefig(beside, format="png", dpi=120)
 
 
-def _extent(
-    boxes: NDArray[np.float64], free: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _extent(boxes: NDArray[np.float64], free: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the low and the high corner of a picture [m]: all but the outermost codes."""
     points = np.concatenate([boxes.reshape(-1, 3), free, np.zeros((0, 3))])[:, :2]
     if len(points) == 0:
@@ -116,10 +114,7 @@ def _in_space(
     away = 0.62 * across / math.tan(0.5 * field_of_view) + 0.3 * (high[1] - low[1])
     eye = middle + away * np.array([0.0, -math.cos(pitch), math.sin(pitch)])
     tops = both[:, 1, 2] - floor
-    shades = (
-        colormaps["viridis_r"](np.clip(tops / max(float(tops.max(initial=0.1)), 0.1), 0.0, 1.0))[:, :3]
-        * 255.0
-    )
+    shades = colormaps["viridis_r"](np.clip(tops / max(float(tops.max(initial=0.1)), 0.1), 0.0, 1.0))[:, :3] * 255.0
     shades[len(boxes) :] = _PATH_RGB
     return shade(faces, Viewpoint.towards(eye, middle, field_of_view), _SIZE, np.zeros((0, 5)), [], shades)
 

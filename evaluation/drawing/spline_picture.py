@@ -81,13 +81,9 @@ def save_spline_picture(
         )
         goal[0].set_label("goal")
         handles += goal
-    axes.legend(
-        handles=handles, loc="upper center", bbox_to_anchor=(0.5, -0.05), ncols=3, frameon=False, fontsize=8.5
-    )
+    axes.legend(handles=handles, loc="upper center", bbox_to_anchor=(0.5, -0.05), ncols=3, frameon=False, fontsize=8.5)
     controls = sum(len(curve.spline.control_points) for curve in spline_map.curves)
-    note = (
-        f"{len(spline_map.curves)} curves with {controls} control points, {spline_map.length:.1f} m of wall"
-    )
+    note = f"{len(spline_map.curves)} curves with {controls} control points, {spline_map.length:.1f} m of wall"
     save_titled_figure(path, figure, title or floor.name, note)
 
 
@@ -100,9 +96,7 @@ def _draw_tree(
     axes.add_collection(
         PolyCollection(list(safe_regions), facecolors=TREE_COLOUR, alpha=0.06, edgecolors="none", zorder=1)
     )
-    axes.add_collection(
-        LineCollection([np.array(edge) for edge in tree], colors=TREE_COLOUR, linewidths=1.1, zorder=4)
-    )
+    axes.add_collection(LineCollection([np.array(edge) for edge in tree], colors=TREE_COLOUR, linewidths=1.1, zorder=4))
     nodes = np.array([point for edge in tree for point in edge])
     axes.plot(*nodes.T, "o", color=TREE_COLOUR, markersize=3.5, zorder=5)
     return Line2D([], [], color=TREE_COLOUR, marker="o", markersize=3.5, label="tree")
@@ -115,9 +109,7 @@ def _draw_map(axes: Axes, spline_map: SplineMap) -> list[Line2D]:
     """
     for k, curve in enumerate(spline_map.curves):
         colour = CURVE_COLOURS[k % len(CURVE_COLOURS)]
-        axes.plot(
-            *curve.spline.sample(_SPACING).T, color=colour, linewidth=2.0, zorder=3, solid_capstyle="round"
-        )
+        axes.plot(*curve.spline.sample(_SPACING).T, color=colour, linewidth=2.0, zorder=3, solid_capstyle="round")
         axes.plot(*curve.spline.control_points.T, ".", color=colour, markersize=3.0, alpha=0.6, zorder=3)
     for marks, marker, colour in (
         (spline_map.corners, "^", CORNER_COLOUR),
@@ -141,7 +133,5 @@ def _draw_paths(
         (believed_path, BELIEVED_COLOUR, "--", "believed path"),
     ):
         if points is not None:
-            handles += axes.plot(
-                points[:, 0], points[:, 1], style, color=colour, linewidth=1.2, zorder=4, label=label
-            )
+            handles += axes.plot(points[:, 0], points[:, 1], style, color=colour, linewidth=1.2, zorder=4, label=label)
     return handles

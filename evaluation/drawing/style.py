@@ -29,9 +29,7 @@ GRID, FRAME = "#e5e7eb", "#d1d5db"
 
 def colours(count: int) -> list[str]:
     """Return colours for policies or robots, first those that all can distinguish."""
-    return [*COLOURS, *(f"#{red:02x}{green:02x}{blue:02x}" for red, green, blue in team_colours(count))][
-        :count
-    ]
+    return [*COLOURS, *(f"#{red:02x}{green:02x}{blue:02x}" for red, green, blue in team_colours(count))][:count]
 
 
 def dash(index: int) -> Any:  # noqa: ANN401
@@ -67,9 +65,7 @@ def band(
 def save(path: Path, figure: Figure, title: str, subtitle: str = "") -> None:
     """Write a figure with a title and, below it, an explanation."""
     height = figure.get_figheight()
-    figure.text(
-        0.012, 1.0 - 0.12 / height, title, ha="left", va="top", fontsize=13, fontweight="bold", color=INK
-    )
+    figure.text(0.012, 1.0 - 0.12 / height, title, ha="left", va="top", fontsize=13, fontweight="bold", color=INK)
     figure.text(0.012, 1.0 - 0.40 / height, subtitle, ha="left", va="top", fontsize=9, color=FAINT)
     engine = figure.get_layout_engine()
     if isinstance(engine, ConstrainedLayoutEngine):

@@ -75,9 +75,7 @@ def decision_lines(report: PolicyReport) -> str:
     return "".join(json.dumps(entry.as_dict(), allow_nan=False) + "\n" for entry in entries)
 
 
-def joined_groups(
-    report: PolicyReport, agents: Sequence[str]
-) -> tuple[list[set[int]], list[tuple[int, int]]]:
+def joined_groups(report: PolicyReport, agents: Sequence[str]) -> tuple[list[set[int]], list[tuple[int, int]]]:
     """Return which robots' maps a station has joined, and by which pairs; robots are places in ``agents``.
 
     Each robot is in one group; a robot that is not joined is alone in it, as are all without a station.

@@ -42,10 +42,7 @@ def _is_any_pair_near(world: WorldArrays, first: int, robots: int) -> bool:
                 world.poses[row, 0] - world.poses[other, 0],
                 world.poses[row, 1] - world.poses[other, 1],
             )
-            if (
-                not (world.flags[row] | world.flags[other]) & ENDED
-                and gap_x * gap_x + gap_y * gap_y < reach * reach
-            ):
+            if not (world.flags[row] | world.flags[other]) & ENDED and gap_x * gap_x + gap_y * gap_y < reach * reach:
                 return True
     return False
 

@@ -64,9 +64,7 @@ class EpisodeData:
         Length of each robot's path [m].
     """
 
-    def __init__(
-        self, env: ExplorationEnv, episode: Episode | None = None, history: History | None = None
-    ) -> None:
+    def __init__(self, env: ExplorationEnv, episode: Episode | None = None, history: History | None = None) -> None:
         self.env, self.settings, self.episode = env, env.settings, episode
         self.history = None if history is None or not history.has_begun else history
         self.robots = env.settings.robots
@@ -242,9 +240,7 @@ def _at_threshold(data: EpisodeData, share: float, figure: str) -> float | int |
 
 def _overlap_of_maps(data: EpisodeData) -> float | None:
     whole = data.milestone(WHOLE)
-    return (
-        None if whole is None or whole.known_shares is None else round(overlap_of_maps(whole.known_shares), 9)
-    )
+    return None if whole is None or whole.known_shares is None else round(overlap_of_maps(whole.known_shares), 9)
 
 
 def _overlap_at(data: EpisodeData, share: float) -> float | None:
@@ -280,9 +276,7 @@ def _absolute_errors(data: EpisodeData) -> list[float] | None:
         return [0.0] * data.robots if data.settings.localization == "truth" else None
     poses = data.trajectories
     return [
-        round(
-            absolute_error(poses.believed[:, robot], poses.true[:, robot], not data.settings.known_starts), 9
-        )
+        round(absolute_error(poses.believed[:, robot], poses.true[:, robot], not data.settings.known_starts), 9)
         for robot in range(data.robots)
     ]
 
@@ -294,9 +288,7 @@ def _relative_errors(data: EpisodeData, part: int) -> list[float | None] | None:
     poses = data.trajectories
     times = poses.times
     steps = max(round(1.0 / (times[1] - times[0])), 1) if len(times) > 1 else 1
-    errors = [
-        relative_error(poses.believed[:, robot], poses.true[:, robot], steps) for robot in range(data.robots)
-    ]
+    errors = [relative_error(poses.believed[:, robot], poses.true[:, robot], steps) for robot in range(data.robots)]
     return [None if error is None else round(error[part], 9) for error in errors]
 
 
@@ -401,9 +393,7 @@ _add(
     "m",
     "lower",
     columns=(
-        Column(
-            "path_m", "path of the team", "m", "lower", of=lambda paths: float(sum(paths)), is_compared=True
-        ),
+        Column("path_m", "path of the team", "m", "lower", of=lambda paths: float(sum(paths)), is_compared=True),
         Column(
             "longest_path_m",
             "longest path of a robot",
@@ -425,9 +415,7 @@ _add(
     lambda data: round(overlap(data.env.score.masks), 9),
     "share of the sensed cells that two or more robots sensed",
     direction="lower",
-    columns=(
-        Column("overlap_percent", "overlap", "%", "lower", of=lambda share: 100.0 * share, is_compared=True),
-    ),
+    columns=(Column("overlap_percent", "overlap", "%", "lower", of=lambda share: 100.0 * share, is_compared=True),),
 )
 _add(
     "overlap_eb",

@@ -156,9 +156,7 @@ def _widened(cells: Mask, by: int = 1) -> Mask:
     """Return the cells within ``by`` cells of given ones, diagonals included."""
     side = 2 * by + 1
     bytes_of = np.ascontiguousarray(cells).view(np.uint8)
-    grown = cv2.dilate(
-        bytes_of, np.ones((side, side), np.uint8), borderType=cv2.BORDER_CONSTANT, borderValue=(0.0,)
-    )
+    grown = cv2.dilate(bytes_of, np.ones((side, side), np.uint8), borderType=cv2.BORDER_CONSTANT, borderValue=(0.0,))
     return np.asarray(grown, np.uint8).view(np.bool_)
 
 

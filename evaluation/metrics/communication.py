@@ -72,9 +72,7 @@ def bytes_per_robot_second(sent: ArrayLike, duration: float) -> float:
     return float(np.mean(np.asarray(sent, np.float64))) / duration if duration > 0.0 else 0.0
 
 
-def sharing_lag(
-    times: ArrayLike, own: NDArray[np.float64], team: ArrayLike, share: float = 0.99
-) -> float | None:
+def sharing_lag(times: ArrayLike, own: NDArray[np.float64], team: ArrayLike, share: float = 0.99) -> float | None:
     """Return ``T_p(min_i C_own,i) - T_p(C_team)`` [s].
 
     It is the delay until the last robot has the team's knowledge; None if not reached.

@@ -144,9 +144,7 @@ def grid_bytes(bounds: tuple[float, float, float, float], resolution: float = 0.
     The grid covers x_min, y_min, x_max, y_max.
     """
     x_min, y_min, x_max, y_max = bounds
-    return int(np.ceil((x_max - x_min) / resolution - 1e-9)) * int(
-        np.ceil((y_max - y_min) / resolution - 1e-9)
-    )
+    return int(np.ceil((x_max - x_min) / resolution - 1e-9)) * int(np.ceil((y_max - y_min) / resolution - 1e-9))
 
 
 @kernel

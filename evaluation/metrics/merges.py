@@ -33,9 +33,7 @@ LEAST_OVERLAP = 0.10
 """Share of the area that maps must have in common for a merge to be expected."""
 
 
-def transform_error(
-    found: ArrayLike, true: ArrayLike, at: tuple[float, float] = (0.0, 0.0)
-) -> tuple[float, float]:
+def transform_error(found: ArrayLike, true: ArrayLike, at: tuple[float, float] = (0.0, 0.0)) -> tuple[float, float]:
     """Return the errors [m] and [rad] of a transform T for a true one T*.
 
     They are ``|T a - T* a|`` and ``|wrap(theta - theta*)|``, of a T that was found.
@@ -64,10 +62,7 @@ def is_correct(translation_error: float, rotation_error: float, resolution: floa
     m-explore's test takes the tolerance of each axis alone; here it is that of the distance.
     """
     # A millionth of a cell, so that an error of exactly two cells is not lost to rounding.
-    return (
-        rotation_error <= ROTATION_TOLERANCE
-        and translation_error <= (TRANSLATION_TOLERANCE + 1e-6) * resolution
-    )
+    return rotation_error <= ROTATION_TOLERANCE and translation_error <= (TRANSLATION_TOLERANCE + 1e-6) * resolution
 
 
 def _is_wrong(translation_error: float, rotation_error: float) -> bool:
@@ -104,9 +99,7 @@ class Trajectories:
         """
         robot = list(self.agents).index(agent)
         known = max(int(np.searchsorted(self.times, until_s, side="right")), 1)
-        nearest = int(
-            np.argmin(np.linalg.norm(self.believed[:known, robot, :2] - np.asarray(at, np.float64), axis=1))
-        )
+        nearest = int(np.argmin(np.linalg.norm(self.believed[:known, robot, :2] - np.asarray(at, np.float64), axis=1)))
         true, believed = (Transform(*poses[nearest, robot].tolist()) for poses in (self.true, self.believed))
         return true @ believed.inverse()
 
@@ -134,9 +127,7 @@ def merge_figures(
     errors = [transform_error(one.found, one.true, one.at) for one in events]
     direct = [one for one in events if one.is_direct]
     here = [
-        transform_error(
-            one.found, one.true if trajectories is None else drifted_truth(one, trajectories), one.at
-        )
+        transform_error(one.found, one.true if trajectories is None else drifted_truth(one, trajectories), one.at)
         for one in direct
     ]
     correct = np.array([is_correct(*error, resolution) for error in errors], np.bool_)
@@ -187,9 +178,7 @@ def recall(accepted: NDArray[np.bool_], correct: NDArray[np.bool_], overlaps: Ar
     return int(np.count_nonzero(accepted & correct & expected)) / total if total else None
 
 
-def first_correct_time(
-    times: Sequence[float], accepted: NDArray[np.bool_], correct: NDArray[np.bool_]
-) -> float | None:
+def first_correct_time(times: Sequence[float], accepted: NDArray[np.bool_], correct: NDArray[np.bool_]) -> float | None:
     """Return when the first correct merge was accepted [s], None if none was.
 
     Parameters

@@ -53,9 +53,7 @@ def absolute_error(believed: Poses, true: Poses, is_aligned: bool = True) -> flo
     believed, true : (times, 3) float64
         Believed and true poses at the same times, at least one.
     """
-    fitted = (
-        moved(believed, best_transform(believed, true)) if is_aligned else np.asarray(believed, np.float64)
-    )
+    fitted = moved(believed, best_transform(believed, true)) if is_aligned else np.asarray(believed, np.float64)
     gaps = fitted[:, :2] - np.asarray(true, np.float64)[:, :2]
     return math.sqrt(float((gaps**2).sum(axis=1).mean()))
 
@@ -77,9 +75,7 @@ def relative_error(believed: Poses, true: Poses, steps: int) -> tuple[float, flo
     motion, truth = _motions(believed, steps), _motions(true, steps)
     # The rotation of Q_k^-1 Q_(k+d) turns the gap of translations and leaves its length.
     gaps = motion[:, :2] - truth[:, :2]
-    return math.sqrt(float((gaps**2).sum(axis=1).mean())), float(
-        np.abs(_wrapped(motion[:, 2] - truth[:, 2])).mean()
-    )
+    return math.sqrt(float((gaps**2).sum(axis=1).mean())), float(np.abs(_wrapped(motion[:, 2] - truth[:, 2])).mean())
 
 
 def _motions(poses: Poses, steps: int) -> Poses:

@@ -102,9 +102,7 @@ def covered(relations: Relations, stamps: NDArray[np.float64]) -> Relations:
     return Relations(relations.begin[is_inside], relations.end[is_inside], relations.motions[is_inside])
 
 
-def relation_errors(
-    begin: NDArray[np.float64], end: NDArray[np.float64], relations: Relations
-) -> RelationErrors:
+def relation_errors(begin: NDArray[np.float64], end: NDArray[np.float64], relations: Relations) -> RelationErrors:
     """Return the errors of poses against relations.
 
     An error is the motion between a relation's two poses, as seen from the true one.

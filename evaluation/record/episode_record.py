@@ -101,9 +101,7 @@ class DisplayTrack:
 
         Before the first sample they are the poses of the start.
         """
-        return np.asarray(
-            self.poses[max(int(np.searchsorted(self.times, time_s + 1e-9, side="right")) - 1, 0)]
-        )
+        return np.asarray(self.poses[max(int(np.searchsorted(self.times, time_s + 1e-9, side="right")) - 1, 0)])
 
     def coverage_at(self, time_s: float) -> float:
         """Return ``C_free`` at a time."""

@@ -115,9 +115,7 @@ def _packed(record: EpisodeRecord) -> dict[str, NDArray[Any]]:
         "map_known": changes.known,
         "map_occupied": changes.occupied,
     }
-    return {
-        name: np.ascontiguousarray(arrays[name], arrays[name].dtype.newbyteorder("<")) for name in _ARRAYS
-    }
+    return {name: np.ascontiguousarray(arrays[name], arrays[name].dtype.newbyteorder("<")) for name in _ARRAYS}
 
 
 def _unpacked(header: dict[str, Any], events: Any, arrays: dict[str, NDArray[Any]]) -> EpisodeRecord:  # noqa: ANN401
@@ -141,8 +139,7 @@ def _unpacked(header: dict[str, Any], events: Any, arrays: dict[str, NDArray[Any
         kind = {"commands": np.float64, "map_known": np.uint64, "map_occupied": np.uint64}.get(name, np.int32)
         if arrays[name].shape != shape or arrays[name].dtype != kind:
             raise ValueError(
-                f"{name} has shape {arrays[name].shape} of {arrays[name].dtype}; want {shape} of "
-                f"{np.dtype(kind)}"
+                f"{name} has shape {arrays[name].shape} of {arrays[name].dtype}; want {shape} of {np.dtype(kind)}"
             )
     if not (np.abs(arrays["commands"]) <= MOST_COMMAND).all():
         raise ValueError(f"commands are not all numbers of at most {MOST_COMMAND:,.0f}")
@@ -151,11 +148,7 @@ def _unpacked(header: dict[str, Any], events: Any, arrays: dict[str, NDArray[Any
         changed and not 0 <= int(places.min()) <= int(places.max()) < rows * words
     ):
         raise ValueError(f"the changes of the map do not fit a map of {rows} x {words} words")
-    if (
-        not (poses and samples)
-        or not isinstance(events, list)
-        or not all(_is_event(event) for event in events)
-    ):
+    if not (poses and samples) or not isinstance(events, list) or not all(_is_event(event) for event in events):
         raise ValueError("it has no poses, no map or no list of events")
     changes = MapChanges(
         rows,

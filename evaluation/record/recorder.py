@@ -80,9 +80,7 @@ class MapSampler:
         self._buffer = np.empty((self.shape[0] * self.shape[1], 3), np.uint64)
         # Between two samples a robot gets no farther from both positions than half of its maximum path.
         self._reach = (
-            settings.lidar.range_max
-            + 0.5 * settings.speed_limits[:, 0].max() * period_s
-            + 4 * self._resolution
+            settings.lidar.range_max + 0.5 * settings.speed_limits[:, 0].max() * period_s + 4 * self._resolution
         )
         self._last = env.beliefs.believed[:, :2].copy()
         self._is_overlaid = not settings.known_starts
@@ -94,9 +92,7 @@ class MapSampler:
         self._renderings = env.beliefs.renderings.copy()
         self._placements = _overlays_of(env, self.origin)
         self._before = (
-            [np.zeros(log_odds.shape, np.int8) for log_odds in env.beliefs.log_odds]
-            if self._is_overlaid
-            else []
+            [np.zeros(log_odds.shape, np.int8) for log_odds in env.beliefs.log_odds] if self._is_overlaid else []
         )
         self._before_at = np.array([log_odds.ctypes.data for log_odds in self._before], np.int64)
         self._steps: list[int] = []
@@ -114,14 +110,10 @@ class MapSampler:
         reach = FAR if is_new else self._reach
         self._renderings[:] = self._env.beliefs.renderings
         if self._is_overlaid:
-            overlaid = OverlaidMaps(
-                self._env.beliefs.belief_rows, self._before_at, self._placements, self._resolution
-            )
+            overlaid = OverlaidMaps(self._env.beliefs.belief_rows, self._before_at, self._placements, self._resolution)
             count = note_overlaid_changes(overlaid, self._env.beliefs.believed, self._last, reach, *planes)
         else:
-            count = note_changes(
-                self._maps, self._env.beliefs.believed, self._last, reach, self._frame, *planes
-            )
+            count = note_changes(self._maps, self._env.beliefs.believed, self._last, reach, self._frame, *planes)
         self._steps.append(step)
         self._changes.append(self._buffer[:count].copy())
 
@@ -239,9 +231,7 @@ class Recorder(Watcher):
         """Return the record of the episode so far; recording may continue."""
         env = self._env
         if env is None or env.floor is None:
-            raise ValueError(
-                "the recorder has seen no episode; let it watch an environment from its reset on"
-            )
+            raise ValueError("the recorder has seen no episode; let it watch an environment from its reset on")
         settings, world = env.settings, env.world
         steps = int(world.steps[0])
         commands = np.frombuffer(self._commands, np.float64).reshape(-1, settings.robots, 2).copy()

@@ -148,10 +148,7 @@ def first_difference(record: EpisodeRecord, env: ExplorationEnv) -> str:
         if apart.max() > 1e-3:
             robot = env.possible_agents[int(apart.argmax())]
             return f"{robot} is {apart.max():.3f} m off at {time_s:.1f} s (recorded with {made_with})"
-    return (
-        "the ways are the same to a millimetre, the final state is not to the bit (recorded with "
-        f"{made_with})"
-    )
+    return f"the ways are the same to a millimetre, the final state is not to the bit (recorded with {made_with})"
 
 
 def _settings_of(header: dict[str, Any]) -> ExplorationSettings:
@@ -195,9 +192,7 @@ def find_floor(header: dict[str, Any], floor: str | Path | Floor | None = None) 
         if found.sha256 == header["floor_sha256"]:
             return found
         what = f"floor {found.name!r}" if isinstance(name, Floor) else str(name)
-        tried.append(
-            f"{what} has the hash {found.sha256[:12]}, the record's floor has {header['floor_sha256'][:12]}"
-        )
+        tried.append(f"{what} has the hash {found.sha256[:12]}, the record's floor has {header['floor_sha256'][:12]}")
     raise ValueError(
         f"the floor {header['floor']!r} of the record is not found: {'; '.join(tried)}; name the floor that "
         "was recorded"

@@ -31,9 +31,7 @@ _DIGITS = 4
 _OF_GROUP = ("times", "values", "comparisons", "coverage_over_time", "profiles", "by_floor")
 
 
-def page_content(
-    report: dict[str, Any], sections: Sequence[Section], replays: Sequence[Row]
-) -> dict[str, Any]:
+def page_content(report: dict[str, Any], sections: Sequence[Section], replays: Sequence[Row]) -> dict[str, Any]:
     """Return the content of a page."""
     policies = sorted({policy for section in sections for policy in section.group.runs})
     values = sections[0].values
@@ -99,9 +97,7 @@ def _columns(
     groups: Sequence[Group], policies: Sequence[str], values: Sequence[Value], replays: dict[int, int]
 ) -> dict[str, list[Any]]:
     """Return all episodes as columns, names as their places in lists: thousands of lines stay small."""
-    floors = {
-        floor: k for k, floor in enumerate(dict.fromkeys(name for each in groups for name in each.floors))
-    }
+    floors = {floor: k for k, floor in enumerate(dict.fromkeys(name for each in groups for name in each.floors))}
     of_policy = {policy: k for k, policy in enumerate(policies)}
     lines = [
         (

@@ -88,9 +88,7 @@ class ReplaySampler(Watcher):
         settings, truth = env.settings, truth_of(env)
         grid = grid_around(truth.knowable, settings.occupancy.resolution)
         own = settings.robots if settings.robots > 1 else 0
-        self.samples = _Samples(
-            grid, Layer.blank(grid), Layer.blank(grid), [Layer.blank(grid) for _ in range(own)]
-        )
+        self.samples = _Samples(grid, Layer.blank(grid), Layer.blank(grid), [Layer.blank(grid) for _ in range(own)])
         occupied = occupied_in_truth(env)[grid.window]
         self.samples.truth.add(coarse(occupied, np.zeros_like(occupied), grid.block))
         self._reach = settings.lidar.range_max + settings.speed_limits[:, 0].max() * self._map_period + 0.5
@@ -151,9 +149,7 @@ class ReplaySampler(Watcher):
             layer.add(levels)
         samples.map_times.append(int(env.world.steps[0]) * env.settings.time_step)
 
-    def _changed(
-        self, env: ExplorationEnv, places: NDArray[np.float64], is_whole: bool
-    ) -> tuple[slice, slice]:
+    def _changed(self, env: ExplorationEnv, places: NDArray[np.float64], is_whole: bool) -> tuple[slice, slice]:
         """Return the rows and columns of the page's grid that may have changed."""
         grid = self.samples.grid
         if is_whole:

@@ -62,11 +62,7 @@ def write_report(
         "seed": seed,
         "warnings": [
             *map(plain, warnings),
-            *(
-                f"{plain(section.group.title)}: {warning}"
-                for section in sections
-                for warning in section.warnings
-            ),
+            *(f"{plain(section.group.title)}: {warning}" for section in sections for warning in section.warnings),
         ],
         "replays": len(replayed),
         "groups": [section.numbers for section in sections],
@@ -117,10 +113,7 @@ def _about_names(episodes: Episodes) -> list[str]:
 
     unknown = sorted({str(row["policy"]) for row in episodes.rows} - set(policy_names()))
     return (
-        [
-            f"Policies that this lidarium does not have: {', '.join(unknown)}; their figures are told all "
-            "the same."
-        ]
+        [f"Policies that this lidarium does not have: {', '.join(unknown)}; their figures are told all the same."]
         if unknown
         else []
     )

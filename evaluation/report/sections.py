@@ -43,8 +43,7 @@ PICTURED_FLOORS = 3
 
 
 _OF_FEW = (
-    "95 % intervals of so few may hold the truth more or less often than that "
-    "(docs/results/interval_coverage.md)."
+    "95 % intervals of so few may hold the truth more or less often than that (docs/results/interval_coverage.md)."
 )
 
 
@@ -97,27 +96,17 @@ def _describe_times(section: Section, seed: int) -> None:
     group = section.group
     section.numbers["times"] = {}
     for key, title in TIMES.items():
-        figures = {
-            policy: time_figure(rows, key, group.horizon_s, seed) for policy, rows in group.runs.items()
-        }
+        figures = {policy: time_figure(rows, key, group.horizon_s, seed) for policy, rows in group.runs.items()}
         section.numbers["times"][key] = figures
         section.markdown += [
             f"### {title[0].upper()}{title[1:]}",
             tables.times_table(figures, group.horizon_s),
         ]
-        if missed := [
-            _missed(policy, figure) for policy, figure in figures.items() if figure.reached < figure.size
-        ]:
+        if missed := [_missed(policy, figure) for policy, figure in figures.items() if figure.reached < figure.size]:
             section.warnings.append(f"{title} was not reached in {', '.join(missed)}.")
-    few = [
-        f"{code(policy)} ({len(rows)})"
-        for policy, rows in group.runs.items()
-        if len(rows) < FEWEST_FOR_NOMINAL
-    ]
+    few = [f"{code(policy)} ({len(rows)})" for policy, rows in group.runs.items() if len(rows) < FEWEST_FOR_NOMINAL]
     if again := [
-        f"{repeats(rows)} of {len(rows)} of {code(policy)}"
-        for policy, rows in group.runs.items()
-        if repeats(rows)
+        f"{repeats(rows)} of {len(rows)} of {code(policy)}" for policy, rows in group.runs.items() if repeats(rows)
     ]:
         section.warnings.append(
             f"runs that repeat another one on their floor in every figure: {', '.join(again)}. The seed "
@@ -137,9 +126,7 @@ def _missed(policy: str, figure: TimeFigure) -> str:
 
 def _describe_values(section: Section, seed: int) -> None:
     figures = {
-        policy: {
-            value.column.key: value_figure([value.of(row) for row in rows], seed) for value in section.values
-        }
+        policy: {value.column.key: value_figure([value.of(row) for row in rows], seed) for value in section.values}
         for policy, rows in section.group.runs.items()
     }
     section.numbers["values"] = figures
@@ -208,9 +195,7 @@ def _draw_plots(section: Section, records: dict[Key, Entry], out: Path) -> None:
     section.numbers["profiles"] = profiles(group)
     section.numbers["pictures"] = []
     if curves:
-        save_coverage(
-            _picture(section, out, f"coverage_{group.slug}.png", "Coverage over time"), group, curves
-        )
+        save_coverage(_picture(section, out, f"coverage_{group.slug}.png", "Coverage over time"), group, curves)
     picture = _picture(section, out, f"boxes_{group.slug}.png", "Times, paths and overlap")
     save_boxes(picture, group, section.values)
     save_profiles(
@@ -269,9 +254,7 @@ def _picture(section: Section, out: Path, name: str, title: str) -> Path:
 def _describe_floors(section: Section) -> None:
     group = section.group
     section.numbers["by_floor"] = {
-        floor: {
-            policy: _of_floor(rows, group.horizon_s) for policy, rows in group.on_floor(floor).items() if rows
-        }
+        floor: {policy: _of_floor(rows, group.horizon_s) for policy, rows in group.on_floor(floor).items() if rows}
         for floor in group.floors
     }
     for key, title in TIMES.items():

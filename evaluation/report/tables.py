@@ -50,18 +50,14 @@ def number(value: float, horizon_s: float | None = None, digits: int = 1) -> str
     return text.removeprefix("-") if float(text) == 0.0 else text
 
 
-def interval(
-    found: Interval | None, horizon_s: float | None = None, scale: float = 1.0, digits: int = 1
-) -> str:
+def interval(found: Interval | None, horizon_s: float | None = None, scale: float = 1.0, digits: int = 1) -> str:
     """Return an estimate with its interval in brackets.
 
     Unbounded ends of the interval are left open.
     """
     if found is None:
         return NONE
-    estimate, low, high = (
-        number(scale * end, horizon_s, digits) for end in (found.estimate, found.low, found.high)
-    )
+    estimate, low, high = (number(scale * end, horizon_s, digits) for end in (found.estimate, found.low, found.high))
     return f"{estimate} [{low}, {high}]"
 
 

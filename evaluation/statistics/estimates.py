@@ -95,9 +95,7 @@ def _between(start: float, end: float, share: float) -> float:
     return float(start + share * (end - start)) if np.isfinite(start) and np.isfinite(end) else float(np.inf)
 
 
-def mean_interval(
-    values: ArrayLike, confidence: float = 0.95, resamples: int = RESAMPLES, seed: int = 0
-) -> Interval:
+def mean_interval(values: ArrayLike, confidence: float = 0.95, resamples: int = RESAMPLES, seed: int = 0) -> Interval:
     """Return the mean and its studentised bootstrap interval.
 
     Parameters
@@ -164,9 +162,7 @@ def paired_ratio(
             index = int(np.flatnonzero(sample <= 0.0)[0])
             raise ValueError(f"{name}[{index}] is {sample[index]}; want values above 0 for a ratio")
     replicates = in_parts(_means(np.log(first) - np.log(second)))
-    return exponential(
-        studentised_interval(replicates, len(first), confidence, resamples, seed, is_symmetric=True)
-    )
+    return exponential(studentised_interval(replicates, len(first), confidence, resamples, seed, is_symmetric=True))
 
 
 def exponential(interval: Interval) -> Interval:
@@ -220,8 +216,6 @@ def _errors(shifts: Values, squares: Values, size: int) -> Values:
 def share_interval(successes: int, size: int, confidence: float = 0.95) -> Interval:
     """Return the share ``successes / size`` and its Wilson interval."""
     if size < 1 or not 0 <= successes <= size:
-        raise ValueError(
-            f"{successes} successes of {size} runs; want 1 run at least and 0 to as many successes"
-        )
+        raise ValueError(f"{successes} successes of {size} runs; want 1 run at least and 0 to as many successes")
     ends = stats.binomtest(successes, size).proportion_ci(checked_confidence(confidence), method="wilson")
     return Interval(successes / size, float(ends.low), float(ends.high), confidence, size)

@@ -35,9 +35,7 @@ def ratio_profile(costs: ArrayLike, factors: ArrayLike) -> Values:
     if needed.ndim != 2 or not needed.size:
         raise ValueError(f"costs have shape {needed.shape}; want (runs, policies), one of each at least")
     if np.isnan(needed).any() or (needed < 0.0).any():
-        raise ValueError(
-            "costs hold nan or negative values; want 0 or more, and inf where a policy did not succeed"
-        )
+        raise ValueError("costs hold nan or negative values; want 0 or more, and inf where a policy did not succeed")
     if (within < 1.0).any():
         raise ValueError(f"factors reach down to {within.min():g}; want 1 or more")
     best = needed.min(axis=1)
@@ -66,9 +64,5 @@ def score_profile(scores: ArrayLike, thresholds: ArrayLike, confidence: float = 
     """
     reached, asked = np.sort(checked_values(scores, "scores")), checked_values(thresholds, "thresholds")
     counts = len(reached) - np.searchsorted(reached, asked, side="left")
-    intervals = {
-        int(count): share_interval(int(count), len(reached), confidence) for count in np.unique(counts)
-    }
-    return np.array(
-        [[each.estimate, each.low, each.high] for each in (intervals[int(count)] for count in counts)]
-    ).T
+    intervals = {int(count): share_interval(int(count), len(reached), confidence) for count in np.unique(counts)}
+    return np.array([[each.estimate, each.low, each.high] for each in (intervals[int(count)] for count in counts)]).T

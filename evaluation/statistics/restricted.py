@@ -86,9 +86,7 @@ def _checked_times(times: ArrayLike, is_observed: ArrayLike) -> tuple[Values, ND
     """Return times and whether each was observed, both (n,)."""
     known, happened = checked_values(times, "times"), np.asarray(is_observed, np.bool_)
     if happened.shape != known.shape:
-        raise ValueError(
-            f"is_observed has shape {happened.shape} and times {known.shape}; want one for each time"
-        )
+        raise ValueError(f"is_observed has shape {happened.shape} and times {known.shape}; want one for each time")
     if (known < 0.0).any():
         raise ValueError(f"times[{int(np.argmin(known))}] is {known.min()}; want 0 or more seconds")
     return known, happened
@@ -163,9 +161,7 @@ def restricted_ratio(
     def replicates(counts: Counts) -> tuple[Values, Values]:
         return _unzipped(_differences_of(counts, a.arrays, b.arrays, True))
 
-    return exponential(
-        studentised_interval(replicates, len(a), confidence, resamples, seed, is_symmetric=True)
-    )
+    return exponential(studentised_interval(replicates, len(a), confidence, resamples, seed, is_symmetric=True))
 
 
 def _check_partners(a: CensoredTimes, b: CensoredTimes) -> None:
@@ -175,8 +171,7 @@ def _check_partners(a: CensoredTimes, b: CensoredTimes) -> None:
         raise ValueError(f"the horizon of a is {a.horizon:g} s and that of b {b.horizon:g} s; want the same")
     if not (a.is_observed.any() or b.is_observed.any()):
         raise ValueError(
-            f"nothing was observed up to the horizon of {a.horizon:g} s, neither in a nor in b; want one "
-            "time at least"
+            f"nothing was observed up to the horizon of {a.horizon:g} s, neither in a nor in b; want one time at least"
         )
 
 

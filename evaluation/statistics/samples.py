@@ -78,8 +78,7 @@ def checked_pairs(a: ArrayLike, b: ArrayLike, names: tuple[str, str] = ("a", "b"
     first, second = checked_values(a, names[0]), checked_values(b, names[1])
     if len(first) != len(second):
         raise ValueError(
-            f"{names[0]} has {len(first)} values and {names[1]} has {len(second)}; want as many, each with "
-            "its partner"
+            f"{names[0]} has {len(first)} values and {names[1]} has {len(second)}; want as many, each with its partner"
         )
     return first, second
 
@@ -121,9 +120,7 @@ def resample_counts(size: int, resamples: int, seed: int) -> Counts:
     if resamples < FEWEST_RESAMPLES:
         raise ValueError(f"resamples is {resamples}; want at least {FEWEST_RESAMPLES}")
     if not 1 <= size <= MOST_VALUES:
-        raise ValueError(
-            f"the sample has {size:,} values; want 1 to {MOST_VALUES:,}: part the episodes by settings"
-        )
+        raise ValueError(f"the sample has {size:,} values; want 1 to {MOST_VALUES:,}: part the episodes by settings")
     generator = np.random.default_rng(seed)
     counts = np.empty((resamples, size), np.uint16)
     for first in range(0, resamples, _CHUNK):
@@ -142,9 +139,7 @@ def in_parts(replicates: Replicates) -> Replicates:
 
     def in_turn(counts: Counts) -> tuple[Values, Values]:
         parts = [replicates(counts[first : first + _CHUNK]) for first in range(0, len(counts), _CHUNK)]
-        return np.concatenate([estimates for estimates, _ in parts]), np.concatenate(
-            [errors for _, errors in parts]
-        )
+        return np.concatenate([estimates for estimates, _ in parts]), np.concatenate([errors for _, errors in parts])
 
     return in_turn
 
@@ -173,9 +168,7 @@ def studentised_interval(
     shifts = estimates - estimate
     # A resample of equal values has no error: it is as far off as can be, or not at all.
     with np.errstate(divide="ignore", invalid="ignore"):
-        ratios = np.where(
-            errors > 0.0, shifts / errors, np.where(shifts == 0.0, 0.0, np.copysign(np.inf, shifts))
-        )
+        ratios = np.where(errors > 0.0, shifts / errors, np.where(shifts == 0.0, 0.0, np.copysign(np.inf, shifts)))
     if is_symmetric:
         reach = _ranked(np.abs(ratios), 1.0 - 2.0 * tail)
         return Interval(estimate, estimate - reach * error, estimate + reach * error, confidence, size)

@@ -192,8 +192,7 @@ def _check_same(episodes: list[dict[str, Any]], suite: Suite, folder: Path) -> N
     for name, options in kept.get("policy_settings", {}).items():
         if name in suite.policies and suite.as_dict()["policy_settings"].get(name) != options:
             raise ValueError(
-                f"{folder} holds episodes of policy {name!r} with other settings, {options}; choose another "
-                "folder"
+                f"{folder} holds episodes of policy {name!r} with other settings, {options}; choose another folder"
             )
     if kept and kept.get("stop") != suite.as_dict()["stop"]:
         raise ValueError(
@@ -205,9 +204,7 @@ def _check_same(episodes: list[dict[str, Any]], suite: Suite, folder: Path) -> N
             raise ValueError(f"{folder} holds episodes with other starts on {floor!r}; choose another folder")
 
 
-def _check_same_options(
-    folder: Path, variant: str, kept: Mapping[str, Any], asked: Mapping[str, Any]
-) -> None:
+def _check_same_options(folder: Path, variant: str, kept: Mapping[str, Any], asked: Mapping[str, Any]) -> None:
     for option in sorted({*kept, *asked}):
         before, now = kept.get(option, "its default"), asked.get(option, "its default")
         if before != now:
@@ -226,9 +223,7 @@ def _kept_suite(path: Path) -> dict[str, Any]:
     except (ValueError, RecursionError) as error:
         raise ValueError(f"{path} is not JSON: {reason(error)}; mend it, or choose another folder") from error
     if not (isinstance(kept, dict) and "version" in kept and "policies" in kept):
-        raise ValueError(
-            f"{path} is there, and no evaluation has written it; move it away, or choose another folder"
-        )
+        raise ValueError(f"{path} is there, and no evaluation has written it; move it away, or choose another folder")
     return kept
 
 

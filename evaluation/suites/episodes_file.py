@@ -112,8 +112,7 @@ def _parsed(path: Path) -> tuple[list[dict[str, Any]], int]:
             )
     if lines.cut_off is not None:
         warnings.warn(
-            f"{path}, line {lines.cut_off[0]}: the last line was cut off and is left out; its episode runs "
-            "again",
+            f"{path}, line {lines.cut_off[0]}: the last line was cut off and is left out; its episode runs again",
             stacklevel=3,
         )
     return list(episodes.values()), lines.whole
@@ -151,9 +150,7 @@ class EpisodesFile:
     def append(self, episode: Mapping[str, Any]) -> None:
         """Add an episode; when this returns it is on the disk."""
         if not isinstance(episode.get(KEY), str):
-            raise ValueError(
-                f"the episode has the key {episode.get(KEY)!r}; want text that tells it from all others"
-            )
+            raise ValueError(f"the episode has the key {episode.get(KEY)!r}; want text that tells it from all others")
         line = json.dumps(episode, allow_nan=False, ensure_ascii=False, separators=(",", ":"))
         # Bytes of names that are no UTF-8 are escaped as JSON does it.
         self._append(line.encode("utf-8", "backslashreplace") + b"\n")
@@ -186,8 +183,7 @@ class EpisodesFile:
                 os.ftruncate(self._handle, self._size)
             raise OSError(
                 error.errno,
-                f"{error.strerror or error}; the episodes before are kept, the same command goes on from "
-                "there",
+                f"{error.strerror or error}; the episodes before are kept, the same command goes on from there",
                 str(self.path),
             ) from error
         self._size += len(content)

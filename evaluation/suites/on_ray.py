@@ -85,8 +85,7 @@ def _connected(address: str) -> Any:  # noqa: ANN401
             ray.init(address=address, logging_level=logging.ERROR, log_to_driver=False)
     except (ConnectionError, RuntimeError, ValueError) as error:
         raise ValueError(
-            f"there is no Ray cluster at {address} ({str(error).splitlines()[0]}); start one with "
-            "`ray start --head`"
+            f"there is no Ray cluster at {address} ({str(error).splitlines()[0]}); start one with `ray start --head`"
         ) from error
     return ray
 

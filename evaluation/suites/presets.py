@@ -98,8 +98,7 @@ PRESETS: dict[str, _Preset] = {
         files=("floorplans/synthetic_dungeon/ARiADNE__*.png",),
         differences=(
             _GRAPH,
-            "four of the project's floors, where it has the first hundred of a listing that differs between "
-            "machines",
+            "four of the project's floors, where it has the first hundred of a listing that differs between machines",
         ),
     ),
     "chen": _Preset(
@@ -111,8 +110,7 @@ PRESETS: dict[str, _Preset] = {
         figures=("path_m", "decisions"),
         files=("floorplans/synthetic_dungeon/DRL_robot_explor__*.png",),
         differences=(
-            "robots drive at 1 m/s with a body of 1 cm; the project jumps to one of 50 places around the "
-            "robot",
+            "robots drive at 1 m/s with a body of 1 cm; the project jumps to one of 50 places around the robot",
         ),
     ),
     "ir2": _Preset(
@@ -239,11 +237,7 @@ def _preset_floors(preset: _Preset, data: Path | None) -> tuple[str, ...]:
 
     They are its files below a folder of real data, otherwise their substitutes.
     """
-    files = (
-        []
-        if data is None
-        else sorted(str(path) for pattern in preset.files for path in Path(data).glob(pattern))
-    )
+    files = [] if data is None else sorted(str(path) for pattern in preset.files for path in Path(data).glob(pattern))
     if files or preset.floors:
         return tuple(dict.fromkeys(files)) or preset.floors
     where = "no folder of real data was given" if data is None else f"there are none below {data}"

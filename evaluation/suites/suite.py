@@ -85,9 +85,7 @@ def seeds_of(seeds: Any, content: Mapping[str, Any]) -> tuple[Any, ...]:  # noqa
     """Return the seeds of a suite: those of a list, or that many from 0 on."""
     if isinstance(seeds, int) and not isinstance(seeds, bool):
         if not 1 <= seeds <= MOST_EACH:
-            raise ValueError(
-                f"seeds of the suite is {shown(seeds)}; want a list, or how many, 1 to {MOST_EACH:,}"
-            )
+            raise ValueError(f"seeds of the suite is {shown(seeds)}; want a list, or how many, 1 to {MOST_EACH:,}")
         return tuple(range(seeds))
     return listed(content, "seeds")
 
@@ -103,17 +101,13 @@ def starts_of(content: Any) -> dict[str, tuple[Starts, ...]]:  # noqa: ANN401
     """Return teams of starts by floor."""
     if not isinstance(content, Mapping):
         raise ValueError(f"starts of the suite is {shown(content)}; want a table of teams by floor")
-    return {
-        floor: tuple(_team(floor, team) for team in _list(floor, teams)) for floor, teams in content.items()
-    }
+    return {floor: tuple(_team(floor, team) for team in _list(floor, teams)) for floor, teams in content.items()}
 
 
 def _team(floor: str, team: Any) -> Starts:  # noqa: ANN401
     for start in _list(floor, team):
         if len(_list(floor, start)) != 3 or not all(_POSE.hold(value) for value in start):
-            raise ValueError(
-                f"a start on {floor!r} is {shown(start)}; want x, y [m] and theta [rad] of each robot"
-            )
+            raise ValueError(f"a start on {floor!r} is {shown(start)}; want x, y [m] and theta [rad] of each robot")
     return tuple((start[0], start[1], start[2]) for start in team)
 
 
@@ -181,9 +175,7 @@ class Suite:
         check_trials(*map(len, (self.policies, self.floors, self.robots, self.seeds, self.variants)), most)
         for name in self.policy_settings:
             if name not in self.policies:
-                raise ValueError(
-                    f"the suite has settings of a policy {name!r}, which is not among its policies"
-                )
+                raise ValueError(f"the suite has settings of a policy {name!r}, which is not among its policies")
         made = {name: self.make_policy(name) for name in self.policies}
         for floor in self.floors:
             _check_floor(floor, self.image_resolution)

@@ -39,10 +39,7 @@ def map_within(env: ExplorationEnv, row: int, rows: slice, columns: slice) -> ND
     own_y = math.cos(theta) * north - math.sin(theta) * east - env.beliefs.origins[row, 1]
     own_columns, own_rows = (np.floor(own / resolution).astype(np.int64) for own in (own_x, own_y))
     is_inside = (
-        (own_rows >= 0)
-        & (own_rows < log_odds.shape[0])
-        & (own_columns >= 0)
-        & (own_columns < log_odds.shape[1])
+        (own_rows >= 0) & (own_rows < log_odds.shape[0]) & (own_columns >= 0) & (own_columns < log_odds.shape[1])
     )
     placed = np.zeros(own_x.shape, np.int8)
     placed[is_inside] = log_odds[own_rows[is_inside], own_columns[is_inside]]
@@ -96,11 +93,7 @@ def held_maps(env: ExplorationEnv) -> list[NDArray[np.int8]]:
     The radio is not ideal: the sum is of its own map and those that reached it.
     """
     held = [env.perception.shared_map(row) for row in range(env.settings.robots)]
-    return [
-        _on_floor(env, row, navigation.log_odds)
-        for row, navigation in enumerate(held)
-        if navigation is not None
-    ]
+    return [_on_floor(env, row, navigation.log_odds) for row, navigation in enumerate(held) if navigation is not None]
 
 
 def free_as_held(env: ExplorationEnv, maps: NDArray[np.int8]) -> NDArray[np.bool_]:

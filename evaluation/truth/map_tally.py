@@ -118,9 +118,7 @@ def sum_up(world: WorldArrays, team: Team, maps: CountedMaps, i: int, j: int) ->
     old = bits[robots, i, j, KNOWN]
     if known != old:
         for kind in (KNOWABLE, VALID):
-            counts[robots, kind] += count_bits(known & truth[kind, i, j]) - count_bits(
-                old & truth[kind, i, j]
-            )
+            counts[robots, kind] += count_bits(known & truth[kind, i, j]) - count_bits(old & truth[kind, i, j])
         bits[robots, i, j, KNOWN] = known
     if team.shares:
         disputed[i, j] = free & occupied & truth[COUNTED, i, j]
@@ -216,9 +214,7 @@ def _count_aligned(
 
 
 @kernel
-def _count_turned(
-    world: WorldArrays, team: Team, robot: int, maps: CountedMaps, signs: Array, change: Array
-) -> None:
+def _count_turned(world: WorldArrays, team: Team, robot: int, maps: CountedMaps, signs: Array, change: Array) -> None:
     """Update the counts for a map in a frame of its own.
 
     Each cell that has changed is transformed to the floor's lattice.
@@ -270,9 +266,7 @@ def _count_turned(
 
 
 @kernel
-def _count_maps(
-    table: Array, episode: int, shares: bool, maps: CountedMaps, signs: Array, last: _LastVisit
-) -> None:
+def _count_maps(table: Array, episode: int, shares: bool, maps: CountedMaps, signs: Array, last: _LastVisit) -> None:
     """Update the bits and counts of an episode's maps.
 
     Parameters
@@ -359,9 +353,7 @@ class MapTally:
         _count_maps(env.simulation.table, 0, self.shares, self._maps, self._signs, self._last)
         if env.perception.hears:
             for robot, held in enumerate(held_maps(env)):
-                self.counts[robot, COUNTED] = int(
-                    np.bitwise_count(pack_bits(held < 0) & self._truth[COUNTED]).sum()
-                )
+                self.counts[robot, COUNTED] = int(np.bitwise_count(pack_bits(held < 0) & self._truth[COUNTED]).sum())
 
     @property
     def known_shares(self) -> NDArray[np.float64]:

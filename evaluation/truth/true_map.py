@@ -105,8 +105,7 @@ def _connected_free(env: ExplorationEnv, occupied: Mask) -> Mask:
     cells = occupied.astype(np.uint8)
     for x, y, _ in env.world.starts:
         column, row = (
-            int((value - corner) / resolution)
-            for value, corner in zip((x, y), tables.laser.origin, strict=True)
+            int((value - corner) / resolution) for value, corner in zip((x, y), tables.laser.origin, strict=True)
         )
         if cells[row, column] == 0:
             cv2.floodFill(cells, None, (column, row), (float(reached),), flags=4)

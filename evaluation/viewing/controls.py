@@ -70,14 +70,10 @@ class Controls:
         self._agents = list(agents)
         with gui.add_folder("Layers"):
             self._layers: dict[Layer, GuiInputHandle[bool]] = {
-                layer: gui.add_checkbox(layer.value, True)
-                for layer in Layer
-                if has_cameras or layer not in OF_CAMERAS
+                layer: gui.add_checkbox(layer.value, True) for layer in Layer if has_cameras or layer not in OF_CAMERAS
             }
             greatest, first = heights
-            self._height = gui.add_slider(
-                "Walls cut [m]", 0.05, max(greatest, 0.1), 0.05, min(first, greatest)
-            )
+            self._height = gui.add_slider("Walls cut [m]", 0.05, max(greatest, 0.1), 0.05, min(first, greatest))
         with gui.add_folder("What happened"):
             self._events = gui.add_html("")
         self._depth = gui.add_image(np.zeros((2, 2, 3), np.uint8), label="Depth image", visible=has_cameras)

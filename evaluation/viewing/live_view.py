@@ -193,9 +193,7 @@ class LiveView(Watcher):
         """Draw if it is time to, and wait until the next step is due."""
         controls = self._controls
         self._draw_due()
-        self._pace.wait(
-            env.scorer.time, lambda: controls.speed, lambda: controls.is_paused, self._answer_controls
-        )
+        self._pace.wait(env.scorer.time, lambda: controls.speed, lambda: controls.is_paused, self._answer_controls)
 
     def decision(self, env: ExplorationEnv, orders: Orders | None, given_up: Sequence[GivenUp]) -> None:
         """Count a decision."""

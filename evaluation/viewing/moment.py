@@ -96,9 +96,7 @@ def moment_of(env: WatchedExploration) -> Moment:
     return Moment(env.scorer.time, robots, frames)
 
 
-def _robot(
-    env: WatchedExploration, row: int, believed: NDArray[np.float64], trail: NDArray[np.float64]
-) -> RobotMoment:
+def _robot(env: WatchedExploration, row: int, believed: NDArray[np.float64], trail: NDArray[np.float64]) -> RobotMoment:
     world = env.world
     body = body_rotation(world.poses[row], world.attitudes[row])
     place = np.array([*world.poses[row, :2], world.attitudes[row, 0]])
@@ -154,9 +152,7 @@ def _scan(env: ExplorationEnv, row: int) -> tuple[NDArray[np.float64], NDArray[n
     is_hit = np.isfinite(ranges) & (ranges < lidar.range_max)
     lengths = np.clip(np.nan_to_num(ranges, nan=0.0, posinf=lidar.range_max), 0.0, lidar.range_max)
     angles = lidar.angles[::stride]
-    ends = np.column_stack(
-        [lengths * np.cos(angles), lengths * np.sin(angles), np.full(len(angles), lidar.height)]
-    )
+    ends = np.column_stack([lengths * np.cos(angles), lengths * np.sin(angles), np.full(len(angles), lidar.height)])
     return ends, is_hit
 
 

@@ -156,9 +156,7 @@ class TeamMaps:
     def levels(self, env: ExplorationEnv, groups: Sequence[set[int]]) -> list[Levels]:
         """Return the map of each group of robots, (rows, columns): above 0 occupied, below 0 free."""
         maps = [map_within(env, row, *self._grid.window) for row in range(env.settings.robots)]
-        together = [
-            np.sum([maps[robot] for robot in sorted(group)], axis=0, dtype=np.int16) for group in groups
-        ]
+        together = [np.sum([maps[robot] for robot in sorted(group)], axis=0, dtype=np.int16) for group in groups]
         return [self._coarse(np.asarray(log_odds)) for log_odds in together]
 
     def _coarse(self, log_odds: NDArray[np.signedinteger[Any]]) -> Levels:
@@ -220,9 +218,7 @@ class RobotNodes:
             ("nose", _nose_mesh(robot.radius, robot.height), EXPLORED),
         ):
             scene.add_mesh_simple(f"{root}/{name}", mesh.vertices, mesh.triangles, color=shade, side="double")
-        scene.add_label(
-            f"{root}/name", agent, position=(0.0, 0.0, robot.height + 0.25), anchor="bottom-center"
-        )
+        scene.add_label(f"{root}/name", agent, position=(0.0, 0.0, robot.height + 0.25), anchor="bottom-center")
         # In the floor's frame: a slow browser shows an old scan at its own pose, not turned with the body.
         self._scans = scene.add_frame(f"/scans/{agent}", show_axes=False)
         self._scan = scene.add_frame(f"/scans/{agent}/last", show_axes=False)

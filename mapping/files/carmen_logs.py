@@ -205,9 +205,7 @@ def _read_line(line: str, content: _Content) -> None:
             case "ROBOTLASER1":
                 content.scans.append((_robotlaser(words), len(content.odometry)))
             case "ODOM":
-                content.odometry.append(
-                    (_numbers(words[1:4], 3), float(words[9] if len(words) > 9 else words[-1]))
-                )
+                content.odometry.append((_numbers(words[1:4], 3), float(words[9] if len(words) > 9 else words[-1])))
             case "PARAM" if len(words) > 2:
                 content.parameters[words[1]] = words[2]
             case "NEFF":
@@ -448,9 +446,7 @@ def _chained(
             previous[before] = scan.robot_pose
     chained = np.zeros_like(readings)
     for k in range(1, len(readings)):
-        chained[k] = (
-            composed(chained[k - 1], relative(previous[k], readings[k])) if is_own[k] else chained[k - 1]
-        )
+        chained[k] = composed(chained[k - 1], relative(previous[k], readings[k])) if is_own[k] else chained[k - 1]
     return chained, is_own
 
 

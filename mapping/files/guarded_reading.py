@@ -255,9 +255,7 @@ class GuardedArchive:
         if member.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
             raise ValueError(f"{name} is packed in a way that is not read; want stored or deflated")
         if member.file_size > self._left:
-            raise ValueError(
-                f"{name} has {member.file_size:,} bytes when unpacked; there is room for {self._left:,}"
-            )
+            raise ValueError(f"{name} has {member.file_size:,} bytes when unpacked; there is room for {self._left:,}")
         self._left -= member.file_size
         return self._archive.read(member)
 
@@ -303,6 +301,4 @@ UNKNOWN = "\N{REPLACEMENT CHARACTER}"
 
 def printable(name: str) -> str:
     """Return a name in which bytes that are no UTF-8, and control characters, are replaced."""
-    return "".join(
-        UNKNOWN if unicodedata.category(letter) in ("Cc", "Cs", "Co") else letter for letter in name
-    )
+    return "".join(UNKNOWN if unicodedata.category(letter) in ("Cc", "Cs", "Co") else letter for letter in name)

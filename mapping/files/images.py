@@ -104,9 +104,7 @@ def _check_size(header: "ImageFile", content: bytes) -> None:
     allowed = MAX_PIXELS if is_grey else MAX_COLOURED
     maximum = min(allowed, max(MIN_PIXELS, PIXELS_PER_BYTE * len(content)))
     if not (width > 0 and height > 0 and width * height <= maximum):
-        raise ValueError(
-            f"it has {width:,} x {height:,} pixels in {len(content):,} bytes; want at most {maximum:,}"
-        )
+        raise ValueError(f"it has {width:,} x {height:,} pixels in {len(content):,} bytes; want at most {maximum:,}")
 
 
 def _header(content: bytes) -> "ImageFile | None":

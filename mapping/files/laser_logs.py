@@ -80,9 +80,7 @@ USUAL = 3.0
 """Factor by which the speed may exceed that which 95 % of a log's motions keep below is still believed."""
 
 
-def _without_jumps(
-    odometry: NDArray[np.float64], stamps: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], int]:
+def _without_jumps(odometry: NDArray[np.float64], stamps: NDArray[np.float64]) -> tuple[NDArray[np.float64], int]:
     """Return odometry without its jumps, and their number.
 
     Over a jump the robot is assumed to have moved as before it.
@@ -182,9 +180,7 @@ class LaserLog:
         reach = min(longest, self.geometry.range_max)
         with np.errstate(invalid="ignore"):
             ranges[ranges > reach] = np.inf
-        geometry = replace(
-            self.geometry, range_max=reach, range_min=min(self.geometry.range_min, 0.5 * reach)
-        )
+        geometry = replace(self.geometry, range_max=reach, range_min=min(self.geometry.range_min, 0.5 * reach))
         return replace(self, ranges=ranges, geometry=geometry)
 
 
@@ -202,9 +198,7 @@ def made_usable(log: LaserLog, where: str) -> LaserLog:
     stamps, skipped, remarks = log.stamps, dict(log.skipped), list(log.remarks)
     if len(stamps) > 2 and not (np.diff(stamps) > 0.0).mean() > 0.5:
         stamps = np.arange(len(stamps), dtype=np.float64)
-        skipped["stamps of a clock that stands still or runs backwards: scans are numbered by the second"] = (
-            len(stamps)
-        )
+        skipped["stamps of a clock that stands still or runs backwards: scans are numbered by the second"] = len(stamps)
         log = _without_readings(log)
     clock = _continued(stamps)
     if len(clock.kept) < len(stamps):
@@ -218,9 +212,7 @@ def made_usable(log: LaserLog, where: str) -> LaserLog:
         remarks.append(f"the clock restarts {clock.restarts} times; stamps are continued")
         log = _without_readings(log)
     odometry = None if log.odometry is None else log.odometry[clock.kept]
-    if odometry is not None and (
-        not np.isfinite(odometry).any() or not np.nanmax(np.ptp(odometry, axis=0)) > 0.0
-    ):
+    if odometry is not None and (not np.isfinite(odometry).any() or not np.nanmax(np.ptp(odometry, axis=0)) > 0.0):
         odometry = None
     if odometry is not None:
         odometry, jumps = _without_jumps(odometry, clock.stamps)
@@ -240,9 +232,7 @@ def made_usable(log: LaserLog, where: str) -> LaserLog:
 
 def _without_readings(log: LaserLog) -> LaserLog:
     """Return a log without the readings between its scans, whose stamps are of no use."""
-    return replace(
-        log, readings_stamps=np.zeros(0), readings=np.zeros((0, 3)), reading_of_scan=np.zeros(0, np.int64)
-    )
+    return replace(log, readings_stamps=np.zeros(0), readings=np.zeros((0, 3)), reading_of_scan=np.zeros(0, np.int64))
 
 
 def symmetric_scans(
@@ -263,12 +253,9 @@ def symmetric_scans(
         Shortest and longest measured range [m].
     """
     beams = ranges.shape[1]
-    if not (
-        increment > 0.0 and beams * increment < 2.0 * math.pi + 1.5 * increment and math.isfinite(angle_min)
-    ):
+    if not (increment > 0.0 and beams * increment < 2.0 * math.pi + 1.5 * increment and math.isfinite(angle_min)):
         raise ValueError(
-            f"{beams} beams from {angle_min} rad in steps of {increment} rad; want steps of more than 0 "
-            "within a circle"
+            f"{beams} beams from {angle_min} rad in steps of {increment} rad; want steps of more than 0 within a circle"
         )
     if not abs(2.0 * angle_min / increment) + 2 * beams <= 2 * MAX_BEAMS or not reach[1] <= MAX_REACH_M:
         raise ValueError(
@@ -294,9 +281,7 @@ def symmetric_scans(
     view = (wide.shape[1] - 1) * increment
     if view > whole:
         raise ValueError(f"beams begin at {angle_min} rad; want beams about the heading")
-    geometry = ScanGeometry(
-        beams=wide.shape[1], field_of_view=view or whole, range_min=reach[0], range_max=reach[1]
-    )
+    geometry = ScanGeometry(beams=wide.shape[1], field_of_view=view or whole, range_min=reach[0], range_max=reach[1])
     first = angle_min - max(missing, 0) * increment
     return wide, geometry, _axis(first + 0.5 * view, increment)
 

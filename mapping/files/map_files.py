@@ -215,9 +215,7 @@ def read_ros_map(yaml_path: Path | str) -> MapImage:
     unknown = unknown_grey(pixels, (MAP_SERVER_GREYS,)) if may_mistake else None
     rule = _raw_levels if mode == "raw" else partial(_levels_of, negate=negate, unknown=unknown)
     levels = _levels_by_blocks(pixels, lambda shades: rule(shades, low=low, high=high), mode == "scale")
-    return MapImage(
-        np.ascontiguousarray(levels[::-1]), _origin(yaml_path, header), _resolution(yaml_path, header)
-    )
+    return MapImage(np.ascontiguousarray(levels[::-1]), _origin(yaml_path, header), _resolution(yaml_path, header))
 
 
 def read_grey_map(path: Path, resolution: float) -> MapImage:
@@ -308,9 +306,7 @@ def write_ros_map(
     }
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
-    write_whole(
-        folder / f"{name}.pgm", f"P5\n{pixels.shape[1]} {pixels.shape[0]}\n255\n".encode() + pixels.tobytes()
-    )
+    write_whole(folder / f"{name}.pgm", f"P5\n{pixels.shape[1]} {pixels.shape[0]}\n255\n".encode() + pixels.tobytes())
     write_whole(folder / f"{name}.yaml", yaml.safe_dump(header, sort_keys=False).encode())
     return folder / f"{name}.yaml"
 
@@ -363,9 +359,7 @@ def _image_path(yaml_path: Path, name: str) -> Path:
         return beside
     if not os.path.lexists(named):
         short = shortened(str(named), 200)
-        raise FileNotFoundError(
-            f"there is no file {short}; {yaml_path} names it as its image: put the image beside it"
-        )
+        raise FileNotFoundError(f"there is no file {short}; {yaml_path} names it as its image: put the image beside it")
     return named
 
 

@@ -83,16 +83,12 @@ def _from_arrays(path: Path, arrays: Mapping[str, NDArray[Any]]) -> LaserLog:
     )
 
 
-def _readings_of_scans(
-    path: Path, arrays: Mapping[str, NDArray[Any]], scans: int, readings: int
-) -> NDArray[np.int64]:
+def _readings_of_scans(path: Path, arrays: Mapping[str, NDArray[Any]], scans: int, readings: int) -> NDArray[np.int64]:
     table = _table(path, arrays, "odometry_of_scan", (scans,)) if readings else None
     if table is None:
         return np.zeros(0, np.int64)
     if not ((table >= -1) & (table < readings)).all():
-        raise ValueError(
-            f"{path}: odometry_of_scan is not within -1 and {readings - 1}, the numbers of odometry_stamp"
-        )
+        raise ValueError(f"{path}: odometry_of_scan is not within -1 and {readings - 1}, the numbers of odometry_stamp")
     return table.astype(np.int64)
 
 

@@ -170,9 +170,7 @@ def check_writable(folder: Path) -> None:
     while not nearest.exists() and not nearest.is_symlink():
         nearest = nearest.parent
     if not nearest.is_dir():
-        raise NotADirectoryError(
-            f"cannot write to {folder}: {nearest} is not a folder; want a folder, or a new name"
-        )
+        raise NotADirectoryError(f"cannot write to {folder}: {nearest} is not a folder; want a folder, or a new name")
     try:
         with tempfile.TemporaryDirectory(dir=nearest, prefix=".lidarium."):
             pass

@@ -101,9 +101,7 @@ def compact_bytes(spline_map: SplineMap) -> int:
     return sum(array.nbytes for array in compact_arrays(spline_map).values())
 
 
-def _from_compact_arrays(
-    arrays: dict[str, NDArray[Any]], settings: SplineSettings | None = None
-) -> SplineMap:
+def _from_compact_arrays(arrays: dict[str, NDArray[Any]], settings: SplineSettings | None = None) -> SplineMap:
     """Return the map of a compact form."""
     version, x, y, unit, corner_count, updates = arrays["frame"].tolist()
     if version != VERSION:
@@ -213,9 +211,7 @@ def _from_json(content: dict[str, Any], settings: SplineSettings | None) -> Spli
         raise ValueError(f"version is {content['version']}; want {VERSION}")
     spline_map = SplineMap(settings)
     for curve in content["curves"]:
-        spline = _checked(
-            Spline(np.array(curve["knots"], np.float64), np.array(curve["control_points"], np.float64))
-        )
+        spline = _checked(Spline(np.array(curve["knots"], np.float64), np.array(curve["control_points"], np.float64)))
         weights = np.array(curve["weights"], np.float64)
         spacing = spline_map.settings.map.sample_spacing
         spline_map.curves.append(

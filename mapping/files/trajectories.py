@@ -26,9 +26,7 @@ def write_tum(path: Path, stamps: NDArray[np.float64], poses: NDArray[np.float64
     half = 0.5 * poses[:, 2]
     lines = [
         f"{stamp:.6f} {x:.6f} {y:.6f} 0 0 0 {z:.9f} {w:.9f}\n"
-        for stamp, x, y, z, w in zip(
-            stamps, poses[:, 0], poses[:, 1], np.sin(half), np.cos(half), strict=True
-        )
+        for stamp, x, y, z, w in zip(stamps, poses[:, 0], poses[:, 1], np.sin(half), np.cos(half), strict=True)
     ]
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)

@@ -42,9 +42,7 @@ class Transform:
     def inverse(self) -> "Transform":
         """Return the motion that undoes this one."""
         cosine, sine = math.cos(self.theta), math.sin(self.theta)
-        return Transform(
-            -cosine * self.x - sine * self.y, sine * self.x - cosine * self.y, wrapped(-self.theta)
-        )
+        return Transform(-cosine * self.x - sine * self.y, sine * self.x - cosine * self.y, wrapped(-self.theta))
 
     def difference(self, other: "Transform", at: ArrayLike = (0.0, 0.0)) -> tuple[float, float]:
         """Return by how much two transforms differ at a point [m, rad]: between its images, and in angle."""

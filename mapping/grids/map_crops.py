@@ -36,9 +36,7 @@ _ALL_UNKNOWN = np.uint64(UNKNOWN * 0x0101010101010101)
 
 
 @kernel(nrt=False)
-def _write_all_indices(
-    half: int, cells: int, step_x: int, step_y: int, corners: Array, indices: Array
-) -> None:
+def _write_all_indices(half: int, cells: int, step_x: int, step_y: int, corners: Array, indices: Array) -> None:
     """Compute the part of a patch (2 * ``half`` rows) that each block of a crop loads, and its cells there.
 
     Parameters
@@ -68,9 +66,7 @@ def _write_all_indices(
             )
             row, column = (y + least_y) >> PLACES, (x + least_x) >> PLACES
             corners[block, 0], corners[block, 1] = row, column
-            write_indices(
-                x, y, row * COLUMNS + column, offsets.ctypes.data, indices.ctypes.data + block * CELLS
-            )
+            write_indices(x, y, row * COLUMNS + column, offsets.ctypes.data, indices.ctypes.data + block * CELLS)
 
 
 @kernel(forceinline=True, nrt=False)
@@ -125,9 +121,7 @@ def _turn_blocks(pools: Array, corners: Array, half: int, step_x: int, step_y: i
         for block in range(blocks * blocks):
             row, column = corners[k, 0] + loads[block, 0], corners[k, 1] + loads[block, 1]
             source, where = pools[k, POOL] + row * columns + column, indices.ctypes.data + block * CELLS
-            target = (
-                crops.ctypes.data + k * side * side + block // blocks * SIDE * side + block % blocks * SIDE
-            )
+            target = crops.ctypes.data + k * side * side + block // blocks * SIDE * side + block % blocks * SIDE
             # A crop was written two steps ago and has left the caches since: begin to load a row of the
             # blocks after these.
             prefetch(target + (SIDE + block % blocks) * side)

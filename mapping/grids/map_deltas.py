@@ -42,9 +42,7 @@ def seen_spans(poses: Array, last: Array, reach: float, frame: Array) -> Array:
 
 
 @kernel
-def note_word(
-    sums: int, where: np.uint64, row: int, word: int, known: Array, occupied: Array, change: Array
-) -> bool:
+def note_word(sums: int, where: np.uint64, row: int, word: int, known: Array, occupied: Array, change: Array) -> bool:
     """Compare 64 int16 sums at an address with a word of the planes; return whether bits have flipped.
 
     Only the bits ``where`` are compared; flipped bits are written into ``change`` (3,).
@@ -122,9 +120,7 @@ def note_changes(
         for robot in range(maps.shape[0]):
             _add_row(maps[robot, 0] + row * maps[robot, 2] + low * 64, sums)
         for word in range(low, high):
-            if note_word(
-                sums.ctypes.data + (word - low) * 128, _ALL, row, word, known, occupied, changes[found]
-            ):
+            if note_word(sums.ctypes.data + (word - low) * 128, _ALL, row, word, known, occupied, changes[found]):
                 found += 1
     return found
 
@@ -136,9 +132,7 @@ def levels_of_planes(known: NDArray[np.uint64], occupied: NDArray[np.uint64]) ->
     """
     rows, words = known.shape
     is_known, is_occupied = (
-        np.unpackbits(np.ascontiguousarray(plane, "<u8").view(np.uint8), bitorder="little").reshape(
-            rows, words * WORD
-        )
+        np.unpackbits(np.ascontiguousarray(plane, "<u8").view(np.uint8), bitorder="little").reshape(rows, words * WORD)
         for plane in (known, occupied)
     )
     return np.asarray(np.array([UNKNOWN, FREE, UNKNOWN, OCCUPIED], np.uint8)[is_known + 2 * is_occupied])
@@ -177,9 +171,7 @@ class OverlaidMaps(NamedTuple):
 
 
 @kernel
-def _mark_stale(
-    log_odds: Array, before: int, placement: Array, resolution: float, span: Array, stale: Array
-) -> None:
+def _mark_stale(log_odds: Array, before: int, placement: Array, resolution: float, span: Array, stale: Array) -> None:
     """Mark the groups of the lattice over cells that have changed since the map at address ``before``.
 
     That map is updated.
@@ -211,9 +203,7 @@ def _mark_stale(
                 max(int(math.floor(east - half_x)) // _GROUP, 0),
                 min(int(math.floor(east + half_x)) // _GROUP + 1, groups),
             )
-            for i in range(
-                max(int(math.floor(north - half_y)), 0), min(int(math.floor(north + half_y)) + 1, rows)
-            ):
+            for i in range(max(int(math.floor(north - half_y)), 0), min(int(math.floor(north + half_y)) + 1, rows)):
                 for over in range(first, end):
                     stale[i, over] = np.uint8(255)
 

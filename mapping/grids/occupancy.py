@@ -126,10 +126,7 @@ class OccupancyGrid:
         below = max(0, -low_row) and max(0, -low_row) + spare_rows
         above = max(0, high_row - rows) and max(0, high_row - rows) + spare_rows
         left = max(0, -low_column) and -(-(max(0, -low_column) + spare_columns) // WORD) * WORD
-        right = (
-            max(0, high_column - columns)
-            and -(-(max(0, high_column - columns) + spare_columns) // WORD) * WORD
-        )
+        right = max(0, high_column - columns) and -(-(max(0, high_column - columns) + spare_columns) // WORD) * WORD
         grown = _blank(below + rows + above, left + columns + right)
         grown[below : below + rows, left : left + columns] = self.log_odds
         self.log_odds = grown
@@ -165,9 +162,7 @@ class OccupancyGrid:
         if scan.shape != (geometry.beams,):
             raise ValueError(f"ranges have shape {scan.shape}; want ({geometry.beams},), one per beam")
         if not all(0.0 <= value < math.inf for value in noise):
-            raise ValueError(
-                f"noise is {noise}; want a deviation [m] and a share of the range, of 0 or more each"
-            )
+            raise ValueError(f"noise is {noise}; want a deviation [m] and a share of the range, of 0 or more each")
         resolution, reach = self.settings.resolution, geometry.range_max
         margin = 4 * resolution
         self.contain(x - reach - margin, y - reach - margin, x + reach + margin, y + reach + margin)

@@ -97,9 +97,7 @@ def _pool_word(log_odds: Array, row: int, word: int, scale: int, maxima: Array, 
         )
         max_of_groups(source, columns, count, -128 if count == scale else 0, halvings, maxima.ctypes.data)
         for index in range(0, width, 4):
-            vector_at(target + index, 1, np.uint32)[0] = vector_at(maxima.ctypes.data + index, 1, np.uint32)[
-                0
-            ]
+            vector_at(target + index, 1, np.uint32)[0] = vector_at(maxima.ctypes.data + index, 1, np.uint32)[0]
         return
     for column in range(word * WORD // scale, min(((word + 1) * WORD - 1) // scale + 1, pooled.shape[1])):
         pooled[row, column] = _max_of_square(log_odds, row * scale, column * scale, scale)

@@ -41,8 +41,7 @@ class ScanGeometry:
         check_settings(self, "the scan")
         if not self.range_min < self.range_max:
             raise ValueError(
-                f"range_min is {self.range_min} m and range_max is {self.range_max} m; want 0 <= range_min < "
-                "range_max"
+                f"range_min is {self.range_min} m and range_max is {self.range_max} m; want 0 <= range_min < range_max"
             )
 
     @property
@@ -120,9 +119,7 @@ def fast_angle(y: float, x: float) -> float:
     # Without a branch, so that loops over many angles run on vectors.
     z = smaller / max(larger, 5e-324)
     square = z * z
-    angle = z * (
-        0.9998660 + square * (-0.3302995 + square * (0.1801410 + square * (-0.0851330 + square * 0.0208351)))
-    )
+    angle = z * (0.9998660 + square * (-0.3302995 + square * (0.1801410 + square * (-0.0851330 + square * 0.0208351))))
     if absolute_y > absolute_x:
         angle = 0.5 * math.pi - angle
     if x < 0.0:

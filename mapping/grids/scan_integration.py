@@ -250,9 +250,7 @@ def integrate_one(
     column_offset = ((int(math.floor(x)) - margin) >> 6) << 6
     local_x, local_y = x - column_offset, y - row_offset
     scan_ends(lengths, directions, local_x, local_y, ends)
-    box = fill_scan_polygon(
-        lengths, directions, ends, local_x, local_y, geometry[0], geometry[3] != 0.0, bits
-    )
+    box = fill_scan_polygon(lengths, directions, ends, local_x, local_y, geometry[0], geometry[3] != 0.0, bits)
     window[0], window[1] = box[0] + row_offset, box[1] + row_offset
     window[2], window[3] = 64 * box[2] + column_offset, 64 * box[3] + column_offset
     seen = SeenScan(bits, np.zeros_like(bits), box, ends, is_hit, row_offset, column_offset)

@@ -130,9 +130,7 @@ def _toggle_between(bits: int, width: int, outline: _Outline, previous: int, bea
 
 
 @kernel(nrt=False)
-def _find_edges(
-    lengths: Array, ends: Array, rows: Array, steepness: float, width: int, found: _Edges
-) -> None:
+def _find_edges(lengths: Array, ends: Array, rows: Array, steepness: float, width: int, found: _Edges) -> None:
     """Compute the rows crossed, the toggled bits and the line of the edge from each beam to the next.
 
     Loops without branches over few arrays, which LLVM runs on vectors.

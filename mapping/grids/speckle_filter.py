@@ -22,9 +22,7 @@ def without_small_components(levels: NDArray[np.uint8]) -> NDArray[np.uint8]:
     cells remain between them. A component is removed if it has at most `LARGEST_COMPONENT` cells, joined over
     sides, and half or more of its sides are walls. ``levels`` (0 occupied, 127 unknown, 255 free) is not changed.
     """
-    count, labels, statistics, _ = cv2.connectedComponentsWithStats(
-        (levels == FREE).astype(np.uint8), connectivity=4
-    )
+    count, labels, statistics, _ = cv2.connectedComponentsWithStats((levels == FREE).astype(np.uint8), connectivity=4)
     is_small = statistics[:, cv2.CC_STAT_AREA] <= LARGEST_COMPONENT
     is_small[0] = False
     if not is_small.any():
@@ -33,9 +31,7 @@ def without_small_components(levels: NDArray[np.uint8]) -> NDArray[np.uint8]:
     walls = cv2.filter2D((levels == OCCUPIED).astype(np.uint8), -1, _CROSS, borderType=cv2.BORDER_CONSTANT)
     others = cv2.filter2D((levels != FREE).astype(np.uint8), -1, _CROSS, borderType=cv2.BORDER_CONSTANT)
     component = is_small[labels]
-    sides = [
-        np.bincount(labels[component], weights=kind[component], minlength=count) for kind in (walls, others)
-    ]
+    sides = [np.bincount(labels[component], weights=kind[component], minlength=count) for kind in (walls, others)]
     is_in_wall = is_small & (2 * sides[0] >= sides[1]) & (sides[0] > 0)
     closed = levels.copy()
     closed[is_in_wall[labels]] = OCCUPIED

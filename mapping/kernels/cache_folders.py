@@ -92,9 +92,7 @@ def is_writable(folder: Path | None) -> bool:
         return False
 
 
-def _candidates(
-    names: tuple[str, ...], beside: Path | None
-) -> Iterator[tuple[Path, tuple[str, ...], tuple[int, ...]]]:
+def _candidates(names: tuple[str, ...], beside: Path | None) -> Iterator[tuple[Path, tuple[str, ...], tuple[int, ...]]]:
     """Yield candidates for the cache: base, folders below, trusted owners."""
     if beside is not None:
         owners = (beside.stat().st_uid,) if _HAS_OWNERS else ()

@@ -64,9 +64,7 @@ def key_sources(root: Path = _ROOT) -> list[Path]:
         for path in (root / folder).rglob("*.py"):
             source = path.read_bytes()
             if b"@kernel" in source or "kernels" in path.parts:
-                modules = (
-                    root / f"{name.decode().replace('.', '/')}.py" for name in _IMPORTS.findall(source)
-                )
+                modules = (root / f"{name.decode().replace('.', '/')}.py" for name in _IMPORTS.findall(source))
                 found.update((path, *filter(Path.is_file, modules)))
     return sorted(found)
 

@@ -49,9 +49,7 @@ def encode_type(argument: Any) -> Any:  # noqa: ANN401
     """
     types = _numba_types()
     if isinstance(argument, types.Array):
-        return f"{argument.dtype}:{argument.ndim}{argument.layout}" + (
-            "" if argument.mutable else ":readonly"
-        )
+        return f"{argument.dtype}:{argument.ndim}{argument.layout}" + ("" if argument.mutable else ":readonly")
     if isinstance(argument, types.BaseNamedTuple):
         made = argument.instance_class
         return {
@@ -62,9 +60,7 @@ def encode_type(argument: Any) -> Any:  # noqa: ANN401
         return [encode_type(each) for each in argument.types]
     if isinstance(argument, types.Number | types.Boolean):
         return str(argument)
-    raise ValueError(
-        f"the type {argument!r} of a kernel's argument cannot be written; want numbers or arrays"
-    )
+    raise ValueError(f"the type {argument!r} of a kernel's argument cannot be written; want numbers or arrays")
 
 
 def decode_type(text: Any) -> Any:  # noqa: ANN401
@@ -93,10 +89,7 @@ def compile_in_processes(entries: Sequence[Entry], processes: int) -> Iterator[s
     """
     plan, names = _Plan(entries), SimpleQueue[str | None]()
     workers = [_start_worker() for _ in range(min(processes, len(entries)))]
-    threads = [
-        threading.Thread(target=_drive, args=(worker, plan, entries, names), daemon=True)
-        for worker in workers
-    ]
+    threads = [threading.Thread(target=_drive, args=(worker, plan, entries, names), daemon=True) for worker in workers]
     for thread in threads:
         thread.start()
     try:

@@ -69,11 +69,7 @@ def _private_memory(size: int, is_large: bool) -> NDArray[np.uint8]:
     It is in large pages if asked for and possible.
     """
     is_private = hasattr(mmap, "MAP_PRIVATE")
-    memory = (
-        mmap.mmap(-1, size, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS)
-        if is_private
-        else mmap.mmap(-1, size)
-    )
+    memory = mmap.mmap(-1, size, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS) if is_private else mmap.mmap(-1, size)
     if is_large and size >= 2 * LARGE_PAGE and hasattr(mmap, "MADV_HUGEPAGE"):
         # Systems may be built without.
         with suppress(OSError):

@@ -194,9 +194,7 @@ def update_around(log_odds: Array, closeness: Array, limit: int, stamp: Array, c
             first, last, row = row, row, _next_stale(stale, row + 1)
             while row < stale.size and row - last <= 2 * reach:
                 last, row = row, _next_stale(stale, row + 1)
-            _recompute(
-                log_odds, closeness, limit, reach, target[0] + first, stale[first : last + 1], block * BLOCK
-            )
+            _recompute(log_odds, closeness, limit, reach, target[0] + first, stale[first : last + 1], block * BLOCK)
     if not is_all:
         for k in range(len(changed)):
             if log_odds[changed[k, 0], changed[k, 1]] > 0:
@@ -291,9 +289,7 @@ def list_cells(listed: Array, count: int, word: np.uint64, row: int, column: int
 def _that_differ(log_odds: Array, closeness: Array, limit: int, index: int, cells: int) -> np.uint64:
     """Return which of up to 64 cells, from an index of the grid on, became occupied or free."""
     if index + BLOCK <= log_odds.size:
-        found: np.uint64 = cells_that_differ(
-            log_odds.ctypes.data + index, closeness.ctypes.data + 2 * index, limit
-        )
+        found: np.uint64 = cells_that_differ(log_odds.ctypes.data + index, closeness.ctypes.data + 2 * index, limit)
         return found & (np.uint64(0xFFFFFFFFFFFFFFFF) >> np.uint64(BLOCK - cells))
     differing, beliefs, known = np.uint64(0), log_odds.reshape(-1), closeness.reshape(-1)
     for k in range(cells):
@@ -392,8 +388,7 @@ class ClearanceField:
         limit = limit_of(maximum, resolution) if math.isfinite(maximum) and maximum > 0.0 else 0
         if not 1 <= limit <= LARGEST_LIMIT:
             raise ValueError(
-                f"maximum is {maximum} m; want {0.5 * resolution} to {90 * resolution} m at cells of "
-                f"{resolution} m"
+                f"maximum is {maximum} m; want {0.5 * resolution} to {90 * resolution} m at cells of {resolution} m"
             )
         self.resolution = float(resolution)
         self.maximum = float(maximum)
@@ -423,9 +418,7 @@ class ClearanceField:
             Cells that may have changed since the last call, high ends excluded; all cells by default.
         """
         if log_odds.shape != self.closeness.shape:
-            raise ValueError(
-                f"log_odds has shape {log_odds.shape}; this field was made for {self.closeness.shape}"
-            )
+            raise ValueError(f"log_odds has shape {log_odds.shape}; this field was made for {self.closeness.shape}")
         row_low, row_high, column_low, column_high = full_window(log_odds.shape) if window is None else window
         inside = (int(row_low), int(row_high), int(column_low), int(column_high))
         return bool(_update_closeness(log_odds, self.closeness, self.limit, self.stamp, inside))
@@ -435,9 +428,7 @@ class ClearanceField:
 
         A new float32 array.
         """
-        row_low, row_high, column_low, column_high = (
-            full_window(self.closeness.shape) if window is None else window
-        )
+        row_low, row_high, column_low, column_high = full_window(self.closeness.shape) if window is None else window
         squared = self.limit - self.closeness[row_low:row_high, column_low:column_high].astype(np.float64)
         return np.minimum(np.sqrt(squared) * (0.5 * self.resolution), self.maximum).astype(np.float32)
 

@@ -35,8 +35,7 @@ class Footprint:
     def __post_init__(self) -> None:
         if not 0.0 <= self.radius <= self.preferred:
             raise ValueError(
-                f"radius is {self.radius} m and preferred clearance {self.preferred} m; want 0 <= radius <= "
-                "preferred"
+                f"radius is {self.radius} m and preferred clearance {self.preferred} m; want 0 <= radius <= preferred"
             )
         if not 0.0 <= self.penalty <= 1000.0:
             raise ValueError(f"penalty is {self.penalty}; want 0 to 1000 times the length of a step")
@@ -51,9 +50,7 @@ def passage_of(footprint: Footprint, resolution: float, limit: int) -> Passage:
     """
     minimum = limit_of(footprint.radius, resolution)
     if limit_of(footprint.preferred, resolution) > limit:
-        raise ValueError(
-            f"preferred clearance {footprint.preferred} m is beyond the maximum of the clearance field"
-        )
+        raise ValueError(f"preferred clearance {footprint.preferred} m is beyond the maximum of the clearance field")
     squared = limit - np.arange(limit + 1)
     clearance = np.sqrt(squared) * 0.5 * resolution
     room = max(footprint.preferred - footprint.radius, 1e-9)
@@ -62,9 +59,7 @@ def passage_of(footprint: Footprint, resolution: float, limit: int) -> Passage:
     costs = np.rint(np.array([[STRAIGHT / 2], [DIAGONAL / 2]]) * factors).astype(np.int32)
     costs[:, squared < max(minimum, 1)] = 0
     costs.flags.writeable = False
-    return Passage(
-        limit, costs, limit - minimum - 2, footprint.radius / resolution, footprint.preferred / resolution
-    )
+    return Passage(limit, costs, limit - minimum - 2, footprint.radius / resolution, footprint.preferred / resolution)
 
 
 MARGIN_M = 0.15

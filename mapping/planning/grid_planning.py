@@ -29,22 +29,18 @@ Cell = tuple[int, int]
 Disc = tuple[float, float, float]
 
 
-def cells_of(
-    points: NDArray[np.float64], origin: tuple[float, float], resolution: float
-) -> NDArray[np.int64]:
+def cells_of(points: NDArray[np.float64], origin: tuple[float, float], resolution: float) -> NDArray[np.int64]:
     """Return the cells (row, column) of points (..., 2) given as (x, y) [m], not clipped to any grid."""
     steps = (np.asarray(points, dtype=np.float64) - np.asarray(origin)) / resolution
     cells: NDArray[np.int64] = np.floor(steps[..., ::-1]).astype(np.int64)
     return cells
 
 
-def centres_of(
-    cells: NDArray[np.integer], origin: tuple[float, float], resolution: float
-) -> NDArray[np.float64]:
+def centres_of(cells: NDArray[np.integer], origin: tuple[float, float], resolution: float) -> NDArray[np.float64]:
     """Return the centres (..., 2) as (x, y) [m] of cells (row, column)."""
-    centres: NDArray[np.float64] = (
-        np.asarray(cells, dtype=np.float64)[..., ::-1] + 0.5
-    ) * resolution + np.asarray(origin)
+    centres: NDArray[np.float64] = (np.asarray(cells, dtype=np.float64)[..., ::-1] + 0.5) * resolution + np.asarray(
+        origin
+    )
     return centres
 
 
@@ -117,9 +113,7 @@ def search(
     space.touched_count, hit_count, settled = search_at(
         log_odds.ctypes.data, clearance.closeness, passage, space.memory, discs, task, lookout
     )
-    return Search(
-        space, first, task.budget, settled, _nearest_hits(space, hit_count)[: until.count], space.generation
-    )
+    return Search(space, first, task.budget, settled, _nearest_hits(space, hit_count)[: until.count], space.generation)
 
 
 def _task_of(start: Cell, until: Until, resolution: float) -> Task:
@@ -194,14 +188,10 @@ def _check_search(
         if shape != space.shape:
             raise ValueError(f"{name} has shape {shape}; this space was made for {space.shape}")
     if log_odds.dtype != np.int8 or not log_odds.flags.c_contiguous:
-        raise ValueError(
-            f"log_odds is of {log_odds.dtype}, strides {log_odds.strides}; want C-contiguous int8"
-        )
+        raise ValueError(f"log_odds is of {log_odds.dtype}, strides {log_odds.strides}; want C-contiguous int8")
     for name, cell in (("start", start), ("goal", start if goal is None else goal)):
         if not (0 <= cell[0] < space.shape[0] and 0 <= cell[1] < space.shape[1]):
-            raise ValueError(
-                f"{name} {(int(cell[0]), int(cell[1]))} lies outside the grid of {space.shape} cells"
-            )
+            raise ValueError(f"{name} {(int(cell[0]), int(cell[1]))} lies outside the grid of {space.shape} cells")
 
 
 def _discs_array(discs: Iterable[Disc]) -> NDArray[np.float64]:

@@ -85,9 +85,7 @@ def _can_replace(path: Array, first: int, last: int, nearest: int, terrain: Terr
         if _distance_to_piece(discs[k, 0], discs[k, 1], row, column, to_row, to_column) < discs[k, 2]:
             return False
     return bool(
-        line_is_clear(
-            terrain.log_odds, terrain.closeness, passage.limit, row, column, to_row, to_column, needed
-        )
+        line_is_clear(terrain.log_odds, terrain.closeness, passage.limit, row, column, to_row, to_column, needed)
     )
 
 
@@ -108,9 +106,7 @@ def _distance_to_piece(
 @kernel
 def _distance_to_square(row: float, column: float, centre_row: int, centre_column: int) -> float:
     """Return the distance from a point to the square of a cell."""
-    return math.sqrt(
-        max(abs(row - centre_row) - 0.5, 0.0) ** 2 + max(abs(column - centre_column) - 0.5, 0.0) ** 2
-    )
+    return math.sqrt(max(abs(row - centre_row) - 0.5, 0.0) ** 2 + max(abs(column - centre_column) - 0.5, 0.0) ** 2)
 
 
 @kernel
@@ -142,10 +138,7 @@ def _piece_is_clear(
                 return False
             for up in (-0.5, 0.5):
                 for right in (-0.5, 0.5):
-                    if (
-                        _distance_to_piece(row + up, column + right, row_a, column_a, row_b, column_b)
-                        < minimum
-                    ):
+                    if _distance_to_piece(row + up, column + right, row_a, column_a, row_b, column_b) < minimum:
                         return False
     return True
 

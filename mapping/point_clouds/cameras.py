@@ -32,9 +32,7 @@ class Intrinsics:
     def __post_init__(self) -> None:
         numbers = (self.fx, self.fy, self.cx, self.cy)
         if not np.isfinite(numbers).all() or self.fx <= 0.0 or self.fy <= 0.0:
-            raise ValueError(
-                f"intrinsics fx, fy, cx, cy are {numbers}; want finite numbers, fx and fy above 0"
-            )
+            raise ValueError(f"intrinsics fx, fy, cx, cy are {numbers}; want finite numbers, fx and fy above 0")
 
 
 def points_of_depth(depth: NDArray[np.floating], intrinsics: Intrinsics) -> NDArray[np.float32]:
@@ -160,9 +158,7 @@ def read_depth_image(
     image = read_image(path)
     if image.ndim != 2 or image.dtype != np.uint16:
         channels = 1 if image.ndim == 2 else image.shape[2]
-        raise ValueError(
-            f"{path} has {channels} channels of {image.dtype}; want a depth image, one channel of uint16"
-        )
+        raise ValueError(f"{path} has {channels} channels of {image.dtype}; want a depth image, one channel of uint16")
     depth = np.where(image == _NO_DEPTH, 0.0, image * scale)
     cloud = PointCloud(points_of_depth(depth, intrinsics), source=str(path))
     return cloud if pose is None else moved(cloud, read_pose(pose))
@@ -176,9 +172,7 @@ def read_pose(path: Path | str) -> Matrix:
     path = Path(path)
     text = read_text(path, _MAX_POSE_BYTES)
     with reading(path, "a pose of 4 x 4 numbers"):
-        motion = _checked_motion(
-            [[float(word) for word in line.split()] for line in text.splitlines() if line.strip()]
-        )
+        motion = _checked_motion([[float(word) for word in line.split()] for line in text.splitlines() if line.strip()])
     left, _, right = np.linalg.svd(motion[:3, :3])
     motion[:3, :3] = left @ right
     return motion

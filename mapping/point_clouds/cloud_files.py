@@ -105,9 +105,7 @@ def _unpacked(packed: bytes, size: int) -> NDArray[np.uint8]:
         The bytes.
     """
     if size > MAX_RATIO * len(packed):
-        raise ValueError(
-            f"{len(packed):,} packed bytes claim to be {size:,} unpacked, more than LZF can pack"
-        )
+        raise ValueError(f"{len(packed):,} packed bytes claim to be {size:,} unpacked, more than LZF can pack")
     room = np.empty(size, np.uint8)
     written = _unpack(np.frombuffer(packed, np.uint8), room)
     if written != size:
@@ -219,9 +217,7 @@ def _unpacked_columns(
         raise ValueError(f"it claims {packed:,} packed bytes and holds {len(body) - 8:,}: truncated")
     row = header.row
     if size != header.points * row.itemsize:
-        raise ValueError(
-            f"it claims {header.points:,} points of {row.itemsize} bytes, but packs {size:,} bytes"
-        )
+        raise ValueError(f"it claims {header.points:,} points of {row.itemsize} bytes, but packs {size:,} bytes")
     whole, columns, start = _unpacked(body[8 : 8 + packed], size), {}, 0
     for place, (kind, count) in enumerate(zip(header.kinds, header.counts, strict=True)):
         length = header.points * count * int(kind[1])
@@ -251,9 +247,7 @@ def _pcd_header(content: bytes) -> _PcdHeader:
     sizes, counts = _numbers(said["SIZE"]), _numbers(said.get("COUNT", ["1"] * len(names)))
     if not len(names) == len(sizes) == len(said["TYPE"]) == len(counts):
         raise ValueError("FIELDS, SIZE, TYPE and COUNT of its header differ in length")
-    kinds = tuple(
-        f"{_PCD_TYPES.get(kind, kind)}{size}" for kind, size in zip(said["TYPE"], sizes, strict=True)
-    )
+    kinds = tuple(f"{_PCD_TYPES.get(kind, kind)}{size}" for kind, size in zip(said["TYPE"], sizes, strict=True))
     for kind in kinds:
         if int(kind[1:]) not in _SIZES.get(kind[0], ()):
             raise ValueError(f"its header has a field of type and size {kind}, which PCD has not")

@@ -77,8 +77,7 @@ def thinned(cloud: PointCloud, edge: float) -> PointCloud:
     places = np.floor(cloud.points.astype(np.float64) / edge)
     if not np.abs(places).max() < MAX_CELLS:
         raise ValueError(
-            f"{cloud.source} has points that are not finite or more than {MAX_CELLS:,} voxels of {edge} m "
-            "away"
+            f"{cloud.source} has points that are not finite or more than {MAX_CELLS:,} voxels of {edge} m away"
         )
     cells = places.astype(np.int64) + MAX_CELLS
     keys = cells[:, 0] | cells[:, 1] << 21 | cells[:, 2] << 42

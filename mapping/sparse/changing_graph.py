@@ -89,9 +89,7 @@ class ChangingGraph:
         """Count obstacles in or out at the edges that they block."""
         base, weights = self._base, self.graph.weights
         for box in boxes:
-            edges = _edges_blocked(
-                base.grid, base.starts, base.ends, box.ravel(), base.body.numbers, self._longest
-            )
+            edges = _edges_blocked(base.grid, base.starts, base.ends, box.ravel(), base.body.numbers, self._longest)
             self._blocks[edges] += change
             weights[edges] = np.where(self._blocks[edges] > 0, np.inf, base.weights[edges])
         moving = np.array(list(self._obstacles.values())).reshape(-1, 6)
@@ -107,9 +105,7 @@ def _checked(box: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 @kernel
-def _edges_blocked(
-    grid: NodeGrid, starts: Array, ends: Array, box: Array, body: Array, longest: float
-) -> Any:  # noqa: ANN401
+def _edges_blocked(grid: NodeGrid, starts: Array, ends: Array, box: Array, body: Array, longest: float) -> Any:  # noqa: ANN401
     """Return the edges along which a body meets a box, at both of their ends, (E,)."""
     reach, squared = body[RADIUS] + longest, body[RADIUS] * body[RADIUS]
     cell, rows, columns = grid.cell[0], grid.shape[0], grid.shape[1]

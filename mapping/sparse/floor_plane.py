@@ -30,9 +30,7 @@ class FloorPlane:
         numbers = (self.x, self.y, self.z, self.offset)
         length = math.hypot(self.x, self.y, self.z)
         if not (all(map(math.isfinite, numbers)) and abs(length - 1.0) < 1e-6):
-            raise ValueError(
-                f"the floor is {numbers}; want a unit normal with the height of the origin above it"
-            )
+            raise ValueError(f"the floor is {numbers}; want a unit normal with the height of the origin above it")
 
     @property
     def normal(self) -> NDArray[np.float64]:
@@ -67,9 +65,7 @@ _BLOCK = 64
 _BANDS = 50
 
 
-def find_floor(
-    points: NDArray[np.float64], settings: FloorSettings | None = None, seed: int = 0
-) -> FloorPlane:
+def find_floor(points: NDArray[np.float64], settings: FloorSettings | None = None, seed: int = 0) -> FloorPlane:
     """Find the plane of the floor.
 
     Parameters
@@ -81,9 +77,7 @@ def find_floor(
     up = np.array([settings.up_x, settings.up_y, settings.up_z], np.float64)
     up /= np.linalg.norm(up)
     rng = np.random.default_rng(seed)
-    some = (
-        points if len(points) <= _MAX_POINTS else points[rng.choice(len(points), _MAX_POINTS, replace=False)]
-    )
+    some = points if len(points) <= _MAX_POINTS else points[rng.choice(len(points), _MAX_POINTS, replace=False)]
     best, share = _best_plane(some, up, settings, rng)
     if best is None or share < max(settings.least_share, 3.0 / max(len(some), 3)):
         raise ValueError(
@@ -135,9 +129,7 @@ def _drawn(heights: NDArray[np.float64], trials: int, rng: np.random.Generator) 
     return places
 
 
-def _refined(
-    points: NDArray[np.float64], plane: FloorPlane, up: NDArray[np.float64], distance: float
-) -> FloorPlane:
+def _refined(points: NDArray[np.float64], plane: FloorPlane, up: NDArray[np.float64], distance: float) -> FloorPlane:
     """Return the plane of least squares through the points on a plane."""
     for _ in range(_REFINEMENTS):
         near = points[np.abs(plane.heights(points)) <= distance]

@@ -113,9 +113,7 @@ def nearest_nodes(grid: NodeGrid, point: Array, found: Array, gaps: Array, witho
 
 
 @kernel(nrt=False)
-def _take_cell(
-    grid: NodeGrid, place: int, point: Array, found: Array, gaps: Array, number: int, without: int
-) -> int:
+def _take_cell(grid: NodeGrid, place: int, point: Array, found: Array, gaps: Array, number: int, without: int) -> int:
     """Sort the nodes of a cell into the nearest ones; return how many these are now."""
     maximum = found.shape[0]
     for k in range(grid.starts[place], grid.starts[place + 1]):

@@ -38,9 +38,7 @@ def _column_blocks(lists: Sequence[NDArray[np.int64]]) -> list[bytes]:
     return [*lowest, b"".join(upper)]
 
 
-def _lists_of_columns(
-    content: bytes, counts: Sequence[int], widths: Sequence[int]
-) -> list[NDArray[np.int64]]:
+def _lists_of_columns(content: bytes, counts: Sequence[int], widths: Sequence[int]) -> list[NDArray[np.int64]]:
     """Return the lists (count, width) whose blocks, joined, are the content."""
     sizes = [count * width for count, width in zip(counts, widths, strict=True)]
     whole = np.frombuffer(content, np.uint8)
@@ -251,9 +249,7 @@ def _unpacked(content: bytes) -> tuple[list[int], bytes]:
     if length > min(MAX_BODY_BYTES, _MAX_DEFLATED * (len(packed) + 1)):
         raise ValueError(f"it claims {length:,} bytes when unpacked; so few bytes cannot hold them")
     if _bytes_of(counts) > length:
-        raise ValueError(
-            f"it claims {sum(counts):,} codes, nodes and edges; {length:,} bytes cannot hold them"
-        )
+        raise ValueError(f"it claims {sum(counts):,} codes, nodes and edges; {length:,} bytes cannot hold them")
     unpacking = zlib.decompressobj()
     body = unpacking.decompress(packed, length + 1)
     if len(body) != length or not unpacking.eof:
@@ -409,9 +405,7 @@ def write_sparse_map(path: Path, sparse_map: SparseMap, graph: _GraphEdges | Non
     if path.suffix == BINARY_SUFFIX:
         _write_binary(path, sparse_map, graph)
     elif path.suffix != TEXT_SUFFIX:
-        raise ValueError(
-            f"{path} is no name for a sparse map; want one that ends in {BINARY_SUFFIX} or {TEXT_SUFFIX}"
-        )
+        raise ValueError(f"{path} is no name for a sparse map; want one that ends in {BINARY_SUFFIX} or {TEXT_SUFFIX}")
     elif graph is not None:
         raise ValueError(f"{path} is a text, which keeps no graph; want a name that ends in {BINARY_SUFFIX}")
     else:

@@ -451,9 +451,7 @@ def measure_path(path: NDArray[np.float64], spacing: float | None = SPACING_M) -
         raise ValueError(f"the path has shape {points.shape}; want (P, D) with at least one finite point")
     length = float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
     even = points if spacing is None else points_along(points, spacing)
-    return _PathMeasures(
-        length=length, points=len(points), turning=_turning_of(even), dispersion=_dispersion_of(even)
-    )
+    return _PathMeasures(length=length, points=len(points), turning=_turning_of(even), dispersion=_dispersion_of(even))
 
 
 def points_along(path: NDArray[np.float64], spacing: float) -> NDArray[np.float64]:

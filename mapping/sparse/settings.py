@@ -115,9 +115,7 @@ class MapperSettings:
         check_settings(self, "the mapper")
         for name, among in (("mode", MODES), ("split", SPLITS)):
             if getattr(self, name) not in among:
-                raise ValueError(
-                    f"{name} of the mapper is {getattr(self, name)!r}; want one of {', '.join(among)}"
-                )
+                raise ValueError(f"{name} of the mapper is {getattr(self, name)!r}; want one of {', '.join(among)}")
 
     @property
     def ceiling_m(self) -> float:

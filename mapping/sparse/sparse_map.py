@@ -162,9 +162,7 @@ class SparseMap:
             raise ValueError(f"poses have shape {self.poses.shape}; want that of {len(self.recorded)} frames")
         frames = np.concatenate([self.occupied.frames, self.ground.frames])
         if len(frames) and not 0 <= frames.min() <= frames.max() < len(self.poses):
-            raise ValueError(
-                f"codes are of frames up to {frames.max()}; want numbers below {len(self.poses)}"
-            )
+            raise ValueError(f"codes are of frames up to {frames.max()}; want numbers below {len(self.poses)}")
 
     @property
     def corrections(self) -> NDArray[np.float64]:

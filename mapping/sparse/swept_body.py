@@ -45,9 +45,7 @@ class SweptBody:
     def __post_init__(self) -> None:
         check_settings(self, "the body")
         if not self.clearance < self.height:
-            raise ValueError(
-                f"clearance of the body is {self.clearance} m; want less than its height, {self.height} m"
-            )
+            raise ValueError(f"clearance of the body is {self.clearance} m; want less than its height, {self.height} m")
 
     @property
     def numbers(self) -> NDArray[np.float64]:

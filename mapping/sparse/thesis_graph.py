@@ -168,9 +168,7 @@ class ThesisGraphSettings:
     def __post_init__(self) -> None:
         check_settings(self, "the thesis's graph")
         if self.support not in SUPPORTS:
-            raise ValueError(
-                f"support of the thesis's graph is {self.support!r}; want one of {', '.join(SUPPORTS)}"
-            )
+            raise ValueError(f"support of the thesis's graph is {self.support!r}; want one of {', '.join(SUPPORTS)}")
 
 
 def build_thesis_graph(

@@ -61,7 +61,5 @@ def _execute(command: _Bench) -> Answer:
     if command.out is not None:
         write_speed(result, lines, command.out)
     shown = table([line.cells for line in lines], ("line", "ours", "beside", "ratio", "to reach", "reached"))
-    text = "\n".join(
-        [f"{result['machine']}, lidarium {result['versions']['lidarium']}", shown, *missing_peers()]
-    )
+    text = "\n".join([f"{result['machine']}, lidarium {result['versions']['lidarium']}", shown, *missing_peers()])
     return Answer(result, text, INTERRUPTED if is_interrupted else 0)

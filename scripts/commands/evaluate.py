@@ -125,8 +125,7 @@ def _suite(command: _Evaluate) -> "Suite":
         for given, what in ((command.supervisor, "the supervisor"), (command.policy_set, "policies")):
             if given:
                 raise ValueError(
-                    f"settings of {what} are given beside a suite or a preset; want them in its "
-                    "policy_settings"
+                    f"settings of {what} are given beside a suite or a preset; want them in its policy_settings"
                 )
     if command.suite is not None:
         return read_suite(command.suite)
@@ -183,8 +182,7 @@ def _answer(campaign: "Campaign", folder: Path, is_interrupted: bool) -> Answer:
         "episodes": campaign.total,
         "finished": campaign.done,
         "failed": [
-            {"key": trial.key, "error": f"{type(error).__name__}: {error}"}
-            for trial, error in campaign.failures
+            {"key": trial.key, "error": f"{type(error).__name__}: {error}"} for trial, error in campaign.failures
         ],
         "interrupted": is_interrupted,
         "summary": rows,

@@ -148,8 +148,7 @@ def _list_floors(command: _List) -> Answer:
         *((f"{kind}:SEED", f"a building of kind {kind}") for kind in KINDS),
     ]
     sets = [
-        (f"set:{name}", f"{count:,} generated floors, building:{first} and on")
-        for name, (first, count) in SETS.items()
+        (f"set:{name}", f"{count:,} generated floors, building:{first} and on") for name, (first, count) in SETS.items()
     ]
     sections = (
         ("drawn floors", list(result["floors"].items())),
@@ -182,9 +181,7 @@ def _generate_floor(command: _Generate) -> Answer:
     from lidarium.envs.floors.generation.buildings import BuildingSettings, generate_building
 
     check_out(command)
-    settings = BuildingSettings(
-        kind=command.kind, area_m2=command.area, loops=command.loops, clutter=command.clutter
-    )
+    settings = BuildingSettings(kind=command.kind, area_m2=command.area, loops=command.loops, clutter=command.clutter)
     return write_floor(command, generate_building(command.seed, settings), command.map_resolution)
 
 
@@ -251,9 +248,7 @@ def _prepared(spec: str, resolution: float, laser_height: float, body_height: fl
     return prepare_tables(floor_store(), load_floor(spec), resolution, laser_height, body_height)
 
 
-def _prepare(
-    prepare: Callable[[str], bool], specs: Sequence[str], command: _Prepare
-) -> tuple[int, int, bool]:
+def _prepare(prepare: Callable[[str], bool], specs: Sequence[str], command: _Prepare) -> tuple[int, int, bool]:
     """Prepare floors.
 
     Return how many are ready, how many were made, and whether it was broken off.
@@ -316,9 +311,7 @@ def _levels(solid: Any, resolution: float) -> Any:  # noqa: ANN401
 
     side = 2 * max(round(0.1 / resolution), 1) + 1
     near_free = cv2.dilate((solid == 0).astype(np.uint8), np.ones((side, side), np.uint8))
-    return np.where(
-        solid == 0, np.uint8(FREE), np.where(near_free != 0, np.uint8(OCCUPIED), np.uint8(UNKNOWN))
-    )
+    return np.where(solid == 0, np.uint8(FREE), np.where(near_free != 0, np.uint8(OCCUPIED), np.uint8(UNKNOWN)))
 
 
 def _save_picture(path: Path, floor: "Floor") -> None:

@@ -79,9 +79,7 @@ class _Merge(Command):
         if self.scale != "fixed" and len(self.maps) != 2:
             raise ValueError(f"a scale is of two maps; {len(self.maps)} are given")
         if factor is None and (self.guess is not None or self.force or self.mode != "default"):
-            raise ValueError(
-                "--scale auto goes without --guess, --force and --mode; give the scale as a number"
-            )
+            raise ValueError("--scale auto goes without --guess, --force and --mode; give the scale as a number")
 
     @property
     def factor(self) -> float | None:
@@ -94,8 +92,7 @@ class _Merge(Command):
             factor = math.nan
         if not LEAST_SCALE <= factor <= 1.0 / LEAST_SCALE:
             raise ValueError(
-                f"scale is {self.scale!r}; want fixed, auto, or a number from {LEAST_SCALE:g} to "
-                f"{1.0 / LEAST_SCALE:g}"
+                f"scale is {self.scale!r}; want fixed, auto, or a number from {LEAST_SCALE:g} to {1.0 / LEAST_SCALE:g}"
             )
         return factor
 
@@ -145,9 +142,7 @@ def _merged(
         scaled = merge_scaled(_grids(images), settings)
         return scaled.merged, _grown(images, scaled.scale), scaled.scale
     images = _grown(images, factor)
-    question = Question(
-        guess=_guess(command, list(images.values())), is_forced=command.force, is_explained=True
-    )
+    question = Question(guess=_guess(command, list(images.values())), is_forced=command.force, is_explained=True)
     return merge_maps(_grids(images), settings, question), images, factor
 
 
@@ -192,9 +187,7 @@ def _read(command: _Merge) -> "dict[str, MapImage]":
         if path.suffix.lower() in (".yaml", ".yml"):
             image = read_ros_map(path)
         elif command.resolution is None:
-            raise ValueError(
-                f"{path} is an image without a scale; pass --resolution with its metres per pixel"
-            )
+            raise ValueError(f"{path} is an image without a scale; pass --resolution with its metres per pixel")
         else:
             image = read_grey_map(path, command.resolution)
         stem, name, number = file_name(path.stem), file_name(path.stem), 1
@@ -240,10 +233,7 @@ def _deformation(found: "Deformation | None") -> dict[str, float] | None:
 
 def _summary(merged: "Merged", files: list[str], out: Path, scale: float | None) -> str:
     """Return the printed text; ``scale`` is by how much the second map has grown, None if it may not."""
-    lines = [
-        f"joined: {', '.join(group)}" if len(group) > 1 else f"alone:  {group[0]}"
-        for group in merged.groups()
-    ]
+    lines = [f"joined: {', '.join(group)}" if len(group) > 1 else f"alone:  {group[0]}" for group in merged.groups()]
     dropped = {(edge.a, edge.b) for edge in merged.tree.dropped}
     rows = []
     for (a, b), found in merged.pairs.items():
@@ -304,9 +294,7 @@ def write_merged(
     return files
 
 
-def draw_regions(
-    merged: "Merged", images: "dict[str, MapImage]", settings: "RegionSettings", out: Path
-) -> str:
+def draw_regions(merged: "Merged", images: "dict[str, MapImage]", settings: "RegionSettings", out: Path) -> str:
     """Draw the regions of each map as it was compared; returns the file's name."""
     from lidarium.evaluation.drawing.region_picture import RegionMap, save_region_picture
     from lidarium.mapping.merging.regions.graph import find_regions

@@ -48,8 +48,7 @@ def _execute(command: _Plan) -> Answer:
     if command.out is not None:
         check_writable(command.out)
     start, goal = (
-        np.array(numbers_of(name, text, (2, 3)))
-        for name, text in (("--from", command.start), ("--to", command.goal))
+        np.array(numbers_of(name, text, (2, 3))) for name, text in (("--from", command.start), ("--to", command.goal))
     )
     sparse_map, _ = read_sparse_map(command.map)
     body = SweptBody(radius=command.radius, height=command.height)
@@ -76,9 +75,7 @@ def _execute(command: _Plan) -> Answer:
             command.out / "path.smap", sparse_map.boxes, sparse_map.free, graph, answer.path
         )
         files = [str(command.out / "path.json"), *pictures]
-    found = (
-        f"{answer.length:.2f} m, {len(answer.path)} points" if answer.is_found else f"none: {answer.reason}"
-    )
+    found = f"{answer.length:.2f} m, {len(answer.path)} points" if answer.is_found else f"none: {answer.reason}"
     facts = [
         ("path", found),
         ("graph", f"{len(graph.nodes)} nodes, {len(graph.edges)} edges"),

@@ -151,9 +151,7 @@ def _run_again(command: _Replay, record: "EpisodeRecord") -> Answer:
         "recorded_sha256": record.header["final_sha256"],
         **_figures(env),
     }
-    verdict = (
-        "the same as recorded, to the bit" if same else f"not as recorded: {first_difference(record, env)}"
-    )
+    verdict = "the same as recorded, to the bit" if same else f"not as recorded: {first_difference(record, env)}"
     ended = [
         (agent, reason or "still at work", f"{length:.1f} m")
         for (agent, reason), length in zip(result["ended_because"].items(), result["path_m"], strict=True)
@@ -166,8 +164,7 @@ def _run_again(command: _Replay, record: "EpisodeRecord") -> Answer:
         ),
         (
             "together",
-            f"{sum(result['path_m']):.1f} m driven, overlap {result['overlap']:.2f}, {result['collisions']} "
-            "collisions",
+            f"{sum(result['path_m']):.1f} m driven, overlap {result['overlap']:.2f}, {result['collisions']} collisions",
         ),
         ("map", f"IoU of occupied cells {result['iou_occupied']:.3f}"),
     ]

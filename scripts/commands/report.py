@@ -83,9 +83,7 @@ def _film(command: _Report, chosen: "Chosen") -> None:
 
 def _summary(result: dict[str, Any], out: Path) -> str:
     """Tell the most important figures of each group."""
-    lines = [
-        f"{result['episodes']} episodes, {result['records']} recorded; compared with {result['baseline']}"
-    ]
+    lines = [f"{result['episodes']} episodes, {result['records']} recorded; compared with {result['baseline']}"]
     for group in result["groups"]:
         robots = f"{group['robots']} robot{'s' if group['robots'] != 1 else ''}"
         rows = [

@@ -50,9 +50,7 @@ def execute(command: Reproduce) -> Answer:
     from lidarium.mapping.files.output import check_writable, write_text
 
     if command.every < 1 or command.workers < 0:
-        raise ValueError(
-            f"--every is {command.every} and --workers {command.workers}; want at least 1, and at least 0"
-        )
+        raise ValueError(f"--every is {command.every} and --workers {command.workers}; want at least 1, and at least 0")
     every = _every(command)
     out = command.out or DEFAULT_FOLDER
     check_writable(out)
@@ -75,9 +73,7 @@ def execute(command: Reproduce) -> Answer:
     failures = [(trial, error) for campaign in campaigns.values() for trial, error in campaign.failures]
     for trial, error in failures:
         notify(f"{trial.key}: {type(error).__name__}: {error}")
-    return Answer(
-        {**_progress_of(campaigns), "page": str(page)}, f"{page} is written", DEFECT if failures else 0
-    )
+    return Answer({**_progress_of(campaigns), "page": str(page)}, f"{page} is written", DEFECT if failures else 0)
 
 
 def _every(command: Reproduce) -> int:
@@ -135,9 +131,7 @@ def _progress_of(campaigns: dict[str, "Campaign"]) -> dict[str, Any]:
 
 def _command_line(command: Reproduce) -> str:
     data = (
-        ""
-        if command.data is None
-        else f" --data {command.data.name if command.data.is_absolute() else command.data}"
+        "" if command.data is None else f" --data {command.data.name if command.data.is_absolute() else command.data}"
     )
     part = f" --every {command.every}" if command.every > 1 else ""
     if command.share is not None:

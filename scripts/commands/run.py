@@ -164,9 +164,7 @@ def _completed(command: Run) -> Run:
     if command.robots == 1 or FloorChoice(command.floor, command.resolution).has_goal:
         return replace(command, policy=LONE_POLICY)
     team = replace(command, policy=TEAM_POLICY, unknown_starts=True)
-    is_world_given = command.realism != "ideal" or any(
-        getattr(command, name) is not None for name in TEAM_WORLD
-    )
+    is_world_given = command.realism != "ideal" or any(getattr(command, name) is not None for name in TEAM_WORLD)
     return team if is_world_given else replace(team, **TEAM_WORLD)
 
 
@@ -202,9 +200,7 @@ def _recorder(command: Run) -> "Recorder | None":
     return Recorder(command.chosen_policy, command.seed, command.floor, command.resolution)
 
 
-def _environment(
-    command: Run, policy: "Policy", recorder: "Recorder | None"
-) -> "tuple[WatchedExploration, History]":
+def _environment(command: Run, policy: "Policy", recorder: "Recorder | None") -> "tuple[WatchedExploration, History]":
     from lidarium.evaluation.episodes.history import History
     from lidarium.evaluation.episodes.watching import WatchedExploration, Watcher
 
@@ -223,9 +219,7 @@ def _parsed_starts(text: str, robots: int) -> "NDArray[np.float64] | str":
     if text in STARTS:
         return text
     try:
-        starts = np.array(
-            [[float(value) for value in start.split(",")] for start in text.strip("; ").split(";")]
-        )
+        starts = np.array([[float(value) for value in start.split(",")] for start in text.strip("; ").split(";")])
     except ValueError:
         starts = np.zeros((0, 0))
     if starts.ndim != 2 or starts.shape[1] != 3 or not np.isfinite(starts).all():

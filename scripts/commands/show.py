@@ -140,14 +140,10 @@ def _lidars() -> tuple[dict[str, Any], str]:
         )
         for name, lidar in LIDARS.items()
     ]
-    noises = [
-        (name, f"{least:g} m or {share:g} of the range, the larger") for name, (least, share) in NOISE.items()
-    ]
+    noises = [(name, f"{least:g} m or {share:g} of the range, the larger") for name, (least, share) in NOISE.items()]
     result = {
         "lidars": {name: asdict(lidar) for name, lidar in LIDARS.items()},
-        "noise": {
-            name: {"noise_floor": least, "noise_share": share} for name, (least, share) in NOISE.items()
-        },
+        "noise": {name: {"noise_floor": least, "noise_share": share} for name, (least, share) in NOISE.items()},
     }
     return result, table(rows, header, indent="") + "\n\nnoise, standard deviation\n" + table(noises)
 
@@ -156,9 +152,7 @@ def _settings() -> tuple[dict[str, Any], str]:
     from lidarium.envs.settings.exploration import ExplorationSettings
     from lidarium.envs.settings.table import settings_table
 
-    rows = [
-        (row.name, "none" if row.default is None else row.default, row.summary) for row in settings_table()
-    ]
+    rows = [(row.name, "none" if row.default is None else row.default, row.summary) for row in settings_table()]
     text = "\n".join(f"{name:<36}{default!s:<24} {summary}" for name, default, summary in rows)
     return {"settings": asdict(ExplorationSettings())}, text
 
@@ -180,9 +174,7 @@ def _realism() -> tuple[dict[str, Any], str]:
         settings = make_settings(realism=name)
         rates = {kind: rate for kind in KINDS[1:] if (rate := getattr(settings.faults, kind)) > 0.0}
         faults = ", ".join(f"{kind} {rate:g}" for kind, rate in rates.items()) or "none"
-        rows.append(
-            (name, preset["noise"], preset["odometry"], settings.localization, settings.radio.kind, faults)
-        )
+        rows.append((name, preset["noise"], preset["odometry"], settings.localization, settings.radio.kind, faults))
         values[name] = {
             part: asdict(settings)[part] for part in ("lidar", "odometry", "localization", "radio", "faults")
         }

@@ -111,8 +111,7 @@ def _execute(command: _Slam) -> Answer:
     followed = follow(log, _settings_of(command), watch)
     if not len(followed.slam.key_scans.poses):
         raise ValueError(
-            f"{command.log} holds no scan with a return within {command.range} m; want a larger --range or "
-            "another log"
+            f"{command.log} holds no scan with a return within {command.range} m; want a larger --range or another log"
         )
     result = _result(command, log, followed)
     if reference is not None:
@@ -134,9 +133,7 @@ def _settings_of(command: _Slam) -> "SlamSettings":
         beam_interval_s=command.beam_interval,
     )
     submaps = replace(LOG_SETTINGS.submaps, resolution=command.resolution)
-    return replace(
-        LOG_SETTINGS, uses_odometry=not command.ignore_odometry, matching=matching, submaps=submaps
-    )
+    return replace(LOG_SETTINGS, uses_odometry=not command.ignore_odometry, matching=matching, submaps=submaps)
 
 
 def _read(command: _Slam) -> "LaserLog":
@@ -180,8 +177,7 @@ def _result(command: _Slam, log: "LaserLog", followed: "Followed") -> dict[str, 
         "cpu_s": round(cpu_s, 3),
         "cpu_over_data": round(cpu_s / data_s, 6) if data_s > 0.0 else None,
         "scan_ms": {
-            f"p{percent}": round(1e3 * float(np.percentile(followed.scan_s, percent)), 3)
-            for percent in (50, 95)
+            f"p{percent}": round(1e3 * float(np.percentile(followed.scan_s, percent)), 3) for percent in (50, 95)
         },
         "path_m": round(float(np.hypot(steps[:, 0], steps[:, 1]).sum()), 3),
         **asdict(followed.slam.counts),
@@ -234,13 +230,9 @@ def _relations(command: _Slam, log: "LaserLog") -> "Relations":
     try:
         found = covered(every, log.stamps + command.clock_shift)
     except ValueError as error:
-        raise ValueError(
-            f"{command.relations}: {error} with --clock-shift, which is {command.clock_shift}"
-        ) from error
+        raise ValueError(f"{command.relations}: {error} with --clock-shift, which is {command.clock_shift}") from error
     if len(found.begin) < len(every.begin):
-        notify(
-            f"{command.relations}: left out: {len(every.begin) - len(found.begin)} of times beyond the log"
-        )
+        notify(f"{command.relations}: left out: {len(every.begin) - len(found.begin)} of times beyond the log")
     return found
 
 

@@ -119,9 +119,7 @@ def _settings(command: _SparseMapping) -> "MapperSettings":
 
     x, y, z = numbers_of("--up", command.up, (3,))
     floor = FloorSettings(up_x=x, up_y=y, up_z=z) if not command.levels else FloorSettings()
-    return MapperSettings(
-        mode=command.mode, robot_height_m=command.robot_height, seed=command.seed, floor=floor
-    )
+    return MapperSettings(mode=command.mode, robot_height_m=command.robot_height, seed=command.seed, floor=floor)
 
 
 def _clouds(command: _SparseMapping) -> "Iterator[tuple[NDArray[np.floating], NDArray[np.float64]]]":
@@ -148,11 +146,7 @@ def _clouds(command: _SparseMapping) -> "Iterator[tuple[NDArray[np.floating], ND
 def _intrinsics(command: _SparseMapping) -> "Intrinsics | None":
     from lidarium.mapping.point_clouds.cameras import Intrinsics
 
-    return (
-        None
-        if command.intrinsics is None
-        else Intrinsics(*numbers_of("--intrinsics", command.intrinsics, (4,)))
-    )
+    return None if command.intrinsics is None else Intrinsics(*numbers_of("--intrinsics", command.intrinsics, (4,)))
 
 
 def numbers_of(name: str, text: str, counts: tuple[int, ...]) -> list[float]:

@@ -78,8 +78,7 @@ def _check_extra() -> None:
     missing = [name for name in EXTRA if importlib.util.find_spec(name) is None]
     if missing:
         raise ValueError(
-            f"training needs {', '.join(missing)}; install the extra: "
-            'pip install -c constraints.txt "lidarium[rl]"'
+            f'training needs {", ".join(missing)}; install the extra: pip install -c constraints.txt "lidarium[rl]"'
         )
 
 
@@ -110,9 +109,7 @@ class _Shown:
 
         if is_new:
             self.close()
-            self._bar = tqdm(
-                desc=step.part, total=step.total, initial=step.done, file=sys.stderr, dynamic_ncols=True
-            )
+            self._bar = tqdm(desc=step.part, total=step.total, initial=step.done, file=sys.stderr, dynamic_ncols=True)
         self._bar.update(step.done - self._bar.n)
         self._bar.set_postfix_str(_figures(step).strip(" ()"))
 

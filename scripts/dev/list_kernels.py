@@ -38,9 +38,7 @@ def called_kernels() -> list[dict[str, Any]]:
 def _code_size(kernel: Any) -> int:  # noqa: ANN401
     """Return the bytes of a kernel's machine code with all that it calls: how long compiling takes."""
     stem = f"{kernel.__module__.rpartition('.')[2]}.{kernel.py_func.__qualname__}-"
-    return max(
-        (path.stat().st_size for path in Path(kernel.stats.cache_path).glob(f"{stem}*.nbc")), default=0
-    )
+    return max((path.stat().st_size for path in Path(kernel.stats.cache_path).glob(f"{stem}*.nbc")), default=0)
 
 
 def _run_and_list(caches: Path | None) -> list[dict[str, Any]]:

@@ -37,9 +37,7 @@ def _compiled_in_reset() -> list[dict[str, Any]]:
             self.began.append(time.perf_counter())
 
         def on_end(self, event: Any) -> None:  # noqa: ANN401
-            found.append(
-                (time.perf_counter() - self.began.pop(), event.data["dispatcher"], event.data["args"])
-            )
+            found.append((time.perf_counter() - self.began.pop(), event.data["dispatcher"], event.data["args"]))
 
     import lidarium
 

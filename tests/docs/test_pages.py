@@ -22,9 +22,7 @@ def text_of(name):
 
 @pytest.mark.parametrize("page", [page for page in PAGES if "```toml" in page.read_text(encoding="utf-8")])
 def test_suites_of_the_pages_are_read(page, tmp_path):
-    for number, block in enumerate(
-        re.findall(r"```toml\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL)
-    ):
+    for number, block in enumerate(re.findall(r"```toml\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL)):
         path = tmp_path / f"suite_{number}.toml"
         path.write_text(block, encoding="utf-8")
         if "[[rounds]]" in block:
@@ -48,9 +46,7 @@ def test_the_architecture_can_be_read_in_five_minutes():
     assert text_of("README.md").count("\n") <= 90
 
 
-@pytest.mark.parametrize(
-    "page", sorted((ROOT / "docs" / "decisions").glob("0*.md")), ids=lambda page: page.stem
-)
+@pytest.mark.parametrize("page", sorted((ROOT / "docs" / "decisions").glob("0*.md")), ids=lambda page: page.stem)
 def test_a_decision_says_why_and_what_follows(page):
     text = page.read_text(encoding="utf-8")
     assert re.findall(r"^## (\w+)$", text, re.MULTILINE) == ["Context", "Decision", "Consequences"]

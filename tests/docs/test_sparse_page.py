@@ -8,9 +8,7 @@ PAGE = Path(__file__).parents[2] / "docs" / "reference" / "sparse_maps.md"
 
 def test_code_prints_what_the_page_shows(capsys):
     names = {"__name__": PAGE.stem}
-    blocks = re.findall(
-        r"^```(python|text)\n(.*?)^```", PAGE.read_text(encoding="utf-8"), re.DOTALL | re.MULTILINE
-    )
+    blocks = re.findall(r"^```(python|text)\n(.*?)^```", PAGE.read_text(encoding="utf-8"), re.DOTALL | re.MULTILINE)
     assert [language for language, _ in blocks] == ["python", "text"] * 3
     for language, content in blocks:
         if language == "python":

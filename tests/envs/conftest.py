@@ -38,9 +38,7 @@ class Alone:
         results, row = [], 0
         for env in self.envs:
             own = dict(zip(env.possible_agents, actions[row : row + len(env.possible_agents)], strict=True))
-            results.append(
-                env.step({agent: own[agent] for agent in env.agents}) if env.agents else env.reset()
-            )
+            results.append(env.step({agent: own[agent] for agent in env.agents}) if env.agents else env.reset())
             row += len(own)
         return results
 
@@ -92,9 +90,7 @@ def compare_rows(level, threads, steps, floors, robots=2, seed=11, **options):
                     check_observation(observations, row, {name: array[row] for name, array in last.items()})
                 assert rewards[row] == gains.get(agent, 0.0)
                 assert terminated[row] == ended.get(agent, False)
-                assert truncated[row] == (
-                    cut[agent] if agent in own and cut else agent not in own and is_over
-                )
+                assert truncated[row] == (cut[agent] if agent in own and cut else agent not in own and is_over)
                 ends += int(terminated[row] or (truncated[row] and agent in own))
     return ends
 

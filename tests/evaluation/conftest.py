@@ -78,9 +78,7 @@ def run_recorded(policy="nearest_frontier", floor="apartment", seed=3, options=N
     """Return the record of an episode and its environment."""
     name = policy if isinstance(policy, str) else type(policy).__name__
     recorder = Recorder(name, seed, floor if isinstance(floor, str) else None)
-    env = WatchedExploration(
-        floor, make_settings(**{"robots": 2, **settings}), watchers=[recorder, *watchers]
-    )
+    env = WatchedExploration(floor, make_settings(**{"robots": 2, **settings}), watchers=[recorder, *watchers])
     run_episode(lidarium.policy(policy) if isinstance(policy, str) else policy, env, seed, options)
     return recorder.finish(), env
 

@@ -97,8 +97,7 @@ class Reference:
 
     def start_cells(self, side):
         return [
-            tuple(int(value) for value in ((start[:2] - self.origin) / side)[::-1])
-            for start in self.env.world.starts
+            tuple(int(value) for value in ((start[:2] - self.origin) / side)[::-1]) for start in self.env.world.starts
         ]
 
     def cells_of_f(self):
@@ -272,11 +271,7 @@ class Reference:
 
     def time_to(self, share):
         return next(
-            (
-                round(k * self.env.settings.time_step, 6)
-                for k, value in enumerate(self.coverage)
-                if value >= share
-            ),
+            (round(k * self.env.settings.time_step, 6) for k, value in enumerate(self.coverage) if value >= share),
             None,
         )
 

@@ -50,9 +50,7 @@ def test_a_metric_is_in_results_tables_and_page(reported):
         "record",
     ]
     (group,) = numbers["groups"]
-    assert group["values"]["random_walk"]["turned_rad"]["median"]["estimate"] == pytest.approx(
-        np.median(turned[2:])
-    )
+    assert group["values"]["random_walk"]["turned_rad"]["median"]["estimate"] == pytest.approx(np.median(turned[2:]))
     assert "turned rad [rad], median" in markdown
     assert page["values"]["turned_rad"] == {
         "title": "turned rad",

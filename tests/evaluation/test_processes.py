@@ -153,9 +153,7 @@ if __name__ == "__main__":
 @linux_only
 def test_a_worker_that_is_stopped_when_all_is_done_holds_nobody_up(tmp_path):
     (tmp_path / "idle.py").write_text(IDLE)
-    told = subprocess.run(
-        [sys.executable, str(tmp_path / "idle.py")], capture_output=True, text=True, timeout=120
-    )
+    told = subprocess.run([sys.executable, str(tmp_path / "idle.py")], capture_output=True, text=True, timeout=120)
     assert (told.returncode, told.stdout, told.stderr) == (0, "over\n", "")
 
 

@@ -41,9 +41,7 @@ def result_of(floor, seed, core, folder, options):
     )
     result = json.loads(output.stdout)
     pixels = (folder / "map.pgm").read_bytes()
-    return json.dumps(
-        [{k: v for k, v in result.items() if k not in OF_THE_MACHINE}, pixels.hex()], sort_keys=True
-    )
+    return json.dumps([{k: v for k, v in result.items() if k not in OF_THE_MACHINE}, pixels.hex()], sort_keys=True)
 
 
 def main():

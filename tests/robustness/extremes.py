@@ -99,8 +99,7 @@ def _rows(settings: Any, prefix: str = "") -> list[_Bounded]:
         if hasattr(value, "__dataclass_fields__"):
             inner = {part.name.rpartition(".")[2]: part for part in _rows(value, f"{prefix}{name}.")}
             rows += [
-                _Bounded(part.name, rule.inner.get(short, part.bounds), part.is_whole)
-                for short, part in inner.items()
+                _Bounded(part.name, rule.inner.get(short, part.bounds), part.is_whole) for short, part in inner.items()
             ]
         elif rule.kind in (int, float):
             rows.append(_Bounded(f"{prefix}{name}", rule.bounds, rule.kind is int))
@@ -152,10 +151,7 @@ def _step(settings: ExplorationSettings, chance: random.Random) -> None:
     for _ in range(STEPS):
         if not env.agents:
             break
-        actions = {
-            agent: np.array([chance.uniform(-1, 1), chance.uniform(-1, 1)], np.float32)
-            for agent in env.agents
-        }
+        actions = {agent: np.array([chance.uniform(-1, 1), chance.uniform(-1, 1)], np.float32) for agent in env.agents}
         observations, rewards, *_ = env.step(actions)
         _check(observations)
         assert all(np.isfinite(reward) for reward in rewards.values()), "a reward is no number"

@@ -212,9 +212,7 @@ CASES: dict[str, tuple[str, Callable[[], bytes]]] = {
     ),
     "rows of a block": (
         "dxf.dxf",
-        lambda: _dxf(
-            "0 INSERT 8 0 2 B0 10 0 20 0 70 30000 71 30000 44 1 45 1 " + _ROOM, _nested_blocks(0, 0, _ROOM)
-        ),
+        lambda: _dxf("0 INSERT 8 0 2 B0 10 0 20 0 70 30000 71 30000 44 1 45 1 " + _ROOM, _nested_blocks(0, 0, _ROOM)),
     ),
     "light polylines of a DXF": ("dxf.dxf", lambda: _dxf(_LIGHT * 18_000 + _ROOM)),
     "heavy polylines of a DXF": ("dxf.dxf", lambda: _dxf(_HEAVY + _VERTICES * 12_000 + "0 SEQEND " + _ROOM)),
@@ -228,9 +226,7 @@ CASES: dict[str, tuple[str, Callable[[], bytes]]] = {
     ),
     "a damaged DXF": (
         "dxf.dxf",
-        lambda: _dxf(_ARC * 3_900 + _LINE.format(0, 0, 9, 9) * 24_000 + _ROOM).replace(
-            b"0\nENDSEC\n0\nEOF", b"0\nEOF"
-        ),
+        lambda: _dxf(_ARC * 3_900 + _LINE.format(0, 0, 9, 9) * 24_000 + _ROOM).replace(b"0\nENDSEC\n0\nEOF", b"0\nEOF"),
     ),
     "a large circle": ("dxf.dxf", lambda: _dxf("0 CIRCLE 8 0 10 0 20 0 40 1e12 " + _ROOM)),
     "curves of a DXF": ("dxf.dxf", lambda: _dxf("0 CIRCLE 8 0 10 5 20 5 40 900 " * 20_000 + _ROOM)),

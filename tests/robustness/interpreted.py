@@ -27,9 +27,7 @@ CASES = {
     "slam": team(drawn_floor, 4, robots=2, **REAL, **SMALL),
     "splines": team(drawn_floor, 4, robots=1, localization="splines", **SMALL),
     "splines_ekf": team(drawn_floor, 4, robots=1, localization="splines_ekf", **SMALL),
-    "faults": team(
-        drawn_floor, 3, robots=2, localization="odometry", odometry="good", battery="kobuki", **SMALL
-    ),
+    "faults": team(drawn_floor, 3, robots=2, localization="odometry", odometry="good", battery="kobuki", **SMALL),
     "merged": team(drawn_floor, 2, "frontier", merged=False, robots=2, known_starts=False, **SMALL),
     "nearest_frontier": policy("nearest_frontier", "srt_l_room", 5, robots=1, **SMALL),
     "srt": policy("srt", "srt_l_room", 5, robots=1, **SMALL),

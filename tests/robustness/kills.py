@@ -102,9 +102,7 @@ def working(work: Work, out: Path) -> Iterator["subprocess.Popen[bytes]"]:
     """Run the command in a group of processes of its own, all of which are gone at the end."""
     command = [sys.executable, "-c", PROGRAM, *work.words]
     with open(out.with_suffix(".txt"), "ab") as told:
-        process = subprocess.Popen(
-            [*command, "--out", str(out)], stdout=told, stderr=told, start_new_session=True
-        )
+        process = subprocess.Popen([*command, "--out", str(out)], stdout=told, stderr=told, start_new_session=True)
     try:
         yield process
     finally:

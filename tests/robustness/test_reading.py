@@ -87,9 +87,7 @@ def test_the_picture_of_a_map_may_be_no_device_either(tmp_path):
 
 
 @pytest.mark.parametrize("name", READERS)
-@pytest.mark.parametrize(
-    "content", [b"[" * 50_000, b'{"a":' * 50_000, b"x = " + b"[" * 50_000, b"<a>" * 50_000]
-)
+@pytest.mark.parametrize("content", [b"[" * 50_000, b'{"a":' * 50_000, b"x = " + b"[" * 50_000, b"<a>" * 50_000])
 def test_deep_nesting_is_told_as_such_or_as_what_it_is_not(name, content, tmp_path):
     (tmp_path / name).write_bytes(content + b"\n\n")
     refused(READERS[name], tmp_path / name, ".", 4.0)
@@ -142,9 +140,7 @@ def test_a_picture_whose_header_is_too_large_is_refused_unread(content, tmp_path
 def test_a_picture_of_tags_that_all_hold_the_whole_file_is_refused(tmp_path):
     tags = [(256, 4, 1, 60), (257, 4, 1, 40), *((1000 + k, 7, 300_000, 100) for k in range(30_000))]
     table = b"".join(struct.pack("<HHII", *tag) for tag in tags)
-    (tmp_path / "a.tif").write_bytes(
-        b"II*\0\x08\0\0\0" + struct.pack("<H", len(tags)) + table + bytes(600_000)
-    )
+    (tmp_path / "a.tif").write_bytes(b"II*\0\x08\0\0\0" + struct.pack("<H", len(tags)) + table + bytes(600_000))
     refused(read_image, tmp_path / "a.tif", "not an image that can be read")
 
 
@@ -207,8 +203,7 @@ def test_walls_and_doors_by_the_thousand_are_not_compared_with_each_other(tmp_pa
 def test_an_outline_with_far_corners_is_refused(far, tmp_path):
     texts = {
         "a.vectormap.txt": f"0,0,6,0\n6,0,6,4\n6,4,0,4\n0,4,0,0\n1,1,{far},1\n",
-        "a.txt": "0 0 60 0 wall\n60 0 60 40 wall\n60 40 0 40 wall\n0 40 0 0 wall\n"
-        f"9 9 {far} 9 wall\n3 3 3 4 door\n",
+        "a.txt": f"0 0 60 0 wall\n60 0 60 40 wall\n60 40 0 40 wall\n0 40 0 0 wall\n9 9 {far} 9 wall\n3 3 3 4 door\n",
         "a.json": json.dumps({"verts": [[0, 0], [far, 0], [6, 4], [0, 4]]}),
         "b.json": json.dumps({**PLAN, "blocks": [[1, 1, far, 2]]}),
     }

@@ -44,9 +44,7 @@ def test_policies_of_both_kinds_are_evaluated_with_the_same_camera(tmp_path):
     assert sorted(policies) == ["nearest_frontier", "sparse_frontier"]
 
 
-@pytest.mark.parametrize(
-    "command", [["evaluate", "--policies"], ["run", "--set", "camera.pitch=-0.8", "--policy"]]
-)
+@pytest.mark.parametrize("command", [["evaluate", "--policies"], ["run", "--set", "camera.pitch=-0.8", "--policy"]])
 def test_without_a_camera_that_sees_the_ground_nothing_begins(command, tmp_path, capsys):
     out = tmp_path / "out"
     assert main([*command, "sparse_frontier", "--out", str(out)]) == 2

@@ -139,9 +139,7 @@ def test_a_report_without_records_has_no_film_and_writes_nothing(folder, tmp_pat
 
 @pytest.mark.parametrize("command", ["replay", "report"])
 @pytest.mark.parametrize("option", ["--gif", "--video"])
-def test_names_of_no_film_and_places_that_cannot_be_written_are_refused(
-    folder, tmp_path, capsys, command, option
-):
+def test_names_of_no_film_and_places_that_cannot_be_written_are_refused(folder, tmp_path, capsys, command, option):
     what = folder if command == "report" else next((folder / "records").iterdir())
     (tmp_path / "file").write_text("mine")
     (tmp_path / "folder.gif").mkdir()

@@ -197,9 +197,7 @@ def test_the_map_of_a_run_lies_where_the_floor_lies(floor, tmp_path):
     assert main(["run", "--floor", str(floor), "--robots", "1", "--out", str(tmp_path / "out")]) == 0
     found = read_ros_map(tmp_path / "out" / "map.yaml")
     assert found.resolution == 0.025
-    column, row = (
-        int((value - corner) / 0.025) for value, corner in zip((1.05, 1.05), found.origin[:2], strict=True)
-    )
+    column, row = (int((value - corner) / 0.025) for value, corner in zip((1.05, 1.05), found.origin[:2], strict=True))
     assert found.levels[row, column] == 255
     column = int((2.15 - found.origin[0]) / 0.025)
     row = int((0.45 - found.origin[1]) / 0.025)
@@ -275,9 +273,7 @@ def test_a_run_starts_where_it_is_told(floor, tmp_path, capsys):
 
 def test_a_missing_floor_is_refused(tmp_path, capsys):
     refused(["run", "--floor", str(tmp_path / "none.yaml")], capsys, tmp_path, "none.yaml")
-    refused(
-        ["floors", "import", str(tmp_path / "none.png"), "--resolution", "0.1"], capsys, tmp_path, "none.png"
-    )
+    refused(["floors", "import", str(tmp_path / "none.png"), "--resolution", "0.1"], capsys, tmp_path, "none.png")
 
 
 def test_what_is_not_an_image_is_refused(tmp_path, capsys):

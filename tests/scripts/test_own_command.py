@@ -73,9 +73,7 @@ def test_a_command_is_listed_with_its_options(my_command, capsys):
 
 def test_an_installed_package_adds_commands(my_command, capsys, monkeypatch, tmp_path):
     entry = EntryPoint("welcome", "my_command:greet", "lidarium.commands")
-    monkeypatch.setattr(
-        commands, "entry_points", lambda group: [entry] if group == "lidarium.commands" else []
-    )
+    monkeypatch.setattr(commands, "entry_points", lambda group: [entry] if group == "lidarium.commands" else [])
     monkeypatch.syspath_prepend(tmp_path)
     assert main(["welcome", "--name", "you"]) == 0
     assert capsys.readouterr().out == "hello you\n"

@@ -100,9 +100,7 @@ def test_robots_that_nobody_joins_are_alone(tmp_path, capsys):
         (["--supervisor.period_s", "5", "--policy", "independent"], ("'independent'", "oracle_starts")),
     ],
 )
-def test_bad_settings_of_the_supervisor_are_refused_before_anything_is_written(
-    options, words, tmp_path, capsys
-):
+def test_bad_settings_of_the_supervisor_are_refused_before_anything_is_written(options, words, tmp_path, capsys):
     assert main([*TEAM, *options, "--out", str(tmp_path / "out")]) == 2
     told = capsys.readouterr().err
     assert all(word in told for word in words)

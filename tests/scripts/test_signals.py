@@ -51,9 +51,7 @@ def wait_until(is_so):
 
 
 def children(process):
-    return [
-        int(number) for number in Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
-    ]
+    return [int(number) for number in Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()]
 
 
 def is_there(number):
@@ -66,9 +64,7 @@ def is_there(number):
 
 def test_a_run_that_is_terminated_keeps_its_finished_parts(tmp_path):
     out = tmp_path / "out"
-    process = begin(
-        "run", "--floor", "office:3", "--policy", "random_walk", "--robots", 1, "--gif", "--out", out
-    )
+    process = begin("run", "--floor", "office:3", "--policy", "random_walk", "--robots", 1, "--gif", "--out", out)
     while "explored" not in process.stderr.readline():
         pass
     process.send_signal(signal.SIGTERM)
@@ -98,9 +94,7 @@ def test_an_evaluation_that_is_terminated_keeps_its_episodes_and_ends_its_worker
     wait_until(lambda: not any(map(is_there, workers)))
 
 
-@pytest.mark.parametrize(
-    ("second", "pause_s"), [(signal.SIGINT, 0.0), (signal.SIGINT, 0.2), (signal.SIGTERM, 0.05)]
-)
+@pytest.mark.parametrize(("second", "pause_s"), [(signal.SIGINT, 0.0), (signal.SIGINT, 0.2), (signal.SIGTERM, 0.05)])
 def test_a_second_interrupt_ends_without_a_traceback(tmp_path, second, pause_s):
     process = begin_evaluation(tmp_path)
     process.send_signal(signal.SIGINT)

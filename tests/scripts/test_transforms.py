@@ -13,9 +13,7 @@ CORNERS = {"a": Transform(-1.0, 0.0, 0.0), "b": Transform(0.0, -3.0, 0.0)}
 
 
 def placed(is_accepted=True, **given):
-    result = PairResult(
-        is_accepted, "accepted" if is_accepted else "too few corners", FOUND, matches=7, inliers=5
-    )
+    result = PairResult(is_accepted, "accepted" if is_accepted else "too few corners", FOUND, matches=7, inliers=5)
     groups = [{"a": Transform(), "b": FOUND}, {"c": Transform()}]
     return transforms(PlacedMaps(groups, {("a", "b"): result}, CORNERS, **given))
 
@@ -31,9 +29,7 @@ def test_a_map_that_is_alone_lies_nowhere():
 def test_a_pair_is_between_frames_and_not_between_corners():
     (pair,) = placed(used=[("a", "b")])["pairs"]
     wanted = CORNERS["a"] @ FOUND @ CORNERS["b"].inverse()
-    assert (pair["x"], pair["y"], pair["theta"]) == pytest.approx(
-        (wanted.x, wanted.y, wanted.theta), abs=1e-6
-    )
+    assert (pair["x"], pair["y"], pair["theta"]) == pytest.approx((wanted.x, wanted.y, wanted.theta), abs=1e-6)
     assert (pair["matches"], pair["inliers"], pair["alternatives"], pair["bend_m"]) == (7, 5, [], None)
 
 

@@ -42,9 +42,7 @@ def test_times_are_compared_in_pairs(tmp_path):
 
 def test_who_does_not_see_enough_needs_the_whole_horizon(tmp_path):
     """Enough is what the settings say, whatever thresholds there are."""
-    folder = written(
-        tmp_path, episode(CLASSIC, "a", 1, 50.0, 0.9), episode("mine", "a", 1, 30.0, coverage=0.89)
-    )
+    folder = written(tmp_path, episode(CLASSIC, "a", 1, 50.0, 0.9), episode("mine", "a", 1, 30.0, coverage=0.89))
     found = compared(folder, "mine", training_of(TRAINING))
     assert found.ratio == pytest.approx(2.0)
     assert (found.ended, found.classic_ended) == (0, 1)

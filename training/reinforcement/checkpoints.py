@@ -58,9 +58,7 @@ class Learner:
     optimizer: torch.optim.Optimizer
 
 
-def write_checkpoint(
-    folder: Path, checkpoint: Checkpoint, network: ExplorerNetwork, learner: Learner
-) -> None:
+def write_checkpoint(folder: Path, checkpoint: Checkpoint, network: ExplorerNetwork, learner: Learner) -> None:
     """Write a checkpoint, and remove all but the last two.
 
     The file that makes it one is written last and removed first: whenever the process is killed, the part that is
@@ -83,9 +81,7 @@ def latest_checkpoint(folder: Path) -> Checkpoint | None:
         return None
     with reading(found[-1], "how far a training has come"):
         content = json.loads(read_text(found[-1], MOST_STATE))
-        curve = [
-            (int(number), None if reward is None else float(reward)) for number, reward in content["curve"]
-        ]
+        curve = [(int(number), None if reward is None else float(reward)) for number, reward in content["curve"]]
         return Checkpoint(int(content["decisions"]), curve)
 
 

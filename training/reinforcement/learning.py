@@ -93,8 +93,7 @@ def _close(environment: VecEnv, is_whole: bool) -> None:
 def environments_of(training: TrainingSettings, workers: int) -> VecEnv:
     """Return the environments of a training, in this process for one worker, else each in its own."""
     makers: list[Callable[[], Env[Any, Any]]] = [
-        partial(_environment, training, k, training.ppo.environments)
-        for k in range(training.ppo.environments)
+        partial(_environment, training, k, training.ppo.environments) for k in range(training.ppo.environments)
     ]
     return DummyVecEnv(makers) if workers <= 1 else SubprocVecEnv(makers, start_method="spawn")
 
@@ -128,9 +127,7 @@ def model_of(settings: PpoSettings, environment: VecEnv, seed: int) -> MaskableP
         )
 
 
-def _learn_on(
-    model: MaskablePPO, environment: VecEnv, training: TrainingSettings, number: int
-) -> float | None:
+def _learn_on(model: MaskablePPO, environment: VecEnv, training: TrainingSettings, number: int) -> float | None:
     """Learn up to the next checkpoint.
 
     New episodes begin and all draws are seeded again, so that a training that goes on from a checkpoint does the

@@ -54,9 +54,7 @@ class RankingPolicy(MaskableMultiInputActorCriticPolicy):
 
     ranking: type[BaseFeaturesExtractor]
 
-    def __init__(
-        self, observation_space: spaces.Dict, action_space: spaces.Discrete, lr_schedule: Schedule
-    ) -> None:
+    def __init__(self, observation_space: spaces.Dict, action_space: spaces.Discrete, lr_schedule: Schedule) -> None:
         super().__init__(
             observation_space,
             action_space,

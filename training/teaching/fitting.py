@@ -48,9 +48,7 @@ def fit(network: ExplorerNetwork, floors: list[Samples], settings: FitSettings, 
     is_held_out = held_out_of(len(floors), settings.held_out)
     held_out = by_width([floors[k] for k in np.flatnonzero(is_held_out)], GROUPS)
     fitted = by_width([floors[k] for k in np.flatnonzero(~is_held_out)], GROUPS)
-    optimizer = torch.optim.AdamW(
-        network.parameters(), lr=settings.learning_rate, weight_decay=settings.weight_decay
-    )
+    optimizer = torch.optim.AdamW(network.parameters(), lr=settings.learning_rate, weight_decay=settings.weight_decay)
     schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimizer, settings.epochs)
     best, least = network.weights(), np.inf
     for _ in range(settings.epochs):

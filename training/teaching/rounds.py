@@ -61,9 +61,7 @@ class RoundFolder:
         return self.path / LESSONS / f"{number:06d}.npz"
 
 
-def run_round(
-    training: TrainingSettings, folder: RoundFolder, workers: int
-) -> Generator[Progress, None, None]:
+def run_round(training: TrainingSettings, folder: RoundFolder, workers: int) -> Generator[Progress, None, None]:
     """Do the missing parts of a round, floor by floor; finished parts are on the disk."""
     if folder.weights.exists():
         return
@@ -121,8 +119,6 @@ def _fit(training: TrainingSettings, folder: RoundFolder) -> Generator[Progress,
         course.append(each)
         yield Progress(name, len(course), training.fit.epochs, asdict(each))
     samples = sum(len(each) for each in floors)
-    write_json(
-        folder.path / FIT, {"floors": len(floors), "samples": samples, "epochs": [asdict(e) for e in course]}
-    )
+    write_json(folder.path / FIT, {"floors": len(floors), "samples": samples, "epochs": [asdict(e) for e in course]})
     # Last: where it is, the round has ended.
     save_weights(folder.weights, network.weights())

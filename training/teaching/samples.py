@@ -55,10 +55,7 @@ def joined(parts: Sequence[Samples]) -> Samples:
     if not parts:
         raise ValueError("there are no lessons to learn from; want those of at least one floor")
     decisions = Decisions(
-        *(
-            np.concatenate([getattr(part.decisions, field.name) for part in parts])
-            for field in fields(Decisions)
-        )
+        *(np.concatenate([getattr(part.decisions, field.name) for part in parts]) for field in fields(Decisions))
     )
     return Samples(decisions, np.concatenate([part.regrets for part in parts]))
 
@@ -118,9 +115,7 @@ def _check(samples: Samples) -> None:
     """Check that all arrays are as ``samples_of`` makes them."""
     wanted = samples_of([])
     own, like_own = samples.decisions, wanted.decisions
-    pairs = [
-        (field.name, getattr(own, field.name), getattr(like_own, field.name)) for field in fields(Decisions)
-    ]
+    pairs = [(field.name, getattr(own, field.name), getattr(like_own, field.name)) for field in fields(Decisions)]
     pairs.append(("regrets", samples.regrets, wanted.regrets))
     for name, array, like in pairs:
         shape = (len(samples), *like.shape[1:])

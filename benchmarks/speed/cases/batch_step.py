@@ -59,8 +59,7 @@ def measure(effort: Effort) -> list[Line]:
     floor = straight_floor()
     options = {"lidar": LIDAR, "resolution": floor.resolution}
     batches = {
-        name: DrivenBatch(floor, threads, **options)
-        for name, threads in (("two", 2), ("one", 1), ("kernel", 2))
+        name: DrivenBatch(floor, threads, **options) for name, threads in (("two", 2), ("one", 1), ("kernel", 2))
     }
     steps = {"two": batches["two"].step, "one": batches["one"].step, "kernel": batches["kernel"].step_kernel}
     seconds: dict[str, list[float]] = {name: [] for name in steps}

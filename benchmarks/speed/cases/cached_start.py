@@ -83,18 +83,14 @@ def read_only_environment(folder: Path) -> dict[str, str]:
         ignore=shutil.ignore_patterns("__pycache__", *("mapping", "envs")),
     )
     for name in ("mapping", "envs"):
-        shutil.copytree(
-            importlib.import_module(f"lidarium.{name}").__path__[0], package / name, ignore=skipped
-        )
+        shutil.copytree(importlib.import_module(f"lidarium.{name}").__path__[0], package / name, ignore=skipped)
     (package / "mapping" / "kernels" / "__pycache__").write_text("in the way")
     home.mkdir()
     (home / ".cache").write_text("in the way")
     temporary.mkdir()
     for each in (home, package, *(path for path in package.rglob("*") if path.is_dir())):
         each.chmod(0o555)
-    kept = {
-        name: value for name, value in os.environ.items() if name not in ("XDG_CACHE_HOME", "NUMBA_CACHE_DIR")
-    }
+    kept = {name: value for name, value in os.environ.items() if name not in ("XDG_CACHE_HOME", "NUMBA_CACHE_DIR")}
     return {
         **kept,
         "PYTHONPATH": str(folder / "package"),
@@ -145,9 +141,7 @@ def measure(effort: Effort) -> list[Line]:
     ]
     lines.append(_compiled("kernels compiled by a second start", starts[-1]))
     if effort.is_full:
-        lines.append(
-            _compiled("kernels compiled by a second start, package and home read-only", read_only_start())
-        )
+        lines.append(_compiled("kernels compiled by a second start, package and home read-only", read_only_start()))
     return lines
 
 

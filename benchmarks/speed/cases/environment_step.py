@@ -74,9 +74,7 @@ class Twins:
             whole, kernel = whole + between - began, kernel + time.perf_counter() - between
             steps += _HOLD
         if not np.array_equal(self._whole.simulation.world.poses, self._kernel.simulation.world.poses):
-            raise RuntimeError(
-                "the two environments are not in the same state; their times cannot be compared"
-            )
+            raise RuntimeError("the two environments are not in the same state; their times cannot be compared")
         return whole / (steps * ROBOTS), kernel / (steps * ROBOTS)
 
 

@@ -78,11 +78,7 @@ class Histories:
         """Bytes of the maps and masks that the robots write to."""
         simulation = self.simulation
         maps = {int(row[0]): int(row[1] * row[2]) for row in simulation.beliefs.belief_rows}
-        masks = {
-            int(row[place]): int(row[3] * row[4] * 8)
-            for row in simulation.score.mask_rows
-            for place in (0, 1)
-        }
+        masks = {int(row[place]): int(row[3] * row[4] * 8) for row in simulation.score.mask_rows for place in (0, 1)}
         return sum(maps.values()) + sum(masks.values())
 
     def run(self) -> float:

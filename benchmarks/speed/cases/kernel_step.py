@@ -158,12 +158,9 @@ def measure(effort: Effort) -> list[Line]:
     """Compare the fused step with VMAS and IR-SIM."""
     straight = straight_floor()
     teams = {
-        name: DrivenTeam(floor, ROBOTS)
-        for name, floor in (("straight", straight), ("turned", turned_floor(straight)))
+        name: DrivenTeam(floor, ROBOTS) for name, floor in (("straight", straight), ("turned", turned_floor(straight)))
     }
-    contenders: dict[str, Contender] = {
-        name: repeated(team.step, ROBOTS, team.start) for name, team in teams.items()
-    }
+    contenders: dict[str, Contender] = {name: repeated(team.step, ROBOTS, team.start) for name, team in teams.items()}
     for shape in ("rectangles", "grid map"):
         step = fastest_irsim_step(straight, free_poses(straight, TRIAL_POSES, 0.5), shape, BEAMS, RANGE_MAX)
         if step is not None:

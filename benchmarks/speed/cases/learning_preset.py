@@ -57,9 +57,7 @@ def measure(effort: Effort) -> list[Line]:
     floor = straight_floor()
     preset = {"lidar": "lidar_360_6m", "resolution": 0.05}
     batch = DrivenBatch(floor, CORES, **preset)
-    plain = DrivenBatch(
-        floor, CORES, **preset, observe=tuple(name for name in OBSERVED if name != "egocentric_map")
-    )
+    plain = DrivenBatch(floor, CORES, **preset, observe=tuple(name for name in OBSERVED if name != "egocentric_map"))
     reach = batch.env.settings.lidar.range_max
     contenders: dict[str, Contender] = {"ours": driving(batch), "plain": driving(plain)}
     poses = free_poses(floor, ROBOTS, 0.5)

@@ -83,9 +83,7 @@ def update_by_rays(
         step_column, step_row = (1 if cosine >= 0.0 else -1), (1 if sine >= 0.0 else -1)
         per_column = abs(1.0 / cosine) if cosine != 0.0 else math.inf
         per_row = abs(1.0 / sine) if sine != 0.0 else math.inf
-        to_column = (
-            ((column + 1 - x) if cosine >= 0.0 else (x - column)) * per_column if cosine != 0.0 else math.inf
-        )
+        to_column = ((column + 1 - x) if cosine >= 0.0 else (x - column)) * per_column if cosine != 0.0 else math.inf
         to_row = ((row + 1 - y) if sine >= 0.0 else (y - row)) * per_row if sine != 0.0 else math.inf
         for _ in range(abs(last_column - column) + abs(last_row - row)):
             if 0 <= row < rows and 0 <= column < columns:
@@ -127,13 +125,9 @@ def measure(effort: Effort) -> list[Line]:
         cosine, sine = np.cos(pose[2]), np.sin(pose[2])
         directions = np.array([[cosine, -sine], [sine, cosine]]) @ lidar.unit_vectors
         lengths = np.minimum(ranges, RANGE_MAX) / floor.resolution
-        scans.append(
-            (pose[0] / floor.resolution, pose[1] / floor.resolution, directions, lengths, np.isfinite(ranges))
-        )
+        scans.append((pose[0] / floor.resolution, pose[1] / floor.resolution, directions, lengths, np.isfinite(ranges)))
     for_polygons, for_rays = itertools.cycle(scans), itertools.cycle(scans)
-    for_grid = itertools.cycle(
-        list(zip(simulation.world.poses.copy(), simulation.ranges.copy(), strict=True))
-    )
+    for_grid = itertools.cycle(list(zip(simulation.world.poses.copy(), simulation.ranges.copy(), strict=True)))
     polygons = PolygonUpdate(floor.solid.shape, settings.increments)
     log_odds = np.zeros(floor.solid.shape, np.int8)
     grid = OccupancyGrid(
@@ -159,9 +153,7 @@ def measure(effort: Effort) -> list[Line]:
             5.0,
             "scans/s",
         ),
-        faster(
-            "map update of a noisy scan", seconds["ours"], "ray traversal", seconds["rays"], 7.0, "scans/s"
-        ),
+        faster("map update of a noisy scan", seconds["ours"], "ray traversal", seconds["rays"], 7.0, "scans/s"),
         faster(
             "map update, called scan by scan",
             seconds["one by one"],

@@ -122,9 +122,7 @@ def measure(effort: Effort) -> list[Line]:
             )
         else:
             lines.append(
-                faster_than_quoted(
-                    line, seconds[name], "f1tenth's scan simulator", F1TENTH_RAYS, wanted, "rays/s"
-                )
+                faster_than_quoted(line, seconds[name], "f1tenth's scan simulator", F1TENTH_RAYS, wanted, "rays/s")
             )
         lines.append(faster(line, seconds[name], "sphere tracing", seconds[f"traced {name}"], None, "rays/s"))
     lines.append(

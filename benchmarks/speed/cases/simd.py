@@ -166,9 +166,7 @@ def _cells_that_differ(log_odds: int, numbers: int, number: int) -> Any:  # noqa
 
 
 @_inlined
-def _count_rows(
-    log_odds: int, stride: int, rows: int, steps: int, maximum: int, minima: int, width: int
-) -> None:
+def _count_rows(log_odds: int, stride: int, rows: int, steps: int, maximum: int, minima: int, width: int) -> None:
     counted = vector_at(steps, BLOCK, np.uint16)
     for row in range(rows):
         cells = vector_at(log_odds + row * stride, BLOCK, np.int8)
@@ -250,9 +248,7 @@ def _nearest_in_tile(points: int, codes: int, numbers: int, count: int, squares:
 
 
 @_inlined
-def _relax_forwards(
-    costs_at: int, straight_at: int, diagonal_at: int, kinds_at: int, at: int, beside: int
-) -> Any:  # noqa: ANN401
+def _relax_forwards(costs_at: int, straight_at: int, diagonal_at: int, kinds_at: int, at: int, beside: int) -> Any:  # noqa: ANN401
     size, changed = max(at, beside) + 17, 0
     costs, straight = vector_at(costs_at, size, np.int32), vector_at(straight_at, size, np.int32)
     diagonal, kinds = vector_at(diagonal_at, size, np.int32), vector_at(kinds_at, size, np.uint8)
@@ -273,9 +269,7 @@ def _relax_forwards(
 
 
 @_inlined
-def _look_up_costs(
-    log_odds: int, closeness: int, body: int, kinds: int, straight: int, diagonal: int
-) -> None:
+def _look_up_costs(log_odds: int, closeness: int, body: int, kinds: int, straight: int, diagonal: int) -> None:
     settings, cells = vector_at(body, 5, np.int64), vector_at(log_odds, 16, np.int8)
     near, found = vector_at(closeness, 16, np.uint16), vector_at(kinds, 16, np.uint8)
     length, same, tight, roomy = settings[1], settings[2], settings[3], settings[4]
@@ -417,8 +411,7 @@ def _crops(kept: list[Array]) -> list[Callable[[], object]]:
     scales, result = np.ones(1, np.int64), np.empty((1, 64, 64), np.uint8)
     kept.append(log_odds)  # it is read at its address
     return [
-        functools.partial(turn, pools, 250.3, 260.8, 0.7, scales, result)
-        for turn in (turn_in_registers, turn_by_cells)
+        functools.partial(turn, pools, 250.3, 260.8, 0.7, scales, result) for turn in (turn_in_registers, turn_by_cells)
     ]
 
 
@@ -442,8 +435,7 @@ def main() -> None:
         text, plain = (1e9 * statistics.median(seconds[form]) for form in ("text", "plain"))
         ratio = compared(seconds["text"], seconds["plain"])
         print(
-            f"| {name} | {text:.1f} | {plain:.1f} "
-            f"| {ratio.median:.2f} ({ratio.least:.2f}-{ratio.greatest:.2f}) |",
+            f"| {name} | {text:.1f} | {plain:.1f} | {ratio.median:.2f} ({ratio.least:.2f}-{ratio.greatest:.2f}) |",
             flush=True,
         )
 

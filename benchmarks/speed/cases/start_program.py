@@ -31,11 +31,7 @@ def main() -> None:
         if isinstance(each, Dispatcher) and each.py_func.__module__.startswith("lidarium."):
             hits = sum(each.stats.cache_hits.values())
             compiled, loaded = compiled + len(each.signatures) - hits, loaded + hits
-    print(
-        json.dumps(
-            {"seconds": seconds, "compiled": compiled, "loaded": loaded, "folder": str(compilation._FOLDER)}
-        )
-    )
+    print(json.dumps({"seconds": seconds, "compiled": compiled, "loaded": loaded, "folder": str(compilation._FOLDER)}))
 
 
 if __name__ == "__main__":

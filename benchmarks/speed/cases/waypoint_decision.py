@@ -110,9 +110,7 @@ class Deciders:
             taken = simulation.world.steps - steps
             duration = np.repeat(taken, ROBOTS) * self._time_step
             turned = np.mod(simulation.world.poses[:, 2] - poses[:, 2] + math.pi, 2.0 * math.pi) - math.pi
-            commands = np.column_stack(
-                [(simulation.world.travelled - travelled) / duration, turned / duration]
-            )
+            commands = np.column_stack([(simulation.world.travelled - travelled) / duration, turned / duration])
             runs = [taken > step for step in range(int(taken.max()))]
             began = time.perf_counter()
             for running in runs:
@@ -148,9 +146,7 @@ class Deciders:
         places = simulation.beliefs.believed[row, :2] + distances[:, None] * np.column_stack(
             [np.cos(angles), np.sin(angles)]
         )
-        cells = np.floor((places - simulation.beliefs.origins[row]) / simulation.occupancy.resolution).astype(
-            np.int64
-        )
+        cells = np.floor((places - simulation.beliefs.origins[row]) / simulation.occupancy.resolution).astype(np.int64)
         log_odds = simulation.beliefs.log_odds[row]
         inside = (cells >= 0).all(axis=1) & (cells < log_odds.shape[::-1]).all(axis=1)
         levels = three_levels(log_odds[cells[inside, 1], cells[inside, 0]])

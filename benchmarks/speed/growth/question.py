@@ -254,9 +254,7 @@ def memory_of_idle_robots() -> IdleMemory:
 
 def main() -> None:
     """Measure, print, and write where asked to."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--repeats", type=int, default=REPEATS, help=f"interleaved repeats ({REPEATS})")
     parser.add_argument("--out", type=Path, help="folder of growth.md and growth.json")
     chosen = parser.parse_args()
@@ -266,9 +264,7 @@ def main() -> None:
         drives = drawn_drives(straight_floor(), max(SIZES), TEAM, ROBOT_STEPS)
         growths: list[Growth] = []
         for resolution, limit in ALLOWED_TO_1024.items():
-            growths += growth_with_robots(
-                drives, resolution, SIZES, chosen.repeats, {64: ALLOWED_TO_64, 1024: limit}
-            )
+            growths += growth_with_robots(drives, resolution, SIZES, chosen.repeats, {64: ALLOWED_TO_64, 1024: limit})
         growths += growth_with_floors(repeats=chosen.repeats)
         memory = memory_of_idle_robots()
     print(growth_table(growths), memory_table(memory), sep="\n\n")

@@ -62,13 +62,9 @@ class Line:
         """
         judged = "-" if self.judged is None else f"{shown(self.judged)} {self.unit}"
         if self.ratio is not None:
-            judged = (
-                f"{shown(self.ratio.median)} x ({shown(self.ratio.least)} to {shown(self.ratio.greatest)})"
-            )
+            judged = f"{shown(self.ratio.median)} x ({shown(self.ratio.least)} to {shown(self.ratio.greatest)})"
         wanted = (
-            "-"
-            if self.to_reach is None
-            else f"{'<=' if self.is_upper_bound else '>='} {self.to_reach:,g} {self.unit}"
+            "-" if self.to_reach is None else f"{'<=' if self.is_upper_bound else '>='} {self.to_reach:,g} {self.unit}"
         )
         return (
             self.name,
@@ -106,9 +102,7 @@ def faster_than_quoted(
     """Make the line of a peer whose rate is quoted, not measured here."""
     ratios = [1.0 / (seconds * quoted) for seconds in ours]
     comparison = Comparison(statistics.median(ratios), min(ratios), max(ratios))
-    return Line(
-        name, f"{shown(rate(ours))} {unit}", f"{peer_name}: {shown(quoted)} (quoted)", comparison, to_reach
-    )
+    return Line(name, f"{shown(rate(ours))} {unit}", f"{peer_name}: {shown(quoted)} (quoted)", comparison, to_reach)
 
 
 def within(
@@ -154,6 +148,4 @@ def shown(value: float) -> str:
 def table(lines: Sequence[Line]) -> str:
     """Write the lines as a markdown table."""
     header = "| line | ours | peer | ratio (least to greatest) | to reach | reached |"
-    return "\n".join(
-        [header, "|---|---|---|---|---|---|", *(f"| {' | '.join(line.cells)} |" for line in lines)]
-    )
+    return "\n".join([header, "|---|---|---|---|---|---|", *(f"| {' | '.join(line.cells)} |" for line in lines)])

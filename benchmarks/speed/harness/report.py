@@ -102,9 +102,7 @@ def write_speed(result: Mapping[str, Any], lines: Sequence[Line], folder: Path) 
 
 def with_effort(parser: argparse.ArgumentParser, default: str = "full") -> argparse.ArgumentParser:
     """Add the option that says how long to measure."""
-    parser.add_argument(
-        "--effort", choices=list(EFFORTS), default=default, help=f"how long to measure ({default})"
-    )
+    parser.add_argument("--effort", choices=list(EFFORTS), default=default, help=f"how long to measure ({default})")
     return parser
 
 

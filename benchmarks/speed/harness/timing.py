@@ -56,11 +56,7 @@ class Comparison:
 
 def cores() -> list[int]:
     """Return the cores that this process may use, as far as the system tells."""
-    return (
-        sorted(os.sched_getaffinity(0))
-        if hasattr(os, "sched_getaffinity")
-        else list(range(os.cpu_count() or 1))
-    )
+    return sorted(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else list(range(os.cpu_count() or 1))
 
 
 @contextmanager
@@ -93,9 +89,7 @@ def _keep_threads_on(chosen: list[int]) -> None:
             os.sched_setaffinity(thread, chosen)
 
 
-def repeated(
-    function: Callable[[], object], units: int = 1, before: Callable[[], object] | None = None
-) -> Contender:
+def repeated(function: Callable[[], object], units: int = 1, before: Callable[[], object] | None = None) -> Contender:
     """Make a contender of a function that does ``units`` of work a call.
 
     ``before`` runs ahead of each block, untimed.

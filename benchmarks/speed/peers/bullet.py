@@ -49,9 +49,7 @@ def bullet_scan(
     rays = []
     for x, y, theta in poses:
         begins = np.tile([x, y, HEIGHT], (beams, 1))
-        ends = begins + reach * np.stack(
-            [np.cos(angles + theta), np.sin(angles + theta), np.zeros(beams)], axis=1
-        )
+        ends = begins + reach * np.stack([np.cos(angles + theta), np.sin(angles + theta), np.zeros(beams)], axis=1)
         # Lists are what rayTestBatch reads fastest.
         rays.append((begins.tolist(), ends.tolist()))
     count = 0

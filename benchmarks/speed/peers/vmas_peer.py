@@ -50,9 +50,7 @@ def package_version() -> str:
     assert python is not None
     program = "from importlib.metadata import version; print(version('vmas'))"
     try:
-        return subprocess.run(
-            [python, "-c", program], capture_output=True, text=True, check=True
-        ).stdout.strip()
+        return subprocess.run([python, "-c", program], capture_output=True, text=True, check=True).stdout.strip()
     except (OSError, subprocess.CalledProcessError) as error:
         raise ValueError(_WRONG.format(python)) from error
 

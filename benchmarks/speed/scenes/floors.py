@@ -62,14 +62,10 @@ class BenchFloor:
     def floor(self) -> Floor:
         """Return the floor for an environment."""
         rows, columns = self.solid.shape
-        return Floor(
-            self.name, (0.0, 0.0, columns * self.resolution, rows * self.resolution), cells=self.raster
-        )
+        return Floor(self.name, (0.0, 0.0, columns * self.resolution, rows * self.resolution), cells=self.raster)
 
 
-def straight_floor(
-    rows: int = 512, columns: int = 512, seed: int = 1, resolution: float = RESOLUTION
-) -> BenchFloor:
+def straight_floor(rows: int = 512, columns: int = 512, seed: int = 1, resolution: float = RESOLUTION) -> BenchFloor:
     """Draw rooms of 3 to 6 m (at 2.5 cm a cell) with boxes in them.
 
     There is a door in every wall between two rooms.
@@ -139,9 +135,7 @@ def free_poses(floor: BenchFloor, count: int, clearance: float = 0.3, seed: int 
             places.append(place)
         if len(places) == count:
             return np.column_stack([np.array(places), generator.uniform(-math.pi, math.pi, count)])
-    raise ValueError(
-        f"floor {floor.name!r} has no room for {count} poses that are {clearance} m off everything"
-    )
+    raise ValueError(f"floor {floor.name!r} has no room for {count} poses that are {clearance} m off everything")
 
 
 def team_poses(
@@ -172,15 +166,11 @@ def _roomy_places(floor: BenchFloor, clearance: float) -> NDArray[np.float64]:
     parts, _ = ndimage.label(floor.solid == 0)
     inside = parts == 1 + int(np.argmax(np.bincount(parts[parts > 0])[1:]))
     rows, columns = np.nonzero(inside & (distance > clearance))
-    places: NDArray[np.float64] = (
-        np.column_stack([columns, rows]).astype(np.float64) + 0.5
-    ) * floor.resolution
+    places: NDArray[np.float64] = (np.column_stack([columns, rows]).astype(np.float64) + 0.5) * floor.resolution
     return places
 
 
-def _divided(
-    room: Rectangle, generator: np.random.Generator
-) -> tuple[list[Rectangle], list[Rectangle]] | None:
+def _divided(room: Rectangle, generator: np.random.Generator) -> tuple[list[Rectangle], list[Rectangle]] | None:
     """Halve a room by a wall with a door; None if it is small enough."""
     x_low, y_low, x_high, y_high = room
     is_wide = x_high - x_low >= y_high - y_low

@@ -37,15 +37,11 @@ class DrivenTeam:
     Each pair is held for 2 s; robots may drive into walls and each other.
     """
 
-    def __init__(
-        self, floor: BenchFloor, robots: int, lidar: Lidar = LIDAR, scales: tuple[int, ...] = ()
-    ) -> None:
+    def __init__(self, floor: BenchFloor, robots: int, lidar: Lidar = LIDAR, scales: tuple[int, ...] = ()) -> None:
         self.robots = robots
         self._floor, self._tables = floor, floor.tables()
         settings = OccupancySettings(resolution=floor.resolution)
-        self.simulation = KinematicSimulation.of_team(
-            [ROBOTS["kobuki"]] * robots, lidar, settings, scales=scales
-        )
+        self.simulation = KinematicSimulation.of_team([ROBOTS["kobuki"]] * robots, lidar, settings, scales=scales)
         self._count, self._starts = 0, 0
         self.start()
 

@@ -22,9 +22,7 @@ PAIRS = (
 """World, policy, and which one it is set beside."""
 
 _ROBOTS = " | ".join(f"{robots} robot{'s' * (robots > 1)}" for robots in TEAMS)
-HEADER = (
-    f"| world | policy | over | floors | {_ROBOTS} | all |\n|---|---|---|---:|{'---:|' * (len(TEAMS) + 1)}"
-)
+HEADER = f"| world | policy | over | floors | {_ROBOTS} | all |\n|---|---|---|---:|{'---:|' * (len(TEAMS) + 1)}"
 
 Episode = Mapping[str, Any]
 

@@ -182,9 +182,7 @@ def _multiples(path: Path, bounds: Mapping[tuple[str, int], float]) -> Multiples
     return {key: multiple for key, multiple in multiples.items() if multiple is not None}
 
 
-def _bounded(
-    episodes: Iterable[dict[str, Any]], bounds: Mapping[tuple[str, int], float]
-) -> Iterator[dict[str, Any]]:
+def _bounded(episodes: Iterable[dict[str, Any]], bounds: Mapping[tuple[str, int], float]) -> Iterator[dict[str, Any]]:
     """Yield episodes with the bound of their floor and team, if it is known."""
     for episode in episodes:
         # Floors by the names that were asked for; `building:3000000` calls itself by its kind.

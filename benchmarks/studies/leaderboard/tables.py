@@ -14,8 +14,7 @@ HEADER = (
     "[s] | path of all [m] | overlap [%] |\n|---:|---|---|---:|---:|---:|---:|---:|---:|---:|"
 )
 SHORT_HEADER = (
-    "| policy | reached 99 % | time to 99 % [s] | over the bound | less the baseline [s] |\n"
-    "|---|---:|---:|---:|---:|"
+    "| policy | reached 99 % | time to 99 % [s] | over the bound | less the baseline [s] |\n|---|---:|---:|---:|---:|"
 )
 
 Multiples = Mapping[tuple[str, int], float]
@@ -109,9 +108,7 @@ def _difference(policy: str, group: Mapping[str, Any]) -> str:
         if comparison["policy"] == policy and comparison["key"] == "t99_s" and figure is not None:
             bounds = [figure["low"], figure["high"]]
             # Of very few pairs there is an estimate alone.
-            text = f"{figure['estimate']:+.0f}" + (
-                "" if None in bounds else f" ({bounds[0]:+.0f} to {bounds[1]:+.0f})"
-            )
+            text = f"{figure['estimate']:+.0f}" + ("" if None in bounds else f" ({bounds[0]:+.0f} to {bounds[1]:+.0f})")
             return f"**{text}**" if comparison["p_holm"] < CHANCE else text
     return "-"
 

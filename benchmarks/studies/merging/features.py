@@ -147,15 +147,12 @@ def compare_methods(maps: dict[str, BankMap], pairs: list[Pair]) -> list[dict[st
     chosen = [pair for pair in pairs if pair.category == "positive" and pair.overlap >= PLENTY][:60]
     if not chosen:
         return []
-    features = {
-        key: described(maps[key].levels, RESOLUTION, settings) for pair in chosen for key in (pair.a, pair.b)
-    }
+    features = {key: described(maps[key].levels, RESOLUTION, settings) for pair in chosen for key in (pair.a, pair.b)}
     rows = []
     for method in METHODS:
         correspondence = CorrespondenceSettings(method=method)
         found = [
-            _matched(pair, features[pair.a], features[pair.b], correspondence, settings.alignment)
-            for pair in chosen
+            _matched(pair, features[pair.a], features[pair.b], correspondence, settings.alignment) for pair in chosen
         ]
         matches, right, votes, spent = np.array(found, np.float64).reshape(-1, 4).T
         rows.append(
@@ -189,20 +186,14 @@ def _matched(
     began = time.process_time()
     matches = match_corners(a.corners, b.corners, a.descriptors, b.descriptors, correspondence)
     spent = 1e3 * (time.process_time() - began)
-    apart = np.linalg.norm(
-        true.apply(b.corners.points[matches.second]) - a.corners.points[matches.first], axis=1
-    )
+    apart = np.linalg.norm(true.apply(b.corners.points[matches.second]) - a.corners.points[matches.first], axis=1)
     proposals, is_inlier = find_inliers(a.corners, b.corners, matches, RESOLUTION, alignment)
-    best = (
-        None if len(proposals) == 0 else Transform(*proposals[int(is_inlier.sum(axis=1).argmax())].tolist())
-    )
+    best = None if len(proposals) == 0 else Transform(*proposals[int(is_inlier.sum(axis=1).argmax())].tolist())
     is_voted = best is not None and best.difference(true, pair.at)[0] <= VOTED_M
     return len(matches), int(np.count_nonzero(apart <= RIGHT_M)), is_voted, spent
 
 
-def _timed(
-    name: str, image: NDArray[np.uint8], work: dict[str, Callable[[NDArray[np.uint8]], int]]
-) -> dict[str, Any]:
+def _timed(name: str, image: NDArray[np.uint8], work: dict[str, Callable[[NDArray[np.uint8]], int]]) -> dict[str, Any]:
     """Do each kind of work on an image, and time it.
 
     The kinds alternate; returned are how many points there were and the least time of each.
@@ -229,9 +220,7 @@ def _shown(maps: dict[str, BankMap]) -> list[str]:
     The floors are of the test half.
     """
     keys = [
-        key
-        for key, one in maps.items()
-        if one.floor.half == "test" and one.stage == 2 and max(one.levels.shape) <= 512
+        key for key, one in maps.items() if one.floor.half == "test" and one.stage == 2 and max(one.levels.shape) <= 512
     ]
     return [
         next(key for key in keys if key.startswith(kind))

@@ -47,10 +47,7 @@ class Share:
     def __str__(self) -> str:
         if not self.total:
             return "-"
-        return (
-            f"{100 * self.value:.1f} % ({self.hits} of {self.total}; {100 * self.low:.1f} to "
-            f"{100 * self.high:.1f})"
-        )
+        return f"{100 * self.value:.1f} % ({self.hits} of {self.total}; {100 * self.low:.1f} to {100 * self.high:.1f})"
 
 
 def is_plenty(pair: Pair) -> bool:
@@ -74,9 +71,7 @@ def recall(tried: Tried, of: Callable[[Pair], bool], above: float = -math.inf) -
     They are accepted by a confidence above a threshold.
     """
     chosen = [outcome for pair, outcome in tried if of(pair)]
-    return Share(
-        sum(one.is_accepted and one.is_exact and one.confidence > above for one in chosen), len(chosen)
-    )
+    return Share(sum(one.is_accepted and one.is_exact and one.confidence > above for one in chosen), len(chosen))
 
 
 def accepted(tried: Tried, categories: Sequence[str], above: float = -math.inf) -> Share:

@@ -111,8 +111,7 @@ def _plans(folder: Path) -> Iterator[PlanRow]:
 def _strangers(data: Path, folder: Path) -> Iterator[PlanRow]:
     """Yield plans with maps of other buildings, and every third pair of maps of different buildings."""
     plans = [
-        (path.stem, path.stem.split("_")[0], _read(folder, path.stem))
-        for path in sorted(folder.glob("*_layout.png"))
+        (path.stem, path.stem.split("_")[0], _read(folder, path.stem)) for path in sorted(folder.glob("*_layout.png"))
     ]
     maps = list(single_maps(data))
     pairs = itertools.chain(

@@ -137,10 +137,7 @@ def _halmstad(folder: Path, settings: MergeSettings) -> Iterator[Row]:
         source, target = name.split("__")
         if not truth.get("usable") or "layout" in name:
             continue
-        a, b = (
-            Grid(read_grey_map(folder / f"{one}.png", HALMSTAD_M).levels, HALMSTAD_M)
-            for one in (target, source)
-        )
+        a, b = (Grid(read_grey_map(folder / f"{one}.png", HALMSTAD_M).levels, HALMSTAD_M) for one in (target, source))
         result, time_ms = _merged(a, b, settings)
         best, error = _best(result), None
         if best is not None:
@@ -157,9 +154,7 @@ def _exact(folder: Path, settings: MergeSettings) -> Iterator[Row]:
             continue
         for name, truth in json.loads(path.read_text(encoding="utf-8")).items():
             resolution = float(truth["resolution"]) if collection == "log_split" else REAL_M
-            a, b = (
-                Grid(read_grey_map(path.parent / truth[key], resolution).levels, resolution) for key in "AB"
-            )
+            a, b = (Grid(read_grey_map(path.parent / truth[key], resolution).levels, resolution) for key in "AB")
             result, time_ms = _merged(a, b, settings)
             wanted = transform_of_pixels(truth.get("pixel", truth), resolution, len(a.levels), len(b.levels))
             best, error = _best(result), None
@@ -175,9 +170,7 @@ def _strangers(data: Path, settings: MergeSettings) -> Iterator[Row]:
     every = list(single_maps(data))
     pairs = [(first, second) for first, second in itertools.combinations(every, 2) if first[1] != second[1]]
     for number, ((a, _, grid), (b, _, other)) in enumerate(pairs, 1):
-        yield _row(
-            (f"{a}, {b}", "strangers"), number % 2 == 0, _merged(grid, other, settings), None, is_right=False
-        )
+        yield _row((f"{a}, {b}", "strangers"), number % 2 == 0, _merged(grid, other, settings), None, is_right=False)
 
 
 def single_maps(data: Path) -> Iterator[tuple[str, str, Grid]]:
@@ -335,7 +328,6 @@ def _missed(rows: Rows) -> str:
             error = (f"{row['distance_m']:.2f}", f"{np.degrees(row['angle']):.1f}")
         result = "joined" if row["is_accepted"] else row["reason"].split(";")[-1].strip().split(":")[0]
         lines.append(
-            f"| {row['pair']} | {row['collection']} | {result} | {row['confidence']:.2f} | {error[0]} | "
-            f"{error[1]} |"
+            f"| {row['pair']} | {row['collection']} | {result} | {row['confidence']:.2f} | {error[0]} | {error[1]} |"
         )
     return "\n".join(lines)

@@ -213,11 +213,7 @@ def compare_structures(data: Path | None, floors: int = FLOORS) -> list[dict[str
         for structure in STRUCTURES:
             tried = list(_tried(pairs, structure))
             for name, is_stranger in ((f"{kind}s", False), (f"{kind}s, strangers", True)):
-                chosen = [
-                    one
-                    for one, pair in zip(tried, pairs, strict=True)
-                    if (pair.a_from_b is None) == is_stranger
-                ]
+                chosen = [one for one, pair in zip(tried, pairs, strict=True) if (pair.a_from_b is None) == is_stranger]
                 rows.append(_row(name, structure, chosen))
     if data is not None:
         rows += [row for structure in STRUCTURES for row in _real_rows(data, structure)]
@@ -232,10 +228,7 @@ def floor_pairs(kind: str, floors: int) -> Iterator[FloorPair]:
         floor = drawn_floor(kind, seed)
         frames = [_frame(generator.uniform(-math.pi, math.pi)) for _ in _PARTS]
         views.append(
-            [
-                seen_by(floor, part, frame, (seed, k))
-                for k, (part, frame) in enumerate(zip(_PARTS, frames, strict=True))
-            ]
+            [seen_by(floor, part, frame, (seed, k)) for k, (part, frame) in enumerate(zip(_PARTS, frames, strict=True))]
         )
     for (first, second), (other, _) in itertools.pairwise([*views, views[0]]):
         both = first.known & second.known

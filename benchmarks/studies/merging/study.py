@@ -46,9 +46,7 @@ from lidarium.mapping.grids.occupancy import FREE, OCCUPIED
 from lidarium.mapping.merging.fusion import FusedMap, fuse
 from lidarium.mapping.merging.settings import STRUCTURES, MergeSettings, merge_settings
 
-FIRST, SECOND, BOTH = (
-    np.array(colour, np.float64) for colour in ((37, 99, 235), (234, 88, 12), (31, 41, 55))
-)
+FIRST, SECOND, BOTH = (np.array(colour, np.float64) for colour in ((37, 99, 235), (234, 88, 12), (31, 41, 55)))
 
 
 def draw_pairs(path: Path, maps: dict[str, BankMap], pairs: list[Pair], outcomes: list[Outcome]) -> None:
@@ -90,13 +88,8 @@ def _chosen(pairs: list[Pair], outcomes: list[Outcome]) -> list[tuple[str, Pair]
         ),
         ("symmetric, refused", lambda pair, one: pair.category == "symmetric" and not one.is_accepted),
     )
-    found = [
-        (title, next((pair for pair, one in both if is_wanted(pair, one)), None))
-        for title, is_wanted in wanted
-    ]
-    return [(title, pair) for title, pair in found if pair is not None] or [
-        (pair.category, pair) for pair in pairs[:1]
-    ]
+    found = [(title, next((pair for pair, one in both if is_wanted(pair, one)), None)) for title, is_wanted in wanted]
+    return [(title, pair) for title, pair in found if pair is not None] or [(pair.category, pair) for pair in pairs[:1]]
 
 
 def _draw(axes: Axes, title: str, a: BankMap, b: BankMap) -> None:
@@ -188,8 +181,7 @@ def page(folder: Path, command: str) -> str:
     """Return the results as markdown."""
     pairs = [pair for pair in read_pairs(folder) or [] if pair.half == "test"]
     tried: dict[str, Tried] = {
-        method: list(zip(pairs, read_outcomes(folder / "outcomes", pairs, method), strict=True))
-        for method in METHODS
+        method: list(zip(pairs, read_outcomes(folder / "outcomes", pairs, method), strict=True)) for method in METHODS
     }
     extra = json.loads((folder / EXTRA_FILE).read_text(encoding="utf-8"))
     parts = [
@@ -213,9 +205,7 @@ def page(folder: Path, command: str) -> str:
         "## Five robots\n\n" + tables.teams(extra["teams"]),
     ]
     outcomes = {MergeSettings().structure: tried["default"]} | {
-        structure: list(
-            zip(pairs, read_outcomes(_proposed(folder, structure), pairs, "default"), strict=True)
-        )
+        structure: list(zip(pairs, read_outcomes(_proposed(folder, structure), pairs, "default"), strict=True))
         for structure in PROPOSED
     }
     parts.append("## Regions and doors\n\n" + structure_text(extra["structure"], outcomes))

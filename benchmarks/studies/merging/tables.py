@@ -87,9 +87,7 @@ def reading(tried: dict[str, figures.Tried]) -> str:
     missed = [one for _, one in little if not (one.is_accepted and one.is_exact)]
     poor = sum(one.agreeing_m < POOR_M for one in missed)
     negatives = figures.accepted(default, figures.NEGATIVE)
-    plenty = [
-        one for pair, one in default if figures.is_plenty(pair) and not (one.is_accepted and one.is_exact)
-    ]
+    plenty = [one for pair, one in default if figures.is_plenty(pair) and not (one.is_accepted and one.is_exact)]
     refused = sum(one.is_exact for one in plenty)
     inexact = sum(one.is_accepted for one in plenty)
     return (
@@ -135,9 +133,7 @@ def by_stage(tried: figures.Tried) -> str:
 
             cells.append(str(figures.recall(tried, of)))
         lines.append(f"| {name} | {' | '.join(cells)} |")
-    return "Recall of the default mode; early is the first of the three maps of a drive.\n\n" + "\n".join(
-        lines
-    )
+    return "Recall of the default mode; early is the first of the three maps of a drive.\n\n" + "\n".join(lines)
 
 
 def beside_thesis(tried: dict[str, figures.Tried]) -> str:
@@ -162,8 +158,7 @@ def beside_thesis(tried: dict[str, figures.Tried]) -> str:
             f"median, {times.p95:.0f} ms 95 % |"
         )
     return (
-        "\n".join(lines)
-        + f"\n\nThe 280 ms that it claims are the longest times of its stages, added up once: "
+        "\n".join(lines) + f"\n\nThe 280 ms that it claims are the longest times of its stages, added up once: "
         f"{thesis.claimed_ms():.0f} ms. "
         f"With both maps described its worst pair takes {max(spent):.0f} ms."
     )
@@ -179,9 +174,7 @@ def detectors(rows: list[dict[str, Any]]) -> str:
     for row in rows:
         cells = [f"{row['time_us'][name]:.0f} ({row['points'][name]})" for name in names]
         ratio = row["time_us"]["goodFeaturesToTrack"] / row["time_us"]["ours"]
-        lines.append(
-            f"| {row['image']} {row['shape'][1]} x {row['shape'][0]} | {' | '.join(cells)} | {ratio:.1f} x |"
-        )
+        lines.append(f"| {row['image']} {row['shape'][1]} x {row['shape'][0]} | {' | '.join(cells)} | {ratio:.1f} x |")
     return (
         f"Least time of {REPEATS} turns of {BURST} runs each [us], one thread, and points found.\n\n"
         + "\n".join(lines)
@@ -236,9 +229,7 @@ def methods(rows: list[dict[str, Any]]) -> str:
         for row in rows
     ]
     return (
-        f"Medians over {rows[0]['pairs']} positives with 30 % of overlap and more.\n\n"
-        + "\n".join(lines)
-        + "\n\n"
+        f"Medians over {rows[0]['pairs']} positives with 30 % of overlap and more.\n\n" + "\n".join(lines) + "\n\n"
         "The thesis [ms]: distances 3.0, triplets 1.5, descriptors 208 and 85; with descriptors two right "
         "matches in more than 85 % of its "
         "pairs."
@@ -254,9 +245,7 @@ def teams(rows: list[dict[str, Any]]) -> str:
             f"{math.degrees(row['angle']):.2f}",
             f"{row['time_s']:.2f}",
         )
-        lines.append(
-            f"| {row['floor']} | {row['joined']} of {row['robots']} | {' | '.join(figures_of_row)} |"
-        )
+        lines.append(f"| {row['floor']} | {row['joined']} of {row['robots']} | {' | '.join(figures_of_row)} |")
     whole = sum(row["joined"] == row["robots"] for row in rows)
     return (
         f"The last maps of five drives of a floor, merged at once: all joined on {whole} of {len(rows)} "

@@ -86,9 +86,7 @@ def claimed_ms() -> float:
 
     It is the longest time of each stage, once.
     """
-    return (
-        max(DETECTION_US.values()) + max(DESCRIPTION_US.values()) + max(pair.time_us for pair in PAIRS)
-    ) / 1e3
+    return (max(DETECTION_US.values()) + max(DESCRIPTION_US.values()) + max(pair.time_us for pair in PAIRS)) / 1e3
 
 
 MOST_PAIRS, MOST_ROWS = 40, 12
@@ -132,14 +130,10 @@ def twelve_pairs(maps: dict[str, BankMap]) -> list[dict[str, Any]]:
 
     Of each start the first and the last map are taken, A1 and A2 and so on.
     """
-    apartments = sorted(
-        key for key in maps if key.startswith("apartment-") and key.endswith(("_0_0", "_0_2"))
-    )
+    apartments = sorted(key for key in maps if key.startswith("apartment-") and key.endswith(("_0_0", "_0_2")))
     first = next((key.split("_")[0] for key in apartments), "")
     names = {
-        key: f"{'ABC'[maps[key].start]}{1 + (maps[key].stage == 2)}"
-        for key in apartments
-        if key.split("_")[0] == first
+        key: f"{'ABC'[maps[key].start]}{1 + (maps[key].stage == 2)}" for key in apartments if key.split("_")[0] == first
     }
     settings = merge_settings("thesis", RESOLUTION)
     rows: list[dict[str, Any]] = []
@@ -197,8 +191,7 @@ def stages_text(rows: Sequence[dict[str, Any]]) -> str:
 def twelve_text(rows: Sequence[dict[str, Any]]) -> str:
     """Return the table of twelve pairs, as markdown."""
     lines = [
-        "| pair | known in both | initial matches | inliers | overlap [%] | time [us] | accepted | "
-        "error [m] |",
+        "| pair | known in both | initial matches | inliers | overlap [%] | time [us] | accepted | error [m] |",
         "|---|---:|---:|---:|---:|---:|---|---:|",
     ]
     for row in rows:

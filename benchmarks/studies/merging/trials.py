@@ -207,9 +207,7 @@ def _tried(pair: Pair, a: BankMap, b: BankMap, method: str, settings: MergeSetti
     )
 
 
-def _both(
-    a: NDArray[np.uint8], b: NDArray[np.uint8], settings: MergeSettings
-) -> tuple[DescribedMap, DescribedMap]:
+def _both(a: NDArray[np.uint8], b: NDArray[np.uint8], settings: MergeSettings) -> tuple[DescribedMap, DescribedMap]:
     return described(a, RESOLUTION, settings), described(b, RESOLUTION, settings)
 
 

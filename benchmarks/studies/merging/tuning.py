@@ -52,9 +52,7 @@ def page(folder: Path, command: str) -> str:
         "are tuned on these pairs; figures are quoted of [the other half](merging.md), which also says how "
         "maps are made and what "
         "pairs are.",
-        f"{len(pairs)} pairs: "
-        + ", ".join(f"{count} {name}" for name, count in sorted(counts.items()))
-        + ".",
+        f"{len(pairs)} pairs: " + ", ".join(f"{count} {name}" for name, count in sorted(counts.items())) + ".",
         _table(tried),
         "Positives that are refused: "
         + "; ".join(f"`{method}` {_reasons(outcomes)}" for method, outcomes in tried.items())

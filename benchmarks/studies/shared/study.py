@@ -82,9 +82,7 @@ def do_missing(
         write_json(_asked_file(path), {"keys": [task.key for task in tasks]})
         finished = {line[KEY] for line in file.episodes}
         missing = [task for task in tasks if task.key not in finished]
-        for done, (task, line) in enumerate(
-            shared_out(measure, missing, workers), len(tasks) - len(missing) + 1
-        ):
+        for done, (task, line) in enumerate(shared_out(measure, missing, workers), len(tasks) - len(missing) + 1):
             if isinstance(line, Exception):
                 raise line
             file.append({KEY: task.key, **line, VERSION: lidarium.__version__})
@@ -122,9 +120,7 @@ def real_floors(data: Path) -> dict[str, list[Path]]:
         "dungeon": sorted((plans / "synthetic_dungeon").glob("*.png")),
     }
     if not any(found.values()):
-        raise FileNotFoundError(
-            f"no real floors below {data}; want the folders floorplans and slam_maps there"
-        )
+        raise FileNotFoundError(f"no real floors below {data}; want the folders floorplans and slam_maps there")
     return found
 
 

@@ -51,11 +51,7 @@ class Lie:
 
 def lies() -> list[Lie]:
     """Return all logs with all that is made wrong with them."""
-    return [
-        lie
-        for log in LOGS
-        for lie in (Lie(log, REMOVED), *(Lie(log, TURN, number) for number in range(TURNS)))
-    ]
+    return [lie for log in LOGS for lie in (Lie(log, REMOVED), *(Lie(log, TURN, number) for number in range(TURNS)))]
 
 
 def measure(logs: Path | None, lie: Lie) -> dict[str, Any]:

@@ -29,9 +29,7 @@ def read(data: Path, name: str) -> tuple[LaserLog, float]:
     return log.limited(RANGE_M, clears_without_return=False), float(parsed.stamps[0] - log.stamps[0])
 
 
-def relation_cells(
-    data: Path, name: str, log: LaserLog, poses: NDArray[np.float64], shift: float
-) -> Iterator[str]:
+def relation_cells(data: Path, name: str, log: LaserLog, poses: NDArray[np.float64], shift: float) -> Iterator[str]:
     """Yield the errors of the trajectory and of the log's own corrected poses.
 
     Both come by both rules for the pose of a relation.
@@ -50,9 +48,7 @@ def _errors(errors: RelationErrors) -> str:
         (errors.translation_m, errors.translation_sd_m),
         (errors.rotation_rad, errors.rotation_sd_rad),
     )
-    return "{:.4f} ± {:.4f} m, {:.3f} ± {:.3f}°".format(
-        *translation, *(math.degrees(angle) for angle in rotation)
-    )
+    return "{:.4f} ± {:.4f} m, {:.3f} ± {:.3f}°".format(*translation, *(math.degrees(angle) for angle in rotation))
 
 
 def log_row(name: str, log: LaserLog, followed: Followed) -> str:

@@ -102,9 +102,7 @@ def measured_robot(floor: str, horizon_s: float) -> Robot:
             matched.append(drawn - began)
     gaps = (np.hypot(*(np.stack(found) - true)[:, :2].T) for found in (given, dead))
     error, odometry_error = (math.sqrt(float((gap**2).mean())) for gap in gaps)
-    match_ms, closure_ms, correction_ms = (
-        1e3 * np.array(seconds) for seconds in (matched, closed, corrected)
-    )
+    match_ms, closure_ms, correction_ms = (1e3 * np.array(seconds) for seconds in (matched, closed, corrected))
     return Robot(match_ms, closure_ms, correction_ms, error, odometry_error, path)
 
 
@@ -128,9 +126,7 @@ def robot_lines(robot: Robot, floor: str) -> list[str]:
         "",
         "| ms of CPU time | scans | median | p95 | most | to reach |",
         "|---|---|---|---|---|---|",
-        f"| scan matched, local maps and map updated | {len(robot.match_ms)} | {spread(robot.match_ms)} | "
-        "median 4 |",
+        f"| scan matched, local maps and map updated | {len(robot.match_ms)} | {spread(robot.match_ms)} | median 4 |",
         f"| scan that recognised a place | {len(robot.closure_ms)} | {spread(robot.closure_ms)} | 50 |",
-        f"| scan with which the past was corrected | {len(robot.correction_ms)} | "
-        f"{spread(robot.correction_ms)} | 50 |",
+        f"| scan with which the past was corrected | {len(robot.correction_ms)} | {spread(robot.correction_ms)} | 50 |",
     ]

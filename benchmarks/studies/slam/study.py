@@ -143,10 +143,7 @@ def _follow_robot(logs: Path | None, task: Task) -> dict[str, Any]:
     """Return the figures of a robot."""
     _warm_up(logs)
     robot = measured_robot(task.key, HORIZON_S)
-    return {
-        name: value.tolist() if isinstance(value, np.ndarray) else value
-        for name, value in asdict(robot).items()
-    }
+    return {name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in asdict(robot).items()}
 
 
 @lru_cache

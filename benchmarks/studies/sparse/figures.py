@@ -16,9 +16,7 @@ def figure_table(lines: Sequence[Line]) -> str:
     """Return what was to be reached, and what was."""
     header = ("figure", "to reach", "incremental", "full", "reached")
     rows = [
-        _row(
-            "requests answered, least of a place [%]", (99.0, 100.0), _each(lines, _least_answered), True, 1
-        ),
+        _row("requests answered, least of a place [%]", (99.0, 100.0), _each(lines, _least_answered), True, 1),
         _row("paths that collide, of all places", (0, 0), _each(lines, _collisions), False, 0),
         _row("length over the optimum, mean", (1.03, 1.03), _each(lines, _over_optimum), False, 3),
         _row("turning over that of the grid, mean", (0.45, 0.45), _each(lines, _turning), False, 2),
@@ -107,9 +105,7 @@ def _deflated(lines: Sequence[Line], usage: str) -> float:
 
 
 def _thesis_bytes(lines: Sequence[Line], usage: str) -> float:
-    return min(
-        float(line["maps"][usage]["thesis_binary"]) / float(line["maps"][usage]["binary"]) for line in lines
-    )
+    return min(float(line["maps"][usage]["thesis_binary"]) / float(line["maps"][usage]["binary"]) for line in lines)
 
 
 def _tops(lines: Sequence[Line], usage: str) -> float:

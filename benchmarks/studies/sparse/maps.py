@@ -50,9 +50,7 @@ class ThesisPlace:
 
 
 THESIS = {
-    "robotics_laboratory": ThesisPlace(
-        frames=122, codes=1024, height=1.0, connection_radius=0.3, neighbours=8
-    ),
+    "robotics_laboratory": ThesisPlace(frames=122, codes=1024, height=1.0, connection_radius=0.3, neighbours=8),
     "signal_laboratory": ThesisPlace(frames=117, codes=2048, height=1.2, connection_radius=0.2, neighbours=6),
     "home_arena": ThesisPlace(frames=38, codes=1024, height=1.0, connection_radius=0.3, neighbours=6),
     "apartment": ThesisPlace(frames=165, codes=2048, height=1.5, connection_radius=0.3, neighbours=6),

@@ -164,17 +164,13 @@ def frames_of(place: Place, camera: DepthCamera = CAMERA, seed: int = 0) -> Iter
             yield Frame(points.astype(np.float64), map_from_base(Transform(*base)) @ mount, base)
 
 
-def _disturbed(
-    depth: NDArray[np.float32], camera: DepthCamera, generator: np.random.Generator
-) -> NDArray[np.float32]:
+def _disturbed(depth: NDArray[np.float32], camera: DepthCamera, generator: np.random.Generator) -> NDArray[np.float32]:
     """Add a camera's noise to depths, and round their inverses to its steps."""
     if not camera.is_noisy:
         return depth
     deviation = camera.noise_floor + camera.noise_share * (depth - camera.depth_min) ** 2
     noisy = np.maximum(depth + deviation * generator.standard_normal(depth.shape), 1e-3)
     if camera.disparity_step > 0.0:
-        noisy = 1.0 / (
-            np.maximum(np.round(1.0 / (noisy * camera.disparity_step)), 1.0) * camera.disparity_step
-        )
+        noisy = 1.0 / (np.maximum(np.round(1.0 / (noisy * camera.disparity_step)), 1.0) * camera.disparity_step)
     within = np.clip(noisy, camera.depth_min, camera.depth_max)
     return np.where(depth > 0.0, within, 0.0).astype(np.float32)

@@ -109,9 +109,7 @@ class Task:
 
 def drive(floor: Floor, seed: int) -> Drive:
     """Drive a Pioneer over a floor and return what it measured."""
-    settings = make_settings(
-        robots=1, robot="pioneer", noise=NOISE, resolution=RESOLUTION, raster_resolution=RASTER
-    )
+    settings = make_settings(robots=1, robot="pioneer", noise=NOISE, resolution=RESOLUTION, raster_resolution=RASTER)
     watcher = Drive([], [])
     env = WatchedExploration(floor, settings, watchers=[watcher])
     run_episode(make_policy(POLICY), env, seed, {"starts": floor.starts[:1]})
@@ -155,9 +153,7 @@ def measure(name: str, floor: Floor, walk: Drive, seed: int, picture: Path | Non
     if picture is not None:
         save_spline_picture(picture, floor, spline_map, poses, track)
     figures = map_figures(floor, spline_map, localizer.geometry, poses, track, reckoned, returns)
-    return Run(
-        figures, 1000.0 * statistics.median(seconds[1:]), 1000.0 * float(np.quantile(seconds[1:], 0.95))
-    )
+    return Run(figures, 1000.0 * statistics.median(seconds[1:]), 1000.0 * float(np.quantile(seconds[1:], 0.95)))
 
 
 def measure_floor(pictures: Path, task: Task) -> dict[str, Any]:
@@ -180,16 +176,12 @@ def _as_entry(run: Run) -> dict[str, Any]:
     A figure that is no number, as of a map without curves, is None.
     """
     entry = asdict(run)
-    entry["figures"] = {
-        name: value if math.isfinite(value) else None for name, value in entry["figures"].items()
-    }
+    entry["figures"] = {name: value if math.isfinite(value) else None for name, value in entry["figures"].items()}
     return entry
 
 
 def _run_of(entry: Mapping[str, Any]) -> Run:
-    figures: dict[str, Any] = {
-        name: math.nan if value is None else value for name, value in entry["figures"].items()
-    }
+    figures: dict[str, Any] = {name: math.nan if value is None else value for name, value in entry["figures"].items()}
     return Run(MapFigures(**figures), entry["step_ms"], entry["step_p95_ms"])
 
 
@@ -199,9 +191,7 @@ def work(folder: Path, _data: Path | None, every: int, workers: int) -> Progress
     measured = partial(measure_floor, folder / PICTURES_FOLDER)
     yield from do_missing(folder / FLOORS_FILE, "floors", tasks, measured, 1)
     stays = [buildings.Stay(floor, name) for floor in buildings.FLOORS for name in buildings.LOCALIZERS]
-    yield from do_missing(
-        folder / BUILDINGS_FILE, "buildings", stays[::every], buildings.measure_stay, workers
-    )
+    yield from do_missing(folder / BUILDINGS_FILE, "buildings", stays[::every], buildings.measure_stay, workers)
 
 
 HEADER = (

@@ -83,9 +83,7 @@ def measure_variants(task: FollowedWay) -> dict[str, Any]:
         localizer.reset(way.true[0].copy(), task.seed)
         believed, returns = _followed(localizer, way, settings.time_step)
         true, odometry = np.array(way.true), np.array(way.odometry)
-        figures[name] = asdict(
-            map_figures(floor, localizer.map, settings.lidar, true, believed, odometry, returns)
-        )
+        figures[name] = asdict(map_figures(floor, localizer.map, settings.lidar, true, believed, odometry, returns))
     return {KEY: task.key, "world": task.world, "seed": task.seed, "variants": figures}
 
 

@@ -146,6 +146,4 @@ def figures_of(env: ExplorationEnv, way: Way) -> MapFigures:
     """Return how well the robot's localizer did."""
     assert env.floor is not None
     true, believed, odometry = (np.array(poses) for poses in (way.true, way.believed, way.odometry))
-    return map_figures(
-        env.floor, tracker_of(env).map, env.settings.lidar, true, believed, odometry, way.returns
-    )
+    return map_figures(env.floor, tracker_of(env).map, env.settings.lidar, true, believed, odometry, way.returns)

@@ -32,15 +32,9 @@ def draw_world(path: Path, world: str, seed: int) -> None:
     env, tree = episode.env, policy.tree
     assert env.floor is not None
     agent = env.possible_agents[0]
-    origin = (
-        np.array(env.belief(agent).map_origin) + np.array(way.believed[-1][:2]) - env.belief(agent).pose[:2]
-    )
+    origin = np.array(env.belief(agent).map_origin) + np.array(way.believed[-1][:2]) - env.belief(agent).pose[:2]
     places = [node.place + origin for node in tree.nodes]
-    edges = [
-        (_pair(places[node.parent]), _pair(places[node.number]))
-        for node in tree.nodes
-        if node.parent is not None
-    ]
+    edges = [(_pair(places[node.parent]), _pair(places[node.number])) for node in tree.nodes if node.parent is not None]
     regions = [place + node.safe.outline for place, node in zip(places, tree.nodes, strict=True)]
     save_spline_picture(
         path,

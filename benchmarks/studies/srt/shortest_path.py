@@ -35,9 +35,7 @@ def shortest_path(tables: FloorTables, start: Place, goal: Place, radius: float)
         for place in (start, goal)
     ]
     space, footprint = SearchSpace((rows, columns), raster.resolution), Footprint(radius, radius, 0.0)
-    found = plan(
-        space, log_odds, clearance, (cells[0][0], cells[0][1]), (cells[1][0], cells[1][1]), footprint
-    )
+    found = plan(space, log_odds, clearance, (cells[0][0], cells[0][1]), (cells[1][0], cells[1][1]), footprint)
     if found is None:
         return None
     gaps = np.sqrt(clearance.limit - clearance.closeness.astype(np.float64)) * 0.5 * raster.resolution
@@ -71,7 +69,5 @@ def _is_clear(
     radius: float,
 ) -> bool:
     count = max(math.ceil(math.dist(start, end) / resolution), 1)
-    cells = np.floor((start + (end - start) * np.linspace(0.0, 1.0, count + 1)[:, None]) / resolution).astype(
-        np.int64
-    )
+    cells = np.floor((start + (end - start) * np.linspace(0.0, 1.0, count + 1)[:, None]) / resolution).astype(np.int64)
     return bool((gaps[cells[:, 1], cells[:, 0]] >= radius).all())

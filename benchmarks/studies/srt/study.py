@@ -54,9 +54,7 @@ def suites(_data: Path | None, every: int = 1) -> dict[str, Suite]:
     from lidarium.envs.floors.catalogue.names import set_floors
 
     floors = (*SCENES, *set_floors("validation:10"))[::every]
-    suite = Suite(
-        policies=POLICIES, floors=floors, seeds=tuple(STARTS[::every]), variants={DEFAULT_VARIANT: SETTINGS}
-    )
+    suite = Suite(policies=POLICIES, floors=floors, seeds=tuple(STARTS[::every]), variants={DEFAULT_VARIANT: SETTINGS})
     return {EXPLORATION: suite}
 
 

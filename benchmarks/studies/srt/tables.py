@@ -37,9 +37,7 @@ def goals(lines: Sequence[Line]) -> str:
     for world in WORLDS:
         if world in PUBLISHED:
             nodes, segments, time = PUBLISHED[world]
-            rows.append(
-                f"| {world} | printed | - | reached | {nodes} | {segments} | {time} | - | - | - | - | - |"
-            )
+            rows.append(f"| {world} | printed | - | reached | {nodes} | {segments} | {time} | - | - | - | - | - |")
         for mode in ("thesis", "default"):
             runs = _of(lines, world, mode)
             if runs:
@@ -48,12 +46,8 @@ def goals(lines: Sequence[Line]) -> str:
 
 
 def _goal_row(world: str, mode: str, runs: Sequence[Line]) -> str:
-    endings = ", ".join(
-        f"{name} {count}" for name, count in sorted(Counter(run["ending"] for run in runs).items())
-    )
-    ratios = [
-        run["path_m"] / run["shortest_m"] for run in runs if run["shortest_m"] and run["ending"] == "reached"
-    ]
+    endings = ", ".join(f"{name} {count}" for name, count in sorted(Counter(run["ending"] for run in runs).items()))
+    ratios = [run["path_m"] / run["shortest_m"] for run in runs if run["shortest_m"] and run["ending"] == "reached"]
     shortest = f"{statistics.median(ratios):.2f} (to {max(ratios):.2f})" if ratios else "-"
     return (
         f"| {world} | {mode} | {len(runs)} | {endings} | {_spread(runs, 'nodes', 0)} | "
@@ -168,8 +162,7 @@ def exploration(episodes: Sequence[Line], policies: Sequence[str]) -> str:
     if all_ratios:
         means = [_geometric_mean([ratios[k] for ratios in all_ratios]) for k in (0, 1)]
         rows.append(
-            f"| all, geometric mean | {' | '.join('' for _ in policies)} | {_shown(means[0])} | "
-            f"{_shown(means[1])} |"
+            f"| all, geometric mean | {' | '.join('' for _ in policies)} | {_shown(means[0])} | {_shown(means[1])} |"
         )
     return "\n".join(rows)
 
@@ -187,9 +180,7 @@ def _means(episodes: Sequence[Line], floor: str, policy: str) -> tuple[float, fl
 
 def _geometric_mean(values: Sequence[float]) -> float:
     return (
-        math.exp(statistics.fmean(math.log(value) for value in values))
-        if all(map(math.isfinite, values))
-        else math.inf
+        math.exp(statistics.fmean(math.log(value) for value in values)) if all(map(math.isfinite, values)) else math.inf
     )
 
 

@@ -89,9 +89,7 @@ def time_shares(rows: Sequence[Row], alone: Iterable[Row]) -> list[float]:
 
 def path_shares(rows: Sequence[Row], alone: Iterable[Row]) -> list[float]:
     """Return ways of whole teams as shares of one robot's."""
-    return [
-        path_of(row) / float(np.mean([path_of(one) for one in ones])) for row, ones in with_alone(rows, alone)
-    ]
+    return [path_of(row) / float(np.mean([path_of(one) for one in ones])) for row, ones in with_alone(rows, alone)]
 
 
 def time_ratios(rows: Sequence[Row], others: Iterable[Row]) -> list[float]:
@@ -99,16 +97,12 @@ def time_ratios(rows: Sequence[Row], others: Iterable[Row]) -> list[float]:
 
     A partner that was not done by the horizon counts as done then.
     """
-    return [
-        time_of(row) / min(time_of(other), float(other["horizon_s"])) for row, other in partners(rows, others)
-    ]
+    return [time_of(row) / min(time_of(other), float(other["horizon_s"])) for row, other in partners(rows, others)]
 
 
 def overlap_points(rows: Sequence[Row], others: Iterable[Row]) -> list[float]:
     """Return overlaps at the end less those of partners, in points of percent."""
-    return [
-        100.0 * (float(row["overlap"]) - float(other["overlap"])) for row, other in partners(rows, others)
-    ]
+    return [100.0 * (float(row["overlap"]) - float(other["overlap"])) for row, other in partners(rows, others)]
 
 
 def path_of(row: Row) -> float:
@@ -129,10 +123,7 @@ def energy_of(row: Row) -> float:
 
 def energy_shares(rows: Sequence[Row], alone: Iterable[Row]) -> list[float]:
     """Return what whole teams used as shares of one robot's."""
-    return [
-        energy_of(row) / float(np.mean([energy_of(one) for one in ones]))
-        for row, ones in with_alone(rows, alone)
-    ]
+    return [energy_of(row) / float(np.mean([energy_of(one) for one in ones])) for row, ones in with_alone(rows, alone)]
 
 
 def median(values: Sequence[float]) -> Interval | None:

@@ -63,9 +63,7 @@ def goals_of(rows: Mapping[str, Sequence[Row]], failing: Sequence[Row]) -> list[
         led = chosen(teams, SUPERVISED, robots)
         title = f"time to 99 % with {robots} robots"
         goals.append(
-            _at_most(
-                f"{title} / one robot's", time_shares(led, alone), share, robots, f" (stretch {stretch})"
-            )
+            _at_most(f"{title} / one robot's", time_shares(led, alone), share, robots, f" (stretch {stretch})")
         )
         goals.append(_at_most(f"{title} / that of `{TOLD}`", time_ratios(led, told), 1.10, robots))
     for robots in (2, 3):
@@ -113,9 +111,7 @@ def _path_goals(rows: Mapping[str, Sequence[Row]], robots: int) -> list[Goal]:
 
 def _merge_goals(every: Sequence[Row]) -> list[Goal]:
     """Return the shares of runs whose merges were wrong, of all runs that merge maps."""
-    led = [
-        row for row in every if row["supervisor"] is not None and row["robots"] > 1 and row["policy"] != TOLD
-    ]
+    led = [row for row in every if row["supervisor"] is not None and row["robots"] > 1 and row["policy"] != TOLD]
     return [
         _share("runs in which a wrong merge was used", led, has_wrong_merge, 0.0),
         _share("runs with a merge that errs as much by the starts, drift included", led, has_off_merge, None),
@@ -140,13 +136,9 @@ def is_covered(row: Row) -> bool:
     return covered_by_others(row) >= 0.99
 
 
-def _at_most(
-    title: str, values: Sequence[float], wanted: float, robots: int, more: str = "", digits: int = 2
-) -> Goal:
+def _at_most(title: str, values: Sequence[float], wanted: float, robots: int, more: str = "", digits: int = 2) -> Goal:
     found = median(values)
-    return Goal(
-        title, f"<= {wanted:g}{more}", found, found is not None and found.estimate <= wanted, digits, robots
-    )
+    return Goal(title, f"<= {wanted:g}{more}", found, found is not None and found.estimate <= wanted, digits, robots)
 
 
 def _share(title: str, rows: Sequence[Row], holds: Callable[[Row], bool], wanted: float | None) -> Goal:
@@ -157,9 +149,7 @@ def _share(title: str, rows: Sequence[Row], holds: Callable[[Row], bool], wanted
     if not rows:
         return Goal(title, "-" if wanted is None else f"{100.0 * wanted:.0f} %", None, False)
     share = share_interval(sum(holds(row) for row in rows), len(rows))
-    found = Interval(
-        100.0 * share.estimate, 100.0 * share.low, 100.0 * share.high, share.confidence, share.size
-    )
+    found = Interval(100.0 * share.estimate, 100.0 * share.low, 100.0 * share.high, share.confidence, share.size)
     if wanted is None:
         return Goal(f"{title} [%]", "-", found, True, 1)
     missed_by = tuple(row for row in rows if holds(row) != bool(wanted))

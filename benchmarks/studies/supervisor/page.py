@@ -171,9 +171,7 @@ def _about(alone: Sequence[Row]) -> str:
     large = [floor for floor in floors if area_m2(floor) >= 300.0]
     is_real = any("/" in floor for floor in floors)
     stand_ins = (
-        ""
-        if is_real
-        else " No folder of real floors was given: generated offices and corridors stand in for them."
+        "" if is_real else " No folder of real floors was given: generated offices and corridors stand in for them."
     )
     return (
         "Kobuki robots with the URG-04LX laser, noise as of its data sheet, typical wheel odometry, SLAM, "

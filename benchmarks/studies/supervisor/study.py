@@ -53,10 +53,7 @@ def work(folder: Path, data: Path | None, every: int, workers: int) -> Iterator[
     """
     plan = suites(data, every)
     asked = {name: {trial.key: (suite, trial) for trial in suite.trials()} for name, suite in plan.items()}
-    rows = {
-        name: [row for row in read_runs(folder / name) if row[KEY] in of_suite]
-        for name, of_suite in asked.items()
-    }
+    rows = {name: [row for row in read_runs(folder / name) if row[KEY] in of_suite] for name, of_suite in asked.items()}
     failing, trials = failing_suite(rows["teams"], plan["teams"])
     if failing is not None:
         campaign = Campaign(failing, folder / FAILING, workers, records=False, trials=trials)
@@ -64,9 +61,7 @@ def work(folder: Path, data: Path | None, every: int, workers: int) -> Iterator[
             yield "runs in which a robot fails", campaign.done, campaign.total
         if campaign.failures:
             trial, error = campaign.failures[0]
-            raise ValueError(
-                f"{len(campaign.failures)} runs came to no end, the first is {trial.key}: {error}"
-            )
+            raise ValueError(f"{len(campaign.failures)} runs came to no end, the first is {trial.key}: {error}")
     asked[FAILING] = {} if failing is None else {trial.key: (failing, trial) for trial in trials}
     write_json(folder / ASKED_FILE, {name: sorted(of_suite) for name, of_suite in asked.items()})
     kept = read_json(folder / LOGS_FILE)
@@ -116,23 +111,15 @@ def typical_runs(rows: Mapping[str, Sequence[Row]], goals: Sequence[Goal]) -> di
     """
     found: dict[str, Row] = {}
     for robots in sorted(
-        {
-            goal.robots
-            for goal in goals
-            if goal.robots is not None and goal.found is not None and not goal.is_reached
-        }
+        {goal.robots for goal in goals if goal.robots is not None and goal.found is not None and not goal.is_reached}
     ):
         runs = chosen([*rows["teams"], *rows["five"]], SUPERVISED, robots)
         # Each alone, as a run without a partner has no share.
-        ranked = sorted(
-            (shares[0], str(row[KEY]), row) for row in runs if (shares := time_shares([row], rows["one"]))
-        )
+        ranked = sorted((shares[0], str(row[KEY]), row) for row in runs if (shares := time_shares([row], rows["one"])))
         if ranked:
             found[f"{robots} robots"] = ranked[len(ranked) // 2][2]
     return found | {
-        goal.title.removesuffix(" [%]"): goal.missed_by[len(goal.missed_by) // 2]
-        for goal in goals
-        if goal.missed_by
+        goal.title.removesuffix(" [%]"): goal.missed_by[len(goal.missed_by) // 2] for goal in goals if goal.missed_by
     }
 
 

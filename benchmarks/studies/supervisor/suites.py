@@ -175,9 +175,7 @@ def suites(data: Path | None, every: int = 1) -> dict[str, Suite]:
         ),
         "one": Suite(policies=(ALONE,), floors=floors, robots=(1,), seeds=seeds, variants=_variants()),
         "teams": Suite(policies=POLICIES, floors=floors, robots=(2, 3), seeds=seeds, variants=_variants()),
-        "five": Suite(
-            policies=POLICIES, floors=five_floors(floors), robots=(5,), seeds=seeds, variants=_variants()
-        ),
+        "five": Suite(policies=POLICIES, floors=five_floors(floors), robots=(5,), seeds=seeds, variants=_variants()),
         "bumper": Suite(
             policies=("supervised", *RESUMING),
             floors=SCENARIOS,
@@ -222,9 +220,7 @@ def _extensions(seeds: tuple[int, ...], few: int) -> dict[str, Suite]:
         "extensions": suite(EXTENSIONS, {DEFAULT_VARIANT: {}}),
         "radio": suite({}, {name: {"radio": values} for name, values in RADIOS.items()}),
         "energy": suite(budget, {"battery": {"battery": BUDGET}}),
-        "together": suite(
-            {"all together": every}, {"battery, radio in line of sight": {"battery": BUDGET, **radio}}
-        ),
+        "together": suite({"all together": every}, {"battery, radio in line of sight": {"battery": BUDGET, **radio}}),
     }
 
 

@@ -90,9 +90,7 @@ def alone_table(rows: Sequence[Row], names: Sequence[str] = ("A", "B", "C")) -> 
     for floor in sorted({floor_of(row) for row in rows}):
         starts = list(
             dict.fromkeys(
-                str(row["starts"])
-                for row in sorted(rows, key=lambda row: str(row["key"]))
-                if floor_of(row) == floor
+                str(row["starts"]) for row in sorted(rows, key=lambda row: str(row["key"])) if floor_of(row) == floor
             )
         )
         for name, start in zip(names, starts, strict=False):
@@ -201,10 +199,7 @@ def _team_line(
         shown(median(path_shares(runs, alone))),
         shown(median([100.0 * row["overlap"] for row in runs]), 0),
         "0" if is_bound else shown(median(overlap_points(runs, told)), 1),
-        *(
-            "-" if policy == ALONE else str(sum(map(holds, runs)))
-            for holds in (has_wrong_merge, has_false_merge)
-        ),
+        *("-" if policy == ALONE else str(sum(map(holds, runs))) for holds in (has_wrong_merge, has_false_merge)),
     )
 
 
@@ -232,9 +227,7 @@ def failing_table(rows: Sequence[Row]) -> str:
         for policy in POLICIES:
             runs = chosen(rows, policy, robots)
             if runs:
-                covered = [
-                    100.0 * float(row["c_others_final"]) for row in runs if row["c_others_final"] is not None
-                ]
+                covered = [100.0 * float(row["c_others_final"]) for row in runs if row["c_others_final"] is not None]
                 count = sum(map(is_covered, runs))
                 ends = shown(median([float(row["time_s"]) for row in runs]), 0)
                 least = f"{min(covered):.1f}" if covered else "-"
@@ -248,9 +241,7 @@ def failing_table(rows: Sequence[Row]) -> str:
                         ends,
                     )
                 )
-    return table(
-        ("robots", "policy", "runs with 99 %", "covered by the others [%]", "least", "end [s]"), lines
-    )
+    return table(("robots", "policy", "runs with 99 %", "covered by the others [%]", "least", "end [s]"), lines)
 
 
 def left_table(rows: Sequence[Row]) -> str:
@@ -263,13 +254,9 @@ def left_table(rows: Sequence[Row]) -> str:
         if not is_covered(row):
             same = [one for policy in POLICIES for _, one in partners([row], chosen(rows, policy))]
             covered = {one["policy"]: f"{100.0 * covered_by_others(one):.2f}" for one in same}
-            ends = ", ".join(
-                sorted({str(why) for robot, why in row["ended_because"].items() if robot != "robot_0"})
-            )
+            ends = ", ".join(sorted({str(why) for robot, why in row["ended_because"].items() if robot != "robot_0"}))
             case = f"`{Path(floor_of(row)).name}`", str(row["robots"]), str(row["seed"])
-            lines.append(
-                (*case, *(covered.get(policy, "-") for policy in POLICIES), ends, f"{row['time_s']:.0f}")
-            )
+            lines.append((*case, *(covered.get(policy, "-") for policy in POLICIES), ends, f"{row['time_s']:.0f}"))
     head = (
         "floor",
         "robots",

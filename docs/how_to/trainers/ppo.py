@@ -137,9 +137,7 @@ class Learner:
         errors = played.rewards + self.settings.discount * following * ~played.terminated - played.values
         found, carried = torch.zeros_like(errors), torch.zeros_like(last)
         for step in reversed(range(len(errors))):
-            carried = (
-                errors[step] + self.settings.discount * self.settings.trace * carried * ~played.ended[step]
-            )
+            carried = errors[step] + self.settings.discount * self.settings.trace * carried * ~played.ended[step]
             carried = carried * ~played.is_idle[step]
             found[step] = carried
         return found

@@ -23,9 +23,7 @@ def make_env(options: dict[str, Any]) -> ParallelPettingZooEnv:
     return ParallelPettingZooEnv(lidarium.parallel_env(**{**TEAM, **forms, **options}))
 
 
-def train(
-    options: dict[str, Any], iterations: int = 50, steps: int = 4000, runners: int = 0
-) -> list[dict[str, Any]]:
+def train(options: dict[str, Any], iterations: int = 50, steps: int = 4000, runners: int = 0) -> list[dict[str, Any]]:
     """Train; return what RLlib reports of each iteration.
 
     Parameters

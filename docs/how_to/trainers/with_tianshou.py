@@ -41,9 +41,7 @@ def train(options: dict[str, Any], epochs: int = 10, decisions: int = 10_000, ro
     policy = ProbabilisticActorPolicy(
         actor=actor, dist_fn=_of_logits, action_space=env.action_space, action_scaling=False
     )
-    algorithm = PPO(
-        policy=policy, critic=DiscreteCritic(preprocess_net=nets[1]), optim=AdamOptimizerFactory(lr=5e-4)
-    )
+    algorithm = PPO(policy=policy, critic=DiscreteCritic(preprocess_net=nets[1]), optim=AdamOptimizerFactory(lr=5e-4))
     collected = min(1000, decisions)
     return algorithm.run_training(
         OnPolicyTrainerParams(

@@ -125,6 +125,4 @@ def _outer_walls(bounds: tuple[float, ...], thickness: float) -> list[Solid]:
 
 
 def _rectangle(x_low: float, y_low: float, x_high: float, y_high: float) -> Solid:
-    return Solid(
-        np.array([(x_low, y_low), (x_high, y_low), (x_high, y_high), (x_low, y_high)], dtype=np.float64)
-    )
+    return Solid(np.array([(x_low, y_low), (x_high, y_low), (x_high, y_high), (x_low, y_high)], dtype=np.float64))

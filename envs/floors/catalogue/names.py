@@ -33,9 +33,7 @@ def _packed_floor(floor: Floor) -> dict[str, NDArray[Any]]:
     return {
         "name": np.frombuffer(floor.name.encode(), np.uint8),
         "bounds": np.array(floor.bounds, np.float64),
-        "heights": np.array([(solid.z_low, solid.z_high) for solid in floor.solids], np.float64).reshape(
-            -1, 2
-        ),
+        "heights": np.array([(solid.z_low, solid.z_high) for solid in floor.solids], np.float64).reshape(-1, 2),
         "rings": np.array([1 + len(solid.holes) for solid in floor.solids], np.int64),
         "corners": np.array([len(ring) for ring in rings], np.int64),
         "points": np.concatenate([np.zeros((0, 2)), *rings]),
@@ -132,9 +130,7 @@ def load_floor(spec: str | Path | Floor, resolution: float | None = None) -> Flo
     if is_file_name(spec):
         return load_file(Path(spec), resolution)
     if resolution is not None:
-        raise ValueError(
-            f"resolution {resolution} m is given for floor {spec!r}, which is not a file; leave it out"
-        )
+        raise ValueError(f"resolution {resolution} m is given for floor {spec!r}, which is not a file; leave it out")
     return _load_named(spec)
 
 
@@ -189,8 +185,7 @@ def set_floors(name: str) -> tuple[str, ...]:
     if colon:
         if not (wanted.isascii() and wanted.isdigit() and 1 <= int(wanted) <= count):
             raise ValueError(
-                f"{name!r} wants {wanted!r} floors; the set {short} has {count}, as in "
-                f"set:{short}:{min(count, 40)}"
+                f"{name!r} wants {wanted!r} floors; the set {short} has {count}, as in set:{short}:{min(count, 40)}"
             )
         count = int(wanted)
     return tuple(f"building:{seed}" for seed in range(first, first + count))
@@ -274,7 +269,4 @@ def _unknown(name: str) -> str:
     forms = [f"{generator}:SEED" for generator in GENERATORS]
     nearest = difflib.get_close_matches(name[:100], [*drawn_names(), *forms], n=1, cutoff=0.5)
     guess = f", did you mean {nearest[0]!r}?" if nearest else ""
-    return (
-        f"no floor called {shown(name)}{guess}; there are {', '.join([*drawn_names(), *forms])}, and paths "
-        "to files"
-    )
+    return f"no floor called {shown(name)}{guess}; there are {', '.join([*drawn_names(), *forms])}, and paths to files"

@@ -111,11 +111,7 @@ class Store:
 
     def size(self) -> int:
         """Return how many bytes the entries take."""
-        return (
-            0
-            if self.folder is None
-            else sum(size for part in self.folder.glob("?") for _, size, _ in _files(part))
-        )
+        return 0 if self.folder is None else sum(size for part in self.folder.glob("?") for _, size, _ in _files(part))
 
     def _path(self, key: str) -> Path:
         assert self.folder is not None
@@ -155,9 +151,7 @@ def mebibytes(variable: str, default: float) -> int:
     except ValueError:
         size = -1.0
     if not 0.0 <= size < float("inf"):
-        raise ValueError(
-            f"environment variable {variable} is {text!r}; want a size in MiB, such as {default:g}"
-        )
+        raise ValueError(f"environment variable {variable} is {text!r}; want a size in MiB, such as {default:g}")
     return int(size * 2**20)
 
 

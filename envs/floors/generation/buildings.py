@@ -123,9 +123,7 @@ def _space(raster: Raster, radius: float) -> tuple[NDArray[np.bool_], NDArray[np
     return space, np.asarray(parts == largest)
 
 
-def _guilty(
-    furniture: list[Furnished], stray: NDArray[np.bool_], missed: set[int], origin: tuple[float, float]
-) -> int:
+def _guilty(furniture: list[Furnished], stray: NDArray[np.bool_], missed: set[int], origin: tuple[float, float]) -> int:
     """Return the index of the last piece of furniture that obstructs the floor.
 
     Such a piece is next to a part cut off or in a room that is not reached. Otherwise the last piece is returned.
@@ -141,9 +139,7 @@ def _guilty(
     return len(furniture) - 1
 
 
-def _room_of_cells(
-    labels: Labels, shape: tuple[int, ...], origin: tuple[float, float], resolution: float
-) -> Labels:
+def _room_of_cells(labels: Labels, shape: tuple[int, ...], origin: tuple[float, float], resolution: float) -> Labels:
     """Label of the room under each cell of a raster."""
     index = []
     for axis in (0, 1):
@@ -286,14 +282,11 @@ def generate_building(seed: int, settings: BuildingSettings | None = None) -> Fl
     shape, *stages = np.random.SeedSequence(seed).spawn(1 + 4 * _ATTEMPTS)
     kind, proportions, clutter = _drawn(settings, np.random.default_rng(shape))
     for attempt in range(_ATTEMPTS):
-        floor = _attempt(
-            f"{kind}:{seed}", kind, proportions, clutter, settings, stages[4 * attempt : 4 * attempt + 4]
-        )
+        floor = _attempt(f"{kind}:{seed}", kind, proportions, clutter, settings, stages[4 * attempt : 4 * attempt + 4])
         if floor is not None:
             return _rotated(floor, settings.rotation)
     raise ValueError(
-        f"no passable {kind} came out of seed {seed} and {settings}; try another seed, wider corridors or "
-        "larger rooms"
+        f"no passable {kind} came out of seed {seed} and {settings}; try another seed, wider corridors or larger rooms"
     )
 
 
@@ -315,8 +308,7 @@ def _attempt(
     if doors is None:
         return None
     walls = tuple(
-        _solid_of(r)
-        for r in outside_rectangles(labels) + wall_rectangles(labels, doors, settings.wall_thickness)
+        _solid_of(r) for r in outside_rectangles(labels) + wall_rectangles(labels, doors, settings.wall_thickness)
     )
     bounds = (0.0, 0.0, metres(labels.shape[1]), metres(labels.shape[0]))
     furniture = furnish(kind, labels, doors, clutter, settings.wall_thickness, np.random.default_rng(pieces))
@@ -325,9 +317,7 @@ def _attempt(
         return None
     furniture, clear, origin = found
     starts = _draw_starts(clear, origin, np.random.default_rng(places))
-    return Floor(
-        name, bounds, walls + tuple(solid for piece in furniture for solid in piece.solids), starts=starts
-    )
+    return Floor(name, bounds, walls + tuple(solid for piece in furniture for solid in piece.solids), starts=starts)
 
 
 def _drawn(settings: BuildingSettings, generator: np.random.Generator) -> tuple[str, Proportions, float]:
@@ -351,9 +341,7 @@ def _drawn(settings: BuildingSettings, generator: np.random.Generator) -> tuple[
     return kind, Proportions(area, corridor, settings.room_size, loops), clutter
 
 
-def _layout(
-    kind: str, proportions: Proportions, settings: BuildingSettings, seed: np.random.SeedSequence
-) -> Labels:
+def _layout(kind: str, proportions: Proportions, settings: BuildingSettings, seed: np.random.SeedSequence) -> Labels:
     """Draw a layout of the wanted area, with outer walls around it.
 
     It is drawn again with its area corrected for the area of walls and cut corners.
@@ -365,9 +353,7 @@ def _layout(
     for _ in range(6):
         drawn = Proportions(gross, proportions.corridor_width, proportions.room_size, proportions.loops)
         labels = np.pad(_LAYOUTS[kind](drawn, np.random.default_rng(seed)), margin, constant_values=OUTSIDE)
-        walls = sum(
-            (r[2] - r[0]) * (r[3] - r[1]) for r in wall_rectangles(labels, [], settings.wall_thickness)
-        )
+        walls = sum((r[2] - r[0]) * (r[3] - r[1]) for r in wall_rectangles(labels, [], settings.wall_thickness))
         area = float(room_areas(labels).sum()) - walls
         if best is None or abs(area - wanted) < abs(best[0] - wanted):
             best = area, labels

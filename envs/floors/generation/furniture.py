@@ -336,14 +336,10 @@ OFFICE = {
         "shelf",
     ),
 }
-CORRIDORS = {
-    "hall": ("cabinet", "bench", "shelf", "plant", "box", "cabinet", "shelf", "seats", "box", "bench") * 4
-}
+CORRIDORS = {"hall": ("cabinet", "bench", "shelf", "plant", "box", "cabinet", "shelf", "seats", "box", "bench") * 4}
 
 
-def _room_wishes(
-    kind: str, areas: NDArray[np.float64], generator: np.random.Generator
-) -> list[tuple[str, ...]]:
+def _room_wishes(kind: str, areas: NDArray[np.float64], generator: np.random.Generator) -> list[tuple[str, ...]]:
     """List the pieces that each room would like to hold, by label, from its use.
 
     Parameters
@@ -458,9 +454,7 @@ class FurniturePlaces:
                 return Furnished(room, rectangle, place(name, x, y, theta, width, depth))
         return None
 
-    def _free(
-        self, room: int, width: float, depth: float, generator: np.random.Generator
-    ) -> tuple[Rectangle, float]:
+    def _free(self, room: int, width: float, depth: float, generator: np.random.Generator) -> tuple[Rectangle, float]:
         rows, columns = self._extent[room]
         turned = generator.random() < 0.5
         across, along = (depth, width) if turned else (width, depth)
@@ -582,8 +576,7 @@ def furnish(
             first, rest = wishes[room][: len(wishes[room]) // 2], wishes[room][len(wishes[room]) // 2 :]
             name = first[turn] if turn < len(first) else rest[(turn - len(first)) % len(rest)]
             width, depth = (
-                round(generator.uniform(*span) / 0.05) * 0.05
-                for span in (PIECES[name].width, PIECES[name].depth)
+                round(generator.uniform(*span) / 0.05) * 0.05 for span in (PIECES[name].width, PIECES[name].depth)
             )
             if width * depth / 2 > budget:
                 continue

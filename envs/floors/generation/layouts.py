@@ -122,9 +122,7 @@ def room_areas(labels: Labels) -> NDArray[np.float64]:
     return np.asarray(np.bincount(labels[labels >= 0], minlength=1) * CELL**2, dtype=np.float64)
 
 
-def choose_doors(
-    labels: Labels, door_width: float, loops: float, generator: np.random.Generator
-) -> list[Door] | None:
+def choose_doors(labels: Labels, door_width: float, loops: float, generator: np.random.Generator) -> list[Door] | None:
     """Choose doors that join all rooms, and a share of the further possible ones.
 
     Rooms are joined from the hall if possible.
@@ -137,9 +135,7 @@ def choose_doors(
         Clear width of every door [m].
     """
     areas = room_areas(labels)
-    candidates = [
-        b for b in boundaries(labels) if b.low >= 0 and b.high >= 0 and b.length >= door_width + 2 * JAMB
-    ]
+    candidates = [b for b in boundaries(labels) if b.low >= 0 and b.high >= 0 and b.length >= door_width + 2 * JAMB]
     order = [candidates[k] for k in generator.permutation(len(candidates))]
     order.sort(key=lambda b: HALL not in (b.low, b.high))
     group = list(range(len(areas)))
@@ -197,9 +193,7 @@ def wall_rectangles(labels: Labels, doors: list[Door], thickness: float) -> list
                 edges += [low, high]
             edges.append(end + half)
             line = Boundary(vertical, position, start, end, 0, 0)
-            rectangles += [
-                line.rectangle(edges[k], edges[k + 1], half, half) for k in range(0, len(edges), 2)
-            ]
+            rectangles += [line.rectangle(edges[k], edges[k + 1], half, half) for k in range(0, len(edges), 2)]
     return rectangles
 
 
@@ -215,9 +209,7 @@ def outside_rectangles(labels: Labels) -> list[Rectangle]:
         edges = np.flatnonzero(np.diff(outside, prepend=False, append=False))
         runs = {(int(edges[k]), int(edges[k + 1])) for k in range(0, len(edges), 2)}
         for first, last in sorted(open_runs.keys() - runs):
-            rectangles.append(
-                (metres(first), metres(open_runs.pop((first, last))), metres(last), metres(row))
-            )
+            rectangles.append((metres(first), metres(open_runs.pop((first, last))), metres(last), metres(row)))
         for run in sorted(runs - open_runs.keys()):
             open_runs[run] = row
     return rectangles

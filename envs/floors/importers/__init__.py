@@ -53,12 +53,8 @@ def _always(path: Path) -> bool:
 FORMATS: Registry[Format] = Registry("floor format")
 """Formats of floors by name; the first that matches reads a file."""
 
-FORMATS.register(
-    "ros_map", Format(ros_map.SUFFIXES, _always, ros_map.load), "ROS map: a picture with its yaml"
-)
-FORMATS.register(
-    "houseexpo", Format((".json", ".json.gz"), _always, houseexpo.load), "HouseExpo, a plan as JSON"
-)
+FORMATS.register("ros_map", Format(ros_map.SUFFIXES, _always, ros_map.load), "ROS map: a picture with its yaml")
+FORMATS.register("houseexpo", Format((".json", ".json.gz"), _always, houseexpo.load), "HouseExpo, a plan as JSON")
 FORMATS.register("kth", Format((".xml", ".xml.gz"), _always, kth.load), "KTH floor plan as XML")
 FORMATS.register("amrl", Format((".txt", ".txt.gz"), amrl.matches, amrl.load), "AMRL vector map")
 FORMATS.register("lifull", Format((".txt", ".txt.gz"), _always, lifull.load), "LIFULL vector annotation")
@@ -71,9 +67,7 @@ FORMATS.register("dxf", Format((".dxf",), _always, dxf.load, dxf.has_scale), "DX
 FORMATS.register("sdf", Format(sdf.SUFFIXES, _always, sdf.load), "SDF, a world of Gazebo")
 FORMATS.register("svg", Format((".svg",), _always, svg.load, svg.has_scale), "SVG drawing")
 FORMATS.register("array", Format((".npy", ".npz"), _always, arrays.load, arrays.has_scale), "numpy array")
-FORMATS.register(
-    "dungeon", Format(images.SUFFIXES, images.is_dungeon, images.load_dungeon), "picture of a dungeon"
-)
+FORMATS.register("dungeon", Format(images.SUFFIXES, images.is_dungeon, images.load_dungeon), "picture of a dungeon")
 FORMATS.register(
     "image",
     Format(images.SUFFIXES, _always, images.load_image, has_scale=lambda path: False),
@@ -114,6 +108,4 @@ def takes_resolution(path: Path) -> bool:
 def _format_of(path: Path) -> Format | None:
     """Return the first format that a file's name and content match."""
     lower = path.name.lower()
-    return next(
-        (known for known in FORMATS.values() if lower.endswith(known.suffixes) and known.matches(path)), None
-    )
+    return next((known for known in FORMATS.values() if lower.endswith(known.suffixes) and known.matches(path)), None)

@@ -34,9 +34,7 @@ def load(path: Path, resolution: float | None) -> Floor:
         if not line.strip():
             continue
         if len(words) != 4 or not all(_is_number(word) for word in words):
-            raise ValueError(
-                f"{path}, line {number}: {line[:60]!r} is no wall; want x1, y1, x2, y2 in metres"
-            )
+            raise ValueError(f"{path}, line {number}: {line[:60]!r} is no wall; want x1, y1, x2, y2 in metres")
         lines.append([float(word) for word in words])
     if not lines:
         raise ValueError(f"{path} has no lines; want x1, y1, x2, y2 per wall in metres")

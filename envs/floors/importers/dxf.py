@@ -217,9 +217,7 @@ def load(path: Path, resolution: float | None) -> Floor:
     document = _document(path, sifted)
     unit = _unit(document)
     if unit is not None and resolution is not None:
-        raise ValueError(
-            f"{path} has units of {unit:g} m, but a resolution of {resolution} m is given; want none"
-        )
+        raise ValueError(f"{path} has units of {unit:g} m, but a resolution of {resolution} m is given; want none")
     if unit is None and resolution is None:
         raise ValueError(f"{path} has no unit; give --resolution, the metres of a unit")
     scale = resolution if unit is None else unit

@@ -57,8 +57,7 @@ def load(path: Path, resolution: float | None) -> Floor:
     columns, rows = (int(size) + 1 for size in (points.max(axis=0) + _MARGIN - low) / RESOLUTION)
     if rows * columns > MAX_RASTER_CELLS:
         raise ValueError(
-            f"{path} has {columns} x {rows} cells at {RESOLUTION} m, more than {MAX_RASTER_CELLS}; check its "
-            "scale"
+            f"{path} has {columns} x {rows} cells at {RESOLUTION} m, more than {MAX_RASTER_CELLS}; check its scale"
         )
     origin = (float(low[0]), float(low[1]))
     free = np.zeros((rows, columns), dtype=np.uint8)
@@ -107,9 +106,7 @@ def _scale(path: Path, root: ElementTree.Element) -> float:
     except ValueError:
         pixels = metres = 0.0
     if not (0.0 < pixels < np.inf and 0.0 < metres < np.inf):
-        raise ValueError(
-            f"{path} has Scale {shown(element.attrib)}; want positive PixelDistance and RealDistance"
-        )
+        raise ValueError(f"{path} has Scale {shown(element.attrib)}; want positive PixelDistance and RealDistance")
     return metres / pixels
 
 
@@ -118,9 +115,9 @@ def _space(path: Path, element: ElementTree.Element, scale: float) -> _Space:
     lines = list(element.iter("linesegment"))
     to_metres = np.array([scale, -scale, scale, -scale])  # y of the drawing points down
     try:
-        segments = np.array(
-            [[float(line.attrib[key]) for key in ("x1", "y1", "x2", "y2")] for line in lines]
-        ).reshape(-1, 4)
+        segments = np.array([[float(line.attrib[key]) for key in ("x1", "y1", "x2", "y2")] for line in lines]).reshape(
+            -1, 4
+        )
     except (KeyError, ValueError):
         segments = np.full((1, 4), np.nan)
     if not np.isfinite(segments).all():
@@ -128,9 +125,7 @@ def _space(path: Path, element: ElementTree.Element, scale: float) -> _Space:
     return _Space(segments * to_metres, tuple(line.get("type", "Wall") for line in lines))
 
 
-def _doorways(
-    spaces: list[_Space], is_free: Callable[[NDArray[np.float64]], bool]
-) -> list[NDArray[np.float64]]:
+def _doorways(spaces: list[_Space], is_free: Callable[[NDArray[np.float64]], bool]) -> list[NDArray[np.float64]]:
     """Return the polygons of doorways between facing portals.
 
     For portals that face none, the polygon goes through the wall in front of them.

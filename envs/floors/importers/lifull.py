@@ -35,9 +35,7 @@ def load(path: Path, resolution: float | None) -> Floor:
     walls, doors = (np.array(lines[label], dtype=np.float64).reshape(-1, 4) for label in ("wall", "door"))
     widths = np.hypot(doors[:, 2] - doors[:, 0], doors[:, 3] - doors[:, 1])
     if len(walls) == 0 or not (len(doors) and np.median(widths) > 0.0):
-        raise ValueError(
-            f"{path} has {len(walls)} walls and {len(doors)} doors; want both, as doors give the scale"
-        )
+        raise ValueError(f"{path} has {len(walls)} walls and {len(doors)} doors; want both, as doors give the scale")
     if np.abs(np.concatenate([walls, doors])).max() > MAX_PIXEL:
         raise ValueError(f"{path} has coordinates beyond {MAX_PIXEL:g} pixels; want an annotation")
     scale = OPENING_WIDTH / float(np.median(widths))
@@ -60,9 +58,7 @@ def _lines(path: Path) -> dict[str, list[list[float]]]:
             corners = [float(word) for word in words[:4]]
             label = words[4]
         except (ValueError, IndexError):
-            raise ValueError(
-                f"{path}, line {number}: {line[:60]!r} is no annotation; want x1 y1 x2 y2 label"
-            ) from None
+            raise ValueError(f"{path}, line {number}: {line[:60]!r} is no annotation; want x1 y1 x2 y2 label") from None
         if not np.isfinite(corners).all():
             raise ValueError(f"{path}, line {number}: {line[:60]!r} has coordinates that are not finite")
         if label in lines:

@@ -37,9 +37,7 @@ def load(path: Path, resolution: float | None) -> Floor:
     try:
         begin = [line.strip().lower() for line in lines[:16]].index("map")
     except ValueError:
-        raise ValueError(
-            f"{path} has no line 'map'; want type, height, width and map before the cells"
-        ) from None
+        raise ValueError(f"{path} has no line 'map'; want type, height, width and map before the cells") from None
     rows, columns = (_side(path, lines[:begin], name) for name in ("height", "width"))
     cells = lines[begin + 1 : begin + 1 + rows]
     if len(cells) < rows:
@@ -48,9 +46,7 @@ def load(path: Path, resolution: float | None) -> Floor:
         if len(line) != columns:
             raise ValueError(f"{path}, line {number} has {len(line)} cells; the width is {columns}")
         if strange := set(line) - set(FREE + SOLID):
-            raise ValueError(
-                f"{path}, line {number} has a cell {min(strange)!r}; want one of {' '.join(FREE + SOLID)}"
-            )
+            raise ValueError(f"{path}, line {number} has a cell {min(strange)!r}; want one of {' '.join(FREE + SOLID)}")
     letters = np.array([list(line) for line in cells])
     free = np.isin(letters, list(FREE))
     return floor_of_cells(path, free[::-1], (0.0, 0.0), resolution)

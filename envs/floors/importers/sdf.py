@@ -44,9 +44,7 @@ def load(path: Path, resolution: float | None) -> Floor:
     refuse_resolution(path, resolution)
     solids = [solid for solid in _solids(path, _root(path), np.eye(4), 0) if solid is not None]
     if not solids:
-        raise ValueError(
-            f"{path} has no collision above the ground; want models that stand there ({_SHAPES})"
-        )
+        raise ValueError(f"{path} has no collision above the ground; want models that stand there ({_SHAPES})")
     points = np.concatenate([solid.polygon for solid in solids])
     low, high = points.min(axis=0), points.max(axis=0)
     bounds = float(low[0]), float(low[1]), float(high[0]), float(high[1])

@@ -99,9 +99,7 @@ def _commands(text: str) -> Iterator[tuple[str, list[float]]]:
             yield command, []
             continue
         if not given or len(given) % wants:
-            raise ValueError(
-                f"a path has {command!r} with {len(given)} numbers; want {wants}, or more of them"
-            )
+            raise ValueError(f"a path has {command!r} with {len(given)} numbers; want {wants}, or more of them")
         yield command, given[:wants]
         for place in range(wants, len(given), wants):
             # Coordinates after a first point without a command of their own are lines.

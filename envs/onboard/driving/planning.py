@@ -104,9 +104,7 @@ TEAMMATE_DISTANCE = 0.06
 @kernel(forceinline=True)
 def passage_in(planning: Planning) -> Passage:
     """Return how a body passes over a map (kernel)."""
-    return Passage(
-        planning.limit, planning.half_costs, planning.roomy, planning.least_clearance, planning.preferred
-    )
+    return Passage(planning.limit, planning.half_costs, planning.roomy, planning.least_clearance, planning.preferred)
 
 
 @kernel
@@ -264,9 +262,7 @@ def prepare_robot(planning: Planning, drives: Drives, row: int, piece: int) -> N
     goal_column = math.floor((place_x - planning.origins[row, 0]) / planning.resolution)
     if not (0.0 <= goal_row < record[ROWS] and 0.0 <= goal_column < record[COLUMNS]):
         return
-    destination = Destination(
-        int(goal_row), int(goal_column), place_x, place_y, drives.target_headings[row], np.inf
-    )
+    destination = Destination(int(goal_row), int(goal_column), place_x, place_y, drives.target_headings[row], np.inf)
     avoided, ended = _standing(planning, drives, row)
     # First plan round all standing robots; if that fails, only round those that have ended and never give way.
     for _ in range(2):
@@ -286,9 +282,7 @@ def _standing(planning: Planning, drives: Drives, row: int) -> tuple[Array, Arra
         other = first + teammate
         if other != row and (planning.knows_teammates or planning.contact[row, teammate] != 0):
             ended[teammate] = planning.has_ended[other]
-            avoided[teammate] = (
-                ended[teammate] or drives.states[other] == IDLE or drives.states[other] == ARRIVED
-            )
+            avoided[teammate] = ended[teammate] or drives.states[other] == IDLE or drives.states[other] == ARRIVED
     return avoided, ended
 
 

@@ -161,10 +161,7 @@ class RightOfWay:
         if other < 0:
             return
         world = self._perception.world
-        waited = (
-            int(world.steps[row // self._settings.robots] - self._drives.since[row])
-            * self._settings.time_step
-        )
+        waited = int(world.steps[row // self._settings.robots] - self._drives.since[row]) * self._settings.time_step
         others_path = self._planner.remaining(other)
         is_past = len(others_path) < 2 or not obstructing(
             self._drives.stations[row], others_path, 2.0 * self._settings.robot.radius + 0.05

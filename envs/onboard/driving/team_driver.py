@@ -63,9 +63,7 @@ class TeamDriver:
         Planner of the paths.
     """
 
-    def __init__(
-        self, perception: Perception, settings: ExplorationSettings, shares_map: bool = True
-    ) -> None:
+    def __init__(self, perception: Perception, settings: ExplorationSettings, shares_map: bool = True) -> None:
         self._perception, self._settings, self.shares_map = perception, settings, shares_map
         robot = settings.robot
         self._rows = settings.robots * perception.world.episodes
@@ -114,9 +112,7 @@ class TeamDriver:
         is_same_heading = (drives.target_headings == orders.headings) | (
             np.isnan(drives.target_headings) & np.isnan(orders.headings)
         )
-        is_same = (drives.is_ordered == orders.is_ordered) & (
-            ~orders.is_ordered | is_same_place & is_same_heading
-        )
+        is_same = (drives.is_ordered == orders.is_ordered) & (~orders.is_ordered | is_same_place & is_same_heading)
         changed = np.flatnonzero(rows & ~is_same)
         drives.is_ordered[changed], drives.is_given[changed] = orders.is_ordered[changed], False
         drives.targets[changed], drives.target_headings[changed] = (

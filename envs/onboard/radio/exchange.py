@@ -77,9 +77,7 @@ class RadioLinks:
         world, team = self._world, slice(self._rows.start, self._rows.stop)
         floor = world.floors[self._episode]
         assert floor is not None
-        self.links = links(
-            self._settings, world.poses[team], floor.laser, self._chance if self._is_shadowed else None
-        )
+        self.links = links(self._settings, world.poses[team], floor.laser, self._chance if self._is_shadowed else None)
         works = self._works(step)
         self.links &= works[:, None] & works[None, :]
 
@@ -116,10 +114,7 @@ class RadioLinks:
         """Return which robots' radios work, (robots,)."""
         world = self._world
         return np.array(
-            [
-                world.failed[row] == 0 and not has_fault(world.faults[row], DEAD_RADIO, step)
-                for row in self._rows
-            ]
+            [world.failed[row] == 0 and not has_fault(world.faults[row], DEAD_RADIO, step) for row in self._rows]
         )
 
 
@@ -196,9 +191,7 @@ class _Message:
 NO_BLOCKS, NO_CELLS = np.zeros(0, np.int64), np.zeros((0, BLOCK), np.int8)
 
 
-def differing_blocks(
-    held: NDArray[np.int8], copy: NDArray[np.int8]
-) -> tuple[NDArray[np.int64], NDArray[np.int8]]:
+def differing_blocks(held: NDArray[np.int8], copy: NDArray[np.int8]) -> tuple[NDArray[np.int64], NDArray[np.int8]]:
     """Return the blocks in which a map differs from an older copy.
 
     Their numbers (blocks,) and their cells (blocks, 64).
@@ -355,11 +348,7 @@ class Exchange:
             # A pose is sent to all at once.
             self.bytes_sent[sender] += POSE_BYTES
             for receiver in np.flatnonzero(self.links[sender]).tolist():
-                self._send(
-                    _Message(
-                        step + self._latency, receiver, sender, step, pose, has_ended, NO_BLOCKS, NO_CELLS
-                    )
-                )
+                self._send(_Message(step + self._latency, receiver, sender, step, pose, has_ended, NO_BLOCKS, NO_CELLS))
 
     def _send_maps(self, step: int) -> None:
         robots = self._settings.robots
@@ -415,9 +404,7 @@ class Exchange:
     def _copy_of(self, receiver: int, source: int) -> NDArray[np.int8]:
         """Return a robot's copy of another's map, blank at first."""
         if self.copies[receiver][source].size == 0:
-            self.copies[receiver][source] = np.zeros(
-                self._beliefs.log_odds[self._first + source].shape, np.int8
-            )
+            self.copies[receiver][source] = np.zeros(self._beliefs.log_odds[self._first + source].shape, np.int8)
         return self.copies[receiver][source]
 
     def _receive(self, message: _Message) -> None:

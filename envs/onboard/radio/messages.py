@@ -76,8 +76,7 @@ class Route:
     def __post_init__(self) -> None:
         if self.points.ndim != 2 or self.points.shape[1] != 2 or not 1 <= len(self.points) <= MOST_POINTS:
             raise ValueError(
-                f"points of the route have shape {self.points.shape}; want (P, 2) with 1 to {MOST_POINTS} "
-                "points x, y"
+                f"points of the route have shape {self.points.shape}; want (P, 2) with 1 to {MOST_POINTS} points x, y"
             )
         if self.room.shape != self.points.shape[:1]:
             raise ValueError(f"room of the route has shape {self.room.shape}; want ({len(self.points)},)")
@@ -103,9 +102,7 @@ class OperatingState(Enum):
 
     @classmethod
     def _missing_(cls, value: object) -> None:
-        raise ValueError(
-            f"operating state is {value!r}; want one of {', '.join(state.value for state in cls)}"
-        )
+        raise ValueError(f"operating state is {value!r}; want one of {', '.join(state.value for state in cls)}")
 
 
 class OrderKind(Enum):
@@ -119,9 +116,7 @@ class OrderKind(Enum):
 
     @classmethod
     def _missing_(cls, value: object) -> None:
-        raise ValueError(
-            f"kind of the order is {value!r}; want one of {', '.join(kind.value for kind in cls)}"
-        )
+        raise ValueError(f"kind of the order is {value!r}; want one of {', '.join(kind.value for kind in cls)}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,13 +141,11 @@ class Order:
         object.__setattr__(self, "kind", OrderKind(self.kind))
         if self.kind is OrderKind.GO_TO and not isinstance(self.target, Target):
             raise ValueError(
-                f"target of the order {self.kind.value!r} is {self.target!r}; want a Target, the place to go "
-                "to"
+                f"target of the order {self.kind.value!r} is {self.target!r}; want a Target, the place to go to"
             )
         if self.kind is not OrderKind.GO_TO and self.target is not None:
             raise ValueError(
-                f"target of the order {self.kind.value!r} is {self.target!r}; want None, only 'go_to' has a "
-                "target"
+                f"target of the order {self.kind.value!r} is {self.target!r}; want None, only 'go_to' has a target"
             )
 
 
@@ -211,8 +204,6 @@ class Orders(NamedTuple):
     def of(cls, targets: Sequence[Target | None]) -> "Orders":
         """Return the orders of a list of targets, one for each row."""
         places = [(0.0, 0.0) if target is None else (target.x, target.y) for target in targets]
-        headings = [
-            math.nan if target is None or target.heading is None else target.heading for target in targets
-        ]
+        headings = [math.nan if target is None or target.heading is None else target.heading for target in targets]
         is_ordered = np.array([target is not None for target in targets])
         return cls(is_ordered, np.array(places, np.float64).reshape(-1, 2), np.array(headings, np.float64))

@@ -53,9 +53,7 @@ def known_map(perception: Perception, row: int) -> GrowingMap:
     return _cut(perception, row, perception.own_map(row).log_odds, perception.known_window(row))
 
 
-def _cut(
-    perception: Perception, row: int, log_odds: NDArray[np.int8], window: tuple[int, int, int, int]
-) -> GrowingMap:
+def _cut(perception: Perception, row: int, log_odds: NDArray[np.int8], window: tuple[int, int, int, int]) -> GrowingMap:
     """Return a window of a map with the place and the size of a robot's own.
 
     The window is rows and columns, low and high.
@@ -95,9 +93,7 @@ class Station:
         Which episode. The first by default.
     """
 
-    def __init__(
-        self, perception: Perception, meters: Meters, operating: Operating, episode: int = 0
-    ) -> None:
+    def __init__(self, perception: Perception, meters: Meters, operating: Operating, episode: int = 0) -> None:
         self._perception = perception
         self._meters = meters
         self._operating = operating
@@ -162,9 +158,7 @@ class Station:
 
     def _report(self, robot: int, time_s: float, known: GrowingMap, status: Status) -> Report:
         of_itself = {field.name: getattr(status, field.name) for field in fields(Status)}
-        return Report(
-            **of_itself, time_s=time_s, map=known, start=self._starts[robot], frame=self._frame(robot)
-        )
+        return Report(**of_itself, time_s=time_s, map=known, start=self._starts[robot], frame=self._frame(robot))
 
     def _frame(self, robot: int) -> Transform | None:
         """Return how a robot's map frame lies in the floor's, if it knows that."""

@@ -131,9 +131,7 @@ class TeamMapping:
             for row, agent in enumerate(agents, first)
         }
         pairs = [
-            (a, b)
-            for a, b in combinations(agents, 2)
-            if any(a in cluster and b in cluster for cluster in clusters)
+            (a, b) for a, b in combinations(agents, 2) if any(a in cluster and b in cluster for cluster in clusters)
         ]
         places = {agent: (pose.x, pose.y) for agent, pose in poses.items()}
         for agent, place in places.items():
@@ -168,9 +166,7 @@ class TeamMapping:
                     if overlaps and result is not None
                     else places[b]
                 )
-                joined[a, b] = _Joined(
-                    transform, (float(centre[0]), float(centre[1])), merged.tree.has_edge(a, b)
-                )
+                joined[a, b] = _Joined(transform, (float(centre[0]), float(centre[1])), merged.tree.has_edge(a, b))
         return joined
 
     def _compared(self, agent: str, one: GrowingMap) -> GrowingMap:
@@ -204,8 +200,6 @@ def crop_around(fused: FusedMap, x: float, y: float, cells: int) -> NDArray[np.u
     crop = np.full((cells, cells), UNKNOWN, np.uint8)
     rows, columns = fused.levels.shape
     top, left = max(row, 0), max(column, 0)
-    part = fused.levels[
-        top : max(min(row + cells, rows), top), left : max(min(column + cells, columns), left)
-    ]
+    part = fused.levels[top : max(min(row + cells, rows), top), left : max(min(column + cells, columns), left)]
     crop[top - row : top - row + part.shape[0], left - column : left - column + part.shape[1]] = part
     return crop

@@ -16,9 +16,7 @@ from lidarium.mapping.merging.incremental import GrowingMap
 from lidarium.mapping.planning.footprint import footprint_mask
 
 
-def without_own_trail(
-    one: GrowingMap, trail: NDArray[np.float64], radius: float, resolution: float
-) -> GrowingMap:
+def without_own_trail(one: GrowingMap, trail: NDArray[np.float64], radius: float, resolution: float) -> GrowingMap:
     """Return a map without any claim about its robot's own trail.
 
     The robot's image on other maps is then no contradiction.
@@ -49,7 +47,5 @@ def without_bodies(
     """
     levels = one.levels.copy()
     for trail in trails:
-        levels[
-            footprint_mask(one.levels.shape, one.origin, trail, radius, resolution) & (levels == OCCUPIED)
-        ] = UNKNOWN
+        levels[footprint_mask(one.levels.shape, one.origin, trail, radius, resolution) & (levels == OCCUPIED)] = UNKNOWN
     return GrowingMap(levels, one.origin)

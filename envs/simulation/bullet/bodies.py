@@ -207,22 +207,16 @@ class Bodies:
             enableFileCaching=0,
             deterministicOverlappingPairs=1,
         )
-        self._ground = client.call(
-            "createMultiBody", 0.0, client.call("createCollisionShape", bullet.GEOM_PLANE)
-        )
+        self._ground = client.call("createMultiBody", 0.0, client.call("createCollisionShape", bullet.GEOM_PLANE))
         client.call("changeDynamics", self._ground, -1, lateralFriction=1.0)
         shapes = FloorShapes.of(floor)
         client.load_text(shapes.urdf, useFixedBase=True)
         if shapes.prisms:
             client.call("changeDynamics", client.load_pieces(shapes.obj), -1, lateralFriction=1.0)
         for robot in range(len(self.team)):
-            self._robots[robot] = client.load_text(
-                urdf_of(self.team[robot]), flags=bullet.URDF_USE_INERTIA_FROM_FILE
-            )
+            self._robots[robot] = client.load_text(urdf_of(self.team[robot]), flags=bullet.URDF_USE_INERTIA_FROM_FILE)
             for link in range(-1, 3):
-                client.call(
-                    "changeDynamics", self._robots[robot], link, linearDamping=0.0, angularDamping=0.0
-                )
+                client.call("changeDynamics", self._robots[robot], link, linearDamping=0.0, angularDamping=0.0)
             self.put(robot, starts[robot])
         # Wheels that hang in the air by a hair would slip in the first step.
         self.step(np.zeros((len(self.team), 2)))
@@ -285,9 +279,7 @@ class Bodies:
         motion = self.motion(robot)
         place = motion.place + height * motion.axes[:, 2]
         bullet = self.client.bullet
-        self.client.call(
-            "applyExternalForce", self._robots[robot], -1, force, place.tolist(), bullet.WORLD_FRAME
-        )
+        self.client.call("applyExternalForce", self._robots[robot], -1, force, place.tolist(), bullet.WORLD_FRAME)
 
     def rays(self, begins: NDArray[np.float64], ends: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the shares of rays (N, 3) at which they meet anything, (N,); 1 if they meet nothing."""

@@ -9,8 +9,7 @@ from pathlib import Path
 from typing import Any
 
 MISSING = (
-    'backend "bullet" needs PyBullet; install it with: pip install "lidarium[bullet]" (its wheels end at '
-    "CPython 3.11)"
+    'backend "bullet" needs PyBullet; install it with: pip install "lidarium[bullet]" (its wheels end at CPython 3.11)'
 )
 
 

@@ -34,8 +34,7 @@ def urdf_of(robot: Robot) -> str:
         parts += [_wheel(robot, name), _joint(name, "continuous", (0.0, y, build.wheel_radius))]
     ball = f'<sphere radius="{build.caster_radius}"/>'
     casters = [
-        _shape(ball, (x, 0.0, build.caster_radius + CASTER_GAP))
-        for x in (build.caster_offset, -build.caster_offset)
+        _shape(ball, (x, 0.0, build.caster_radius + CASTER_GAP)) for x in (build.caster_offset, -build.caster_offset)
     ]
     inertia = (_CASTER_MASS * build.caster_offset**2,) * 3
     parts.append(_link("casters", _CASTER_MASS, inertia, build.caster_friction, "".join(casters)))
@@ -61,9 +60,7 @@ def _link(
     place: Numbers = (0.0, 0.0, 0.0),
 ) -> str:
     """Return a link with its centre of mass at a position of its frame [m]."""
-    along = " ".join(
-        f'{axis}="{value!r}"' for axis, value in zip(("ixx", "iyy", "izz"), inertia, strict=True)
-    )
+    along = " ".join(f'{axis}="{value!r}"' for axis, value in zip(("ixx", "iyy", "izz"), inertia, strict=True))
     return (
         f'<link name="{name}"><contact><lateral_friction value="{friction!r}"/></contact>'
         f'<inertial><origin xyz="{_numbers(place)}"/><mass value="{mass!r}"/>'

@@ -181,11 +181,7 @@ def _take_frame(cameras: Cameras, row: int, robots: int, depth: Array) -> None:
             body = cameras.bodies[other - first]
             draw_body(centre, body[RADIUS], body[HEIGHT], axes, eye, cameras.pinhole, inverse)
     _measure_depth(inverse, cameras.pinhole, depth)
-    if (
-        cameras.noise[NOISE_FLOOR] > 0.0
-        or cameras.noise[NOISE_SHARE] > 0.0
-        or cameras.noise[DISPARITY_STEP] > 0.0
-    ):
+    if cameras.noise[NOISE_FLOOR] > 0.0 or cameras.noise[NOISE_SHARE] > 0.0 or cameras.noise[DISPARITY_STEP] > 0.0:
         key = stream_key(cameras.seeds[episode], row - first, cameras.steps[episode])
         _disturb_depth(cameras, mix(key ^ np.uint32(DEPTH_STREAM)), depth)
 

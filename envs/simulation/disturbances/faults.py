@@ -75,17 +75,13 @@ def plan_faults(
             is_for_ever = fault.lasts_s is None or fault.kind == "dead_robot"
             # A fault shorter than a step lasts one step.
             table[robot, k, END_STEP] = (
-                math.inf
-                if is_for_ever
-                else fault.at_s / time_step + max((fault.lasts_s or 0.0) / time_step, 1.0)
+                math.inf if is_for_ever else fault.at_s / time_step + max((fault.lasts_s or 0.0) / time_step, 1.0)
             )
             table[robot, k, WHEEL:] = _needs(fault, generator, places)
     return table.reshape(robots, -1)
 
 
-def _drawn(
-    settings: FaultSettings, robot: int, longest: float, generator: np.random.Generator
-) -> list[Fault]:
+def _drawn(settings: FaultSettings, robot: int, longest: float, generator: np.random.Generator) -> list[Fault]:
     """Draw the faults that rates bring a robot, in the order of time."""
     faults: list[Fault] = []
     for kind, rate in zip(KINDS[1:], settings.rates, strict=True):
@@ -107,9 +103,7 @@ def _drawn(
     return sorted(faults, key=lambda fault: fault.at_s)[:MOST_DRAWN]
 
 
-def _needs(
-    fault: Fault, generator: np.random.Generator, places: NDArray[np.float64]
-) -> tuple[float, float, float]:
+def _needs(fault: Fault, generator: np.random.Generator, places: NDArray[np.float64]) -> tuple[float, float, float]:
     """Return the three numbers that a fault's kind needs."""
     if fault.kind == "blind_sector":
         return fault.bearing, fault.width, 0.0
@@ -174,9 +168,7 @@ def kidnap(faults: Array, step: int, robot: int, bodies: Array, poses: Array) ->
 
 
 @kernel(nrt=False)
-def blind_beams(
-    faults: Array, step: int, angle_first: float, increment: float, ranges: Array, lengths: Array
-) -> None:
+def blind_beams(faults: Array, step: int, angle_first: float, increment: float, ranges: Array, lengths: Array) -> None:
     """Make beams invalid that a fault takes away: ``ranges`` nan, ``lengths`` 0.
 
     The fault is a dropout, a blind sector or death.

@@ -120,11 +120,7 @@ def read_encoders(
     path, angle = abs(distance), abs(turn)
     turn_deviation = math.sqrt(numbers[0] * numbers[0] * angle + numbers[1] * numbers[1] * path)
     distance_deviation = math.sqrt(numbers[2] * numbers[2] * path + numbers[3] * numbers[3] * angle)
-    turn = (
-        turn * wheels[TURN_SCALE]
-        + distance * wheels[DRIFT]
-        + turn_deviation * gaussian_at(key, noise_table, 0)
-    )
+    turn = turn * wheels[TURN_SCALE] + distance * wheels[DRIFT] + turn_deviation * gaussian_at(key, noise_table, 0)
     distance = distance * wheels[DISTANCE_SCALE] + distance_deviation * gaussian_at(key, noise_table, 1)
     if numbers[4] != 0.0:
         wheels[LEFT_TRAVEL] += distance - 0.5 * turn * wheel_base

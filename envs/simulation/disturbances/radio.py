@@ -75,9 +75,7 @@ def _wall_lengths(solid: Array, places: Array, lengths: Array) -> None:
     for i in range(places.shape[0]):
         lengths[i, i] = 0.0
         for j in range(i):
-            lengths[i, j] = lengths[j, i] = solid_length(
-                solid, places[i, 0], places[i, 1], places[j, 0], places[j, 1]
-            )
+            lengths[i, j] = lengths[j, i] = solid_length(solid, places[i, 0], places[i, 1], places[j, 0], places[j, 1])
 
 
 def path_loss(
@@ -95,9 +93,7 @@ def path_loss(
     loss = settings.reference_loss + 10.0 * settings.free_exponent * np.log10(
         np.maximum(free / settings.reference_distance, 1.0)
     )
-    through = settings.wall_loss + 10.0 * settings.wall_exponent * np.log10(
-        np.maximum(walls / OBSTACLE_UNIT, 1.0)
-    )
+    through = settings.wall_loss + 10.0 * settings.wall_exponent * np.log10(np.maximum(walls / OBSTACLE_UNIT, 1.0))
     return np.asarray(loss + np.where(walls > 0.0, through, 0.0), np.float64)
 
 

@@ -120,9 +120,7 @@ def deepest_wall(solid: Array, x: float, y: float, radius: float) -> tuple[float
         while column < high_column:
             column += 1
             place = row * columns + column
-            if place + _AT_ONCE <= size and vector_at(solid.ctypes.data + place, 1, np.uint64)[
-                0
-            ] == np.uint64(0):
+            if place + _AT_ONCE <= size and vector_at(solid.ctypes.data + place, 1, np.uint64)[0] == np.uint64(0):
                 column += _AT_ONCE - 1
                 continue
             if solid[row, column] == 0:
@@ -161,9 +159,7 @@ def _deepest_robot(team: TeamBodies, robot: int, x: float, y: float) -> tuple[fl
 
 
 @kernel(nrt=False)
-def is_free_of_contact(
-    grids: BodyGrids, team: TeamBodies, robot: int, x: float, y: float, margin: float
-) -> bool:
+def is_free_of_contact(grids: BodyGrids, team: TeamBodies, robot: int, x: float, y: float, margin: float) -> bool:
     """Whether nothing is within ``margin`` [m] of the disc at x, y, by bounds alone."""
     bound, frame, poses, bodies = grids.bound, grids.frame, team.poses, team.bodies
     resolution = frame[FRAME_RESOLUTION]

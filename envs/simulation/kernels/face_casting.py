@@ -60,9 +60,7 @@ class _BeamRows(NamedTuple):
 
 
 @kernel(forceinline=True, nrt=False)
-def _draw_face(
-    first: int, last: int, rows: _BeamRows, distance: float, run: float, low: float, high: float
-) -> None:
+def _draw_face(first: int, last: int, rows: _BeamRows, distance: float, run: float, low: float, high: float) -> None:
     """Lower the ranges of the beams that meet a face.
 
     The beams are those from ``first`` to ``last`` and a few next to them. The face spans low to high along its run.

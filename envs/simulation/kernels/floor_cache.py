@@ -54,9 +54,7 @@ class FloorTables:
     floor: Floor | None = field(default=None, repr=False)
 
     @classmethod
-    def of_floor(
-        cls, floor: Floor, resolution: float, laser_height: float, body_height: float
-    ) -> "FloorTables":
+    def of_floor(cls, floor: Floor, resolution: float, laser_height: float, body_height: float) -> "FloorTables":
         """Rasterise a floor and prepare its tables.
 
         Parameters
@@ -133,9 +131,9 @@ class FloorTables:
 
         It holds the rays' 8 numbers and the addresses of the bound and of the solid cells.
         """
-        return np.concatenate(
-            [self.rays.addresses, [self.bound.ctypes.data, self.body.solid.ctypes.data]]
-        ).astype(np.int64)
+        return np.concatenate([self.rays.addresses, [self.bound.ctypes.data, self.body.solid.ctypes.data]]).astype(
+            np.int64
+        )
 
     @property
     def frame(self) -> NDArray[np.float64]:
@@ -251,9 +249,7 @@ class _UsedLast(Generic[Value]):
         return gone
 
 
-def floor_tables(
-    floor: Floor, raster_resolution: float, laser_height: float, body_height: float
-) -> FloorTables:
+def floor_tables(floor: Floor, raster_resolution: float, laser_height: float, body_height: float) -> FloorTables:
     """Return the kernels' tables of a floor.
 
     They are those of this process, otherwise those of the store, otherwise new ones.

@@ -84,11 +84,7 @@ def _travel(squares: Array, offset: int, columns: int, beams: Beams, beam: int, 
                 return reach
             last_column = column + step_x * (side - 1)
             crossed = int(x + distance * direction_x)
-            column = (
-                min(max(crossed, column), last_column)
-                if step_x > 0
-                else max(min(crossed, column), last_column)
-            )
+            column = min(max(crossed, column), last_column) if step_x > 0 else max(min(crossed, column), last_column)
             row += step_y * side
 
 

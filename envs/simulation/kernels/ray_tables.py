@@ -81,9 +81,7 @@ class RayTables:
 
     def __init__(self, solid: NDArray[np.uint8]) -> None:
         if solid.ndim != 2 or min(solid.shape) < 3:
-            raise ValueError(
-                f"the raster of solid cells has shape {solid.shape}; want at least 3 rows and 3 columns"
-            )
+            raise ValueError(f"the raster of solid cells has shape {solid.shape}; want at least 3 rows and 3 columns")
         border = (solid[0], solid[-1], solid[:, 0], solid[:, -1])
         if not all(side.all() for side in border):
             raise ValueError("the outermost ring of the raster is not all solid; a ray could leave the floor")

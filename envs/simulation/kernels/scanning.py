@@ -103,9 +103,7 @@ def _add_noise(world: WorldArrays, row: int, first: int, robots: int) -> None:
     sensor, ranges = world.sensor, world.ranges[row]
     beams, episode = ranges.shape[0], first // robots
     noise = scratch_vector(beams, np.float32)
-    fill_gaussian(
-        stream_key(world.seeds[episode], row - first, world.steps[episode]), world.noise_table, noise
-    )
+    fill_gaussian(stream_key(world.seeds[episode], row - first, world.steps[episode]), world.noise_table, noise)
     floor_deviation, share = np.float32(sensor[NOISE_FLOOR]), np.float32(sensor[NOISE_SHARE])
     low, high = np.float32(sensor[RANGE_MIN]), np.float32(sensor[RANGE_MAX] - RANGE_GAP)
     for beam in range(beams):

@@ -86,9 +86,7 @@ def _drive(world: WorldArrays, episode: int, robots: int, commands: Array) -> No
     for row in range(first, last):
         world.driven[row, 0], world.driven[row, 1] = commands[row, 0], commands[row, 1]
     if world.odometry_model.shape[0] > 0:
-        disturb_commands(
-            world.odometry_model, world.noise_table, world.seeds[episode], step, world.driven[first:last]
-        )
+        disturb_commands(world.odometry_model, world.noise_table, world.seeds[episode], step, world.driven[first:last])
     for row in range(first, last):
         faults = world.faults[row]
         stick_wheels(faults, step, world.bodies[row - first, WHEEL_BASE], world.driven[row])
@@ -170,9 +168,7 @@ def _share(world: WorldArrays, episode: int, robots: int) -> None:
 
 
 @kernel
-def step_episode(
-    table: Array, episode: int, robots: int, commands: Array, moves_bodies: bool, perceives: bool
-) -> None:
+def step_episode(table: Array, episode: int, robots: int, commands: Array, moves_bodies: bool, perceives: bool) -> None:
     """Run a step of one episode: move, sense, score and (if ``perceives``) map."""
     world = world_at(table)
     _move(world, episode, robots, commands, moves_bodies)
@@ -317,18 +313,14 @@ def ranges_without_teammates(table: Array, row: int, robots: int, ranges: Array)
         invalidate_teammates(world, row, row // robots * robots, robots, ranges)
 
 
-def _step_serial(
-    table: Array, robots: int, commands: Array, runs: Array, moves_bodies: bool, perceives: bool
-) -> None:
+def _step_serial(table: Array, robots: int, commands: Array, runs: Array, moves_bodies: bool, perceives: bool) -> None:
     """Run a step of the episodes with ``runs`` (episodes,)."""
     for episode in range(runs.shape[0]):
         if runs[episode]:
             step_episode(table, episode, robots, commands, moves_bodies, perceives)
 
 
-def _step_rows(
-    table: Array, robots: int, commands: Array, runs: Array, moves_bodies: bool, perceives: bool
-) -> None:
+def _step_rows(table: Array, robots: int, commands: Array, runs: Array, moves_bodies: bool, perceives: bool) -> None:
     """Run a step of the episodes with ``runs``; threads take single robots."""
     for episode in range(runs.shape[0]):
         if runs[episode]:

@@ -41,9 +41,7 @@ class _Messages:
     odometry: list[tuple[float, float, float]] = field(default_factory=list)
     base: str = ""
     static: dict[tuple[str, str], tuple[float, float, float]] = field(default_factory=dict)
-    moving: dict[tuple[str, str], list[tuple[float, tuple[float, float, float]]]] = field(
-        default_factory=dict
-    )
+    moving: dict[tuple[str, str], list[tuple[float, tuple[float, float, float]]]] = field(default_factory=dict)
 
 
 def is_bag(path: Path) -> bool:
@@ -180,9 +178,7 @@ def _log(path: Path, messages: _Messages) -> LaserLog:
         readings_stamps=readings_stamps,
         readings=readings,
         reading_of_scan=(
-            np.searchsorted(readings_stamps, stamps, side="right") - 1
-            if has_readings
-            else np.zeros(0, np.int64)
+            np.searchsorted(readings_stamps, stamps, side="right") - 1 if has_readings else np.zeros(0, np.int64)
         ),
         skipped=skipped,
     )
@@ -217,7 +213,5 @@ def _seconds(stamp: Any) -> float:  # noqa: ANN401
 
 def _in_plane(place: Any, turn: Any) -> tuple[float, float, float]:  # noqa: ANN401
     """Return x, y, theta of a pose in space [m, rad]."""
-    theta = math.atan2(
-        2.0 * (turn.w * turn.z + turn.x * turn.y), 1.0 - 2.0 * (turn.y * turn.y + turn.z * turn.z)
-    )
+    theta = math.atan2(2.0 * (turn.w * turn.z + turn.x * turn.y), 1.0 - 2.0 * (turn.y * turn.y + turn.z * turn.z))
     return float(place.x), float(place.y), theta

@@ -149,9 +149,7 @@ def _storage_files(path: Path) -> list[Path]:
     return files
 
 
-def _within(
-    storage: _Storage, budget: _Budget
-) -> Callable[[Collection[str]], Iterator[tuple[int, str, bytes]]]:
+def _within(storage: _Storage, budget: _Budget) -> Callable[[Collection[str]], Iterator[tuple[int, str, bytes]]]:
     """Return the messages of a storage, unpacked and counted."""
 
     def messages(topics: Collection[str]) -> Iterator[tuple[int, str, bytes]]:
@@ -221,9 +219,7 @@ def _open_mcap(path: Path, budget: _Budget) -> Iterator[_Storage]:
             if types[channel.topic] in READ:
                 encodings.add(channel.message_encoding)
         if encodings not in ({"cdr"}, {"ros1"}, set()):
-            raise ValueError(
-                f"{path} has messages in {', '.join(map(printable, sorted(encodings)))}; {WANTED}"
-            )
+            raise ValueError(f"{path} has messages in {', '.join(map(printable, sorted(encodings)))}; {WANTED}")
 
         def messages(topics: Collection[str]) -> Iterator[tuple[int, str, bytes]]:
             # Sorted by the caller: the reader's own queue takes half as long as decoding.
@@ -266,9 +262,7 @@ def _open_sqlite(path: Path, budget: _Budget) -> Iterator[_Storage]:
             raise ValueError(_encoded_otherwise(path, formats))
 
         def messages(topics: Collection[str]) -> Iterator[tuple[int, str, bytes]]:
-            for identifier, time, content in database.execute(
-                "SELECT topic_id, timestamp, data FROM messages"
-            ):
+            for identifier, time, content in database.execute("SELECT topic_id, timestamp, data FROM messages"):
                 if names.get(identifier) in topics:
                     yield int(time), names[identifier], bytes(memoryview(content))
 

@@ -86,9 +86,7 @@ class BagWriter:
             time_s,
             header=self._header(frame, time_s),
             child_frame_id=child,
-            pose=self._made(
-                "geometry_msgs/msg/PoseWithCovariance", pose=self._pose(pose), covariance=unknown
-            ),
+            pose=self._made("geometry_msgs/msg/PoseWithCovariance", pose=self._pose(pose), covariance=unknown),
             twist=self._made("geometry_msgs/msg/TwistWithCovariance", twist=twist, covariance=unknown),
         )
 
@@ -139,14 +137,10 @@ class BagWriter:
         data = _GRID_LEVELS[levels].ravel()
         self._write(topic, GRID, time_s, header=self._header(frame, time_s), info=info, data=data)
 
-    def path(
-        self, topic: str, frame: str, time_s: float, times: Sequence[float], poses: NDArray[np.float64]
-    ) -> None:
+    def path(self, topic: str, frame: str, time_s: float, times: Sequence[float], poses: NDArray[np.float64]) -> None:
         """Write a path: poses (n, 3) with their times (n,) [m, rad, s]."""
         stamped = [
-            self._made(
-                "geometry_msgs/msg/PoseStamped", header=self._header(frame, when), pose=self._pose(pose)
-            )
+            self._made("geometry_msgs/msg/PoseStamped", header=self._header(frame, when), pose=self._pose(pose))
             for when, pose in zip(times, poses, strict=True)
         ]
         self._write(topic, PATH, time_s, header=self._header(frame, time_s), poses=stamped)
@@ -213,14 +207,10 @@ def write_mcap_log(path: Path, log: LaserLog, robot: str = "robot") -> None:
     if not len(log.readings_stamps) and log.odometry is not None:
         readings = times, log.odometry
     with bag(path) as writer:
-        writer.transform(
-            frames["base_link"], frames["laser"], float(times[0]), log.laser_pose, is_static=True
-        )
+        writer.transform(frames["base_link"], frames["laser"], float(times[0]), log.laser_pose, is_static=True)
         for time_s, pose in zip(*readings, strict=True):
             if np.isfinite(pose).all() and time_s >= 0.0:
                 writer.odometry(f"/{robot}/odom", frames["odom"], frames["base_link"], float(time_s), pose)
                 writer.transform(frames["odom"], frames["base_link"], float(time_s), pose)
         for time_s, ranges in zip(times, log.ranges, strict=True):
-            writer.scan(
-                f"/{robot}/scan", frames["laser"], float(time_s), ranges, log.geometry, log.beam_interval_s
-            )
+            writer.scan(f"/{robot}/scan", frames["laser"], float(time_s), ranges, log.geometry, log.beam_interval_s)

@@ -82,8 +82,7 @@ def _(
     with if_any(builder, builder.icmp_signed("!=", new, old)):
         store_at(builder, new, address)
     is_other = [
-        builder.xor(builder.icmp_signed(sign, old, NO_BYTES), builder.icmp_signed(sign, new, NO_BYTES))
-        for sign in "<>"
+        builder.xor(builder.icmp_signed(sign, old, NO_BYTES), builder.icmp_signed(sign, new, NO_BYTES)) for sign in "<>"
     ]
     return bits_of_lanes(builder, builder.or_(*is_other))
 

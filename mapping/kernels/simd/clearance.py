@@ -45,9 +45,7 @@ def _(builder: Builder, log_odds: Value, numbers: Value, number: Value) -> Value
     return bits_of_lanes(builder, builder.xor(is_positive, is_number))
 
 
-def count_rows(
-    log_odds: int, stride: int, rows: int, steps: int, maximum: int, minima: int, width: int
-) -> None:
+def count_rows(log_odds: int, stride: int, rows: int, steps: int, maximum: int, minima: int, width: int) -> None:
     """Count the rows since the last occupied cell of each of 64 columns, row by row."""
     counted = vector_at(steps, BLOCK, np.uint16)
     for row in range(rows):
@@ -114,9 +112,7 @@ def write_min_sums(numbers: int, costs: int, low: int, high: int, cap: int, resu
 
 
 @llvm_overload(write_min_sums, types.void, *(types.int64,) * 6)
-def _(
-    builder: Builder, numbers: Value, costs: Value, low: Value, high: Value, cap: Value, result: Value
-) -> Value:
+def _(builder: Builder, numbers: Value, costs: Value, low: Value, high: Value, cap: Value, result: Value) -> Value:
     caps = splat(builder, cap, SHORTS)
     minimum = stack_slot(builder, caps)
     with cgutils.for_range_slice(builder, low, high, ir.Constant(LONG, 1), intp=LONG) as (k, _):

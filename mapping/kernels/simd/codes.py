@@ -52,16 +52,13 @@ def _(
 ) -> Value:
     offsets = range(0, TILE * _SIZE, _VECTOR_SIZE)
     sides = [
-        [load_at(builder, points, _REALS, axis * TILE * _SIZE + offset) for axis in range(3)]
-        for offset in offsets
+        [load_at(builder, points, _REALS, axis * TILE * _SIZE + offset) for axis in range(3)] for offset in offsets
     ]
     nearest = [stack_slot(builder, load_at(builder, squares, _REALS, offset)) for offset in offsets]
     chosen = [stack_slot(builder, load_at(builder, labels, _INTS, offset)) for offset in offsets]
     with cgutils.for_range(builder, count) as step:
         at = builder.add(codes, builder.mul(step.index, ir.Constant(codes.type, 3 * _SIZE)))
-        code = [
-            splat(builder, load_at(builder, at, _REALS.element, axis * _SIZE), _REALS) for axis in range(3)
-        ]
+        code = [splat(builder, load_at(builder, at, _REALS.element, axis * _SIZE), _REALS) for axis in range(3)]
         at = builder.add(numbers, builder.mul(step.index, ir.Constant(numbers.type, _SIZE)))
         number = splat(builder, load_at(builder, at, INT), _INTS)
         for side, least, label in zip(sides, nearest, chosen, strict=True):

@@ -124,9 +124,7 @@ def _diagonal_is_open(builder: Builder, kinds: Value, at: Value, beside: Value, 
     return _has_bits(builder, builder.or_(both_fit, builder.and_(ends_are_roomy, one_is_free)), 0xFF)
 
 
-def _relax_along(
-    builder: Builder, new: Value, step_costs: Value, costs: Value, at: Value, step: int
-) -> Value:
+def _relax_along(builder: Builder, new: Value, step_costs: Value, costs: Value, at: Value, step: int) -> Value:
     """Lower costs by those of the cells before them in the row.
 
     ``step_costs`` are those of the steps that lead to each cell; n rounds take all cells of up to 2 ** n steps

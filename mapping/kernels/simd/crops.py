@@ -121,9 +121,7 @@ def _store_levels(builder: Builder, rows: list[Value], indices: Value, crop: Val
     while len(registers) > ROWS * COLUMNS // CELLS:
         count = 2 * registers[0].type.count
         joined = constant(vector(INT, count), *range(count))
-        registers = [
-            builder.shuffle_vector(*registers[k : k + 2], joined) for k in range(0, len(registers), 2)
-        ]
+        registers = [builder.shuffle_vector(*registers[k : k + 2], joined) for k in range(0, len(registers), 2)]
     first, second, third = registers
     index = load_at(builder, indices, _REGISTER)
     near = call(builder, "llvm.x86.avx512.vpermi2var.qi.512", _REGISTER, first, index, second)

@@ -78,8 +78,6 @@ def _(builder: Builder, address: Value, start: Value, slope: Value, first: Value
     slopes, starts = splat(builder, slope, _PIXELS), splat(builder, start, _PIXELS)
     old = load_at(builder, address, _PIXELS)
     new = builder.fadd(starts, builder.fmul(slopes, ramp))
-    is_within = builder.and_(
-        builder.icmp_signed("<=", low, indices), builder.icmp_signed("<=", indices, high)
-    )
+    is_within = builder.and_(builder.icmp_signed("<=", low, indices), builder.icmp_signed("<=", indices, high))
     is_raised = builder.and_(is_within, builder.fcmp_ordered(">", new, old))
     store_at(builder, builder.select(is_raised, new, old), address)

@@ -130,14 +130,11 @@ def _end_of_bundle(
     distance = 0.0
     while True:
         cells = [
-            sorted((int(start[k] + distance * outer[k]), int(start[k] + distance * outer[2 + k])))
-            for k in range(2)
+            sorted((int(start[k] + distance * outer[k]), int(start[k] + distance * outer[2 + k]))) for k in range(2)
         ]
         near = [cells[k][0 if step[k] > 0 else 1] for k in range(2)]
         side = int(table[near[1], near[0]])
-        borders = [
-            (near[k] + step[k] * (side - 1) + (step[k] > 0) - start[k]) * outer[4 + k] for k in range(2)
-        ]
+        borders = [(near[k] + step[k] * (side - 1) + (step[k] > 0) - start[k]) * outer[4 + k] for k in range(2)]
         leaving = min(borders) - inside
         if side <= max(high - low for low, high in cells) or leaving <= distance + 1.0:
             return distance
@@ -342,9 +339,7 @@ def _advance_bundles(
     return advance
 
 
-@llvm_overload(
-    travel_bundles, types.void, types.int64, _PAIR, _TRIPLE, types.float64, types.int64, types.int64
-)
+@llvm_overload(travel_bundles, types.void, types.int64, _PAIR, _TRIPLE, types.float64, types.int64, types.int64)
 def _(
     builder: Builder,
     squares: Value,
@@ -359,9 +354,7 @@ def _(
     advances, targets = [], []
     for group in range(RAYS // GROUP):
         rows = _rows_of_group(builder, bundles, stride, group)
-        first_x, first_y, last_x, last_y, inverse_x, inverse_y = (
-            load_at(builder, row, _REALS) for row in rows[:6]
-        )
+        first_x, first_y, last_x, last_y, inverse_x, inverse_y = (load_at(builder, row, _REALS) for row in rows[:6])
         across, up = _Axis(builder, x, first_x, inverse_x), _Axis(builder, y, first_y, inverse_y)
         table = _Squares(builder, squares, shape, across, up)
         advances.append(_advance_bundles(builder, table, ((across, last_x), (up, last_y)), reach, inside))

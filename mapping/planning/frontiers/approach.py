@@ -263,9 +263,7 @@ def cheapest_views(
 
 
 @kernel(nrt=False)
-def _cheapest_view(
-    cell: Array, log_odds: Array, swept: SweptCosts, spans: Array, lowest: int, place: Array
-) -> int:
+def _cheapest_view(cell: Array, log_odds: Array, swept: SweptCosts, spans: Array, lowest: int, place: Array) -> int:
     """Search a cheaper cell near a frontier cell; return the lowest cost.
 
     The cell and the frontier cell are written to ``place`` (4,).

@@ -59,13 +59,7 @@ def update_frontiers(log_odds: Array, flags: Array, tiles: Array, window: Window
             elif column_high < columns:
                 beside |= log_odds[row, column_high] == 0
             is_frontier = (here[i] < 0) & (beside | (below[i] == 0) | (above[i] == 0))
-            marks[i] = (
-                np.uint8(0)
-                if not is_frontier
-                else IGNORED_MARK
-                if marks[i] == IGNORED_MARK
-                else FRONTIER_MARK
-            )
+            marks[i] = np.uint8(0) if not is_frontier else IGNORED_MARK if marks[i] == IGNORED_MARK else FRONTIER_MARK
     for tile_row in range(row_low >> TILE_SHIFT, ((row_high - 1) >> TILE_SHIFT) + 1):
         for tile_column in range(column_low >> TILE_SHIFT, ((column_high - 1) >> TILE_SHIFT) + 1):
             count = 0
@@ -169,9 +163,7 @@ def _clustered(
 
 
 @kernel
-def _centres(
-    cells: NDArray[np.int64], starts: NDArray[np.int64]
-) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def _centres(cells: NDArray[np.int64], starts: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Return the mean cell of each cluster, and its cell nearest to that.
 
     Ties go to the lowest row and column.
@@ -303,9 +295,7 @@ class FrontierMap:
 
     def ignore_near(self, cell: tuple[int, int], reach: float) -> int:
         """Ignore the frontier cells within ``reach`` [m] of a cell, itself included; return their number."""
-        return int(
-            ignore_frontiers_near(self.flags, self.tiles, int(cell[0]), int(cell[1]), reach / self.resolution)
-        )
+        return int(ignore_frontiers_near(self.flags, self.tiles, int(cell[0]), int(cell[1]), reach / self.resolution))
 
     def add(self, cells: NDArray[np.integer]) -> None:
         """Flag distinct cells (N, 2) that are not flagged yet, in a map with a selection of cells."""

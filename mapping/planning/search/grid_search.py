@@ -354,6 +354,4 @@ def _widened(state: SearchState) -> SearchState:
     buckets = state.buckets
     wider = np.empty((buckets.shape[0], 2 * buckets.shape[1]), np.int32)
     wider[:, : buckets.shape[1]] = buckets
-    return SearchState(
-        state.remaining, state.parent, state.touched, wider, state.sizes, state.counts, state.steps
-    )
+    return SearchState(state.remaining, state.parent, state.touched, wider, state.sizes, state.counts, state.steps)

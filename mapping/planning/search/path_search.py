@@ -97,9 +97,7 @@ def budget_of(maximum_cost: float, resolution: float) -> int:
 
 
 @kernel
-def _search_in(
-    terrain: Terrain, memory: Array, task: Task, lookout: Lookout
-) -> tuple[Array, Array, int, int, int]:
+def _search_in(terrain: Terrain, memory: Array, task: Task, lookout: Lookout) -> tuple[Array, Array, int, int, int]:
     """Search in a piece of memory, see ``grid_search.spread`` (kernel).
 
     Parameters
@@ -326,11 +324,7 @@ class Search:
         if (row, column) == self.start:
             return 0.0
         left = int(self.space.remaining[row, column])
-        if (
-            left in (0, NO_ENTRY)
-            or self.space.parent[row, column] >= LEAVING
-            or self.budget - left > self.settled
-        ):
+        if left in (0, NO_ENTRY) or self.space.parent[row, column] >= LEAVING or self.budget - left > self.settled:
             return math.inf
         return (self.budget - left) * self.unit
 
@@ -355,9 +349,7 @@ class Search:
         cells = np.stack((packed >> ROW_SHIFT, packed & COLUMN_BITS), axis=1)
         left = self.space.remaining[cells[:, 0], cells[:, 1]]
         passable = self.space.parent[cells[:, 0], cells[:, 1]] < LEAVING
-        reached: NDArray[np.int64] = cells[
-            (left != NO_ENTRY) & (self.budget - left <= self.settled) & passable
-        ]
+        reached: NDArray[np.int64] = cells[(left != NO_ENTRY) & (self.budget - left <= self.settled) & passable]
         return reached
 
     def path(self, cell: tuple[int, int]) -> NDArray[np.int64]:
@@ -371,8 +363,7 @@ class Search:
         """
         if math.isinf(self.cost(cell)):
             raise ValueError(
-                f"cell {(int(cell[0]), int(cell[1]))} was not reached from {self.start}; ask for its cost "
-                "first"
+                f"cell {(int(cell[0]), int(cell[1]))} was not reached from {self.start}; ask for its cost first"
             )
         return np.asarray(trace(self.space.parent, self.start[0], self.start[1], int(cell[0]), int(cell[1])))
 

@@ -186,9 +186,7 @@ def close_discs(remaining: NDArray[np.int32], touched: NDArray[np.int32], discs:
     for k in range(len(discs)):
         centre_row, centre_column, radius = discs[k]
         for row in range(max(int(centre_row - radius), 0), min(int(centre_row + radius) + 2, rows)):
-            for column in range(
-                max(int(centre_column - radius), 0), min(int(centre_column + radius) + 2, columns)
-            ):
+            for column in range(max(int(centre_column - radius), 0), min(int(centre_column + radius) + 2, columns)):
                 if (row - centre_row) ** 2 + (column - centre_column) ** 2 < radius * radius and remaining[
                     row, column
                 ] == 0:
@@ -252,9 +250,7 @@ class Targets:
         cells = np.ascontiguousarray(mask, dtype=np.uint8)
         size = 1 << TILE_SHIFT
         rows, columns = (np.arange(0, side, size) for side in cells.shape)
-        counts = np.add.reduceat(
-            np.add.reduceat((cells == 1).astype(np.int32), rows, axis=0), columns, axis=1
-        )
+        counts = np.add.reduceat(np.add.reduceat((cells == 1).astype(np.int32), rows, axis=0), columns, axis=1)
         return cls(cells, near_tiles(counts, reach), disc_spans(reach))
 
     @classmethod
@@ -292,7 +288,5 @@ def _grown(counts: NDArray[np.int32], margin: int) -> NDArray[np.uint8]:
     for row in range(rows):
         for column in range(columns):
             if counts[row, column] > 0:
-                near[
-                    max(row - margin, 0) : row + margin + 1, max(column - margin, 0) : column + margin + 1
-                ] = 1
+                near[max(row - margin, 0) : row + margin + 1, max(column - margin, 0) : column + margin + 1] = 1
     return near

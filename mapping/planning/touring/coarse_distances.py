@@ -106,9 +106,7 @@ def place_in(
     return row + int(best[0]), column + int(best[1])
 
 
-def distances_from(
-    grid: CoarseGrid, starts: NDArray[np.int64], maximum: float = math.inf
-) -> NDArray[np.int32]:
+def distances_from(grid: CoarseGrid, starts: NDArray[np.int64], maximum: float = math.inf) -> NDArray[np.int32]:
     """Return the lengths of the shortest paths from each of some coarse cells to all.
 
     Parameters
@@ -202,9 +200,7 @@ def _opened(log_odds: Array, fits: Array, factor: int) -> tuple[NDArray[np.bool_
 
 
 @kernel
-def _spread(
-    is_open: Array, starts: Array, others: Array, is_among: bool, max_length: int, lengths: Array
-) -> None:
+def _spread(is_open: Array, starts: Array, others: Array, is_among: bool, max_length: int, lengths: Array) -> None:
     """Spread lengths from each start over open cells.
 
     If ``is_among``, it ends when all cells up to the length of the farthest target are reached. Targets are the

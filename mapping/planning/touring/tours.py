@@ -70,9 +70,7 @@ def _go_to_nearest(beginning: int, between: Array, tour: Array) -> None:
     for k in range(1, count):
         nearest = -1
         for place in range(count):
-            if is_left[place] and (
-                nearest < 0 or between[tour[k - 1], place] < between[tour[k - 1], nearest]
-            ):
+            if is_left[place] and (nearest < 0 or between[tour[k - 1], place] < between[tour[k - 1], nearest]):
                 nearest = place
         tour[k], is_left[nearest] = nearest, False
 
@@ -238,9 +236,7 @@ def with_first(sequence: NDArray[np.int64], robot: int, place: int, count: int) 
 
 
 @kernel
-def _cost(
-    sequence: Array, size: int, first: Array, between: Array, worth: Array, weights: TourWeights
-) -> float:
+def _cost(sequence: Array, size: int, first: Array, between: Array, worth: Array, weights: TourWeights) -> float:
     """Return the cost of the tours of the first ``size`` numbers of a sequence."""
     count = first.shape[1]
     robot, last = 0, -1

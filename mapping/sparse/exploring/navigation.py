@@ -346,9 +346,7 @@ class SparseNavigation:
         been = np.unique(labels[rows, columns])
         return np.where((levels == SEEN) & ~np.isin(labels, been[been > 0]), np.int8(BLOCKED), levels)
 
-    def best_view(
-        self, pose: NDArray[np.float64], frontier: NDArray[np.float64], sight: Sight
-    ) -> View | None:
+    def best_view(self, pose: NDArray[np.float64], frontier: NDArray[np.float64], sight: Sight) -> View | None:
         """Return the best view of unknown ground adjacent to seen ground, (F, 2) [m].
 
         None if a robot at x, y, theta (3,) cannot come to see enough of it.

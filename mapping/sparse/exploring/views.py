@@ -142,9 +142,7 @@ def _best_view(index: BoxIndex, places: Places, unknown: Unknown, sight: Sight) 
         if seen.sum() * unknown.length < sight.least_m - 1e-9:
             continue
         frontier = _by_heading(point, unknown.frontier, seen)
-        samples = _by_heading(
-            point, unknown.samples, _seen_from(index, point, unknown.samples, sight, sight.farthest)
-        )
+        samples = _by_heading(point, unknown.samples, _seen_from(index, point, unknown.samples, sight, sight.farthest))
         for middle in range(HEADINGS):
             length, area = 0.0, 0.0
             for k in range(middle - half, middle + half + 1):

@@ -90,8 +90,7 @@ def usable_points(points: NDArray[np.floating], range_m: float | None = None) ->
     low, high = np.percentile(finite, (1.0, 99.0), axis=0)
     if float((high - low).max()) > WIDEST_M:
         raise ValueError(
-            f"the cloud is {(high - low).max():,.0f} m wide; want at most {WIDEST_M:,.0f} m: "
-            "are these millimetres?"
+            f"the cloud is {(high - low).max():,.0f} m wide; want at most {WIDEST_M:,.0f} m: are these millimetres?"
         )
     return finite
 
@@ -130,9 +129,7 @@ def _is_floor(points: NDArray[np.float64], floor: FloorPlane, settings: MapperSe
     return np.asarray(is_level & (floor.heights(points) <= settings.floor_height_m))
 
 
-def _hangs_over(
-    points: NDArray[np.float64], floor: FloorPlane, settings: MapperSettings
-) -> NDArray[np.bool_]:
+def _hangs_over(points: NDArray[np.float64], floor: FloorPlane, settings: MapperSettings) -> NDArray[np.bool_]:
     """Return which points are too high to be driven up to: table tops, seats."""
     reach = floor.heights(points) - settings.floor_height_m
     aside = points @ floor.levelling()[:2, :3].T
@@ -332,9 +329,7 @@ def code_counts(count: int, floor_share: float) -> tuple[int, int]:
     return count - on_floor, on_floor
 
 
-def _between_cuts(
-    points: NDArray[np.float64], floor: FloorPlane, settings: MapperSettings
-) -> NDArray[np.bool_]:
+def _between_cuts(points: NDArray[np.float64], floor: FloorPlane, settings: MapperSettings) -> NDArray[np.bool_]:
     """Return which points (N, 3) are neither too deep nor too high, (N,) bool."""
     heights = floor.heights(points)
     return np.asarray((heights >= -settings.noise_depth_m) & (heights <= settings.ceiling_m))
@@ -353,9 +348,7 @@ def split_points(
     return points[~on_floor], points[on_floor]
 
 
-def coded_obstacles(
-    points: NDArray[np.float64], count: int, settings: MapperSettings, frame: int = 0
-) -> OccupiedCodes:
+def coded_obstacles(points: NDArray[np.float64], count: int, settings: MapperSettings, frame: int = 0) -> OccupiedCodes:
     """Return the codes of obstacles, each with the box of its points.
 
     Parameters
@@ -393,9 +386,7 @@ def codes_of_labels(
     )
 
 
-def coded_floor(
-    points: NDArray[np.float64], count: int, settings: MapperSettings, frame: int = 0
-) -> FreeCodes:
+def coded_floor(points: NDArray[np.float64], count: int, settings: MapperSettings, frame: int = 0) -> FreeCodes:
     """Return at most a number of codes of floor points (N, 3) [m], close ones merged."""
     if len(points) == 0 or count < 1:
         return free_codes(np.empty((0, 3)), frame)

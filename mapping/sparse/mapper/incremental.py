@@ -89,9 +89,7 @@ class IncrementalMapper:
         cloud = moved_points(usable_points(points, settings.range_m), pose)
         floor = self._floor
         if floor is None:
-            floor = find_floor(
-                voxels_of(cloud, max(settings.voxel_m, 0.02)).means, settings.floor, settings.seed
-            )
+            floor = find_floor(voxels_of(cloud, max(settings.voxel_m, 0.02)).means, settings.floor, settings.seed)
         known = self._map or _empty_map(floor, settings)
         known = replace(
             known,

@@ -16,9 +16,7 @@ MAX_PIECES = 512
 
 
 @kernel(nrt=False)
-def _uncovered_volume(
-    around: Array, slack: float, boxes: Array, limit: float, pieces: Array, nexts: Array
-) -> float:
+def _uncovered_volume(around: Array, slack: float, boxes: Array, limit: float, pieces: Array, nexts: Array) -> float:
     """Return how much of a box is in none of others, all made wider by a slack.
 
     Parameters
@@ -160,9 +158,7 @@ def normals_of(
     spreads = np.empty((count, 3, 3))
     for row in range(3):
         for column in range(3):
-            spreads[:, row, column] = (
-                np.bincount(labels, weights * gaps[:, row] * gaps[:, column], count) / masses
-            )
+            spreads[:, row, column] = np.bincount(labels, weights * gaps[:, row] * gaps[:, column], count) / masses
     values, vectors = np.linalg.eigh(spreads)
     normals = vectors[:, :, 0]
     largest = np.take_along_axis(normals, np.abs(normals).argmax(axis=1)[:, None], axis=1)
@@ -269,9 +265,7 @@ def _merged_boxes(
 
 
 @kernel
-def _merge_tiles(
-    boxes: Array, owners: Array, order: Array, starts: Array, nodes: Array, slack: float
-) -> None:
+def _merge_tiles(boxes: Array, owners: Array, order: Array, starts: Array, nodes: Array, slack: float) -> None:
     """Merge the boxes of each tile: those of ``order`` from one start to the next."""
     for tile in range(starts.shape[0] - 1):
         _merge(boxes, owners, order[starts[tile] : starts[tile + 1]], nodes, slack)
@@ -395,11 +389,7 @@ def _gather(
             continue
         shared = 1.0
         for axis in range(3):
-            side = (
-                min(around[axis + 3], boxes[box, axis + 3])
-                - max(around[axis], boxes[box, axis])
-                + 2.0 * slack
-            )
+            side = min(around[axis + 3], boxes[box, axis + 3]) - max(around[axis], boxes[box, axis]) + 2.0 * slack
             shared *= max(side, 0.0)
         if shared > 0.0:
             _copy(boxes[box], beside[number])

@@ -188,9 +188,7 @@ def _nearest_of_none(tiles: Tiles) -> Nearest:
     )
 
 
-def drawn_codes(
-    tiles: Tiles, count: int, generator: np.random.Generator
-) -> tuple[NDArray[np.float32], Nearest]:
+def drawn_codes(tiles: Tiles, count: int, generator: np.random.Generator) -> tuple[NDArray[np.float32], Nearest]:
     """Draw codes among the points by K-means++.
 
     Returns
@@ -201,9 +199,7 @@ def drawn_codes(
     nearest, codes = _nearest_of_none(tiles), np.empty((count, 3), np.float32)
     found = _draw_codes(tiles, generator.random(count), codes, nearest)
     if found < count:
-        raise ValueError(
-            f"points are at {found:,} different places; want at least {count:,}, one for each code"
-        )
+        raise ValueError(f"points are at {found:,} different places; want at least {count:,}, one for each code")
     return codes, nearest
 
 
@@ -263,9 +259,7 @@ def _come_nearer(tiles: Tiles, code: Array, number: int, nearest: Nearest) -> No
                     nearest.squares[tile].ctypes.data,
                     nearest.labels[tile].ctypes.data,
                 )
-                nearest.errors[tile], nearest.worst[tile] = _error_of(
-                    tiles.weights[tile], nearest.squares[tile]
-                )
+                nearest.errors[tile], nearest.worst[tile] = _error_of(tiles.weights[tile], nearest.squares[tile])
                 is_changed = True
             error += nearest.errors[tile]
             worst = max(worst, nearest.worst[tile])
@@ -296,9 +290,7 @@ def _error_of(weights: Array, squares: Array) -> tuple[float, Any]:
         second += float(weights[lane + 1]) * float(squares[lane + 1])
         third += float(weights[lane + 2]) * float(squares[lane + 2])
         fourth += float(weights[lane + 3]) * float(squares[lane + 3])
-        worst = max(
-            worst, max(max(squares[lane], squares[lane + 1]), max(squares[lane + 2], squares[lane + 3]))
-        )
+        worst = max(worst, max(max(squares[lane], squares[lane + 1]), max(squares[lane + 2], squares[lane + 3])))
     return (first + second) + (third + fourth), worst
 
 

@@ -71,9 +71,7 @@ class QuantisationSettings:
         check_settings(self, "quantisation")
         for name, allowed in (("method", METHODS), ("mode", MODES), ("device", DEVICES)):
             if getattr(self, name) not in allowed:
-                raise ValueError(
-                    f"{name} of quantisation is {getattr(self, name)!r}; want one of {', '.join(allowed)}"
-                )
+                raise ValueError(f"{name} of quantisation is {getattr(self, name)!r}; want one of {', '.join(allowed)}")
 
     @property
     def keeps_empty(self) -> bool:
@@ -125,9 +123,7 @@ STEPS = 4
 """Lloyd's steps after exchanges."""
 
 
-def _relocated(
-    tiles: Tiles, codes: Codes, deadline: float, keeps_empty: bool = False
-) -> tuple[Codes, Nearest]:
+def _relocated(tiles: Tiles, codes: Codes, deadline: float, keeps_empty: bool = False) -> tuple[Codes, Nearest]:
     """Return better codes, found until a time, and the nearest of every point.
 
     Parameters
@@ -244,9 +240,7 @@ def _has_gpu() -> bool:
     return bool(torch.cuda.is_available())
 
 
-def _improved_on_gpu(
-    tiles: Tiles, codes: Codes, steps: int, keeps_empty: bool = False, device: str = "cuda"
-) -> Codes:
+def _improved_on_gpu(tiles: Tiles, codes: Codes, steps: int, keeps_empty: bool = False, device: str = "cuda") -> Codes:
     """Return codes after some of Lloyd's steps, as ``improved``, on a device of torch."""
     torch: Any = importlib.import_module("torch")
     points = torch.from_numpy(np.ascontiguousarray(tiles.points.transpose(0, 2, 1)).reshape(-1, 3)).to(device)
@@ -423,9 +417,7 @@ def _even_draws(tiles: Tiles, count: int, generator: np.random.Generator) -> Cod
     masses = tiles.weights.reshape(-1)[:total].astype(np.float64)
     is_even = bool((masses == masses[0]).all())
     chosen = generator.choice(total, count, replace=False, p=None if is_even else masses / masses.sum())
-    return np.ascontiguousarray(
-        tiles.points[chosen // tiles.points.shape[2], :, chosen % tiles.points.shape[2]]
-    )
+    return np.ascontiguousarray(tiles.points[chosen // tiles.points.shape[2], :, chosen % tiles.points.shape[2]])
 
 
 def _checked_points(points: ArrayLike, count: int) -> NDArray[np.float32]:
@@ -434,9 +426,7 @@ def _checked_points(points: ArrayLike, count: int) -> NDArray[np.float32]:
     if given.ndim != 2 or given.shape[1] != 3 or len(given) == 0:
         raise ValueError(f"points have shape {given.shape}; want (N, 3) with at least one point")
     if not 1 <= count <= len(given):
-        raise ValueError(
-            f"{count:,} codes are asked for of {len(given):,} points; want 1 to as many as points"
-        )
+        raise ValueError(f"{count:,} codes are asked for of {len(given):,} points; want 1 to as many as points")
     return np.ascontiguousarray(given, np.float32)
 
 

@@ -89,7 +89,4 @@ def test_the_maps_at_hand_are_run_from_their_marks(shared_data, tmp_path):
     assert len(small.floors) == 12
     assert small.stop == {"figure": "remaining_cells", "at_most": 250.0}
     assert list(dungeons.work(tmp_path, shared_data, 1, 1)) == [("ways of planners", 1, 1)]
-    assert (
-        len(dungeons.printed_ways(tmp_path / "ways.csv", [p.name for p in dungeons.maps_of(shared_data)]))
-        == 4
-    )
+    assert len(dungeons.printed_ways(tmp_path / "ways.csv", [p.name for p in dungeons.maps_of(shared_data)])) == 4

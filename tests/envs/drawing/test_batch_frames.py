@@ -13,9 +13,7 @@ def test_tiles_are_side_by_side():
         tiled([])
 
 
-@pytest.mark.parametrize(
-    ("count", "shape"), [(1, (2, 4)), (2, (2, 8)), (4, (4, 8)), (5, (4, 12)), (10, (6, 16))]
-)
+@pytest.mark.parametrize(("count", "shape"), [(1, (2, 4)), (2, (2, 8)), (4, (4, 8)), (5, (4, 12)), (10, (6, 16))])
 def test_there_are_about_as_many_rows_as_columns(count, shape):
     assert tiled([np.zeros((2, 4, 3), np.uint8)] * count).shape == (*shape, 3)
 

@@ -41,9 +41,7 @@ def test_what_cannot_begin_leaves_the_generators_as_they_were():
     for made in (tried, plain):
         made.draw(np.arange(2), [1, 2], {})
     with pytest.raises(ValueError, match="start"):
-        tried.draw(
-            np.arange(2), None, {1: ResetOptions(starts=np.array([[-9.0, 0.0, 0.0], [1.0, 1.0, 0.0]]))}
-        )
+        tried.draw(np.arange(2), None, {1: ResetOptions(starts=np.array([[-9.0, 0.0, 0.0], [1.0, 1.0, 0.0]]))})
     assert starts_of(tried.draw(np.arange(2), None, {})) == starts_of(plain.draw(np.arange(2), None, {}))
 
 

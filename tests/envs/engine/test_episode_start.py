@@ -9,9 +9,7 @@ from lidarium.envs.floors.floor_choice import FloorChoice
 from lidarium.envs.settings.making import make_settings
 from lidarium.envs.settings.reset_options import ResetOptions
 
-HALL = Floor(
-    "hall", (0.0, 0.0, 6.0, 4.0), starts=np.array([[1.0, 1.0, 0.0], [4.0, 3.0, 1.0]]), goal=(5.0, 1.0)
-)
+HALL = Floor("hall", (0.0, 0.0, 6.0, 4.0), starts=np.array([[1.0, 1.0, 0.0], [4.0, 3.0, 1.0]]), goal=(5.0, 1.0))
 
 
 def begun(seed=0, floor=HALL, chosen=None, **options):

@@ -67,9 +67,7 @@ def test_a_batch_leaves_nothing_behind(no_collection, level):
 
 def test_an_environment_that_was_only_reset_leaves_nothing_behind(no_collection):
     def made():
-        env = ExplorationEnv(
-            "apartment", make_settings(robots=2, radio="range", localization="slam", resolution=0.05)
-        )
+        env = ExplorationEnv("apartment", make_settings(robots=2, radio="range", localization="slam", resolution=0.05))
         env.reset(seed=0)
         return parts_of(env)
 

@@ -49,9 +49,7 @@ def test_terms_make_up_the_reward_and_have_the_signs_of_their_names():
 @pytest.mark.usefixtures("steps")
 def test_a_registered_term_is_weighed_and_reported():
     plain = [rewards for rewards, _ in run(lidarium.parallel_env("scene_room", robots=2))]
-    more = list(
-        run(lidarium.parallel_env("scene_room", robots=2, reward={"more": {"steps": 10.0, "turning": -1.0}}))
-    )
+    more = list(run(lidarium.parallel_env("scene_room", robots=2, reward={"more": {"steps": 10.0, "turning": -1.0}})))
     for number, (before, (rewards, infos)) in enumerate(zip(plain, more, strict=True), 1):
         for agent in rewards:
             terms = infos[agent]["reward_terms"]
@@ -71,9 +69,7 @@ def test_rows_of_a_batch_earn_what_single_episodes_do():
         _, of_rows, _, _, told = rows.step(np.tile(DRIVE, (4, 1)))
         assert of_rows[:2].tolist() == [rewards["robot_0"], rewards["robot_1"]]
         for name, values in told["reward_terms"].items():
-            assert values[:2].tolist() == [
-                infos[agent]["reward_terms"][name] for agent in ("robot_0", "robot_1")
-            ]
+            assert values[:2].tolist() == [infos[agent]["reward_terms"][name] for agent in ("robot_0", "robot_1")]
 
 
 def test_an_unknown_term_is_refused():

@@ -163,8 +163,7 @@ def test_every_observation_lies_in_its_space_and_is_of_its_type(level):
                 assert box.is_bounded() or name == "action_mask"
         if level == "frontier":
             actions = {
-                agent: int(generator.choice(np.flatnonzero(observations[agent]["action_mask"])))
-                for agent in env.agents
+                agent: int(generator.choice(np.flatnonzero(observations[agent]["action_mask"]))) for agent in env.agents
             }
         else:
             actions = {agent: generator.uniform(-1.0, 1.0, 2).astype(np.float32) for agent in env.agents}
@@ -219,12 +218,8 @@ def test_no_mode_renders_nothing_and_rendering_needs_a_reset():
 @pytest.mark.parametrize("name", IDS)
 def test_the_solo_form_is_the_parallel_one_with_one_robot(name):
     level = LEVELS[name.split("/")[1].removesuffix("-v1")]
-    solo = gymnasium.make(
-        name, floor="building:5", noise="datasheet", map_cells=64, disable_env_checker=True
-    ).unwrapped
-    team = lidarium.parallel_env(
-        "building:5", level=level, robots=1, starts="drawn", noise="datasheet", map_cells=64
-    )
+    solo = gymnasium.make(name, floor="building:5", noise="datasheet", map_cells=64, disable_env_checker=True).unwrapped
+    team = lidarium.parallel_env("building:5", level=level, robots=1, starts="drawn", noise="datasheet", map_cells=64)
     ours, _ = solo.reset(seed=3)
     theirs, _ = team.reset(seed=3)
     for _ in range(5):
@@ -258,9 +253,7 @@ def test_random_actions_never_break_the_bounds_of_velocity_and_heading():
     env.reset(seed=0)
     generator = np.random.default_rng(1)
     for _ in range(300):
-        observations = env.step(
-            {agent: generator.choice([-1.0, 1.0], 2).astype(np.float32) for agent in env.agents}
-        )[0]
+        observations = env.step({agent: generator.choice([-1.0, 1.0], 2).astype(np.float32) for agent in env.agents})[0]
         for observation in observations.values():
             assert abs(observation["velocity"][0]) <= np.float32(0.77)
             assert abs(observation["pose"][2]) <= math.pi + 1e-6

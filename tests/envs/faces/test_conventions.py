@@ -36,9 +36,7 @@ def test_a_share_beyond_the_whole_is_refused():
         make(team_reward=1.5)
 
 
-@pytest.mark.parametrize(
-    ("level", "mask"), [("velocity", None), ("frontier", "beside"), ("frontier", "infos")]
-)
+@pytest.mark.parametrize(("level", "mask"), [("velocity", None), ("frontier", "beside"), ("frontier", "infos")])
 def test_rows_of_a_batch_take_the_forms_of_single_teams(level, mask):
     forms = {"observation": "flat", "infos": "flat", "team_reward": 0.5}
     if mask is not None:

@@ -28,8 +28,7 @@ def test_a_batch_sees_what_lone_environments_see(threads):
         actions = generator.uniform(-1.0, 1.0, (8, 2)).astype(np.float32)
         observations, _, _, _, infos = batch.step(actions)
         seen = [
-            env.step({f"robot_{robot}": actions[2 * k + robot] for robot in range(2)})[0]
-            for k, env in enumerate(lone)
+            env.step({f"robot_{robot}": actions[2 * k + robot] for robot in range(2)})[0] for k, env in enumerate(lone)
         ]
     batch.close()
 

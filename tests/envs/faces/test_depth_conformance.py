@@ -26,9 +26,7 @@ OBSERVE = ["pose", "depth"]
 @pytest.mark.parametrize("level", ["velocity", "waypoint", "frontier"])
 def test_the_parallel_api_is_pettingzoos(backend, level, capsys):
     observe = [*OBSERVE, "map"] if level == "waypoint" else OBSERVE
-    env = lidarium.parallel_env(
-        backend=backend, level=level, robots=2, horizon_s=3.0, observe=observe, **SMALL
-    )
+    env = lidarium.parallel_env(backend=backend, level=level, robots=2, horizon_s=3.0, observe=observe, **SMALL)
     parallel_api_test(env, num_cycles=40)
     assert "Passed" in capsys.readouterr().out
 
@@ -36,9 +34,7 @@ def test_the_parallel_api_is_pettingzoos(backend, level, capsys):
 @pytest.mark.parametrize("backend", BACKENDS)
 def test_equal_seeds_give_equal_images(backend):
     parallel_seed_test(
-        lambda: lidarium.parallel_env(
-            backend=backend, robots=2, observe=OBSERVE, **{**SMALL, "camera": "xtion_noisy"}
-        ),
+        lambda: lidarium.parallel_env(backend=backend, robots=2, observe=OBSERVE, **{**SMALL, "camera": "xtion_noisy"}),
         num_cycles=5,
     )
 

@@ -27,16 +27,13 @@ def assert_equal(one, other):
 
 
 def differs(one, other):
-    return any(
-        not np.array_equal(a, b) for (_, a), (_, b) in zip(flattened(one), flattened(other), strict=True)
-    )
+    return any(not np.array_equal(a, b) for (_, a), (_, b) in zip(flattened(one), flattened(other), strict=True))
 
 
 def sampled(env, generator, observations, level):
     if level == "frontier":
         return {
-            agent: int(generator.choice(np.flatnonzero(observations[agent]["action_mask"])))
-            for agent in env.agents
+            agent: int(generator.choice(np.flatnonzero(observations[agent]["action_mask"]))) for agent in env.agents
         }
     return {agent: generator.uniform(-1.0, 1.0, 2).astype(np.float32) for agent in env.agents}
 
@@ -95,9 +92,7 @@ def test_decisions_give_the_same_arrays_for_the_same_seed(level):
 
 
 def test_one_environment_used_twice_gives_the_same_as_a_new_one():
-    used, new = (
-        lidarium.parallel_env("set:test", robots=2, noise="datasheet", map_cells=64) for _ in range(2)
-    )
+    used, new = (lidarium.parallel_env("set:test", robots=2, noise="datasheet", map_cells=64) for _ in range(2))
     run(used, 5, 30)
     for one, other in zip(run(used, 6, 60), run(new, 6, 60), strict=True):
         assert_equal(one, other)
@@ -105,8 +100,7 @@ def test_one_environment_used_twice_gives_the_same_as_a_new_one():
 
 def test_another_seed_gives_other_starts_noise_and_floors():
     records = [
-        run(lidarium.parallel_env("building:5", robots=2, noise="datasheet", map_cells=64), seed, 5)
-        for seed in (1, 2)
+        run(lidarium.parallel_env("building:5", robots=2, noise="datasheet", map_cells=64), seed, 5) for seed in (1, 2)
     ]
     assert differs(records[0][0], records[1][0])
     env = lidarium.parallel_env("scene_room", robots=1, noise="datasheet", map_cells=64)
@@ -193,9 +187,7 @@ def test_writing_into_what_was_returned_changes_nothing_later():
             leaf[...] = 0
         for info in outcomes[0][-1].values():
             info["truth"]["pose"][:] = 99.0
-        outcomes = [
-            env.step({agent: np.array([0.4, 0.2], np.float32) for agent in env.agents}) for env in envs
-        ]
+        outcomes = [env.step({agent: np.array([0.4, 0.2], np.float32) for agent in env.agents}) for env in envs]
         assert_equal(outcomes[0][0], outcomes[1][0])
         assert_equal(outcomes[0][-1], outcomes[1][-1])
 

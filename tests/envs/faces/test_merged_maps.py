@@ -120,9 +120,7 @@ def test_every_level_of_decision_can_be_wrapped_and_repeats_itself(level):
         env = MergedMaps(base)
         observations, _ = env.reset(seed=5)
         for _ in range(2):
-            actions = {
-                agent: 0 if level == "frontier" else np.array([0.5, 0.1], np.float32) for agent in env.agents
-            }
+            actions = {agent: 0 if level == "frontier" else np.array([0.5, 0.1], np.float32) for agent in env.agents}
             observations = env.step(actions)[0]
         told.append(observations)
     for agent, observation in told[0].items():

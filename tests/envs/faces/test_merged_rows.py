@@ -21,9 +21,7 @@ FLOORS = ["scene_room", "apartment"]
 def test_rows_see_and_are_told_what_single_teams_are(level, options):
     merging = MergingSettings(period_s=2.0, known_starts=level == "frontier")
     batch = lidarium.vector_env(2, FLOORS, level=level, merging=merging, **OPTIONS, **options)
-    teams = [
-        MergedMaps(lidarium.parallel_env(FLOORS, level=level, **OPTIONS, **options), merging) for _ in FLOORS
-    ]
+    teams = [MergedMaps(lidarium.parallel_env(FLOORS, level=level, **OPTIONS, **options), merging) for _ in FLOORS]
     assert batch.single_observation_space == teams[0].observation_space("robot_0")
     observations, infos = batch.reset(seed=5)
     alone = [env.reset(seed=5 + episode) for episode, env in enumerate(teams)]

@@ -89,9 +89,7 @@ def test_rows_of_a_batch_hear_the_same(level):
                 row = 3 * episode + int(agent[-1])
                 assert np.array_equal(observations["messages"][row], observation["messages"])
         numbers = generator.uniform(-1.0, 1.0, (6, 4)).astype(np.float32)
-        rows = (
-            {"action": np.zeros(6, np.int64), "message": numbers[:, 2:]} if level == "frontier" else numbers
-        )
+        rows = {"action": np.zeros(6, np.int64), "message": numbers[:, 2:]} if level == "frontier" else numbers
         observations = batch.step(rows)[0]
         for episode, env in enumerate(teams):
             own = {

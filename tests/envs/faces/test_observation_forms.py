@@ -25,8 +25,7 @@ BOXES = {
 def observation(seed, rows=()):
     generator = np.random.default_rng(seed)
     return {
-        name: generator.uniform(box.low, box.high, (*rows, *box.shape)).astype(box.dtype)
-        for name, box in BOXES.items()
+        name: generator.uniform(box.low, box.high, (*rows, *box.shape)).astype(box.dtype) for name, box in BOXES.items()
     }
 
 

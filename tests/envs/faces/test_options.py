@@ -75,9 +75,7 @@ def test_bad_seeds_are_refused_alike_by_every_environment(seed):
 
 
 def test_options_that_are_no_mapping_are_refused():
-    with pytest.raises(
-        ValueError, match=r"options of reset are .*; want a dict of any of floor, starts, goal"
-    ):
+    with pytest.raises(ValueError, match=r"options of reset are .*; want a dict of any of floor, starts, goal"):
         lidarium.parallel_env("scene_room").reset(options=["floor"])
     with pytest.raises(ValueError, match="options of reset are"):
         lidarium.vector_env(1, "scene_room").reset(options=["floor"])

@@ -19,9 +19,7 @@ WALL_ACROSS = Solid(np.array([[2.0, 0.0], [2.2, 0.0], [2.2, 4.0], [2.0, 4.0]]))
 
 
 def box(width=5.0, height=4.0, solids=(), starts=((1.0, 1.0, 0.0), (1.0, 3.0, 0.0)), goal=None):
-    return Floor(
-        "box", (0.0, 0.0, width, height), tuple(solids), starts=np.array(starts, np.float64), goal=goal
-    )
+    return Floor("box", (0.0, 0.0, width, height), tuple(solids), starts=np.array(starts, np.float64), goal=goal)
 
 
 def make(floor=None, **options):
@@ -177,9 +175,7 @@ def test_a_robot_at_the_goal_has_reached_it_and_the_others_go_on():
     assert env.agents == ["robot_1"]
 
 
-@pytest.mark.parametrize(
-    ("goal", "told"), [((9.0, 1.0), "outside of the floor"), ((2.1, 1.0), "inside a wall")]
-)
+@pytest.mark.parametrize(("goal", "told"), [((9.0, 1.0), "outside of the floor"), ((2.1, 1.0), "inside a wall")])
 def test_a_goal_that_no_robot_can_be_at_is_refused_before_the_run(goal, told):
     env = make(box(solids=[WALL_ACROSS], goal=(1.5, 3.0)))
     with pytest.raises(ValueError, match=told):
@@ -327,9 +323,7 @@ def test_headings_of_starts_are_told_within_half_a_turn(known_starts, turns):
     for floor, options in [(box(), {"starts": starts}), (box(starts=starts), {})]:
         env = make(floor, known_starts=known_starts)
         observations, _ = env.reset(seed=0, options=options)
-        assert all(
-            env.observation_space(agent).contains(observation) for agent, observation in observations.items()
-        )
+        assert all(env.observation_space(agent).contains(observation) for agent, observation in observations.items())
         assert env.world.poses[:, 2] == pytest.approx([1.0, math.pi])
 
 

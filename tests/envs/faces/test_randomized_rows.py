@@ -36,9 +36,7 @@ def test_each_episode_is_the_team_with_the_same_seed(level):
                     assert np.array_equal(seen[name][2 * k + robot], value), name
         assert [team.drawn for team in teams] == rows.batch.drawn
         actions = (
-            np.zeros(4, np.int64)
-            if level == "frontier"
-            else generator.uniform(-1.0, 1.0, (4, 2)).astype(np.float32)
+            np.zeros(4, np.int64) if level == "frontier" else generator.uniform(-1.0, 1.0, (4, 2)).astype(np.float32)
         )
         seen, rewards, terminated, truncated, infos = rows.step(actions)
         for k, team in enumerate(teams):
@@ -127,9 +125,7 @@ def test_learners_get_episodes_of_drawn_settings():
 
 
 def test_what_cannot_be_drawn_in_batches_is_refused():
-    rows = lidarium.vector_env(
-        2, "scene_room", randomize={"map_cells": [32, 64]}, **{**SMALL, "observe": ["map"]}
-    )
+    rows = lidarium.vector_env(2, "scene_room", randomize={"map_cells": [32, 64]}, **{**SMALL, "observe": ["map"]})
     with pytest.raises(ValueError, match="want some that leave the spaces"):
         [rows.reset(seed=seed) for seed in range(10)]
     with pytest.raises(RuntimeError, match="was not reset"):

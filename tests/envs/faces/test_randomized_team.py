@@ -56,9 +56,7 @@ def test_an_episode_is_that_of_an_environment_with_these_settings():
     wanted, _ = plain.reset(seed=2)
     for _ in range(5):
         for agent, observation in wanted.items():
-            assert all(
-                np.array_equal(observations[agent][name], value) for name, value in observation.items()
-            )
+            assert all(np.array_equal(observations[agent][name], value) for name, value in observation.items())
         actions = dict.fromkeys(env.agents, np.array([0.5, 0.1], np.float32))
         observations, wanted = env.step(actions)[0], plain.step(actions)[0]
 
@@ -136,9 +134,7 @@ def test_the_size_of_the_team_is_drawn_for_each_episode():
             assert not observation["teammates"][size - 1 :].any()
         plain = lidarium.parallel_env("scene_room", **{**options, "robots": size})
         wanted, _ = plain.reset(seed=seed)
-        assert np.array_equal(
-            observations["robot_0"]["teammates"][: size - 1], wanted["robot_0"]["teammates"]
-        )
+        assert np.array_equal(observations["robot_0"]["teammates"][: size - 1], wanted["robot_0"]["teammates"])
         state, plain_state = env.state(), plain.state()
         assert env.state_space.contains(state)
         assert np.array_equal(state[: 7 * size], plain_state[: 7 * size])
@@ -152,9 +148,7 @@ def test_the_size_of_the_team_is_drawn_for_each_episode():
 @pytest.mark.parametrize("level", ["velocity", "frontier"])
 def test_teams_of_drawn_sizes_pass_the_test_of_pettingzoo(level):
     options = {**SMALL, "observe": ["bumper"], "level": level, "horizon_s": 3.0, "infos": "flat"}
-    parallel_api_test(
-        lidarium.parallel_env("scene_room", randomize={"robots": [1, 3]}, **options), num_cycles=30
-    )
+    parallel_api_test(lidarium.parallel_env("scene_room", randomize={"robots": [1, 3]}, **options), num_cycles=30)
 
 
 def test_sizes_of_which_the_largest_is_unknown_are_refused():

@@ -11,9 +11,7 @@ def test_one_seed_counts_on_by_episode():
     assert seeds_of([4, None, 9], 3) == [4, None, 9]
     assert seeds_of(None, 2) == [None, None]
     assert seeds_of(np.array([1, 2]), 2) == [1, 2]
-    with pytest.raises(
-        ValueError, match="seed has 2 entries; want one number, or one entry for each of the 3"
-    ):
+    with pytest.raises(ValueError, match="seed has 2 entries; want one number, or one entry for each of the 3"):
         seeds_of([1, 2], 3)
     for bad in (-1, "12", [0, -1, 2]):
         with pytest.raises(ValueError, match="seed is"):
@@ -51,7 +49,5 @@ def test_options_are_for_all_or_for_each():
 
 
 def test_as_many_entries_as_there_are_not_episodes_are_refused():
-    with pytest.raises(
-        ValueError, match="option floor has 2 entries; want one for all, or one for each of the 3"
-    ):
+    with pytest.raises(ValueError, match="option floor has 2 entries; want one for all, or one for each of the 3"):
         options_of({"floor": ["a", "b"]}, np.array([0]), 3, 2)

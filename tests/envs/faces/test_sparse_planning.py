@@ -116,9 +116,7 @@ def test_orders_of_a_station_are_driven_along_routes_too():
 def test_robots_without_cameras_or_without_goals_are_refused():
     with pytest.raises(ValueError, match=r"no depth camera.*camera='xtion'"):
         SparsePlanning(made(camera=None))
-    env = lidarium.parallel_env(
-        "apartment", robots=1, camera="xtion_tilted", observe=["scan", "pose", "bumper"]
-    )
+    env = lidarium.parallel_env("apartment", robots=1, camera="xtion_tilted", observe=["scan", "pose", "bumper"])
     with pytest.raises(ValueError, match="the policy decides speeds; want waypoints or frontiers"):
         run_episode(lidarium.policy("random_walk"), env, 0, plans_sparsely=True)
 

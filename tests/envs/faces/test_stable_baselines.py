@@ -15,18 +15,14 @@ from lidarium.envs.settings.lidar import Lidar
 stable_baselines3 = pytest.importorskip(
     "stable_baselines3", reason='stable-baselines3 is not installed: pip install "lidarium[rl]"'
 )
-sb3_contrib = pytest.importorskip(
-    "sb3_contrib", reason='sb3-contrib is not installed: pip install "lidarium[rl]"'
-)
+sb3_contrib = pytest.importorskip("sb3_contrib", reason='sb3-contrib is not installed: pip install "lidarium[rl]"')
 
 import torch  # noqa: E402
 from sb3_contrib.common.maskable.utils import get_action_masks, is_masking_supported  # noqa: E402
 from stable_baselines3.common.env_checker import check_env  # noqa: E402
 from stable_baselines3.common.vec_env import VecMonitor, VecNormalize  # noqa: E402
 
-ROOM = Floor(
-    "room", (0.0, 0.0, 5.0, 4.0), (Solid(np.array([(2.4, 0.0), (2.6, 0.0), (2.6, 2.8), (2.4, 2.8)])),)
-)
+ROOM = Floor("room", (0.0, 0.0, 5.0, 4.0), (Solid(np.array([(2.4, 0.0), (2.6, 0.0), (2.6, 2.8), (2.4, 2.8)])),))
 FEW = {
     "lidar": Lidar(beams=36, field_of_view=2.0 * math.pi, range_max=6.0),
     "observe": ["scan", "pose"],
@@ -64,9 +60,7 @@ def test_rows_are_those_of_the_vector_environment_but_for_the_time_of_the_reset(
         for name, array in wanted.items():
             assert np.array_equal(observations[name], array), name
         if level == "frontier":
-            actions = np.array(
-                [generator.choice(np.flatnonzero(mask)) for mask in observations["action_mask"]]
-            )
+            actions = np.array([generator.choice(np.flatnonzero(mask)) for mask in observations["action_mask"]])
         else:
             actions = generator.uniform(-1.0, 1.0, (6, 2)).astype(np.float32)
         observations, rewards, dones, infos = both[0].step(actions)
@@ -78,9 +72,7 @@ def test_rows_are_those_of_the_vector_environment_but_for_the_time_of_the_reset(
             assert info["TimeLimit.truncated"] == truncated[row]
             assert np.array_equal(info["truth"]["pose"], told["truth"]["pose"][row])
             assert ("terminal_observation" in info) == dones[row]
-            assert info.get("ended_because") == (
-                told["ended_because"][row] if "ended_because" in told else None
-            )
+            assert info.get("ended_because") == (told["ended_because"][row] if "ended_because" in told else None)
             if dones[row]:
                 assert_row(wanted, row, info["terminal_observation"])
         ends += int(dones.sum())
@@ -192,9 +184,7 @@ def test_options_are_for_all_episodes_for_each_or_for_each_row():
     assert [floor.name for floor in envs.engine.floors] == ["apartment", "room"]
     envs.reset()
     assert [floor.name for floor in envs.engine.floors] == ["room", "room"]
-    with pytest.raises(
-        ValueError, match="options has 2 entries; want one dict, or one for each of the 4 rows"
-    ):
+    with pytest.raises(ValueError, match="options has 2 entries; want one dict, or one for each of the 4 rows"):
         envs.set_options([{}, {}])
     with pytest.raises(ValueError, match=r"option starts has shape \(1, 3\); want \(2, 3\)"):
         envs.set_options({"starts": [(1.0, 1.0, 0.0)]})

@@ -22,17 +22,13 @@ from lidarium.envs.settings.making import make_settings
 from lidarium.mapping.grids.scan_geometry import MAX_BEAMS
 from lidarium.mapping.kernels.compilation import available_threads
 
-ROOM = Floor(
-    "room", (0.0, 0.0, 5.0, 4.0), (Solid(np.array([(2.4, 0.0), (2.6, 0.0), (2.6, 2.8), (2.4, 2.8)])),)
-)
+ROOM = Floor("room", (0.0, 0.0, 5.0, 4.0), (Solid(np.array([(2.4, 0.0), (2.6, 0.0), (2.6, 2.8), (2.4, 2.8)])),))
 COARSE = Lidar(beams=36, field_of_view=2.0 * math.pi, range_max=6.0)
 FEW = {"lidar": COARSE, "observe": ["scan", "pose"], "robots": 1, "threads": 1}
 IDS = {"velocity": "Exploration", "waypoint": "WaypointExploration", "frontier": "FrontierExploration"}
 AHEAD, STAY = (1.0, 0.0), (0.0, 0.0)
 
-TOLD_ALWAYS = {
-    prefix + name for name in ("truth", "state", "order", "active", "reward_terms") for prefix in ("", "_")
-}
+TOLD_ALWAYS = {prefix + name for name in ("truth", "state", "order", "active", "reward_terms") for prefix in ("", "_")}
 """Keys of infos when nothing special has happened."""
 
 
@@ -270,9 +266,7 @@ def test_of_a_set_each_beginning_draws_a_floor(monkeypatch):
         alone.reset()
         for _ in range(2):
             batch.step(np.zeros((4, 2)))
-    assert {name for names in seen for name in names} == {
-        load_floor(f"building:{seed}").name for seed in (5, 6, 7)
-    }
+    assert {name for names in seen for name in names} == {load_floor(f"building:{seed}").name for seed in (5, 6, 7)}
 
 
 def test_a_list_has_a_seed_for_each_episode():
@@ -295,9 +289,7 @@ def test_observations_are_new_arrays_or_two_sets_that_take_turns():
     returned = [first] + [fresh.step(np.ones((2, 2)))[0] for _ in range(4)]
     assert_same(first, kept)
     assert not any(
-        np.shares_memory(one["scan"], other["scan"])
-        for k, one in enumerate(returned)
-        for other in returned[:k]
+        np.shares_memory(one["scan"], other["scan"]) for k, one in enumerate(returned) for other in returned[:k]
     )
     turning = lidarium.vector_env(2, ROOM, copy=False, **FEW)
     reused = [turning.reset(seed=0)[0]]

@@ -8,9 +8,7 @@ def test_rectangles_around_many_segments_are_those_around_each():
     segments = np.random.default_rng(0).uniform(-5.0, 5.0, (50, 4))
     segments[7, 2:] = segments[7, :2]  # a point
     widths = np.random.default_rng(1).uniform(0.1, 1.0, 50)
-    wanted = [
-        ring_edges(strip(each, width, width / 2.0)) for each, width in zip(segments, widths, strict=True)
-    ]
+    wanted = [ring_edges(strip(each, width, width / 2.0)) for each, width in zip(segments, widths, strict=True)]
     np.testing.assert_allclose(strip_edges(segments, widths, 0.5), wanted, atol=1e-12)
     np.testing.assert_allclose(strip_edges(segments, 0.3)[3], ring_edges(strip(segments[3], 0.3)), atol=1e-12)
     assert strip_edges(np.zeros((0, 4)), 0.1).shape == (0, 4, 4)

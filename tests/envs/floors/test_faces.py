@@ -33,9 +33,7 @@ def faces_of_solid(solid):
 
 
 def areas_of(corners):
-    return (
-        np.linalg.norm(np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]), axis=1) / 2.0
-    )
+    return np.linalg.norm(np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]), axis=1) / 2.0
 
 
 @pytest.mark.parametrize("ring", [SQUARE, SQUARE[::-1], BENT, BENT[::-1], STAR])
@@ -55,9 +53,7 @@ def test_faces_of_a_solid_enclose_its_volume(ring, has_hole):
 def test_parts_of_any_outline_are_convex_and_cover_it(steps):
     angles = np.cumsum([step for _, step in steps])
     angles *= 2.0 * np.pi / (angles[-1] + 0.3)
-    ring = np.round(
-        np.array([(r * np.cos(a), r * np.sin(a)) for (r, _), a in zip(steps, angles, strict=True)]), 3
-    )
+    ring = np.round(np.array([(r * np.cos(a), r * np.sin(a)) for (r, _), a in zip(steps, angles, strict=True)]), 3)
     parts = convex_parts(Solid(ring))
     assert sum(area_of(part) for part in parts) == pytest.approx(abs(area_of(ring)), abs=1e-6)
     for part in parts:

@@ -160,9 +160,7 @@ def test_a_cell_is_solid_if_its_centre_is_in_a_thick_solid(points, resolution):
     # A star around the middle is simple; a hole keeps it from being drawn as a thin wall.
     polygon = points[np.argsort(np.arctan2(*(points - middle).T))]
     hole = rectangle(4.0, 4.0, 1.0, 1.0)
-    raster = Floor("star", (0.0, 0.0, 3.0, 3.0), (Solid(polygon, holes=(hole,)),)).raster(
-        resolution, 0.0, 1.0
-    )
+    raster = Floor("star", (0.0, 0.0, 3.0, 3.0), (Solid(polygon, holes=(hole,)),)).raster(resolution, 0.0, 1.0)
     at = centres(raster)
     want = (
         Outline(np.vstack([polygon, polygon[:1]]), closed=True)
@@ -174,10 +172,7 @@ def test_a_cell_is_solid_if_its_centre_is_in_a_thick_solid(points, resolution):
     share = np.clip(
         ((at[..., None, :] - edges[:, 0]) * along).sum(-1) / np.maximum((along**2).sum(-1), 1e-12), 0.0, 1.0
     )
-    clear = (
-        np.hypot(*np.moveaxis(at[..., None, :] - edges[:, 0] - share[..., None] * along, -1, 0)).min(axis=-1)
-        > 1e-6
-    )
+    clear = np.hypot(*np.moveaxis(at[..., None, :] - edges[:, 0] - share[..., None] * along, -1, 0)).min(axis=-1) > 1e-6
     within = ((at > 0.0) & (at < 3.0)).all(axis=-1)
     np.testing.assert_array_equal(raster.solid[within & clear] == 1, want[within & clear])
 
@@ -208,19 +203,12 @@ def test_no_ray_slips_through_a_thin_wall_however_it_is_turned(turn, thickness, 
 def test_a_thin_bent_wall_is_closed():
     outside = np.array([[0.0, 0.7], [1.303, 0.7], [1.303, 2.0]])
     inside = np.array([[1.3, 2.0], [1.3, 0.703], [0.0, 0.703]])
-    free = (
-        Floor("bent", (0.0, 0.0, 2.0, 2.0), (Solid(np.vstack([outside, inside])),))
-        .raster(0.05, 0.0, 1.0)
-        .solid
-        == 0
-    )
+    free = Floor("bent", (0.0, 0.0, 2.0, 2.0), (Solid(np.vstack([outside, inside])),)).raster(0.05, 0.0, 1.0).solid == 0
     assert ndimage.label(free, structure=np.ones((3, 3)))[1] == 2
 
 
 def test_a_solid_smaller_than_a_cell_leaves_a_mark():
-    raster = Floor("leg", (0.0, 0.0, 1.0, 1.0), (Solid(rectangle(0.501, 0.501, 0.004, 0.004)),)).raster(
-        0.05, 0.0, 1.0
-    )
+    raster = Floor("leg", (0.0, 0.0, 1.0, 1.0), (Solid(rectangle(0.501, 0.501, 0.004, 0.004)),)).raster(0.05, 0.0, 1.0)
     assert (raster.solid == 0).sum() == 20 * 20 - 1
 
 

@@ -54,8 +54,7 @@ def test_the_swept_space_is_what_discs_cover_from_the_start(seed, radius):
     kept = np.argwhere(labels == labels[row, column])
     i, j = np.indices(space.shape)
     near = (
-        np.hypot(i[..., None] - kept[:, 0], j[..., None] - kept[:, 1]).min(axis=-1) * raster.resolution
-        <= radius + 1e-9
+        np.hypot(i[..., None] - kept[:, 0], j[..., None] - kept[:, 1]).min(axis=-1) * raster.resolution <= radius + 1e-9
     )
     start = np.array([[(column + 0.5) * 0.05, (row + 0.5) * 0.05, 0.0]])
     np.testing.assert_array_equal(reachable_free_space(raster, radius, start), near & (raster.solid == 0))
@@ -121,9 +120,7 @@ def test_what_a_shared_raster_is_asked_again_is_kept_and_is_what_a_new_one_gives
 def test_starts_drawn_on_a_raster_that_keeps_are_those_of_a_new_one():
     raster, generator, other = read_only(two_rooms()), np.random.default_rng(3), np.random.default_rng(3)
     for _ in range(5):
-        np.testing.assert_array_equal(
-            draw_starts(raster, 0.18, 3, generator), draw_starts(two_rooms(), 0.18, 3, other)
-        )
+        np.testing.assert_array_equal(draw_starts(raster, 0.18, 3, generator), draw_starts(two_rooms(), 0.18, 3, other))
 
 
 def test_a_raster_keeps_no_more_than_it_may_and_one_that_can_be_written_to_nothing():

@@ -25,9 +25,7 @@ def test_drawn_starts_fit_keep_their_distance_and_share_the_largest_room(seed, c
 
 
 def test_the_same_seed_draws_the_same_starts():
-    first, again, other = (
-        draw_starts(two_rooms(), 0.18, 4, np.random.default_rng(seed)) for seed in (5, 5, 6)
-    )
+    first, again, other = (draw_starts(two_rooms(), 0.18, 4, np.random.default_rng(seed)) for seed in (5, 5, 6))
     np.testing.assert_array_equal(first, again)
     assert not np.array_equal(first, other)
 
@@ -44,9 +42,7 @@ def test_proposed_starts_come_first_and_choose_the_room():
     starts = draw_starts(two_rooms(), 0.18, 3, np.random.default_rng(0), proposed)
     np.testing.assert_array_equal(starts[:2], proposed)
     assert starts[2, 0] > 4.1
-    np.testing.assert_array_equal(
-        draw_starts(two_rooms(), 0.18, 1, np.random.default_rng(0), proposed), proposed[:1]
-    )
+    np.testing.assert_array_equal(draw_starts(two_rooms(), 0.18, 1, np.random.default_rng(0), proposed), proposed[:1])
 
 
 def test_a_proposed_start_too_near_to_a_wall_is_passed_over():
@@ -63,9 +59,7 @@ def test_a_proposed_start_inside_a_wall_is_refused():
 
 def test_disconnected_proposed_starts_are_refused():
     with pytest.raises(ValueError, match="disconnected"):
-        draw_starts(
-            two_rooms(), 0.18, 2, np.random.default_rng(0), np.array([[1.0, 1.0, 0.0], [5.0, 1.0, 0.0]])
-        )
+        draw_starts(two_rooms(), 0.18, 2, np.random.default_rng(0), np.array([[1.0, 1.0, 0.0], [5.0, 1.0, 0.0]]))
 
 
 def test_a_robot_that_fits_nowhere_is_refused():

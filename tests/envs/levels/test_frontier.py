@@ -32,10 +32,7 @@ def make(floor=ROOMS, **options):
 
 
 def first_offered(observations):
-    return {
-        agent: int(np.flatnonzero(observation["action_mask"])[0])
-        for agent, observation in observations.items()
-    }
+    return {agent: int(np.flatnonzero(observation["action_mask"])[0]) for agent, observation in observations.items()}
 
 
 def run(env, choose=first_offered, limit=200, seed=0):
@@ -103,9 +100,7 @@ def test_staying_and_what_the_mask_rules_out_stay():
 def test_a_number_that_is_no_candidate_is_refused(action):
     env = make(robots=1)
     env.reset(seed=0)
-    with pytest.raises(
-        ValueError, match=f"action of robot_0 is {action}; want a frontier from 0 to 31, or 32 to stay"
-    ):
+    with pytest.raises(ValueError, match=f"action of robot_0 is {action}; want a frontier from 0 to 31, or 32 to stay"):
         env.step({"robot_0": action})
 
 
@@ -164,9 +159,7 @@ def test_on_their_own_maps_robots_explore_twice():
 
     shares = []
     for shares_map in (True, False):
-        base = ExplorationEnv(
-            ROOMS, make_settings(robots=2, stop_coverage=None, horizon_s=None, map_cells=64)
-        )
+        base = ExplorationEnv(ROOMS, make_settings(robots=2, stop_coverage=None, horizon_s=None, map_cells=64))
         base.use_level("frontier", shares_map)
         run(base)
         shares.append(float((base.score.seen / base.score.counted[0]).min()))

@@ -25,9 +25,9 @@ def test_a_waypoint_is_a_share_of_half_the_maps_side_along_the_axes_of_the_frame
     env.reset(seed=0)
     start = env.unwrapped.world.poses[0, :2].copy()
     for _ in range(10):
-        info = env.step(
-            {"robot_0": np.array([0.5, 0.0], np.float32) if _ == 0 else Target(*(np.array([1.8, 0.0])))}
-        )[4]["robot_0"]
+        info = env.step({"robot_0": np.array([0.5, 0.0], np.float32) if _ == 0 else Target(*(np.array([1.8, 0.0])))})[
+            4
+        ]["robot_0"]
         if info["drive"] is DriveState.ARRIVED:
             break
     assert env.unwrapped.world.poses[0, :2] == pytest.approx(start + np.array([1.8, 0.0]), abs=0.08)
@@ -162,9 +162,7 @@ def test_after_the_end_steps_give_nothing_and_a_reset_begins_anew():
 def test_own_maps_and_the_teams_map_lead_to_different_plans():
     """Behind a wall that only the other robot has looked behind, the way is known to the team alone."""
     wall = Solid(np.array([[3.0, 0.0], [3.2, 0.0], [3.2, 3.0], [3.0, 3.0]]))
-    floor = Floor(
-        "divided", (0.0, 0.0, 6.0, 4.0), (wall,), starts=np.array([[1.0, 1.0, -1.5], [3.1, 3.5, -1.0]])
-    )
+    floor = Floor("divided", (0.0, 0.0, 6.0, 4.0), (wall,), starts=np.array([[1.0, 1.0, -1.5], [3.1, 3.5, -1.0]]))
     states = []
     for shares_map in (True, False):
         settings = make_settings(robots=2, stop_coverage=None, map_cells=32, lidar="lidar_360_6m")

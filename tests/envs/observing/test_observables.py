@@ -75,9 +75,7 @@ def test_goals_of_teammates_are_what_they_drive_to():
     poses = env.unwrapped.perception.poses
     for row, agent in enumerate(env.possible_agents):
         here = poses.pose_in_frame(row, row)[:2]
-        for entry, other in zip(
-            observations[agent]["teammates"], [k for k in range(3) if k != row], strict=True
-        ):
+        for entry, other in zip(observations[agent]["teammates"], [k for k in range(3) if k != row], strict=True):
             target = env.driver.target(other)
             in_frame = np.array([target.x, target.y]) + poses.offset(other) - poses.offset(row)
             assert np.allclose(entry[3:5], in_frame - here, atol=1e-4)

@@ -37,9 +37,7 @@ def driven(steps=15, floor="building:5", **options):
     observations, _ = env.reset(seed=2)
     generator = np.random.default_rng(0)
     for _ in range(steps):
-        observations = env.step(
-            {agent: generator.uniform(-1.0, 1.0, 2).astype(np.float32) for agent in env.agents}
-        )[0]
+        observations = env.step({agent: generator.uniform(-1.0, 1.0, 2).astype(np.float32) for agent in env.agents})[0]
     return env, observations
 
 
@@ -85,9 +83,7 @@ def test_what_is_observed_does_not_depend_on_what_else_is(names):
 
 
 @pytest.mark.parametrize("level", ["velocity", "waypoint", "frontier"])
-@pytest.mark.parametrize(
-    "observe", [["egocentric_map"], ["map", "scan"], ["bumper", "egocentric_map", "pose"]]
-)
+@pytest.mark.parametrize("observe", [["egocentric_map"], ["map", "scan"], ["bumper", "egocentric_map", "pose"]])
 @pytest.mark.parametrize("floor", ["scene_room", GOAL_FLOOR])
 def test_any_choice_is_observed_at_every_level_and_lies_in_its_space(level, observe, floor):
     env = lidarium.parallel_env(floor, level=level, robots=2, observe=observe, stop_coverage=None, **SMALL)
@@ -98,27 +94,23 @@ def test_any_choice_is_observed_at_every_level_and_lies_in_its_space(level, obse
         for agent, observation in observations.items():
             assert set(observation) == set(observe) | added | goal
             assert env.observation_space(agent).contains(observation)
-        observations = env.step(
-            {agent: 0 if level == "frontier" else np.zeros(2, np.float32) for agent in env.agents}
-        )[0]
+        observations = env.step({agent: 0 if level == "frontier" else np.zeros(2, np.float32) for agent in env.agents})[
+            0
+        ]
 
 
 def test_the_order_of_the_names_does_not_matter():
     one, other = (make_settings(observe=names) for names in (["map", "scan"], ("scan", "map")))
     assert one == other
     assert hash(one) == hash(other)
-    assert list(observation_space(one, has_goal=True).spaces) == list(
-        observation_space(other, has_goal=True).spaces
-    )
+    assert list(observation_space(one, has_goal=True).spaces) == list(observation_space(other, has_goal=True).spaces)
 
 
 def pooled(log_odds, scale):
     rows, columns = (-(-size // scale) * scale for size in log_odds.shape)
     padded = np.zeros((rows, columns), np.int8)
     padded[: log_odds.shape[0], : log_odds.shape[1]] = log_odds
-    return np.ascontiguousarray(
-        padded.reshape(rows // scale, scale, columns // scale, scale).max(axis=(1, 3))
-    )
+    return np.ascontiguousarray(padded.reshape(rows // scale, scale, columns // scale, scale).max(axis=(1, 3)))
 
 
 def test_the_egocentric_map_is_turned_about_the_corner_nearest_to_where_the_robot_believes_to_be():
@@ -170,9 +162,7 @@ def test_rows_that_are_not_active_keep_what_they_hold(observe):
         writer.write(out, np.array(active))
         for name, array in out.items():
             for row, is_active in enumerate(active):
-                assert np.array_equal(
-                    array[row], whole[name][row] if is_active else np.full_like(array[row], 77)
-                )
+                assert np.array_equal(array[row], whole[name][row] if is_active else np.full_like(array[row], 77))
 
 
 def test_threads_do_not_change_an_observation():
@@ -280,9 +270,7 @@ def test_explorers_need_no_observation_and_the_random_walk_says_which_it_needs()
         ends.append(env.world.poses)
     assert all(np.array_equal(end, ends[0]) for end in ends)
     with pytest.raises(ValueError, match=r"RandomWalk needs scan, bumper, which .* observe"):
-        run_episode(
-            RandomWalk(), ExplorationEnv("scene_room", make_settings(robots=1, observe=["pose"], **SMALL)), 1
-        )
+        run_episode(RandomWalk(), ExplorationEnv("scene_room", make_settings(robots=1, observe=["pose"], **SMALL)), 1)
 
 
 def test_a_frame_is_drawn_whatever_is_observed():

@@ -12,9 +12,7 @@ RESOLUTION = 0.05
 
 @pytest.fixture
 def env():
-    environment = ExplorationEnv(
-        "apartment", make_settings(robots=2, known_starts=False, localization="slam")
-    )
+    environment = ExplorationEnv("apartment", make_settings(robots=2, known_starts=False, localization="slam"))
     environment.reset(seed=0)
     return environment
 
@@ -32,9 +30,7 @@ def test_walls_along_the_trail_become_unknown_and_nothing_else_changes(env):
     trail = middle + np.array([(-0.4, 0.0), (0.4, 0.0), (0.4, 3.0)])
     env.perception.trails.forget_walls(0, trail)
     after = belief.map.log_odds
-    where = footprint_mask(before.shape, belief.map_origin, trail, belief.radius, RESOLUTION, 0.0) & (
-        before > 0
-    )
+    where = footprint_mask(before.shape, belief.map_origin, trail, belief.radius, RESOLUTION, 0.0) & (before > 0)
     assert where[tuple(walls[len(walls) // 2])]
     assert (after[where] == 0).all()
     assert (after[~where] == before[~where]).all()
@@ -96,9 +92,7 @@ def test_a_trail_beyond_the_map_or_of_one_place_changes_nothing(env):
     assert (belief.map.log_odds == before).all()
 
 
-@pytest.mark.parametrize(
-    "trail", [np.zeros((0, 2)), np.zeros(2), np.zeros((3, 3)), np.array([[0.0, np.nan]])]
-)
+@pytest.mark.parametrize("trail", [np.zeros((0, 2)), np.zeros(2), np.zeros((3, 3)), np.array([[0.0, np.nan]])])
 def test_what_is_no_trail_is_refused(env, trail):
     with pytest.raises(ValueError, match="want places"):
         env.perception.trails.forget_walls(0, trail)

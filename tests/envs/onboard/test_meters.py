@@ -14,9 +14,7 @@ SIMPLE = Battery(capacity_j=1000.0, idle_w=2.0, per_metre_j=5.0, per_radian_j=3.
 
 
 def hall(robots=1, **options):
-    env = lidarium.parallel_env(
-        HALL, robots=robots, lidar="lidar_360_6m", **{"stop_coverage": None, **options}
-    )
+    env = lidarium.parallel_env(HALL, robots=robots, lidar="lidar_360_6m", **{"stop_coverage": None, **options})
     env.reset(seed=1, options={"starts": [[3.0, 3.0 + 3.0 * robot, 0.0] for robot in range(robots)]})
     return env
 
@@ -73,9 +71,7 @@ def test_an_empty_battery_ends_its_robot_and_no_other():
 
 
 def test_a_decision_ends_when_a_battery_is_empty():
-    env = lidarium.parallel_env(
-        "apartment", level="waypoint", robots=1, battery=Battery(capacity_j=10.0, idle_w=10.0)
-    )
+    env = lidarium.parallel_env("apartment", level="waypoint", robots=1, battery=Battery(capacity_j=10.0, idle_w=10.0))
     env.reset(seed=1)
     env.step({"robot_0": None})
     assert env.agents == []
@@ -101,9 +97,7 @@ def test_a_battery_changes_nothing_else():
 
 def test_a_kobuki_lasts_as_long_as_its_guide_says():
     battery = BATTERIES["kobuki"]
-    assert battery.capacity_j / (battery.idle_w + 0.33 * battery.per_metre_j) == pytest.approx(
-        4.5 * 3600.0, rel=0.01
-    )
+    assert battery.capacity_j / (battery.idle_w + 0.33 * battery.per_metre_j) == pytest.approx(4.5 * 3600.0, rel=0.01)
 
 
 def test_each_episode_begins_with_a_full_battery():

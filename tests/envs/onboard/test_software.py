@@ -68,8 +68,7 @@ def explored(steps=150, seed=2, **options):
     for step in range(steps):
         if step % 15 == 0:
             actions = {
-                agent: generator.uniform([0.1, -0.5], [0.5, 0.5]).astype(np.float32)
-                for agent in env.possible_agents
+                agent: generator.uniform([0.1, -0.5], [0.5, 0.5]).astype(np.float32) for agent in env.possible_agents
             }
         observations, *_ = env.step(actions)
     return env, observations
@@ -78,13 +77,9 @@ def explored(steps=150, seed=2, **options):
 @pytest.mark.parametrize("known_starts", [True, False])
 def test_a_localizer_outside_of_the_kernels_is_as_good_as_one_within(localizers, known_starts):
     inside, seen = explored(localization="odometry", odometry="good", known_starts=known_starts, radio="none")
-    outside, also_seen = explored(
-        localization="reckoner", odometry="good", known_starts=known_starts, radio="none"
-    )
+    outside, also_seen = explored(localization="reckoner", odometry="good", known_starts=known_starts, radio="none")
     assert np.allclose(inside.simulation.beliefs.believed, outside.simulation.beliefs.believed, atol=1e-9)
-    for one, other in zip(
-        inside.simulation.beliefs.log_odds, outside.simulation.beliefs.log_odds, strict=True
-    ):
+    for one, other in zip(inside.simulation.beliefs.log_odds, outside.simulation.beliefs.log_odds, strict=True):
         assert (one != other).mean() < 1e-4
     assert seen.keys() == also_seen.keys()
 
@@ -101,9 +96,7 @@ def test_a_map_rendered_anew_at_the_same_poses_is_the_same_map(localizers):
 
 
 def test_pooled_and_navigation_maps_follow_a_rendering(localizers):
-    env, _ = explored(
-        localization="corrector", odometry="typical", observe=("egocentric_map",), noise="datasheet"
-    )
+    env, _ = explored(localization="corrector", odometry="typical", observe=("egocentric_map",), noise="datasheet")
     twin = copy.deepcopy(env)
     own = env.perception.own_map(0)
     fresh = type(own)(env.beliefs.log_odds[0], own.resolution)
@@ -123,10 +116,7 @@ def test_the_spread_of_a_belief_is_what_the_localizer_tells(localizers):
 
 def test_localizers_draw_from_the_seed_of_the_episode(localizers):
     seeds = [
-        [
-            localizer.seed
-            for localizer in explored(1, seed=seed, localization="reckoner")[0].perception.poses.localizers
-        ]
+        [localizer.seed for localizer in explored(1, seed=seed, localization="reckoner")[0].perception.poses.localizers]
         for seed in (1, 1, 2)
     ]
     assert seeds[0] == seeds[1]

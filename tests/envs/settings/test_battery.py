@@ -19,9 +19,7 @@ def test_a_kobuki_drives_for_about_as_long_as_its_guide_says():
     assert hours == pytest.approx(4.5, rel=0.02)
 
 
-@pytest.mark.parametrize(
-    ("name", "value"), [("capacity_j", 0.0), ("idle_w", -1.0), ("per_metre_j", math.nan)]
-)
+@pytest.mark.parametrize(("name", "value"), [("capacity_j", 0.0), ("idle_w", -1.0), ("per_metre_j", math.nan)])
 def test_what_no_battery_has_is_refused(name, value):
     with pytest.raises(ValueError, match=f"{name} of the battery is {value}"):
         Battery(**{name: value})

@@ -14,9 +14,7 @@ def test_faults_of_files_are_mappings():
 
 
 def test_the_capacity_is_that_of_the_robot_with_most_faults():
-    schedule = [
-        Fault(kind="dead_radio", robot=robot, at_s=float(k)) for k, robot in enumerate((0, 1, 1, 2, 1))
-    ]
+    schedule = [Fault(kind="dead_radio", robot=robot, at_s=float(k)) for k, robot in enumerate((0, 1, 1, 2, 1))]
     assert NO_FAULTS.capacity == 0
     assert FaultSettings(schedule=schedule).capacity == 3
     assert FaultSettings(schedule=schedule, stuck_wheel=0.1).capacity == 3 + MOST_DRAWN

@@ -73,9 +73,7 @@ def test_a_mixed_team_is_in_a_batch_what_it_is_alone(level):
     generator = np.random.default_rng(0)
     for _ in range(6):
         actions = (
-            np.zeros(6, np.int64)
-            if level == "frontier"
-            else generator.uniform(-1.0, 1.0, (6, 2)).astype(np.float32)
+            np.zeros(6, np.int64) if level == "frontier" else generator.uniform(-1.0, 1.0, (6, 2)).astype(np.float32)
         )
         rewards = alone.step({agent: actions[3 + k] for k, agent in enumerate(alone.possible_agents)})[1]
         _, wanted, *_ = batch.step(actions)

@@ -10,9 +10,7 @@ from lidarium.envs.settings.table import markdown_table, settings_table
 def names_of(part, prefix=""):
     for each in fields(part):
         value = getattr(part, each.name)
-        yield from (
-            names_of(value, f"{prefix}{each.name}.") if is_dataclass(value) else [f"{prefix}{each.name}"]
-        )
+        yield from (names_of(value, f"{prefix}{each.name}.") if is_dataclass(value) else [f"{prefix}{each.name}"])
 
 
 def test_every_setting_is_documented_with_its_type():

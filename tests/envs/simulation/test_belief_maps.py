@@ -35,9 +35,7 @@ def everywhere():
 
 
 @pytest.mark.parametrize("scale", [2, 4, 5])
-@given(
-    st.integers(0, 2**32 - 1), st.integers(0, 60), st.integers(0, 100), st.integers(1, 30), st.integers(1, 28)
-)
+@given(st.integers(0, 2**32 - 1), st.integers(0, 60), st.integers(0, 100), st.integers(1, 30), st.integers(1, 28))
 def test_a_mask_is_made_unknown_and_noted(scale, seed, row, column, rows, columns):
     log_odds = drawn(seed)
     before, kept = log_odds.copy(), pooled(log_odds, scale, everywhere())

@@ -114,9 +114,7 @@ def test_sharing_news_equals_a_slow_count_cell_by_cell(seed, robots):
         )
         assert new_own == (scans[k] & counted & ~owns[k]).sum()
     gains = np.zeros(robots)
-    total = share_new_cells(
-        np.array([own.ctypes.data for own in packed]), packed_team, news, 0, robots, gains
-    )
+    total = share_new_cells(np.array([own.ctypes.data for own in packed]), packed_team, news, 0, robots, gains)
     fresh = [scan & counted & ~team_seen for scan in scans]
     sharers = np.sum(fresh, axis=0)
     assert np.allclose(gains, [(1.0 / sharers[mine]).sum() for mine in fresh])

@@ -22,8 +22,7 @@ def test_a_last_line_that_breaks_off_is_dropped_with_a_warning(rows, directory_o
     episodes = read_episodes(folder)
     assert list(episodes.rows) == rows[:2]
     assert episodes.warnings == (
-        f"Line 3 of episodes.jsonl breaks off ({bytes_left} bytes) and was left out: its episode was not "
-        "finished.",
+        f"Line 3 of episodes.jsonl breaks off ({bytes_left} bytes) and was left out: its episode was not finished.",
     )
 
 

@@ -32,9 +32,7 @@ def test_numbers_under_other_keys_are_figures_too(row):
 
 
 def test_a_faster_policy_is_found_pair_by_pair(row):
-    slow = [
-        row("slow", seed, t90_s=40.0 + 7.0 * seed % 31, t99_s=60.0 + 7.0 * seed % 31) for seed in range(20)
-    ]
+    slow = [row("slow", seed, t90_s=40.0 + 7.0 * seed % 31, t99_s=60.0 + 7.0 * seed % 31) for seed in range(20)]
     fast = [
         row("fast", seed, t90_s=each["t90_s"] - 5.0 - 0.1 * seed, t99_s=each["t99_s"] - 2.0)
         for seed, each in enumerate(slow)

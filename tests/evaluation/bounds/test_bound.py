@@ -54,8 +54,7 @@ def test_no_explorer_is_faster(robots):
 def test_robots_drive_on_past_a_goal():
     with_goal = replace(TWO_ROOMS, goal=(1.4, 2.0))
     bounds = [
-        known_floor_bound(floor, settings_of(), TWO_ROOMS.starts[:1], rounds=20)
-        for floor in (TWO_ROOMS, with_goal)
+        known_floor_bound(floor, settings_of(), TWO_ROOMS.starts[:1], rounds=20) for floor in (TWO_ROOMS, with_goal)
     ]
     assert bounds[1].share >= 0.99
     assert bounds[0].time_s == bounds[1].time_s

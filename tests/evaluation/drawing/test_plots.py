@@ -25,8 +25,7 @@ def recorded(row, count):
     rows = [row("a", seed, record=f"{seed}.npz") for seed in range(count)]
     (group,) = grouped(rows)
     return group, {
-        f"{k}.npz": Entry(Path(f"{k}.npz"), np.array([(0.0, 0.0), (10.0 * (k + 1), 1.0)]))
-        for k in range(count)
+        f"{k}.npz": Entry(Path(f"{k}.npz"), np.array([(0.0, 0.0), (10.0 * (k + 1), 1.0)])) for k in range(count)
     }
 
 

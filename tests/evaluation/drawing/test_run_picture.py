@@ -11,9 +11,7 @@ from lidarium.evaluation.episodes.runner import run_episode
 
 
 def explored(policy="nearest_frontier", **options):
-    env = ExplorationEnv(
-        "apartment", make_settings(**{"robots": 2, "resolution": 0.05, "horizon_s": 10.0, **options})
-    )
+    env = ExplorationEnv("apartment", make_settings(**{"robots": 2, "resolution": 0.05, "horizon_s": 10.0, **options}))
     return run_episode(lidarium.policy(policy), env, 0)
 
 

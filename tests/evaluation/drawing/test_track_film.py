@@ -45,9 +45,7 @@ def test_records_run_side_by_side_in_step(foreign, recorded, tmp_path):
     assert share_of(film.frames[0], INK) > 0.03
 
 
-@pytest.mark.parametrize(
-    ("count", "columns", "rows"), [(1, 1, 1), (2, 2, 1), (4, 2, 2), (5, 3, 2), (9, 3, 3)]
-)
+@pytest.mark.parametrize(("count", "columns", "rows"), [(1, 1, 1), (2, 2, 1), (4, 2, 2), (5, 3, 2), (9, 3, 3)])
 def test_tiles_stand_in_rows_and_can_be_read(foreign, count, columns, rows):
     tiles = track_film._Tiles({str(k): foreign for k in range(count)}, "attic", 900, columns)
     frame = tiles.draw(10.0)

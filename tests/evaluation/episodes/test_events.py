@@ -74,9 +74,7 @@ def test_orders_and_states_are_in_the_result_with_places_in_the_floors_frame(ord
         {**first, "kind": "state", "state": "paused", "reason": "order"},
         {**first, "time_s": 0.3, "kind": "refused", "order": "explore", "reason": "paused"},
     ]
-    (refused,) = [
-        event for event in result["operating"] if event["agent"] == "robot_1" and event["kind"] == "refused"
-    ]
+    (refused,) = [event for event in result["operating"] if event["agent"] == "robot_1" and event["kind"] == "refused"]
     # Its map frame begins at (3, 9), a quarter turned.
     assert refused == {
         "time_s": 0.9,

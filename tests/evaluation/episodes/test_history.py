@@ -81,9 +81,7 @@ def test_a_sample_is_taken_at_the_start_every_decision_period_and_at_the_end():
     assert curves.times[-1] == episode.env.scorer.time
     assert curves.c_free[-1] == episode.env.scorer.coverage
     assert np.array_equal(curves.lengths[-1], episode.env.world.travelled)
-    assert len(curves.seen_once) == len(
-        [time for time in curves.times if abs(time / 2.0 - round(time / 2.0)) < 1e-9]
-    )
+    assert len(curves.seen_once) == len([time for time in curves.times if abs(time / 2.0 - round(time / 2.0)) < 1e-9])
 
 
 def test_thresholds_are_noted_in_the_step_that_reaches_them():
@@ -108,9 +106,7 @@ def test_the_last_milestone_has_what_each_map_knew(known_starts):
     truth, maps = truth_of(episode.env), maps_on_floor(episode.env)
     milestone = history.milestone(0.99)
     assert milestone.time_s == episode.env.scorer.time
-    assert milestone.known_shares == pytest.approx(
-        [cells.known_coverage(own != 0, truth.knowable) for own in maps]
-    )
+    assert milestone.known_shares == pytest.approx([cells.known_coverage(own != 0, truth.knowable) for own in maps])
     assert milestone.overlap == cells.overlap(episode.env.score.masks)
 
 

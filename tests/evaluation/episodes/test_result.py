@@ -50,9 +50,7 @@ KEYS = {
     "floor_sha256": str,
     "settings_sha256": str,
 }
-AT_THRESHOLDS = [
-    name.format(share) for name in ("t{}_s", "d{}_m", "d_sum{}_m", "n{}") for share in (85, 90, 95, 99)
-]
+AT_THRESHOLDS = [name.format(share) for name in ("t{}_s", "d{}_m", "d_sum{}_m", "n{}") for share in (85, 90, 95, 99)]
 OVER_TIME = ["overlap_eb", "overlap_mx_85", "overlap_mx_95", "overlap_mv", "rpe_m", "rpe_rad"]
 MAY_BE_NONE = [
     "horizon_s",
@@ -69,12 +67,8 @@ MAY_BE_NONE = [
 
 
 def explored(on_decision=None, **options):
-    env = ExplorationEnv(
-        "apartment", make_settings(**{"robots": 2, "resolution": 0.05, "horizon_s": 30.0, **options})
-    )
-    return run_episode(
-        lidarium.policy("nearest_frontier"), env, 0, on_decision=on_decision, raise_interrupt=False
-    )
+    env = ExplorationEnv("apartment", make_settings(**{"robots": 2, "resolution": 0.05, "horizon_s": 30.0, **options}))
+    return run_episode(lidarium.policy("nearest_frontier"), env, 0, on_decision=on_decision, raise_interrupt=False)
 
 
 def watched(on_decision=None, **options):
@@ -82,9 +76,7 @@ def watched(on_decision=None, **options):
     history = History()
     settings = make_settings(**{"robots": 2, "resolution": 0.05, "horizon_s": 30.0, **options})
     env = WatchedExploration("apartment", settings, watchers=[history])
-    episode = run_episode(
-        lidarium.policy("nearest_frontier"), env, 0, on_decision=on_decision, raise_interrupt=False
-    )
+    episode = run_episode(lidarium.policy("nearest_frontier"), env, 0, on_decision=on_decision, raise_interrupt=False)
     return episode, history, result_of(episode, history=history)
 
 
@@ -143,9 +135,7 @@ def test_the_path_to_a_threshold_is_the_one_driven_by_then():
     episode, history, result = watched(horizon_s=90.0)
     [milestone] = [milestone for milestone in history.milestones if milestone.time_s == result["t85_s"]]
     times = [time for time, _ in episode.env.scorer.track]
-    driven = path_lengths(
-        np.stack([pose for time, pose in episode.env.scorer.track if time <= milestone.time_s])
-    )
+    driven = path_lengths(np.stack([pose for time, pose in episode.env.scorer.track if time <= milestone.time_s]))
     assert result["d85_m"] == pytest.approx(driven.max(), abs=0.1)
     assert result["d_sum85_m"] == pytest.approx(driven.sum(), abs=0.2)
     assert len(times) == len(history.believed)
@@ -160,12 +150,7 @@ def test_success_is_the_coverage_that_stops_the_run():
 
 def test_robots_that_share_a_map_hold_the_same_and_others_their_own():
     shared, own = (watched(horizon_s=20.0, known_starts=known_starts)[2] for known_starts in (True, False))
-    assert (
-        shared["c_own_min_final"]
-        == shared["c_own_mean_final"]
-        > own["c_own_mean_final"]
-        > own["c_own_min_final"]
-    )
+    assert shared["c_own_min_final"] == shared["c_own_mean_final"] > own["c_own_mean_final"] > own["c_own_min_final"]
 
 
 def test_walls_that_cannot_be_touched_are_no_error_of_f1_though_they_are_of_iou():

@@ -18,9 +18,7 @@ class FirstFrontier(Policy):
         self.team = team
 
     def act(self, observations):
-        return {
-            agent: 0 if observation["action_mask"][0] else 16 for agent, observation in observations.items()
-        }
+        return {agent: 0 if observation["action_mask"][0] else 16 for agent, observation in observations.items()}
 
 
 class StopsAfter(Policy):
@@ -34,8 +32,7 @@ class StopsAfter(Policy):
     def act(self, observations):
         self.steps += 1
         return {
-            agent: Stop(f"tired of {agent}") if self.steps > 3 else np.zeros(2, np.float32)
-            for agent in observations
+            agent: Stop(f"tired of {agent}") if self.steps > 3 else np.zeros(2, np.float32) for agent in observations
         }
 
 

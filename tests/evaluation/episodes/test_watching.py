@@ -30,9 +30,7 @@ class Log(Watcher):
 
 def test_every_step_is_shown_whatever_the_level_of_the_policy():
     log = Log()
-    run_episode(
-        lidarium.policy("nearest_frontier"), WatchedExploration("apartment", SETTINGS, watchers=[log]), seed=3
-    )
+    run_episode(lidarium.policy("nearest_frontier"), WatchedExploration("apartment", SETTINGS, watchers=[log]), seed=3)
     assert log.seen[0] == ("begin", 0.0)
     assert np.allclose([time for kind, time in log.seen if kind == "step"], 0.1 * np.arange(1, 121))
     assert log.seen[-1] == ("outcome", 0)

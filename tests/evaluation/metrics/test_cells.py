@@ -90,9 +90,7 @@ def test_overlap_is_that_of_the_counts(seen):
 
 def test_the_surface_does_not_hold_the_inside_of_solids():
     occupied = mask("#### #### #### ....")
-    assert (
-        cells.surface(occupied, mask(".... .... .... ####")).tolist() == mask(".... .... #### ....").tolist()
-    )
+    assert cells.surface(occupied, mask(".... .... .... ####")).tolist() == mask(".... .... #### ....").tolist()
 
 
 def test_iou_of_a_perfect_map_is_one_and_solid_interiors_do_not_count():
@@ -130,9 +128,7 @@ def test_f1_has_precision_and_recall_within_a_cell():
     assert cells.occupied_f1(occupied, occupied) == 1.0
     # 2 of the 3 believed cells are within a cell of a true one, 2 of the 4 true ones within a cell of a
     # believed one.
-    assert cells.occupied_f1(mask("...##..#"), occupied) == pytest.approx(
-        2 * (2 / 3) * (2 / 4) / (2 / 3 + 2 / 4)
-    )
+    assert cells.occupied_f1(mask("...##..#"), occupied) == pytest.approx(2 * (2 / 3) * (2 / 4) / (2 / 3 + 2 / 4))
     assert cells.occupied_f1(mask("........"), occupied) == 0.0
     assert cells.occupied_f1(mask("........"), mask("........")) == 1.0
     assert cells.occupied_f1(mask("...##..#"), occupied, tolerance=0) == pytest.approx(

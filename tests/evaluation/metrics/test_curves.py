@@ -78,17 +78,13 @@ def test_a_map_is_drawn_over_its_floor(tmp_path):
     ranges = np.full(laser.beams, np.inf, np.float32)
     ends = hits_of_beams(walls, floor.starts, laser.angles, laser.range_max)
     own = Transform(*map(float, floor.starts[0])).inverse().apply(ends)
-    beams = np.rint((np.arctan2(own[:, 1], own[:, 0]) - laser.angle_first) / laser.angle_increment).astype(
-        int
-    )
+    beams = np.rint((np.arctan2(own[:, 1], own[:, 0]) - laser.angle_first) / laser.angle_increment).astype(int)
     ranges[beams] = np.linalg.norm(own, axis=1)
     spline_map = SplineMap()
     spline_map.update(observe(scan_points(ranges, laser)), Transform(*map(float, floor.starts[0])))
     assert wall_error(spline_map.sample(), walls).mean < 0.01
     path = np.array([(0.0, 0.0), (1.0, 1.0)])
-    save_spline_picture(
-        tmp_path / "map.png", floor, spline_map, path, path + 0.05, tree=[((0.0, 0.0), (1.0, 1.0))]
-    )
+    save_spline_picture(tmp_path / "map.png", floor, spline_map, path, path + 0.05, tree=[((0.0, 0.0), (1.0, 1.0))])
     assert (tmp_path / "map.png").read_bytes().startswith(b"\x89PNG")
     save_spline_picture(tmp_path / "blank.png", floor, SplineMap())
     assert (tmp_path / "blank.png").is_file()

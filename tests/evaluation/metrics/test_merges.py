@@ -14,9 +14,7 @@ def test_merges_are_correct_within_the_tolerances_of_m_explores_test():
     assert merges.is_correct(*merges.transform_error((0.1, 0.0, 0.009), (0.0, 0.0, 0.0)), resolution=0.05)
     assert not merges.is_correct(*merges.transform_error((0.11, 0.0, 0.0), (0.0, 0.0, 0.0)), resolution=0.05)
     assert not merges.is_correct(*merges.transform_error((0.0, 0.0, 0.011), (0.0, 0.0, 0.0)), resolution=0.05)
-    assert merges.transform_error((0.0, 0.0, np.pi - 0.001), (0.0, 0.0, 0.001 - np.pi)) == pytest.approx(
-        (0.0, 0.002)
-    )
+    assert merges.transform_error((0.0, 0.0, np.pi - 0.001), (0.0, 0.0, 0.001 - np.pi)) == pytest.approx((0.0, 0.002))
 
 
 def test_the_error_of_a_merge_is_that_where_the_maps_meet():

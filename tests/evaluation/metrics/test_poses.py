@@ -21,9 +21,7 @@ def test_a_track_in_another_frame_has_no_error_once_aligned(theta, x, seed):
     believed = poses.moved(true, np.array([x, -0.5 * x, theta]))
     assert poses.absolute_error(believed, true) == pytest.approx(0.0, abs=1e-9)
     assert poses.relative_error(believed, true, 10) == pytest.approx((0.0, 0.0), abs=1e-9)
-    assert poses.moved(believed, poses.best_transform(believed, true))[:, :2] == pytest.approx(
-        true[:, :2], abs=1e-9
-    )
+    assert poses.moved(believed, poses.best_transform(believed, true))[:, :2] == pytest.approx(true[:, :2], abs=1e-9)
 
 
 def test_absolute_error_is_the_root_mean_square_of_what_alignment_leaves():

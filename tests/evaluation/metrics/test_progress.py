@@ -23,11 +23,7 @@ def test_thresholds_are_reached_where_coverage_first_is_as_much():
     assert progress.decisions_to([0, 4, 9, 13], coverage, 0.85) == 4
     assert progress.distance_to(lengths, coverage, 0.85) == 3.0
     assert progress.distance_sum_to(lengths, coverage, 0.9) == 12.0
-    assert (
-        progress.decisions_to([0, 4, 9, 13], coverage, 1.0)
-        is progress.distance_to(lengths, coverage, 1.0)
-        is None
-    )
+    assert progress.decisions_to([0, 4, 9, 13], coverage, 1.0) is progress.distance_to(lengths, coverage, 1.0) is None
     assert progress.distance_sum_to(lengths, coverage, 1.0) is None
 
 
@@ -40,9 +36,7 @@ def test_success_is_within_the_horizon():
 
 
 def test_the_area_under_the_curve_holds_each_value_until_the_next_and_the_last_to_the_horizon():
-    assert progress.area_under_curve([0.0, 2.0, 4.0], [0.0, 0.5, 1.0], 10.0) == pytest.approx(
-        (2 * 0.5 + 6 * 1.0) / 10
-    )
+    assert progress.area_under_curve([0.0, 2.0, 4.0], [0.0, 0.5, 1.0], 10.0) == pytest.approx((2 * 0.5 + 6 * 1.0) / 10)
     assert progress.area_under_curve([0.0, 2.0, 4.0], [0.0, 0.5, 1.0], 3.0) == pytest.approx(0.5 / 3)
     assert progress.area_under_curve([1.0], [1.0], 4.0) == 0.75
     with pytest.raises(ValueError, match="horizon is 0"):

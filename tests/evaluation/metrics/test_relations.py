@@ -87,9 +87,7 @@ def test_the_absolute_error_is_that_of_evo(tmp_path):
             "its programs"
         )
     true = some_poses()
-    believed = composed(
-        np.array([1.0, 2.0, 0.7]), true + np.random.default_rng(1).normal(0.0, 0.1, true.shape)
-    )
+    believed = composed(np.array([1.0, 2.0, 0.7]), true + np.random.default_rng(1).normal(0.0, 0.1, true.shape))
     for name, poses in (("true", true), ("believed", believed)):
         write_tum(tmp_path / f"{name}.tum", np.arange(len(poses)) * 0.1, poses)
     arguments = [

@@ -53,9 +53,7 @@ def test_scans_and_odometry_are_those_of_the_robots(episode):
     assert np.array_equal(log.ranges[-1], env.simulation.ranges[1])
     assert np.allclose(log.odometry[-1], env.simulation.odometry[1], atol=1e-9)
     half = len(record.commands) // 2
-    again = drive_again(
-        replace(record, commands=record.commands[:half], header={**record.header, "endings": []})
-    )
+    again = drive_again(replace(record, commands=record.commands[:half], header={**record.header, "endings": []}))
     assert np.array_equal(log.ranges[half], again.simulation.ranges[1])
 
 

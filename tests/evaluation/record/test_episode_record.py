@@ -109,9 +109,7 @@ def test_before_the_first_sample_nothing_is_known(changes):
 
 def test_poses_and_coverage_hold_until_the_next_ones(changes):
     poses = np.arange(6.0).reshape(2, 1, 3)
-    track = DisplayTrack(
-        np.array([0.0, 0.2]), poses, np.array([[1.0, 0.25], [3.0, 0.5]]), (0.0, 0.0), 0.1, changes, []
-    )
+    track = DisplayTrack(np.array([0.0, 0.2]), poses, np.array([[1.0, 0.25], [3.0, 0.5]]), (0.0, 0.0), 0.1, changes, [])
     assert track.poses_at(-1.0).tolist() == track.poses_at(0.1).tolist() == [[0.0, 1.0, 2.0]]
     assert track.poses_at(0.2).tolist() == track.poses_at(9.0).tolist() == [[3.0, 4.0, 5.0]]
     assert [track.coverage_at(time) for time in (0.5, 1.0, 2.9, 3.0, 9.0)] == [0.0, 0.25, 0.25, 0.5, 0.5]

@@ -41,9 +41,7 @@ def assert_equal(one, other):
     for name in ("times", "poses", "coverage"):
         np.testing.assert_array_equal(getattr(one.display, name), getattr(other.display, name))
     for name in ("rows", "words", "times", "counts", "places", "known", "occupied"):
-        np.testing.assert_array_equal(
-            getattr(one.display.changes, name), getattr(other.display.changes, name)
-        )
+        np.testing.assert_array_equal(getattr(one.display.changes, name), getattr(other.display.changes, name))
     assert (one.display.origin, one.display.resolution) == (other.display.origin, other.display.resolution)
     assert one.display.events == other.display.events
 

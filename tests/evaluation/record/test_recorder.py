@@ -63,10 +63,7 @@ class Rams(Policy):
 
     def act(self, observations):
         self.steps += 1
-        return {
-            agent: np.array([1.0 if self.steps % 50 < 40 else -0.5, 0.0], np.float32)
-            for agent in observations
-        }
+        return {agent: np.array([1.0 if self.steps % 50 < 40 else -0.5, 0.0], np.float32) for agent in observations}
 
 
 @pytest.mark.parametrize(
@@ -134,9 +131,7 @@ def test_decisions_tell_where_a_robot_was_sent_and_when(recorded):
 def test_decisions_with_unknown_starts_are_in_the_floors_frame(recorded):
     record, env = recorded(known_starts=False, horizon_s=10.0)
     x_min, y_min, x_max, y_max = env.floor.bounds
-    told = [
-        event for event in record.display.events if event["kind"] == "decision" and event["x"] is not None
-    ]
+    told = [event for event in record.display.events if event["kind"] == "decision" and event["x"] is not None]
     assert {event["agent"] for event in told} == {"robot_0", "robot_1"}
     assert all(x_min <= event["x"] <= x_max and y_min <= event["y"] <= y_max for event in told)
 
@@ -145,9 +140,9 @@ def test_what_is_given_up_is_told_once_with_its_place(recorded):
     record, env = recorded(robots=3, resolution=0.025)
     told = [event for event in record.display.events if event["kind"] == "given_up"]
     assert told
-    assert len(
-        {(event["agent"], event["x"], event["y"], event["size_m"], event["reason"]) for event in told}
-    ) == len(told)
+    assert len({(event["agent"], event["x"], event["y"], event["size_m"], event["reason"]) for event in told}) == len(
+        told
+    )
     assert all(0.0 <= event["time_s"] <= env.scorer.time for event in told)
 
 
@@ -240,9 +235,7 @@ def test_each_sample_is_the_map_of_its_time(known_starts):
             sampler.sample()
             wanted[env.scorer.time] = three_levels(team_log_odds(env)[0])
             turns = generator.uniform(-1.0, 1.0, 2)
-        env.step(
-            {agent: np.array([1.0, turn], np.float32) for agent, turn in zip(env.agents, turns, strict=True)}
-        )
+        env.step({agent: np.array([1.0, turn], np.float32) for agent, turn in zip(env.agents, turns, strict=True)})
     changes = sampler.changes()
     assert changes.times.tolist() == pytest.approx(list(wanted))
     for time, levels in wanted.items():

@@ -24,9 +24,7 @@ class FirstFrontier(Policy):
         self.team = team
 
     def act(self, observations):
-        return {
-            agent: 0 if observation["action_mask"][0] else 16 for agent, observation in observations.items()
-        }
+        return {agent: 0 if observation["action_mask"][0] else 16 for agent, observation in observations.items()}
 
 
 class Leaves(Policy):
@@ -114,8 +112,7 @@ def assert_same(again, env):
         },
     ],
     ids=lambda setup: "-".join(
-        f"{value if isinstance(value, str | float | int) else type(value).__name__}"
-        for value in setup.values()
+        f"{value if isinstance(value, str | float | int) else type(value).__name__}" for value in setup.values()
     ),
 )
 def test_a_record_runs_again_to_the_bit(recorded, setup, tmp_path):

@@ -86,9 +86,7 @@ def scrub(page, share):
     slider = page.find("#replay input[type=range]")
     page.run("arguments[0].scrollIntoView({block: 'center'})", slider)
     across = round((share - 0.5) * (slider.size["width"] - 16))
-    ActionChains(page.driver).move_to_element(slider).click_and_hold().move_by_offset(
-        across, 0
-    ).release().perform()
+    ActionChains(page.driver).move_to_element(slider).click_and_hold().move_by_offset(across, 0).release().perform()
 
 
 def test_multiples_of_the_bound_have_a_column_where_there_are_any(driver, report, rows, tmp_path):
@@ -137,9 +135,7 @@ def test_charts_are_drawn_when_they_are_seen_with_their_numbers(page):
     charts = page.wait(lambda: page.find_all("#charts .uplot canvas"))
     # Of this short run no policy reached 99 %, all the same there is a profile of each time.
     assert len(charts) >= 3
-    assert all(
-        "random_walk" in each.get_attribute("aria-label") for each in page.find_all("#charts [role=img]")
-    )
+    assert all("random_walk" in each.get_attribute("aria-label") for each in page.find_all("#charts [role=img]"))
     page.find("#charts details summary").click()
     lines = page.find_all("#charts details[open] tbody tr")
     assert len(lines) == 9
@@ -290,10 +286,7 @@ def test_no_serious_fault_for_those_who_cannot_see_or_use_a_mouse(driver, report
         "axe.run(document, {resultTypes: ['violations']}).then(arguments[arguments.length - 1])"
     )
     serious = [each for each in found["violations"] if each["impact"] in ("serious", "critical")]
-    assert (
-        json.dumps([(each["id"], [node["html"][:200] for node in each["nodes"]][:3]) for each in serious])
-        == "[]"
-    )
+    assert json.dumps([(each["id"], [node["html"][:200] for node in each["nodes"]][:3]) for each in serious]) == "[]"
     assert found["passes"]
 
 

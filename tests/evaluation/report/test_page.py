@@ -103,9 +103,7 @@ def recorded_rows(floors, seeds, policies):
 
 def test_replays_are_of_all_policies_on_one_floor_then_of_the_next_floor():
     rows = recorded_rows(["apartment", "office:1", "office:2"], [0, 1], ["a", "b"])
-    records = {
-        row["record"]: Entry(None, np.zeros((0, 2))) for row in rows if row["record"] != "office:1 0 b"
-    }
+    records = {row["record"]: Entry(None, np.zeros((0, 2))) for row in rows if row["record"] != "office:1 0 b"}
     chosen = [row["record"] for row in chosen_replays(grouped(rows), records, 7)]
     assert chosen == [
         "apartment 0 a",

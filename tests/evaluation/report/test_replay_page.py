@@ -169,9 +169,7 @@ def test_poses_scans_and_beliefs_are_those_of_the_episode(apart):
     assert np.allclose(columns(streams["pose_times"], 1)[:, 0], record.display.times)
     assert np.allclose(columns(streams["coverage"], 1, 1e-6)[:, 0], record.display.coverage[:, 1], atol=1e-6)
     beams = len(header["beam_angles"])
-    ranges = (
-        np.cumsum(np.array(signed_numbers(streams["scans"])).reshape(-1, 2, beams), axis=-1) * SCAN_UNIT_M
-    )
+    ranges = np.cumsum(np.array(signed_numbers(streams["scans"])).reshape(-1, 2, beams), axis=-1) * SCAN_UNIT_M
     stride = -(-env.settings.lidar.beams // 60)
     last = env.simulation.ranges[:, ::stride]
     assert ranges.shape[0] == len(columns(streams["scan_times"], 1))

@@ -49,8 +49,7 @@ def test_a_report_has_tables_plots_and_all_their_numbers(episodes_folder, tmp_pa
     curve = group["coverage_over_time"]["random_walk"]
     assert curve["runs"] == 2
     assert all(
-        later >= sooner
-        for sooner, later in zip(curve["median_percent"], curve["median_percent"][1:], strict=False)
+        later >= sooner for sooner, later in zip(curve["median_percent"], curve["median_percent"][1:], strict=False)
     )
     assert {each["policy"] for each in group["comparisons"]} == {"random_walk", "utility_frontier"}
     assert any("fewer than 50 runs" in warning for warning in result["warnings"])
@@ -62,8 +61,7 @@ def test_without_records_their_plots_are_left_out_and_that_is_told(rows, directo
     result = write_report(directory_of(rows), tmp_path / "out", baseline="random_walk")
     assert [name.split("_")[0] for name in result["groups"][0]["pictures"]] == ["boxes", "profiles"]
     assert (
-        "There are no records in records/, so coverage over time, paths and visits are not drawn."
-        in result["warnings"]
+        "There are no records in records/, so coverage over time, paths and visits are not drawn." in result["warnings"]
     )
     assert "Compared with `random_walk`" in (tmp_path / "out" / "report.md").read_text()
 
@@ -79,9 +77,7 @@ def test_a_damaged_record_is_left_out_and_named(rows, directory_of, tmp_path, ep
     result = write_report(folder, tmp_path / "out")
     assert result["records"] == 1
     assert any(warning.startswith("The record cut.npz was left out") for warning in result["warnings"])
-    assert any(
-        "left out: it is of an episode with another policy" in warning for warning in result["warnings"]
-    )
+    assert any("left out: it is of an episode with another policy" in warning for warning in result["warnings"])
     assert any("2 of 3 episodes have no record" in warning for warning in result["warnings"])
 
 
@@ -107,9 +103,7 @@ def test_a_policy_that_is_gone_is_reported_all_the_same(rows, directory_of, tmp_
 def test_a_baseline_without_episodes_is_refused_and_nothing_written(rows, directory_of, tmp_path):
     with pytest.raises(
         ValueError,
-        match=(
-            "--baseline is 'best', of which there are no episodes; want one of nearest_frontier, random_walk"
-        ),
+        match=("--baseline is 'best', of which there are no episodes; want one of nearest_frontier, random_walk"),
     ):
         write_report(directory_of(rows), tmp_path / "out", baseline="best")
     assert not (tmp_path / "out").exists()

@@ -21,8 +21,7 @@ def test_a_group_without_its_baseline_is_not_compared_and_that_is_said(row, desc
     assert section.numbers["comparisons"] == []
     assert any("no runs of the baseline `a`" in warning for warning in section.warnings)
     assert any(
-        "time to 90 % was not reached in 1 of 2 runs of `b` (50 % censored)" in warning
-        for warning in section.warnings
+        "time to 90 % was not reached in 1 of 2 runs of `b` (50 % censored)" in warning for warning in section.warnings
     )
     assert section.numbers["by_floor"]["apartment"]["b"]["t90_s"]["reached"] == 1
     assert sorted(path.name for path in tmp_path.iterdir()) == sorted(section.numbers["pictures"])

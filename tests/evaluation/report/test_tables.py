@@ -52,9 +52,7 @@ def test_a_p_value_has_the_digits_that_matter(value, text):
 
 def test_times_are_listed_by_policy_with_those_that_got_there(row):
     runs = [row(seed=seed, t90_s=50.0 if seed else None) for seed in range(4)]
-    _, _, (policy, size, reached, success, *_) = cells(
-        times_table({"a": time_figure(runs, "t90_s", 100.0, 0)}, 100.0)
-    )
+    _, _, (policy, size, reached, success, *_) = cells(times_table({"a": time_figure(runs, "t90_s", 100.0, 0)}, 100.0))
     assert (policy, size, reached) == ("`a`", "4", "3")
     assert success.startswith("75.0 [")
 
@@ -70,11 +68,7 @@ def test_a_floor_without_a_run_of_a_policy_has_a_dash(row):
 
 
 def test_comparisons_say_how_many_pairs_are_less_more_and_the_same(row):
-    runs = [
-        row(policy, seed, path_m=[10.0 - (policy == "b") * (seed > 0)])
-        for policy in "ab"
-        for seed in range(4)
-    ]
+    runs = [row(policy, seed, path_m=[10.0 - (policy == "b") * (seed > 0)]) for policy in "ab" for seed in range(4)]
     (group,) = grouped(runs)
     values = values_of(runs)
     lines = cells(comparisons_table(compared(group, values, "a", seed=0), values))

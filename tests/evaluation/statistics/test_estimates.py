@@ -125,9 +125,7 @@ def test_the_interval_is_the_studentised_one_of_the_drawn_samples():
     ratios = [(sample.mean() - skewed.mean()) / (sample.std() / np.sqrt(60)) for sample in drawn]
     low, high = np.sort(ratios)[[5 - 1, 195 - 1]]
     found, error = mean_interval(skewed, resamples=199, seed=4), skewed.std() / np.sqrt(60)
-    assert (found.low, found.high) == pytest.approx(
-        (skewed.mean() - high * error, skewed.mean() - low * error)
-    )
+    assert (found.low, found.high) == pytest.approx((skewed.mean() - high * error, skewed.mean() - low * error))
 
 
 def test_draws_come_from_the_seed():
@@ -152,15 +150,11 @@ def test_the_interquartile_mean_is_scipys_trimmed_mean_where_quarters_are_whole(
 
 
 def test_of_six_values_the_second_and_the_fifth_count_by_half():
-    assert interquartile_mean([0.0, 1.0, 2.0, 3.0, 10.0, 100.0]) == pytest.approx(
-        (0.5 * 1 + 2 + 3 + 0.5 * 10) / 3
-    )
+    assert interquartile_mean([0.0, 1.0, 2.0, 3.0, 10.0, 100.0]) == pytest.approx((0.5 * 1 + 2 + 3 + 0.5 * 10) / 3)
 
 
 def test_an_outlier_does_not_move_the_interquartile_mean():
-    found, with_outlier = (
-        interquartile_mean_interval(values) for values in (skewed, np.append(skewed[:-1], 1e9))
-    )
+    found, with_outlier = (interquartile_mean_interval(values) for values in (skewed, np.append(skewed[:-1], 1e9)))
     assert with_outlier.estimate == pytest.approx(found.estimate, rel=0.1)
     assert with_outlier.high < 100.0
 
@@ -183,9 +177,7 @@ def test_a_paired_ratio_is_the_geometric_mean_of_ratios():
 
 
 @settings(max_examples=25)
-@given(
-    st.lists(st.floats(-100.0, 100.0), min_size=8, max_size=30), st.floats(-50.0, 50.0), st.floats(0.1, 10.0)
-)
+@given(st.lists(st.floats(-100.0, 100.0), min_size=8, max_size=30), st.floats(-50.0, 50.0), st.floats(0.1, 10.0))
 def test_intervals_move_and_stretch_with_the_values(values, shift, scale):
     sample = np.round(values, 3)
     for interval in (mean_interval, interquartile_mean_interval):

@@ -39,12 +39,10 @@ def test_known_times_have_their_plain_mean():
 
 
 def test_times_cut_at_the_horizon_count_with_the_horizon():
-    assert restricted_mean(
-        [10.0, 20.0, 100.0, 100.0], [True, True, False, False], 100.0
-    ).estimate == pytest.approx(57.5)
-    assert restricted_mean(
-        [10.0, 20.0, 300.0, 150.0], [True, True, True, False], 100.0
-    ).estimate == pytest.approx(57.5)
+    assert restricted_mean([10.0, 20.0, 100.0, 100.0], [True, True, False, False], 100.0).estimate == pytest.approx(
+        57.5
+    )
+    assert restricted_mean([10.0, 20.0, 300.0, 150.0], [True, True, True, False], 100.0).estimate == pytest.approx(57.5)
 
 
 def test_a_time_cut_early_counts_as_those_that_were_left_at_the_cut():
@@ -107,9 +105,7 @@ def test_the_error_without_ties_is_greenwoods():
     at_risk = np.array([(moment <= TIMES).sum() for moment in moments])
     ends = np.append(moments[1:], 150.0)
     right = np.cumsum((shares * (ends - moments))[::-1])[::-1]
-    assert np.sqrt((influences**2).sum()) == pytest.approx(
-        np.sqrt(np.sum(right**2 / (at_risk * (at_risk - 1))))
-    )
+    assert np.sqrt((influences**2).sum()) == pytest.approx(np.sqrt(np.sum(right**2 / (at_risk * (at_risk - 1)))))
     assert mean == pytest.approx(moments[0] + right[0])
 
 

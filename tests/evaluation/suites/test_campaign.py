@@ -27,9 +27,7 @@ def suite(**changes):
 
 def lasting(folder):
     lines = read_episodes(folder / "episodes.jsonl")
-    return {
-        line["key"]: {name: value for name, value in line.items() if name not in TIMINGS} for line in lines
-    }
+    return {line["key"]: {name: value for name, value in line.items() if name not in TIMINGS} for line in lines}
 
 
 @pytest.fixture(scope="module")
@@ -58,9 +56,7 @@ def test_a_record_of_a_campaign_runs_again(folder):
 
 
 def test_pairs_have_the_same_starts_and_seeds_other_ones(folder):
-    starts = {
-        (line["policy"], line["seed"]): line["starts"] for line in read_episodes(folder / "episodes.jsonl")
-    }
+    starts = {(line["policy"], line["seed"]): line["starts"] for line in read_episodes(folder / "episodes.jsonl")}
     assert starts["nearest_frontier", 0] == starts["random_walk", 0] != starts["nearest_frontier", 1]
 
 
@@ -105,9 +101,7 @@ def test_a_folder_that_is_removed_meanwhile_ends_the_campaign(tmp_path, workers)
 
 
 @pytest.mark.parametrize("records", [True, False])
-def test_a_full_disk_ends_the_campaign_at_its_first_write_and_the_next_goes_on(
-    folder, tmp_path, monkeypatch, records
-):
+def test_a_full_disk_ends_the_campaign_at_its_first_write_and_the_next_goes_on(folder, tmp_path, monkeypatch, records):
     before, calls = os.fsync, []
 
     def full(handle):

@@ -11,9 +11,7 @@ from lidarium.evaluation.suites.presets import PRESETS, preset_named, preset_sui
 @pytest.mark.parametrize("name", PRESETS)
 def test_a_preset_runs_and_has_the_figures_that_its_project_prints(name, shared_data):
     whole = preset_suite(name, ("nearest_frontier",), (0,), shared_data)
-    short = replace(
-        whole, floors=whole.floors[:1], variants={name: {**whole.variants[name], "horizon_s": 4.0}}
-    )
+    short = replace(whole, floors=whole.floors[:1], variants={name: {**whole.variants[name], "horizon_s": 4.0}})
     line = run_trial(short, next(short.trials()))
     assert {figure for figure in preset_named(name).figures if figure not in line} == set()
     assert line["time_s"] <= 4.0 + 1e-6

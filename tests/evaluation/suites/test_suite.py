@@ -71,11 +71,7 @@ def test_variants_add_to_the_common_settings(tmp_path):
 def test_given_starts_are_taken_in_place_of_drawn_ones(tmp_path):
     (tmp_path / "suite.toml").write_text(TOML)
     made = read_suite(tmp_path / "suite.toml")
-    by_floor = {
-        trial.floor: made.starts_of(trial)
-        for trial in made.trials()
-        if trial.robots == 1 and trial.start != 1
-    }
+    by_floor = {trial.floor: made.starts_of(trial) for trial in made.trials() if trial.robots == 1 and trial.start != 1}
     assert by_floor["apartment"] == [[1.0, 1.5, 0.0]]
     assert by_floor["building:3000000"] is None
 

@@ -49,9 +49,7 @@ def test_steps_between_two_counts_are_all_taken_in(options):
             held = free_as_held(env, maps) & truth.counted
             found = tally.counts[-1:, 2] if tally.shares else tally.counts[:-1, 2]
             assert set(held.sum(axis=(1, 2)).tolist()) == set(found.tolist())
-            assert tally.known_shares == pytest.approx(
-                [cells.known_coverage(own != 0, truth.knowable) for own in maps]
-            )
+            assert tally.known_shares == pytest.approx([cells.known_coverage(own != 0, truth.knowable) for own in maps])
 
 
 def test_what_has_not_been_taken_in_is_not_counted():

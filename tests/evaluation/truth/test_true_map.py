@@ -28,8 +28,7 @@ def at(env, x, y):
     """Return the row and column of a place."""
     origin = env.world.floors[0].laser.origin
     return tuple(
-        int((value - corner) / env.settings.occupancy.resolution)
-        for value, corner in ((y, origin[1]), (x, origin[0]))
+        int((value - corner) / env.settings.occupancy.resolution) for value, corner in ((y, origin[1]), (x, origin[0]))
     )
 
 

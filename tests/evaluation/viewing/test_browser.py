@@ -51,9 +51,7 @@ def page(driver):
 
 def says(page, text):
     """Whether a button says something."""
-    return text in page.run(
-        "return [...document.querySelectorAll('button')].map(each => each.innerText.trim())"
-    )
+    return text in page.run("return [...document.querySelectorAll('button')].map(each => each.innerText.trim())")
 
 
 def picture(page):

@@ -344,9 +344,7 @@ def test_names_are_shown_as_text():
 
 
 def test_what_a_station_did_is_listed_last_things_first():
-    settings = make_settings(
-        robots=2, horizon_s=60.0, resolution=0.05, known_starts=False, localization="slam"
-    )
+    settings = make_settings(robots=2, horizon_s=60.0, resolution=0.05, known_starts=False, localization="slam")
     policy, env = lidarium.policy("supervised"), WatchedExploration("apartment", settings)
     run_episode(policy, env, 0)
     report = policy.report()

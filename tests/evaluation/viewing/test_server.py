@@ -69,9 +69,7 @@ def test_a_port_in_use_is_named():
         other.bind((HOST, 0))
         other.listen()
         port = other.getsockname()[1]
-        with pytest.raises(
-            OSError, match=f"port {port} of 127.0.0.1 cannot be used: .*; want another --view-port"
-        ):
+        with pytest.raises(OSError, match=f"port {port} of 127.0.0.1 cannot be used: .*; want another --view-port"):
             view_server(port).__enter__()
 
 

@@ -130,9 +130,7 @@ def test_parameters_that_contradict_a_sick_are_not_believed(tmp_path):
 
 
 FLASER = "FLASER 3 1.0 2.0 3.0 0.5 0.6 0.1 0.4 0.5 0.2 12.5 host 12.6"
-ROBOTLASER = (
-    "ROBOTLASER1 0 -1.0 2.0 1.0 30.0 0.1 0 3 1.0 2.0 3.0 1 9 0.5 0.6 0.1 0.4 0.5 0.2 1 2 3 4 5 13.5 host 13.6"
-)
+ROBOTLASER = "ROBOTLASER1 0 -1.0 2.0 1.0 30.0 0.1 0 3 1.0 2.0 3.0 1 9 0.5 0.6 0.1 0.4 0.5 0.2 1 2 3 4 5 13.5 host 13.6"
 
 
 def said(*lines):
@@ -252,8 +250,7 @@ def odom(stamp, x=0.0, y=0.0, theta=0.0):
 def robotlaser(stamp, ranges, laser=(0.1, 0.0, 0.0), robot=(0.0, 0.0, 0.0), max_range=8.0):
     step = math.pi / (len(ranges) - 1)
     head = (
-        f"ROBOTLASER1 0 {-math.pi / 2} {math.pi} {step} {max_range} 0.01 0 {len(ranges)} "
-        f"{' '.join(map(str, ranges))}"
+        f"ROBOTLASER1 0 {-math.pi / 2} {math.pi} {step} {max_range} 0.01 0 {len(ranges)} {' '.join(map(str, ranges))}"
     )
     return f"{head} 0 {' '.join(map(str, (*laser, *robot)))} 0 0 0.1 0.1 0 {stamp} host {stamp}\n"
 

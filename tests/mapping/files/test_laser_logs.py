@@ -84,9 +84,7 @@ def test_a_full_circle_is_turned_so_that_it_begins_behind():
 
 def test_a_shorter_laser_sees_that_the_way_is_free():
     log = recording().limited(2.2, clears_without_return=True)
-    np.testing.assert_array_equal(
-        log.ranges, [[1.0, math.inf, math.nan, 2.0], [1.5, math.inf, math.inf, math.inf]]
-    )
+    np.testing.assert_array_equal(log.ranges, [[1.0, math.inf, math.nan, 2.0], [1.5, math.inf, math.inf, math.inf]])
     assert log.geometry.range_max == 2.2
     silent = recording().limited(9.0, clears_without_return=False)
     np.testing.assert_array_equal(silent.ranges, [[1.0, math.nan, math.nan, 2.0], [1.5, 2.5, 3.5, math.nan]])

@@ -45,9 +45,7 @@ def test_thresholds_are_of_occupancy_and_are_themselves_unknown():
 
 def test_a_grey_that_stands_for_unknown_is_that_whatever_the_thresholds():
     shades = np.array([[204.0, 205.0, 205.6]])
-    assert _levels_of(shades, negate=False, low=0.3, high=0.65, unknown=205).tolist() == [
-        [FREE, UNKNOWN, FREE]
-    ]
+    assert _levels_of(shades, negate=False, low=0.3, high=0.65, unknown=205).tolist() == [[FREE, UNKNOWN, FREE]]
 
 
 def test_raw_pixels_are_percent_of_occupancy():
@@ -195,9 +193,7 @@ def test_other_float_pixels_are_refused_by_the_name_of_the_file(tmp_path, value)
         read_ros_map(path)
 
 
-@pytest.mark.parametrize(
-    "name", ["/home/user/maps/map.pgm", "maps/map.pgm", "~/map.pgm", r"C:\robot\maps\map.pgm"]
-)
+@pytest.mark.parametrize("name", ["/home/user/maps/map.pgm", "maps/map.pgm", "~/map.pgm", r"C:\robot\maps\map.pgm"])
 def test_an_image_beside_the_header_is_used_where_its_path_leads_nowhere(tmp_path, caplog, name):
     path = write(tmp_path, greys())
     header = yaml.safe_load(path.read_text())
@@ -255,11 +251,7 @@ def write_of_map_files(folder, pixels, **changes):
 
 
 @settings(max_examples=25)
-@given(
-    arrays(
-        np.uint8, array_shapes(min_dims=2, max_dims=2, max_side=20), elements=st.sampled_from([0, 127, 255])
-    )
-)
+@given(arrays(np.uint8, array_shapes(min_dims=2, max_dims=2, max_side=20), elements=st.sampled_from([0, 127, 255])))
 def test_a_map_written_reads_back_the_same(tmp_path_factory, levels):
     folder = tmp_path_factory.mktemp("maps")
     path = write_ros_map(folder, "office", levels, (-1.25, 3.5, 0.25), 0.05)

@@ -77,9 +77,7 @@ def test_least_squares_want_pairs():
 @given(POSES, POSES)
 def test_half_way_lies_between(a, b):
     middle = halfway(a, b, (1.0, 1.0))
-    np.testing.assert_allclose(
-        middle.apply((1.0, 1.0)), 0.5 * (a.apply((1.0, 1.0)) + b.apply((1.0, 1.0))), atol=1e-9
-    )
+    np.testing.assert_allclose(middle.apply((1.0, 1.0)), 0.5 * (a.apply((1.0, 1.0)) + b.apply((1.0, 1.0))), atol=1e-9)
     assert middle.difference(a)[1] == pytest.approx(middle.difference(b)[1], abs=1e-9)
 
 

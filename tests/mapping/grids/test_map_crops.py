@@ -21,8 +21,7 @@ def levels_around(log_odds, row, column, scale, half):
     padding = 2 * half + 400
     around = np.pad(pooled_levels(log_odds, scale), padding, constant_values=UNKNOWN)
     row, column = (
-        min(max(math.floor(value / scale + 0.5), -300 - half), 300 + half) + padding
-        for value in (row, column)
+        min(max(math.floor(value / scale + 0.5), -300 - half), 300 + half) + padding for value in (row, column)
     )
     return around[row - half : row + half, column - half : column + half]
 
@@ -38,18 +37,14 @@ def turned(log_odds, row, column, heading, scale, cells):
     return pooled[(y >> 16) + half, (x >> 16) + half]
 
 
-@given(
-    row=st.integers(-40, 80), column=st.integers(-40, 170), half=st.integers(1, 32), seed=st.integers(0, 99)
-)
+@given(row=st.integers(-40, 80), column=st.integers(-40, 170), half=st.integers(1, 32), seed=st.integers(0, 99))
 @settings(max_examples=100)
 def test_a_crop_is_what_numpy_cuts_out_unknown_outside(row, column, half, seed):
     log_odds = np.random.default_rng(seed).integers(-3, 4, (40, 128)).astype(np.int8)
     cut = np.full((2 * half, 2 * half), 99, np.uint8)
     crop_levels(log_odds, row, column, cut)
     padded = np.pad(log_odds, 200)
-    expected = three_levels(
-        padded[200 + row - half : 200 + row + half, 200 + column - half : 200 + column + half]
-    )
+    expected = three_levels(padded[200 + row - half : 200 + row + half, 200 + column - half : 200 + column + half])
     assert np.array_equal(cut, expected)
 
 

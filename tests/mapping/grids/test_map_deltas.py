@@ -38,18 +38,14 @@ def test_changes_lead_from_map_to_map(seed, robots, rows, words, share):
         told[1, changes[:, 0].astype(np.int64)] ^= changes[:, 2]
         want = levels_of_sum(np.sum(maps, axis=0, dtype=np.int64))
         np.testing.assert_array_equal(levels_of_planes(known, occupied), want)
-        np.testing.assert_array_equal(
-            levels_of_planes(*told.reshape(2, words, rows).transpose(0, 2, 1)), want
-        )
+        np.testing.assert_array_equal(levels_of_planes(*told.reshape(2, words, rows).transpose(0, 2, 1)), want)
 
 
 def test_only_what_robots_can_have_seen_is_looked_at():
     log_odds = np.full((200, 256), -1, np.int8)
     known, occupied, buffer = blank_planes(200, 4)
     poses, last = np.array([[5.0, 5.0, 0.0]]), np.array([[4.0, 6.0]])
-    count = note_changes(
-        records_of([log_odds]), poses, last, 1.0, np.array([0.0, 0.0, 0.1]), known, occupied, buffer
-    )
+    count = note_changes(records_of([log_odds]), poses, last, 1.0, np.array([0.0, 0.0, 0.1]), known, occupied, buffer)
     seen = np.argwhere(levels_of_planes(known, occupied) == 255)
     # Rows from 4 to 7 m; columns from 3 to 6 m, in whole words of 6.4 m.
     assert seen.min(axis=0).tolist() == [40, 0]

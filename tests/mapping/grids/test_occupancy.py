@@ -25,9 +25,7 @@ def rooms(generator, rows=70, columns=90):
     solid[0], solid[-1], solid[:, 0], solid[:, -1] = True, True, True, True
     for _ in range(6):
         row, column = generator.integers(2, rows - 4), generator.integers(2, columns - 4)
-        height, width = (int(generator.integers(2, 30)), int(generator.integers(1, 4)))[
-            :: generator.choice([-1, 1])
-        ]
+        height, width = (int(generator.integers(2, 30)), int(generator.integers(1, 4)))[:: generator.choice([-1, 1])]
         solid[row : row + height, column : column + width] = True
     return solid
 
@@ -86,9 +84,7 @@ def test_a_closed_room_is_seen_whole_and_nothing_beyond_its_walls():
     solid[0], solid[-1], solid[:, 0], solid[:, -1] = True, True, True, True
     geometry = ScanGeometry(beams=2000, field_of_view=2.0 * math.pi, range_max=5.0)
     grid = OccupancyGrid(OccupancySettings(resolution=RESOLUTION))
-    grid.integrate(
-        (1.013, 0.987, 0.1), exact_ranges(solid, 1.013, 0.987, 0.1 + geometry.angles, 5.0), geometry
-    )
+    grid.integrate((1.013, 0.987, 0.1), exact_ranges(solid, 1.013, 0.987, 0.1 + geometry.angles, 5.0), geometry)
     levels = cells_on_truth(grid, solid)
     assert (levels[1:-1, 1:-1] == FREE).all()
     corners = np.zeros_like(solid)
@@ -105,9 +101,7 @@ def test_each_cell_changes_at_most_once_a_scan_by_hit_or_miss_within_the_bounds(
     settings_ = OccupancySettings(resolution=RESOLUTION)
     hit, miss, minimum, maximum = (int(value) for value in settings_.increments)
     grid = OccupancyGrid(settings_)
-    geometry = ScanGeometry(
-        beams=60, field_of_view=generator.choice([1.5, 4.0, 2.0 * math.pi]), range_max=1.5
-    )
+    geometry = ScanGeometry(beams=60, field_of_view=generator.choice([1.5, 4.0, 2.0 * math.pi]), range_max=1.5)
     pose = (*generator.uniform(-0.5, 0.5, 2), generator.uniform(-3.0, 3.0))
     for _ in range(14):
         ranges = generator.uniform(0.05, 1.6, 60).astype(np.float32)
@@ -120,9 +114,7 @@ def test_each_cell_changes_at_most_once_a_scan_by_hit_or_miss_within_the_bounds(
         changed = after != before
         assert np.isin(
             after[changed],
-            np.concatenate(
-                [np.minimum(before[changed] + hit, maximum), np.maximum(before[changed] - miss, minimum)]
-            ),
+            np.concatenate([np.minimum(before[changed] + hit, maximum), np.maximum(before[changed] - miss, minimum)]),
         ).all()
         raised, lowered = after > before, after < before
         assert (after[raised] == np.minimum(before[raised] + hit, maximum)).all()

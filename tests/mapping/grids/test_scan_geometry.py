@@ -73,9 +73,7 @@ def test_every_beam_that_meets_a_disc_is_in_the_range_of_beams(heading):
         begin, count = beams_towards(x, y, radius, heading, geometry.angle_first, geometry.angle_increment)
         turned = geometry.angles + heading
         aside = np.abs(np.cos(turned) * y - np.sin(turned) * x)
-        is_met = (aside <= radius) & (np.cos(turned) * x + np.sin(turned) * y > 0.0) | (
-            math.hypot(x, y) <= radius
-        )
+        is_met = (aside <= radius) & (np.cos(turned) * x + np.sin(turned) * y > 0.0) | (math.hypot(x, y) <= radius)
         offset = (np.arange(360) - begin) % 360.0
         assert ((offset <= count + 0.02) | (offset >= 359.98))[is_met].all()
         assert count <= is_met.sum() + 1.1 or math.hypot(x, y) <= radius

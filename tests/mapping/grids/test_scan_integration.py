@@ -108,10 +108,7 @@ def settled_one_by_one(log_odds, x, y, lengths, directions, is_hit, deviation, s
             continue
         at = end
         while at >= max(end - DEVIATIONS * max(deviation, share * end) - 1.0, 0.0):
-            if (
-                level(math.floor(y + at * directions[1, beam]), math.floor(x + at * directions[0, beam]))
-                >= occupied
-            ):
+            if level(math.floor(y + at * directions[1, beam]), math.floor(x + at * directions[0, beam])) >= occupied:
                 result[beam] = at
                 break
             at -= STEP
@@ -126,9 +123,7 @@ def settled_one_by_one(log_odds, x, y, lengths, directions, is_hit, deviation, s
     shares=st.sampled_from([(0.0, 0.1), (0.02, 0.1), (0.3, 0.3), (0.9, 0.05)]),
     noise=st.sampled_from([(0.5, 0.0), (2.0, 0.0), (0.2, 0.05)]),
 )
-def test_returns_settle_as_told_beam_by_beam_at_the_border_and_beyond_it_too(
-    seed, rows, columns, shares, noise
-):
+def test_returns_settle_as_told_beam_by_beam_at_the_border_and_beyond_it_too(seed, rows, columns, shares, noise):
     generator = np.random.default_rng(seed)
     log_odds = generator.choice(
         np.array([-20, 0, 20], np.int8), (rows, columns), p=[shares[0], 1.0 - sum(shares), shares[1]]

@@ -31,9 +31,7 @@ def fill(ranges, geometry, heading, x, y, reach):
     bits = np.zeros((window_rows(reach), window_words(reach)), np.uint64)
     lengths, ends = np.asarray(ranges, np.float64), np.empty((2, geometry.beams))
     scan_ends(lengths, directions, x, y, ends)
-    box = fill_scan_polygon(
-        lengths, directions, ends, x, y, geometry.angle_increment, geometry.is_full_circle, bits
-    )
+    box = fill_scan_polygon(lengths, directions, ends, x, y, geometry.angle_increment, geometry.is_full_circle, bits)
     return np.unpackbits(bits.view(np.uint8), axis=1, bitorder="little").astype(bool), box[:2], directions
 
 
@@ -61,9 +59,7 @@ def inside_by_rows(shape, corners):
     for row in range(shape[0]):
         y = row + 0.5
         crosses = (ay < y) != (by < y)
-        at = np.sort(
-            ax[crosses] + (y - ay[crosses]) * (bx[crosses] - ax[crosses]) / (by[crosses] - ay[crosses])
-        )
+        at = np.sort(ax[crosses] + (y - ay[crosses]) * (bx[crosses] - ax[crosses]) / (by[crosses] - ay[crosses]))
         inside[row] = np.searchsorted(at, centres, side="right") % 2 == 1
         unsure[row] = np.searchsorted(at, centres + 1e-7) != np.searchsorted(at, centres - 1e-7)
     return inside, unsure
@@ -113,9 +109,7 @@ def test_the_seen_area_is_the_polygon_of_its_definition_cell_by_cell(beams, view
 @settings(max_examples=30)
 def test_the_rows_told_hold_all_bits(seed):
     generator = np.random.default_rng(seed)
-    geometry = ScanGeometry(
-        beams=120, field_of_view=generator.choice([1.0, 4.0, 2.0 * math.pi]), range_max=30.0
-    )
+    geometry = ScanGeometry(beams=120, field_of_view=generator.choice([1.0, 4.0, 2.0 * math.pi]), range_max=30.0)
     ranges = generator.uniform(0.0, 30.0, 120)
     seen, (low, high), _ = fill(ranges, geometry, generator.uniform(-4.0, 4.0), 40.3, 33.6, 30.0)
     assert not seen[:low].any()
@@ -129,8 +123,7 @@ def test_nothing_is_claimed_behind_an_edge():
     seen, _, _ = fill(ranges, geometry, 0.0, 70.5, 70.5, 60.0)
     # The edge lies between the beams at -1 and 0 degrees; everything below belongs to the near surface.
     below = [
-        (70 + int(r * math.sin(math.radians(-1.5))), 70 + int(r * math.cos(math.radians(-1.5))))
-        for r in range(14, 48)
+        (70 + int(r * math.sin(math.radians(-1.5))), 70 + int(r * math.cos(math.radians(-1.5)))) for r in range(14, 48)
     ]
     assert not any(seen[row, column] for row, column in below if row < 70)
     assert seen[70 + 5, 70 + 40]
@@ -261,9 +254,7 @@ def test_an_edge_toggles_the_first_cell_centre_to_its_right_in_each_row_that_it_
         np.testing.assert_array_equal(found, expected)
 
 
-@pytest.mark.parametrize(
-    "corners", [[(10, 3), (90, 5), (40, 20)], [(5.5, 2.5), (60.5, 2.5), (60.5, 15), (5.5, 15)]]
-)
+@pytest.mark.parametrize("corners", [[(10, 3), (90, 5), (40, 20)], [(5.5, 2.5), (60.5, 2.5), (60.5, 15), (5.5, 15)]])
 def test_edges_of_a_polygon_toggle_its_inside_row_by_row(corners):
     # A cell whose centre lies on an edge is not right of it.
     edges = [(*a, *b) for a, b in zip(corners, [*corners[1:], corners[0]], strict=True) if a[1] != b[1]]

@@ -182,9 +182,7 @@ sys.exit(main())
 
 
 def test_commands_work_without_a_home_and_without_an_entry_of_the_user(tmp_path):
-    kept = {
-        name: value for name, value in os.environ.items() if name not in ("HOME", "XDG_CACHE_HOME", "USER")
-    }
+    kept = {name: value for name, value in os.environ.items() if name not in ("HOME", "XDG_CACHE_HOME", "USER")}
     arguments = ["floors", "generate", "--out", str(tmp_path / "out")]
     told = subprocess.run(
         [sys.executable, "-c", PROGRAM, *arguments],

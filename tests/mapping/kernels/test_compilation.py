@@ -18,9 +18,7 @@ from lidarium.mapping.kernels.views import scratch_grid, scratch_vector
 
 ROOT = Path(compilation.__file__).resolve().parents[2]
 SOURCES = {
-    path: path.read_text()
-    for folder in compilation.PACKAGE_FOLDERS
-    for path in sorted((ROOT / folder).rglob("*.py"))
+    path: path.read_text() for folder in compilation.PACKAGE_FOLDERS for path in sorted((ROOT / folder).rglob("*.py"))
 }
 
 
@@ -117,8 +115,7 @@ def test_every_file_whose_constants_or_kernels_a_kernel_uses_is_in_the_cache_key
     for path in with_kernels:
         tree = ast.parse(SOURCES[path])
         imported = {
-            alias.asname or alias.name: ROOT
-            / (node.module.removeprefix("lidarium.").replace(".", "/") + ".py")
+            alias.asname or alias.name: ROOT / (node.module.removeprefix("lidarium.").replace(".", "/") + ".py")
             for node in ast.walk(tree)
             if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("lidarium.")
             for alias in node.names
@@ -172,9 +169,7 @@ def test_indices_are_checked_where_that_is_asked_for(tmp_path):
     for asked, ends in (("0", "2.0"), ("1", "IndexError")):
         cache = str(tmp_path / asked)
         environment = {**os.environ, "NUMBA_BOUNDSCHECK": asked, "NUMBA_CACHE_DIR": cache}
-        result = subprocess.run(
-            [sys.executable, str(script)], capture_output=True, text=True, env=environment
-        )
+        result = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, env=environment)
         assert ends in result.stdout + result.stderr
 
 
@@ -198,9 +193,7 @@ def test_a_cache_folder_that_the_user_chose_is_used(tmp_path):
     )
     chosen = tmp_path / "cache"
     environment = {**os.environ, "NUMBA_CACHE_DIR": str(chosen)}
-    result = subprocess.run(
-        [sys.executable, str(script)], capture_output=True, text=True, env=environment, check=True
-    )
+    result = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, env=environment, check=True)
     assert result.stdout.split() == ["2", "True"]
     assert list(chosen.rglob("*.nbi"))
 
@@ -243,9 +236,7 @@ def test_kernels_are_compiled_anew_where_nothing_can_be_written(tmp_path):
         "print(one_more(1), compilation._CAN_CACHE)\n"
     )
     environment = {name: value for name, value in os.environ.items() if name != "NUMBA_CACHE_DIR"}
-    result = subprocess.run(
-        [sys.executable, str(script)], capture_output=True, text=True, env=environment, check=True
-    )
+    result = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, env=environment, check=True)
     assert result.stdout.split() == ["2", "False"]
 
 
@@ -273,15 +264,11 @@ def test_nothing_is_loaded_from_a_folder_that_another_user_made_before(tmp_path)
     os.chown(planted, 65534, 65534)
     script = tmp_path / "planted.py"
     script.write_text(PLANTED)
-    result = subprocess.run(
-        [sys.executable, str(script)], capture_output=True, text=True, env=environment, check=True
-    )
+    result = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, env=environment, check=True)
     assert result.stdout.split() == ["2", "None", "False"]
     assert not list(planted.iterdir())
     planted.rmdir()
-    result = subprocess.run(
-        [sys.executable, str(script)], capture_output=True, text=True, env=environment, check=True
-    )
+    result = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, env=environment, check=True)
     assert result.stdout.split()[1].startswith(str(planted / "kernels"))
     assert planted.stat().st_mode & 0o777 == 0o700
     for folder in (each for each in (tmp_path / "place").rglob("*") if each.is_dir()):
@@ -296,9 +283,7 @@ def test_kernels_that_borrow_arrays_leave_their_count_as_it_was():
     assert sys.getrefcount(values) == before
 
 
-@pytest.mark.parametrize(
-    ("given", "wanted", "spins"), [(None, "passive", "2000"), ("active", "active", None)]
-)
+@pytest.mark.parametrize(("given", "wanted", "spins"), [(None, "passive", "2000"), ("active", "active", None)])
 def test_threads_hardly_spin_where_nobody_has_said_otherwise(given, wanted, spins):
     """OpenMP says what it was given when it is loaded, with the first threads."""
     code = "\n".join(
@@ -319,9 +304,7 @@ def test_threads_hardly_spin_where_nobody_has_said_otherwise(given, wanted, spin
     if given is not None:
         environment["OMP_WAIT_POLICY"] = given
     environment["OMP_DISPLAY_ENV"] = "true"
-    result = subprocess.run(
-        [sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=False
-    )
+    result = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=False)
     if "No module named" in result.stderr or "omppool" in result.stderr:
         pytest.skip("numba has no OpenMP here")
     assert result.returncode == 0, result.stderr

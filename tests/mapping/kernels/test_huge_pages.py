@@ -58,9 +58,7 @@ def resident():
     return next(int(line.split()[1]) * 1024 for line in status.splitlines() if line.startswith("VmRSS"))
 
 
-@pytest.mark.skipif(
-    not Path("/proc/self/status").exists(), reason="the system does not tell how much memory is in use"
-)
+@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="the system does not tell how much memory is in use")
 @pytest.mark.parametrize("expected", [0, LARGEST_PIECE])
 def test_what_is_not_touched_takes_no_room(expected):
     before = resident()

@@ -81,9 +81,7 @@ def test_a_body_that_has_not_moved_covers_a_disc_where_it_stands():
     area = stand.sum() * RESOLUTION**2
     assert 0.8 * np.pi * RADIUS**2 < area < 1.5 * np.pi * RADIUS**2
     rows, columns = np.nonzero(stand)
-    np.testing.assert_allclose(
-        (np.mean([columns, rows], axis=1) + 0.5) * RESOLUTION + ORIGIN, TRAIL[0], atol=0.03
-    )
+    np.testing.assert_allclose((np.mean([columns, rows], axis=1) + 0.5) * RESOLUTION + ORIGIN, TRAIL[0], atol=0.03)
 
 
 def test_no_trail_covers_nothing():

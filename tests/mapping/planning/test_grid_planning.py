@@ -16,9 +16,7 @@ from lidarium.mapping.planning.search.path_search import SearchSpace
 
 
 @settings(max_examples=40)
-@given(
-    seed=SEEDS, radius=st.sampled_from([0.0, 0.03, 0.05, 0.0625]), penalty=st.sampled_from([0.0, 3.0, 40.0])
-)
+@given(seed=SEEDS, radius=st.sampled_from([0.0, 0.03, 0.05, 0.0625]), penalty=st.sampled_from([0.0, 3.0, 40.0]))
 def test_costs_are_those_of_dijkstra_over_the_explicit_graph(seed, radius, penalty):
     footprint = Footprint(radius, radius + 0.1, penalty)
     belief = random_belief(seed)
@@ -95,9 +93,7 @@ def touches_nothing(line, belief, radius):
 def test_a_passage_is_taken_exactly_where_the_disc_fits(width, fits):
     belief = np.full((60, 80), -5, np.int8)
     belief[:, 40:48] = 9
-    belief[
-        20 : 20 + width, 40:48
-    ] = -5  # 15 cells of 0.025 m hold a disc of 0.36 m at a cell's centre, 14 do not
+    belief[20 : 20 + width, 40:48] = -5  # 15 cells of 0.025 m hold a disc of 0.36 m at a cell's centre, 14 do not
     space, field = made(belief)
     found = plan(space, belief, field, (30, 10), (30, 70), Footprint(0.18, 0.33))
     assert (found is not None) == fits
@@ -107,9 +103,7 @@ def test_a_passage_at_45_degrees_is_taken_where_the_disc_fits():
     rows, columns = np.indices((90, 90))
     belief = np.where(np.abs(rows - columns) <= 11, -5, 9).astype(np.int8)
     space, field = made(belief)
-    assert (
-        field.at((45, 46)) < 0.193 < field.at((45, 45))
-    )  # only the cells of the diagonal itself hold the disc
+    assert field.at((45, 46)) < 0.193 < field.at((45, 45))  # only the cells of the diagonal itself hold the disc
     found = plan(space, belief, field, (20, 20), (70, 70), Footprint(0.193, 0.33))
     assert found is not None
     assert touches_nothing(found[1], belief, 0.193 / RESOLUTION)

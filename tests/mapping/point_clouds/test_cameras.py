@@ -75,9 +75,7 @@ def test_depth_images_become_points_of_the_map(suffix, tmp_path):
     cv2.imwrite(str(path), image)
     optical = [[0.0, -0.005, 1.0], [-0.02, 0.01, 2.0]]
     assert read_cloud(path, intrinsics=PINHOLE_OF_DEPTH_IMAGES).points == pytest.approx(np.array(optical))
-    assert read_depth_image(path, PINHOLE_OF_DEPTH_IMAGES, TUM_UNITS).points[:, 2].tolist() == pytest.approx(
-        [0.2, 0.4]
-    )
+    assert read_depth_image(path, PINHOLE_OF_DEPTH_IMAGES, TUM_UNITS).points[:, 2].tolist() == pytest.approx([0.2, 0.4])
     (tmp_path / "pose.txt").write_text("0 0 1 5\n-1 0 0 0\n0 -1 0 1\n0 0 0 1\n")
     on_map = read_cloud(path, intrinsics=PINHOLE_OF_DEPTH_IMAGES, pose=tmp_path / "pose.txt").points
     assert on_map == pytest.approx(np.array([[6.0, 0.0, 1.005], [7.0, 0.02, 0.99]]), abs=1e-6)
@@ -85,9 +83,7 @@ def test_depth_images_become_points_of_the_map(suffix, tmp_path):
 
 def test_millimetres_are_read_with_their_scale(tmp_path):
     (tmp_path / "a.xyz").write_text("0 0 0\n6000 1 2\n")
-    assert read_cloud(tmp_path / "a.xyz", scale=0.001).points[1].tolist() == pytest.approx(
-        [6.0, 0.001, 0.002]
-    )
+    assert read_cloud(tmp_path / "a.xyz", scale=0.001).points[1].tolist() == pytest.approx([6.0, 0.001, 0.002])
     with pytest.raises(ValueError, match="scale of"):
         read_cloud(tmp_path / "a.xyz", scale=0.0)
 

@@ -108,9 +108,7 @@ def test_packed_bytes_of_another_packer_are_refused(tmp_path):
 
 
 def test_fields_of_a_pcd_may_be_in_any_order_of_any_type_with_padding_between(tmp_path):
-    row = np.dtype(
-        [("a", "u1", (3,)), ("z", "<f8"), ("l", "<u2"), ("x", "<f4"), ("b", "u1", (2,)), ("y", "<i2")]
-    )
+    row = np.dtype([("a", "u1", (3,)), ("z", "<f8"), ("l", "<u2"), ("x", "<f4"), ("b", "u1", (2,)), ("y", "<i2")])
     rows = np.zeros(2, row)
     rows["x"], rows["y"], rows["z"] = [0.5, 1.5], [-3, 7], [2.25, 4.5]
     kinds = {

@@ -14,9 +14,7 @@ from lidarium.mapping.sparse.settings import FloorSettings
 @pytest.mark.parametrize("plane", [FloorPlane(0.6, 0.0, 0.8, 1.5), FloorPlane(0.0, -1.0, 0.0, 2.0)])
 def test_levelling_makes_the_floor_level(plane):
     points = np.random.default_rng(0).uniform(-3.0, 3.0, (20, 3))
-    np.testing.assert_allclose(
-        moved_points(points, plane.levelling())[:, 2], plane.heights(points), atol=1e-12
-    )
+    np.testing.assert_allclose(moved_points(points, plane.levelling())[:, 2], plane.heights(points), atol=1e-12)
     checked_poses(plane.levelling())
     checked_poses(FloorPlane(0.0, 0.0, -1.0, 0.0).levelling())
 

@@ -106,9 +106,7 @@ def test_a_passage_whose_nodes_lie_at_its_sides_is_passed():
 
 @given(
     st.lists(st.tuples(st.floats(0.0, 4.0), st.floats(0.0, 4.0)), min_size=1, max_size=30),
-    st.lists(
-        st.tuples(st.floats(0.0, 3.5), st.floats(0.0, 3.5), st.floats(0.01, 1.0)), min_size=1, max_size=8
-    ),
+    st.lists(st.tuples(st.floats(0.0, 3.5), st.floats(0.0, 3.5), st.floats(0.01, 1.0)), min_size=1, max_size=8),
 )
 def test_nodes_move_by_at_most_a_radius_and_those_that_are_returned_stand(places, blocks):
     nodes = np.array([[x, y, 0.0] for x, y in places])
@@ -175,9 +173,7 @@ def test_a_table_top_blocks_the_swept_body_and_not_the_cylinder_of_the_thesis():
     top = np.array([[0.8, -0.3, 0.7], [1.2, 0.3, 0.75]])
     swept = build_graph(free, top[None], BODY_OF_TOPOLOGICAL_GRAPH, GraphSettings(longest_edge=3.0))
     assert len(swept.edges) == 0
-    points = np.stack(
-        np.meshgrid(np.linspace(0.8, 1.2, 9), np.linspace(-0.3, 0.3, 9), [0.7]), axis=-1
-    ).reshape(-1, 3)
+    points = np.stack(np.meshgrid(np.linspace(0.8, 1.2, 9), np.linspace(-0.3, 0.3, 9), [0.7]), axis=-1).reshape(-1, 3)
     printed = build_thesis_graph(free, points, ThesisGraphSettings(longest_edge=3.0, collision_radius=0.2))
     assert len(printed.edges) == 1
 

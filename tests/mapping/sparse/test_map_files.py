@@ -95,12 +95,8 @@ def test_neighbours_are_near_in_strips():
 
 def outward_steps(box):
     """Whole centimetres of the smallest box that holds another one, low corner first."""
-    low = [
-        max(step for step in range(round(100 * x) - 2, round(100 * x) + 3) if step / 100 <= x) for x in box[0]
-    ]
-    high = [
-        min(step for step in range(round(100 * x) - 2, round(100 * x) + 3) if step / 100 >= x) for x in box[1]
-    ]
+    low = [max(step for step in range(round(100 * x) - 2, round(100 * x) + 3) if step / 100 <= x) for x in box[0]]
+    high = [min(step for step in range(round(100 * x) - 2, round(100 * x) + 3) if step / 100 >= x) for x in box[1]]
     return low + high
 
 
@@ -122,9 +118,7 @@ def test_binary_boxes_hold_what_they_held_to_a_centimetre(corners, others, free)
     assert graph is None
     expected = sorted(outward_steps(box) for box in boxes)
     assert sorted(np.rint(100.0 * box).astype(int).ravel().tolist() for box in after.boxes) == expected
-    np.testing.assert_array_equal(
-        sorted_rows(np.rint(after.free * 100.0)), sorted_rows(np.rint(np.rint(free * 100.0)))
-    )
+    np.testing.assert_array_equal(sorted_rows(np.rint(after.free * 100.0)), sorted_rows(np.rint(np.rint(free * 100.0))))
     # What was read is written to the same bytes.
     assert binary_content(after) == binary_content(before)
 
@@ -133,9 +127,7 @@ def test_binary_boxes_hold_what_they_held_to_a_centimetre(corners, others, free)
 def test_no_point_leaves_its_box(corners):
     for corner in corners:
         box = np.stack([corner, corner])[None]
-        after, _ = _parsed_binary(
-            binary_content(SparseMap(occupied=occupied_codes(box), ground=free_codes([])))
-        )
+        after, _ = _parsed_binary(binary_content(SparseMap(occupied=occupied_codes(box), ground=free_codes([]))))
         assert (after.boxes[0, 0] <= corner).all()
         assert (after.boxes[0, 1] >= corner).all()
 

@@ -72,9 +72,7 @@ def test_of_several_first_and_last_nodes_the_cheapest_pair_is_taken():
     starts, ends = np.array([0, 1, 3, 5, 6]), np.array([1, 0, 2, 1, 3, 2])
     weights, goal = np.ones(6), np.array([3.5, 0.0, 0.0])
     first = np.array([0.5, 2.0, np.inf, np.inf])
-    path, cost = _shortest_path(
-        nodes, starts, ends, weights, first, np.array([np.inf, np.inf, 1.6, 0.5]), goal
-    )
+    path, cost = _shortest_path(nodes, starts, ends, weights, first, np.array([np.inf, np.inf, 1.6, 0.5]), goal)
     assert (path.tolist(), cost) == ([0, 1, 2, 3], 4.0)
     path, cost = _shortest_path(nodes, starts, ends, weights, first, np.array([np.inf, 2.5, 1.6, 0.5]), goal)
     assert (path.tolist(), cost) == ([0, 1], 4.0)

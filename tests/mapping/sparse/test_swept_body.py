@@ -89,9 +89,7 @@ def test_a_cylinder_without_an_axis_is_a_ball():
     assert cylinder_holds(np.zeros(3), np.zeros(3), points, 0.3).tolist() == [True, False, False]
 
 
-@pytest.mark.parametrize(
-    "values", [{"radius": 0.0}, {"height": np.nan}, {"clearance": 2.0}, {"height": 0.03}]
-)
+@pytest.mark.parametrize("values", [{"radius": 0.0}, {"height": np.nan}, {"clearance": 2.0}, {"height": 0.03}])
 def test_bodies_that_cannot_be_are_refused(values):
     with pytest.raises(ValueError, match="body"):
         SweptBody(**values)

@@ -25,11 +25,7 @@ def test_an_evaluation_writes_a_folder_and_tells_its_medians(tmp_path, capsys):
     told = capsys.readouterr().out
     assert "4 of 4 episodes finished" in told
     assert "random_walk" in told
-    assert (
-        len(read_episodes(tmp_path / "episodes.jsonl"))
-        == len(list((tmp_path / "records").glob("*.npz")))
-        == 4
-    )
+    assert len(read_episodes(tmp_path / "episodes.jsonl")) == len(list((tmp_path / "records").glob("*.npz"))) == 4
     assert evaluate("--policies", "random_walk", *SHORT, "--out", tmp_path, "--json") == 0
     result = json.loads(capsys.readouterr().out)
     assert (result["episodes"], result["finished"], result["failed"]) == (2, 2, [])
@@ -39,9 +35,7 @@ def test_an_evaluation_writes_a_folder_and_tells_its_medians(tmp_path, capsys):
 def test_shards_together_are_the_whole_evaluation(tmp_path):
     def lines(*folders):
         rows = [row for folder in folders for row in read_episodes(tmp_path / folder / "episodes.jsonl")]
-        return sorted(
-            json.dumps({name: value for name, value in row.items() if name not in TIMINGS}) for row in rows
-        )
+        return sorted(json.dumps({name: value for name, value in row.items() if name not in TIMINGS}) for row in rows)
 
     assert evaluate("--policies", "random_walk", *SHORT, "--seeds", "3", "--out", tmp_path / "all") == 0
     for shard in (1, 2):

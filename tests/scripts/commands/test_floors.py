@@ -27,8 +27,7 @@ def test_the_list_names_floors_kinds_and_sets(capsys):
     assert main(["floors", "list"]) == 0
     told = capsys.readouterr().out
     assert all(
-        word in told
-        for word in ("apartment", "clinic", "scene_loop_corridor", "office:SEED", "set:validation", "200")
+        word in told for word in ("apartment", "clinic", "scene_loop_corridor", "office:SEED", "set:validation", "200")
     )
 
 
@@ -256,9 +255,7 @@ def test_facts_name_what_was_assumed():
     assert "12.5 %" in text
     assert "none, cells of an image" in text
     assert "note" not in text
-    assert "scale was assumed" in floor_description(
-        {**result, "remark": "scale was assumed"}, None, [], "a hall"
-    )
+    assert "scale was assumed" in floor_description({**result, "remark": "scale was assumed"}, None, [], "a hall")
 
 
 def test_results_go_to_out_where_it_is_given(tmp_path):

@@ -38,11 +38,7 @@ def maps(tmp_path):
 
 @pytest.fixture
 def elsewhere(tmp_path):
-    return str(
-        write_ros_map(
-            tmp_path / "in", "elsewhere", room(blank(), 20, 20, 90, 130), (0.0, 0.0, 0.0), RESOLUTION
-        )
-    )
+    return str(write_ros_map(tmp_path / "in", "elsewhere", room(blank(), 20, 20, 90, 130), (0.0, 0.0, 0.0), RESOLUTION))
 
 
 def test_two_maps_are_joined_in_the_ros_frame_of_the_first(maps, tmp_path, capsys):
@@ -314,10 +310,7 @@ def test_unknown_modes_are_named(maps, tmp_path, capsys):
 
 def test_maps_are_bent_to_agree_only_where_asked(tmp_path, capsys):
     levels = {"straight": hall(), "bowed": bowed(hall(), 0.35)}
-    paths = [
-        str(write_ros_map(tmp_path / "in", name, levels[name], (0.0, 0.0, 0.0), RESOLUTION))
-        for name in levels
-    ]
+    paths = [str(write_ros_map(tmp_path / "in", name, levels[name], (0.0, 0.0, 0.0), RESOLUTION)) for name in levels]
     walls, pictures = {}, set()
     for name, options in (("rigid", []), ("bent", ["--deform"])):
         out = tmp_path / name

@@ -31,10 +31,7 @@ def log(run, tmp_path_factory):
     write_npz_log(folder / "run.npz", LaserLog(stamps, ranges, GEOMETRY, odometry))
     write_tum(folder / "true.tum", stamps, run.truth)
     motions = relative(run.truth[:-20], run.truth[20:])
-    rows = [
-        f"{a} {b} {m[0]} {m[1]} 0 0 0 {m[2]}\n"
-        for a, b, m in zip(stamps[:-20], stamps[20:], motions, strict=True)
-    ]
+    rows = [f"{a} {b} {m[0]} {m[1]} 0 0 0 {m[2]}\n" for a, b, m in zip(stamps[:-20], stamps[20:], motions, strict=True)]
     (folder / "true.relations").write_text("".join(rows))
     return folder / "run.npz"
 

@@ -24,9 +24,7 @@ def test_frames_with_poses_make_one_map(room, tmp_path):
         pose = np.eye(4)
         pose[0, 3] = x
         np.savetxt(tmp_path / f"{name}.txt", pose)
-    clouds, poses = (
-        [str(tmp_path / f"{name}.{kind}") for name in ("left", "right")] for kind in ("ply", "txt")
-    )
+    clouds, poses = ([str(tmp_path / f"{name}.{kind}") for name in ("left", "right")] for kind in ("ply", "txt"))
     assert main(["sparse-map", *clouds, "--poses", *poses, "--out", str(tmp_path / "map.txt")]) == 0
     assert (tmp_path / "map.txt").read_text().startswith("# sparse-map v1 ")
 

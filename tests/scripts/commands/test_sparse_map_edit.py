@@ -15,9 +15,7 @@ BOX = np.array([[[0.0, 0.0, 0.0], [1.0, 1.0, 1.0]]])
 @pytest.fixture
 def before(tmp_path):
     path = tmp_path / "before.smap"
-    write_sparse_map(
-        path, SparseMap(occupied=occupied_codes(BOX), ground=free_codes(np.array([[2.0, 2.0, 0.0]])))
-    )
+    write_sparse_map(path, SparseMap(occupied=occupied_codes(BOX), ground=free_codes(np.array([[2.0, 2.0, 0.0]]))))
     return path
 
 

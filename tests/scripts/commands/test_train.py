@@ -74,9 +74,7 @@ def test_numbers_that_cannot_be_used_are_refused(config, tmp_path, capsys):
 @pytest.mark.parametrize("missing", ["torch", "sb3_contrib", "stable_baselines3", "tensorboard"])
 def test_a_missing_extra_is_named(config, tmp_path, capsys, monkeypatch, missing):
     find = importlib.util.find_spec
-    monkeypatch.setattr(
-        importlib.util, "find_spec", lambda name, *rest: None if name == missing else find(name, *rest)
-    )
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name, *rest: None if name == missing else find(name, *rest))
     refused([config], tmp_path / "out", capsys, f"training needs {missing}", '"lidarium[rl]"')
 
 

@@ -12,9 +12,7 @@ from lidarium.training.settings import TrainingSettings
 
 
 def place_at(robots, number):
-    return Place(
-        f"apartment:{7 + number}", TrainingSettings(settings={"resolution": 0.05}).team(robots), number
-    )
+    return Place(f"apartment:{7 + number}", TrainingSettings(settings={"resolution": 0.05}).team(robots), number)
 
 
 @pytest.fixture

@@ -25,8 +25,7 @@ def decisions():
         seen = env.step(np.array(actions))[0]
     env.close()
     return env.observation_space, {
-        name: torch.from_numpy(np.concatenate([row[name] for row in rows]).astype(np.float32))
-        for name in rows[0]
+        name: torch.from_numpy(np.concatenate([row[name] for row in rows]).astype(np.float32)) for name in rows[0]
     }
 
 

@@ -90,9 +90,7 @@ def test_learning_obeys_masks_and_changes_network_and_critic(model):
     model.learn(32)
     after = model.policy.network.weights()
     assert any(not np.array_equal(array, after[name]) for name, array in before.items())
-    assert any(
-        not torch.equal(one, two) for one, two in zip(critic, model.policy.critic.parameters(), strict=True)
-    )
+    assert any(not torch.equal(one, two) for one, two in zip(critic, model.policy.critic.parameters(), strict=True))
 
 
 def test_values_have_no_gradient_in_the_network(model):

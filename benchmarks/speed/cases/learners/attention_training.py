@@ -28,9 +28,7 @@ def measure(effort: Effort) -> list[Line]:
     """Measure decisions a second and the simulator's share, floors in memory as usual and all of them."""
     name = "attention to frontiers, two cores"
     if not is_there():
-        return [
-            Line(name, "-", 'not measured: pip install "lidarium[rl]"', None, TO_REACH, unit="decisions/s")
-        ]
+        return [Line(name, "-", 'not measured: pip install "lidarium[rl]"', None, TO_REACH, unit="decisions/s")]
     from lidarium.training.reinforcement.frontier_policy import FrontierPolicy
 
     learner, lines = FrontierLearner(FrontierPolicy, EPISODES, ROLLOUT, BATCH, EPOCHS, threads=2), []

@@ -82,9 +82,7 @@ def measure(effort: Effort) -> list[Line]:
     return [
         faster(name, seconds["ours"], "rig with rayTestBatch", seconds["rays"], 3.0),
         faster(name, seconds["ours"], "rig without scans", seconds["bare"], 0.85),
-        _bounded(
-            f"substep of {SOLIDS} static solids", seconds["still"], (1e6, "us", 20.0), seconds["still rig"]
-        ),
+        _bounded(f"substep of {SOLIDS} static solids", seconds["still"], (1e6, "us", 20.0), seconds["still rig"]),
         _bounded("reset of that world, apartment", _resets(env_of("apartment"), effort), (1e3, "ms", 50.0)),
         _bounded(f"reset of that world, {LARGE}", _resets(env, effort), (1e3, "ms", 250.0)),
     ]

@@ -86,9 +86,7 @@ def our_images(floor: Floor, camera: DepthCamera, poses: np.ndarray) -> Contende
 def batch(observe: tuple[str, ...], has_depth: bool) -> Contender:
     """Step a batch that observes something, with or without depth; a unit is an agent step."""
     options = {"camera": "depth_64x48", "observe": (*observe, "depth")} if has_depth else {"observe": observe}
-    env = lidarium.vector_env(
-        EPISODES, "apartment", robots=ROBOTS_EACH, copy=False, horizon_s=None, **options
-    )
+    env = lidarium.vector_env(EPISODES, "apartment", robots=ROBOTS_EACH, copy=False, horizon_s=None, **options)
     env.reset(seed=0)
     actions = np.random.default_rng(0).uniform(-1.0, 1.0, (EPISODES * ROBOTS_EACH, 2)).astype(np.float32)
 

@@ -49,9 +49,7 @@ def scikit_learn_steps(points: Points, start: Points, steps: int) -> Quantiser |
 
     def quantise() -> NDArray[np.floating]:
         with limits.threadpool_limits(1):
-            model = cluster.KMeans(
-                len(start), init=start, n_init=1, max_iter=steps, tol=0.0, algorithm="lloyd"
-            )
+            model = cluster.KMeans(len(start), init=start, n_init=1, max_iter=steps, tol=0.0, algorithm="lloyd")
             codes: NDArray[np.floating] = model.fit(points).cluster_centers_
         return codes
 

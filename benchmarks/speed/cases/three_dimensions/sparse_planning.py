@@ -87,9 +87,7 @@ def measure(effort: Effort) -> list[Line]:
     ]
 
 
-def _met(
-    graph: TopologicalGraph, requests: np.ndarray
-) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+def _met(graph: TopologicalGraph, requests: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
     """Yield starts and goals whose paths bend, and a corner of each path."""
     bent = ((start, goal, plan(graph, start, goal).path) for start, goal in requests)
     found = ((start, goal, path[len(path) // 2]) for start, goal, path in bent if len(path) > 2)

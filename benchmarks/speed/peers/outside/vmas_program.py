@@ -25,9 +25,7 @@ from vmas.simulator.sensors import Lidar
 class Rooms(BaseScenario):
     """Differential-drive agents with lidars among boxes."""
 
-    def make_world(
-        self, batch_dim: int, device: torch.device, floor: dict[str, Any], **kwargs: object
-    ) -> World:
+    def make_world(self, batch_dim: int, device: torch.device, floor: dict[str, Any], **kwargs: object) -> World:
         """Put agents and boxes into the world."""
         world = World(batch_dim, device, dt=0.1, substeps=1)
         self.floor = floor
@@ -55,9 +53,7 @@ class Rooms(BaseScenario):
         for agent, (x, y, theta) in zip(self.world.agents, self.floor["poses"], strict=True):
             agent.set_pos(torch.tensor([x, y], dtype=torch.float32), batch_index=env_index)
             agent.set_rot(torch.tensor([theta], dtype=torch.float32), batch_index=env_index)
-        for landmark, (x_low, y_low, x_high, y_high) in zip(
-            self.world.landmarks, self.floor["boxes"], strict=True
-        ):
+        for landmark, (x_low, y_low, x_high, y_high) in zip(self.world.landmarks, self.floor["boxes"], strict=True):
             landmark.set_pos(
                 torch.tensor([(x_low + x_high) / 2, (y_low + y_high) / 2], dtype=torch.float32),
                 batch_index=env_index,
@@ -77,9 +73,7 @@ class Batch:
 
     def __init__(self, floor: dict[str, Any], size: int) -> None:
         self.agents = len(floor["poses"])
-        self.env = make_env(
-            Rooms(), num_envs=size, device="cpu", continuous_actions=True, seed=0, floor=floor
-        )
+        self.env = make_env(Rooms(), num_envs=size, device="cpu", continuous_actions=True, seed=0, floor=floor)
         self.actions = [torch.rand(size, 2) - 0.5 for _ in range(self.agents)]
         self.size = size
 

@@ -163,9 +163,7 @@ def read_pairs(folder: Path) -> list[Pair] | None:
     if not path.exists():
         return None
     entries = json.loads(path.read_text(encoding="utf-8"))["pairs"]
-    return [
-        Pair(**{**one, "pose": one["pose"] and tuple(one["pose"]), "at": tuple(one["at"])}) for one in entries
-    ]
+    return [Pair(**{**one, "pose": one["pose"] and tuple(one["pose"]), "at": tuple(one["at"])}) for one in entries]
 
 
 def _file_of(folder: Path, drive_: Drive) -> Path:

@@ -96,9 +96,7 @@ class MapMaker(Watcher):
         pose = self._start.inverse() @ Transform(*world.poses[0].tolist())
         lidar = env.settings.lidar
         noise = (lidar.noise_floor, lidar.noise_share)
-        self._grid.integrate(
-            (pose.x + x, pose.y + y, pose.theta + theta), env.simulation.ranges[0], lidar, noise
-        )
+        self._grid.integrate((pose.x + x, pose.y + y, pose.theta + theta), env.simulation.ranges[0], lidar, noise)
         while self._shares and scorer.coverage >= self._shares[0]:
             self._keep(scorer.time, scorer.coverage)
 

@@ -32,14 +32,10 @@ def like_rooms(seed: int) -> Floor:
     boxes = _walls(rooms, width, depth, corridor)
     for index, slot in enumerate(choices.tolist()):
         pieces = [*furniture[:-SLOTS], furniture[len(furniture) - SLOTS + slot]]
-        boxes += [
-            _placed(piece, index, rooms, width, depth, corridor) for piece in pieces if piece[2] > piece[0]
-        ]
+        boxes += [_placed(piece, index, rooms, width, depth, corridor) for piece in pieces if piece[2] > piece[0]]
     bounds = (0.0, 0.0, rooms * width + 2 * WALL, 2 * depth + corridor + 2 * WALL)
     solids = tuple(Solid(np.array([(a, b), (c, b), (c, d), (a, d)], np.float64)) for a, b, c, d in boxes)
-    return Floor(
-        f"like_rooms:{seed}", bounds, solids, starts=_starts(rooms, width, depth, corridor, generator)
-    )
+    return Floor(f"like_rooms:{seed}", bounds, solids, starts=_starts(rooms, width, depth, corridor, generator))
 
 
 def _furniture(width: float, depth: float, generator: np.random.Generator) -> list[Box]:
@@ -47,9 +43,7 @@ def _furniture(width: float, depth: float, generator: np.random.Generator) -> li
 
     X along the corridor, y from it, in a room's frame.
     """
-    bed, desk, long = (
-        round(float(generator.uniform(*span)), 2) for span in ((1.8, 2.1), (1.0, 1.4), (1.1, 1.4))
-    )
+    bed, desk, long = (round(float(generator.uniform(*span)), 2) for span in ((1.8, 2.1), (1.0, 1.4), (1.1, 1.4)))
     common = [
         (WALL / 2, depth - bed, WALL / 2 + 0.9, depth),
         (width - WALL / 2 - desk, depth - 0.6, width - WALL / 2, depth),
@@ -193,19 +187,13 @@ def bank_floors(data: Path | None, every: int = 1) -> list[BankFloor]:
             ("corridors", _CORRIDORS),
             ("like_rooms", _LIKE_ROOMS),
         ):
-            floors += [
-                BankFloor(f"{kind}-{seed}", half, kind, seed) for seed in range(first, first + count, every)
-            ]
+            floors += [BankFloor(f"{kind}-{seed}", half, kind, seed) for seed in range(first, first + count, every)]
         floors.append(BankFloor(_DRAWN[half], half, "drawn"))
         chosen = [] if data is None else _real_floors(Path(data), *_REAL_M2[half])[:_REAL:every]
         floors += [BankFloor(f"real-{path.stem[:20]}", half, "real", path=path) for path in chosen]
-        originals = [
-            floor for floor in floors if floor.half == half and floor.kind in ("apartment", "office")
-        ]
+        originals = [floor for floor in floors if floor.half == half and floor.kind in ("apartment", "office")]
         copied = originals[:_COPIED]
-        floors += [
-            BankFloor(f"{floor.name}-copy", half, floor.kind, floor.seed, is_copy=True) for floor in copied
-        ]
+        floors += [BankFloor(f"{floor.name}-copy", half, floor.kind, floor.seed, is_copy=True) for floor in copied]
     return floors
 
 
@@ -222,9 +210,7 @@ def without_some_furniture(floor: Floor, seed: int) -> Floor:
         and np.ptp(solid.polygon, axis=0).min() >= 0.35
     ]
     if not pieces:
-        raise ValueError(
-            f"floor {floor.name!r} has no furniture that could be taken away; want one with some"
-        )
+        raise ValueError(f"floor {floor.name!r} has no furniture that could be taken away; want one with some")
     generator = np.random.default_rng(seed)
     count = min(int(generator.integers(1, 4)), len(pieces))
     taken = set(generator.choice(pieces, count, replace=False).tolist())
@@ -240,14 +226,6 @@ def _real_floors(data: Path, least_m2: float, most_m2: float) -> list[Path]:
     if not (folder / "meta.json").is_file():
         raise FileNotFoundError(f"no floors of LIFULL below {data}; want {folder.relative_to(data)} there")
     meta = json.loads((folder / "meta.json").read_text())
-    areas = {
-        name: one["free_px"] * one["resolution"] ** 2
-        for name, one in meta.items()
-        if one["conn"] >= _CONNECTED
-    }
+    areas = {name: one["free_px"] * one["resolution"] ** 2 for name, one in meta.items() if one["conn"] >= _CONNECTED}
     wanted = [name for name, area in areas.items() if least_m2 <= area < most_m2]
-    return [
-        folder / "txt" / f"{name}.txt"
-        for name in sorted(wanted)
-        if (folder / "txt" / f"{name}.txt").is_file()
-    ]
+    return [folder / "txt" / f"{name}.txt" for name in sorted(wanted) if (folder / "txt" / f"{name}.txt").is_file()]

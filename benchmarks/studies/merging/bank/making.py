@@ -46,9 +46,7 @@ def make_bank(folder: Path, floors: list[BankFloor], workers: int) -> Progress:
 def kept_floors(folder: Path) -> list[BankFloor]:
     """Return the floors of a bank in a folder."""
     entries = json.loads((folder / DATA_FILE).read_text(encoding="utf-8"))["floors"]
-    return [
-        BankFloor(**{**one, "path": None if one["path"] is None else Path(one["path"])}) for one in entries
-    ]
+    return [BankFloor(**{**one, "path": None if one["path"] is None else Path(one["path"])}) for one in entries]
 
 
 def _check_same(path: Path, floors: list[BankFloor]) -> None:
@@ -56,8 +54,7 @@ def _check_same(path: Path, floors: list[BankFloor]) -> None:
     asked = {"version": lidarium.__version__, "floors": [_entry(floor) for floor in floors]}
     if path.exists() and json.loads(path.read_text(encoding="utf-8")) != asked:
         raise ValueError(
-            f"{path.parent} holds a bank of other floors or of another version; choose another folder with "
-            "--runs"
+            f"{path.parent} holds a bank of other floors or of another version; choose another folder with --runs"
         )
     write_json(path, asked)
 

@@ -123,9 +123,7 @@ def choose_pairs(maps: dict[str, BankMap], seed: int = 0, wanted: Wanted | None 
         yield from _across_floors(originals, half, wanted, generator)
 
 
-def overlap_of(
-    a: BankMap, b: BankMap, a_from_b: Transform, stride: int = 3
-) -> tuple[float, tuple[float, float]]:
+def overlap_of(a: BankMap, b: BankMap, a_from_b: Transform, stride: int = 3) -> tuple[float, tuple[float, float]]:
     """Return the overlap of two maps, and its centroid in map b [m].
 
     The overlap is what both maps know, as a share of the smaller known area.
@@ -143,9 +141,7 @@ def overlap_of(
     return float(np.count_nonzero(both)) / smaller, (x, y)
 
 
-def _within_floors(
-    known: list[_Known], half: str, wanted: Wanted, generator: np.random.Generator
-) -> Iterator[Pair]:
+def _within_floors(known: list[_Known], half: str, wanted: Wanted, generator: np.random.Generator) -> Iterator[Pair]:
     """Yield pairs of maps of one floor, made from different starts."""
     room = {
         "plenty": wanted.plenty,
@@ -171,9 +167,7 @@ def _within_floors(
         )
         if kind is None or room[kind] == 0:
             continue
-        pair = Pair(
-            a.map.key, b.map.key, half, "positive", round(overlap, 4), (true.x, true.y, true.theta), at
-        )
+        pair = Pair(a.map.key, b.map.key, half, "positive", round(overlap, 4), (true.x, true.y, true.theta), at)
         if kind == "apart":
             pair = replace(_judged_negative(pair, a, b), pose=None)
             kind = "indistinct" if pair.category == "indistinct" else kind
@@ -205,14 +199,10 @@ def _copies(known: list[_Known], half: str, wanted: Wanted, generator: np.random
         if room[has_seen] > 0:
             room[has_seen] -= 1
             pose = (true.x, true.y, true.theta)
-            yield Pair(
-                a.map.key, b.map.key, half, "refurnished", round(overlap, 4), pose, at, round(differing, 3)
-            )
+            yield Pair(a.map.key, b.map.key, half, "refurnished", round(overlap, 4), pose, at, round(differing, 3))
 
 
-def _across_floors(
-    known: list[_Known], half: str, wanted: Wanted, generator: np.random.Generator
-) -> Iterator[Pair]:
+def _across_floors(known: list[_Known], half: str, wanted: Wanted, generator: np.random.Generator) -> Iterator[Pair]:
     """Yield pairs of maps of different floors, if there are any."""
     if len({one.map.floor for one in known}) < 2:
         return
@@ -233,9 +223,7 @@ def _judged_negative(pair: Pair, a: _Known, b: _Known) -> Pair:
     if not looks:
         return replace(pair, category="negative")
     least = min(one.contradicting_m for one in looks)
-    return replace(
-        pair, category="look_alike" if least >= DIFFERENT_M else "indistinct", differing_m=round(least, 3)
-    )
+    return replace(pair, category="look_alike" if least >= DIFFERENT_M else "indistinct", differing_m=round(least, 3))
 
 
 def _is_symmetric(a: _Known, b: _Known) -> bool:
@@ -248,11 +236,7 @@ def _is_symmetric(a: _Known, b: _Known) -> bool:
     for transform, agreement in [*slides, *_alignments(a, b)]:
         distance, angle = transform.difference(Transform(), truth.centre)
         is_other = distance > 0.25 or angle > math.radians(5.0)
-        if (
-            is_other
-            and agreement.contradicting_m < DIFFERENT_M
-            and agreement.agreeing_m >= AS_WELL * truth.agreeing_m
-        ):
+        if is_other and agreement.contradicting_m < DIFFERENT_M and agreement.agreeing_m >= AS_WELL * truth.agreeing_m:
             return True
     return False
 
@@ -266,9 +250,7 @@ def _alignments(a: _Known, b: _Known) -> list[tuple[Transform, Agreement]]:
     order = np.argsort(-values, kind="stable")
     middle: NDArray[np.float64] = b.truth.walls.mean(axis=0) if len(b.truth.walls) else np.zeros(2)
     chosen = distinct(transforms, order, middle, 24, (0.5, math.radians(5.0)))
-    refined = [
-        refine_on_walls(a.truth, b.truth, Transform(*transforms[k].tolist()), 0.2, 400) for k in chosen
-    ]
+    refined = [refine_on_walls(a.truth, b.truth, Transform(*transforms[k].tolist()), 0.2, 400) for k in chosen]
     return [(transform, compare(a.truth, b.truth, transform, _TRUTH)) for transform in refined]
 
 

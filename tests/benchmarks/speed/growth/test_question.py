@@ -74,9 +74,8 @@ def test_the_page_of_growth_has_both_tables_and_the_command(tmp_path):
     memory = IdleMemory(1024, 1000, 1100.0, 1300.0, None)
     result = growth_result(growths, memory, 15, about("python growth.py"))
     page = growth_page(result, growths, memory)
-    assert (
-        "| robots | 8 | 1.0 MiB | 20.0 us (20.0 to 20.0) | 2.00 (2.00 to 2.00) | <= 1.8 | no |"
-        in growth_table(growths)
+    assert "| robots | 8 | 1.0 MiB | 20.0 us (20.0 to 20.0) | 2.00 (2.00 to 2.00) | <= 1.8 | no |" in growth_table(
+        growths
     )
     assert "| arrays that belong to the robot | 1.10 | <= 1.2 | yes |" in memory_table(memory)
     assert "resident" not in memory_table(memory)

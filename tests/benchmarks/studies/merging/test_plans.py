@@ -32,9 +32,7 @@ def rows(tmp_path_factory):
     floor = np.kron(hall(), np.ones((2, 2), np.uint8))
     plan_from_sensor = Transform(1.0, 2.0, 0.1)
     there = Transform(plan_from_sensor.x / SCALE, plan_from_sensor.y / SCALE, plan_from_sensor.theta)
-    small = cv2.resize(
-        moved(floor, there, (1250, 1250), HALMSTAD_M), (PIXELS, PIXELS), interpolation=cv2.INTER_NEAREST
-    )
+    small = cv2.resize(moved(floor, there, (1250, 1250), HALMSTAD_M), (PIXELS, PIXELS), interpolation=cv2.INTER_NEAREST)
     sensor = np.full((PIXELS, PIXELS), 127, np.uint8)
     sensor[: floor.shape[0], : floor.shape[1]] = floor
     for name, levels in (("E5_07", sensor), ("E5_layout", small)):

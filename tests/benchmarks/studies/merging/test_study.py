@@ -25,9 +25,7 @@ def small_bank(monkeypatch):
     monkeypatch.setattr(features, "REPEATS", 1)
     for module in (merging, trials):
         # What is patched here holds in this process alone.
-        monkeypatch.setattr(
-            module, "shared_out", lambda work, tasks, workers, is_apart: shared_out(work, tasks, 1)
-        )
+        monkeypatch.setattr(module, "shared_out", lambda work, tasks, workers, is_apart: shared_out(work, tasks, 1))
     monkeypatch.setattr(bank, "RUNS", 1)
     monkeypatch.setattr(drives, "HORIZON_S", 30.0)
     monkeypatch.setattr(tuning, "bank_floors", lambda data, every: FLOORS)

@@ -74,9 +74,7 @@ def test_small_maps_are_padded_and_large_ones_left():
 
 def test_figures_count_what_they_say():
     plenty, little = Pair("a", "b", "test", "positive", 0.5), Pair("a", "b", "test", "positive", 0.2)
-    negative, alike, symmetric = (
-        Pair("a", "b", "test", name) for name in ("negative", "look_alike", "symmetric")
-    )
+    negative, alike, symmetric = (Pair("a", "b", "test", name) for name in ("negative", "look_alike", "symmetric"))
     tried = [
         (plenty, outcome(True, 0.02, 0.001, confidence=0.9)),
         (plenty, outcome(True, 0.3, 0.001)),

@@ -56,8 +56,6 @@ def test_what_was_done_before_a_task_failed_is_kept(path):
 
 def test_a_file_of_another_version_is_refused(path):
     run(path, ["a"], [])
-    path.write_text(
-        json.dumps({**json.loads(path.read_text()), "version": f"{lidarium.__version__}0"}) + "\n"
-    )
+    path.write_text(json.dumps({**json.loads(path.read_text()), "version": f"{lidarium.__version__}0"}) + "\n")
     with pytest.raises(ValueError, match="another version"):
         run(path, ["a", "b"], [])

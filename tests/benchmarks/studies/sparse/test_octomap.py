@@ -9,9 +9,7 @@ from scipy import ndimage
 from lidarium.benchmarks.studies.sparse.grids import OctoMap
 from lidarium.benchmarks.studies.sparse.places import frames_of, load_place
 
-pytestmark = pytest.mark.skipif(
-    importlib.util.find_spec("octomap") is None, reason="octomap-python is not installed"
-)
+pytestmark = pytest.mark.skipif(importlib.util.find_spec("octomap") is None, reason="octomap-python is not installed")
 
 
 def test_what_frames_show_is_free_or_occupied_and_the_rest_unknown():

@@ -68,8 +68,7 @@ def test_the_thesis_takes_16_bytes_a_node(usage):
         assert all(sum(thesis.NODES[usage][place]) == THESIS[place].codes for place in PLACES)
     else:
         assert all(
-            abs(sum(thesis.NODES[usage][place]) - THESIS_FRAME_CODES * THESIS[place].frames) < 32
-            for place in PLACES
+            abs(sum(thesis.NODES[usage][place]) - THESIS_FRAME_CODES * THESIS[place].frames) < 32 for place in PLACES
         )
 
 

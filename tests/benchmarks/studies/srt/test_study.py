@@ -24,9 +24,7 @@ def tables_of(*solids):
 
 
 def test_the_shortest_way_is_straight_where_it_is_clear():
-    assert shortest_path(tables_of(), (1.0, 1.0), (4.0, 2.0), 0.2) == pytest.approx(
-        math.hypot(3.0, 1.0), abs=0.05
-    )
+    assert shortest_path(tables_of(), (1.0, 1.0), (4.0, 2.0), 0.2) == pytest.approx(math.hypot(3.0, 1.0), abs=0.05)
 
 
 def test_the_shortest_way_bends_round_a_wall_at_the_radius():

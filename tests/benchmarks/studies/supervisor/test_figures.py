@@ -80,9 +80,7 @@ def test_a_wrong_merge_counts_in_whichever_suite_it_was_used():
     suites = dict.fromkeys(("teams", "one", "pairs", "three", "alone", "five"), ())
 
     def wrong_runs(rows, failing):
-        (goal,) = [
-            each for each in goals_of(rows, failing) if each.title.startswith("runs in which a wrong merge")
-        ]
+        (goal,) = [each for each in goals_of(rows, failing) if each.title.startswith("runs in which a wrong merge")]
         return goal
 
     right, wrong = led("supervised", False), led("supervised", True)

@@ -46,9 +46,7 @@ def test_a_share_takes_seeds_first_and_then_floors():
 def test_floors_are_as_large_as_is_said(name):
     raster = load_floor(name).raster(0.05, 0.05, 0.52)
     starts = draw_starts(raster, 0.18, 1, np.random.default_rng(0))
-    assert reachable_free_space(raster, 0.18, starts).sum() * 0.05**2 == pytest.approx(
-        plan.GENERATED[name], abs=1.0
-    )
+    assert reachable_free_space(raster, 0.18, starts).sum() * 0.05**2 == pytest.approx(plan.GENERATED[name], abs=1.0)
 
 
 def test_a_folder_without_the_real_floors_is_refused(tmp_path):
@@ -119,8 +117,7 @@ def test_the_typical_run_is_the_middle_one_of_a_team_that_missed_something():
     }
     rows["one"] = [row("independent", 1, 0, 100.0)]
     missed, reached = (
-        Goal("time", "<= 0.62", Interval(0.7, 0.6, 0.8, 0.95, 3), is_reached, robots=2)
-        for is_reached in (False, True)
+        Goal("time", "<= 0.62", Interval(0.7, 0.6, 0.8, 0.95, 3), is_reached, robots=2) for is_reached in (False, True)
     )
     assert typical_runs(rows, [missed])["2 robots"]["seed"] == 0
     assert typical_runs(rows, [reached]) == {}

@@ -112,8 +112,7 @@ def parts(floor: Floor, resolution: float, height: float, connectivity: int = 4)
 def mean_measures(**wanted):
     measured = [measure_building(generate_building(seed, BuildingSettings(**wanted))) for seed in range(6)]
     return {
-        name: float(np.mean([getattr(m, name) for m in measured]))
-        for name in ("area_m2", "loops", "clutter", "rooms")
+        name: float(np.mean([getattr(m, name) for m in measured])) for name in ("area_m2", "loops", "clutter", "rooms")
     }
 
 
@@ -122,9 +121,7 @@ def mean_measures(**wanted):
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_robot_of_radius_30_cm_reaches_everything(kind, resolution, height):
     for seed in range(10):
-        assert parts(generate_building(seed, BuildingSettings(kind=kind)), resolution, height) == 1, (
-            f"seed {seed}"
-        )
+        assert parts(generate_building(seed, BuildingSettings(kind=kind)), resolution, height) == 1, f"seed {seed}"
 
 
 @settings(max_examples=25)
@@ -136,9 +133,7 @@ def test_a_robot_of_radius_30_cm_reaches_everything(kind, resolution, height):
     door_width=st.floats(0.8, 1.0),
     wall_thickness=st.floats(0.05, 0.3),
 )
-@example(
-    seed=1355424, kind="apartment", loops=0.0, clutter=0.0, door_width=0.9999999999999999, wall_thickness=0.25
-)
+@example(seed=1355424, kind="apartment", loops=0.0, clutter=0.0, door_width=0.9999999999999999, wall_thickness=0.25)
 def test_whatever_the_settings_the_floor_is_one_piece_with_three_clear_starts(
     seed, kind, loops, clutter, door_width, wall_thickness
 ):
@@ -194,9 +189,7 @@ def test_a_knob_of_one_stage_leaves_the_walls_alone():
     def walls(floor):
         return [solid.polygon.tolist() for solid in floor.solids if solid.z_high == math.inf]
 
-    sparse, dense = (
-        generate_building(3, BuildingSettings(kind="office", clutter=share)) for share in (0.0, 0.2)
-    )
+    sparse, dense = (generate_building(3, BuildingSettings(kind="office", clutter=share)) for share in (0.0, 0.2))
     assert walls(sparse) == walls(dense)
 
 

@@ -65,9 +65,7 @@ def test_rooms_of_an_apartment_are_used_by_their_size():
 
 def test_a_lone_room_is_a_bath_and_two_are_bath_and_living():
     for areas, uses in (([5.0, 20.0], ["hall", "bath"]), ([5.0, 20.0, 4.0], ["hall", "living", "bath"])):
-        assert _room_wishes("apartment", np.array(areas), np.random.default_rng(0)) == [
-            APARTMENT[use] for use in uses
-        ]
+        assert _room_wishes("apartment", np.array(areas), np.random.default_rng(0)) == [APARTMENT[use] for use in uses]
 
 
 @pytest.mark.parametrize(
@@ -87,9 +85,7 @@ def test_small_rooms_of_an_office_are_no_meeting_rooms(area, draw, use):
 
 
 def test_all_that_is_wished_for_exists():
-    wished = {
-        piece for uses in (APARTMENT, OFFICE, CORRIDORS) for pieces in uses.values() for piece in pieces
-    }
+    wished = {piece for uses in (APARTMENT, OFFICE, CORRIDORS) for pieces in uses.values() for piece in pieces}
     assert wished <= set(PIECES)
     assert len(_room_wishes("corridors", np.array([50.0]), np.random.default_rng(0))) == 1
 

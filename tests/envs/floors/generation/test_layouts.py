@@ -27,9 +27,7 @@ from lidarium.envs.floors.generation.layouts import (
 
 def plan(text):
     """Read a plan from rows of digits, row 0 first; a dot is outside."""
-    return np.array(
-        [[-1 if letter == "." else int(letter) for letter in row] for row in text.split()], np.int32
-    )
+    return np.array([[-1 if letter == "." else int(letter) for letter in row] for row in text.split()], np.int32)
 
 
 def large(text, times=20):
@@ -66,9 +64,7 @@ def test_doors_join_all_rooms_and_lie_within_their_walls(seed):
 
 
 def test_more_loops_keep_the_doors_of_fewer():
-    few, many = (
-        choose_doors(large("12 00 34", 30), 0.9, loops, np.random.default_rng(3)) for loops in (0.0, 1.0)
-    )
+    few, many = (choose_doors(large("12 00 34", 30), 0.9, loops, np.random.default_rng(3)) for loops in (0.0, 1.0))
     assert len(few) == 4
     assert len(many) == 6
     assert [door.boundary for door in many[:4]] == [door.boundary for door in few]

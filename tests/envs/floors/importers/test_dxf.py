@@ -90,9 +90,7 @@ def test_damaged_walls_are_left_for_a_parser(line):
     assert _sift(text) == _Sifted(text)
 
 
-@pytest.mark.parametrize(
-    "text", ["", "\n", "0", "no drawing\nEOF\n", "0\nSECTION\n2\nENTITIES", "0\nLINE\n" * 3]
-)
+@pytest.mark.parametrize("text", ["", "\n", "0", "no drawing\nEOF\n", "0\nSECTION\n2\nENTITIES", "0\nLINE\n" * 3])
 def test_what_is_no_drawing_stays_as_it_is(text):
     assert _sift(text) == _Sifted(text)
 

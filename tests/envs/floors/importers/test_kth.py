@@ -67,8 +67,7 @@ def test_y_of_a_kth_drawing_points_down(tmp_path):
         ("<floor><Scale PixelDistance='0' RealDistance='1'/><space/></floor>", "has Scale"),
         ("<floor>", "not XML"),
         (
-            "<floor><Scale PixelDistance='1' RealDistance='1'/><space name='a'><linesegment "
-            "x1='1'/></space></floor>",
+            "<floor><Scale PixelDistance='1' RealDistance='1'/><space name='a'><linesegment x1='1'/></space></floor>",
             "space 'a'",
         ),
         (KTH_XML.format(kind="Wall", other="Wall").replace("820", "nan"), "space 'b'"),

@@ -114,16 +114,12 @@ def test_shapes_have_their_outline_and_height(tmp_path, geometry, area, heights)
 def test_included_models_are_found_beside_the_world(tmp_path):
     for place in (tmp_path / "worlds" / "chair", tmp_path / "models" / "chair"):
         place.mkdir(parents=True)
-        (place / "model.sdf").write_text(
-            f'<sdf version="1.6">{model(box("seat", 0, 0, 0.5, 0.5, 0.5))}</sdf>'
-        )
+        (place / "model.sdf").write_text(f'<sdf version="1.6">{model(box("seat", 0, 0, 0.5, 0.5, 0.5))}</sdf>')
         include = "<include><uri>model://chair</uri><pose>3 2 0 0 0 0</pose></include>"
         floor = load_file(world(tmp_path / "worlds", model(WALLS) + include))
         assert free_area(floor) == pytest.approx(5.8 * 3.8 - 0.25, rel=0.01)
         (place / "model.sdf").unlink()
-    with pytest.raises(
-        ValueError, match=r"includes 'chair', which is not there; want its folder beside the world"
-    ):
+    with pytest.raises(ValueError, match=r"includes 'chair', which is not there; want its folder beside the world"):
         load_file(tmp_path / "worlds" / "hall.world")
 
 

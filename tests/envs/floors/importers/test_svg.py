@@ -127,8 +127,7 @@ def test_a_thin_line_lets_nothing_through(tmp_path):
         ('<g transform="translate(200 100) scale(2)" fill="black"><rect width="50" height="50"/></g>', 1.0),
         ('<g fill="white"><rect x="100" y="100" width="100" height="100" fill="inherit"/></g>', 0.0),
         (
-            '<style>.a{fill:none} .b, .c{fill:#000}</style><rect class="a c" x="9" y="9" '
-            'width="100" height="100"/>',
+            '<style>.a{fill:none} .b, .c{fill:#000}</style><rect class="a c" x="9" y="9" width="100" height="100"/>',
             1.0,
         ),
         (

@@ -42,9 +42,7 @@ class Drive:
 
     def __init__(self, tables, starts, paths, heading=math.nan, knows_teammates=True, margin=0.3):
         count = len(starts)
-        self.simulation = KinematicSimulation.of_team(
-            [ROBOTS["kobuki"]] * count, Lidar(), OccupancySettings()
-        )
+        self.simulation = KinematicSimulation.of_team([ROBOTS["kobuki"]] * count, Lidar(), OccupancySettings())
         self.simulation.place(0, tables, np.array(starts, np.float64), 1)
         self.simulation.step(np.zeros((count, 2)), moves_bodies=False)
         robot = ROBOTS["kobuki"]
@@ -198,9 +196,7 @@ def test_the_robot_stops_before_a_body_that_appears_on_its_way_and_goes_on_when_
 def test_two_whose_ways_cross_never_touch():
     for late in (0.0, 0.3, 0.6):
         paths = [[(1.0, 2.5), (5.0, 2.5)], [(3.0, 0.5 - late / 2), (3.0, 4.5)]]
-        drive = Drive(hall(), [(1.0 + late / 2, 2.5, 0.0), (*paths[1][0], math.pi / 2)], paths).until_done(
-            1000
-        )
+        drive = Drive(hall(), [(1.0 + late / 2, 2.5, 0.0), (*paths[1][0], math.pi / 2)], paths).until_done(1000)
         assert drive.simulation.world.collisions.sum() == 0
         track = np.array(drive.track)
         assert np.hypot(*(track[:, 0, :2] - track[:, 1, :2]).T).min() > 0.36
@@ -243,9 +239,7 @@ def driven(floor, targets, decisions=60, robots=2, **options):
         states.append([infos[agent]["drive"] for agent in orders])
         tracks.append(base.world.poses[:, :2].copy())
         if all(
-            state is DriveState.ARRIVED
-            for state, target in zip(states[-1], targets, strict=True)
-            if target is not None
+            state is DriveState.ARRIVED for state, target in zip(states[-1], targets, strict=True) if target is not None
         ):
             break
     return base, states, np.array(tracks)

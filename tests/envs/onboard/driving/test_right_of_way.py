@@ -22,9 +22,7 @@ def met(floor=CORRIDOR, starts=MET, targets=((5.2, 1.5), (1.9, 1.5))):
     """Two robots that have paths and are blocked, and what settles their right of way."""
     met_floor = Floor(floor.name, floor.bounds, floor.solids, starts=np.array(starts))
     teams = Teams((met_floor,), (1,))
-    orders = [
-        None if place is None else Target(*(place - teams.offsets[row])) for row, place in enumerate(targets)
-    ]
+    orders = [None if place is None else Target(*(place - teams.offsets[row])) for row, place in enumerate(targets)]
     teams.driver.assign(teams.every, Orders.of(orders))
     teams.driver.prepare()
     drives = teams.driver.drives

@@ -25,9 +25,7 @@ RADIUS = 0.2
 
 def bodies_of(robots, knows_teammates=True):
     limits = np.array([0.5, 2.0, 1.0, 0.1])
-    return Bodies(
-        UNIT, np.full(robots, RADIUS), limits, knows_teammates, np.ones(robots, np.uint8), FORESIGHT_TIMES
-    )
+    return Bodies(UNIT, np.full(robots, RADIUS), limits, knows_teammates, np.ones(robots, np.uint8), FORESIGHT_TIMES)
 
 
 def sensed_of(poses, ranges=None, contact=None):

@@ -36,9 +36,7 @@ def refuge(navigation, start, path, distance=0.45, discs=()):
 def gap_to(cell, path):
     place = centres_of(np.array(cell), ORIGIN, RESOLUTION)
     path = np.asarray(path, np.float64)
-    dense = np.concatenate(
-        [a + (b - a) * np.linspace(0, 1, 200)[:, None] for a, b in itertools.pairwise(path)]
-    )
+    dense = np.concatenate([a + (b - a) * np.linspace(0, 1, 200)[:, None] for a, b in itertools.pairwise(path)])
     return float(np.hypot(*(dense - place).T).min())
 
 

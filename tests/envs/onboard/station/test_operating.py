@@ -36,9 +36,7 @@ def state_of(env, agent="robot_0"):
 def told(env, agent="robot_0"):
     """What happened to a robot: kinds, names and reasons of its events."""
     return [
-        (event.kind, event.what, event.reason)
-        for event in env.unwrapped.operating.events[0]
-        if event.agent == agent
+        (event.kind, event.what, event.reason) for event in env.unwrapped.operating.events[0] if event.agent == agent
     ]
 
 
@@ -239,9 +237,7 @@ def test_who_was_never_given_an_order_needs_an_action():
 
 
 def test_a_dead_robot_has_failed_and_an_episode_of_failed_robots_is_over():
-    faults = FaultSettings(
-        schedule=tuple(Fault(kind="dead_robot", robot=robot, at_s=1.0) for robot in (0, 1))
-    )
+    faults = FaultSettings(schedule=tuple(Fault(kind="dead_robot", robot=robot, at_s=1.0) for robot in (0, 1)))
     env = hall(faults=faults)
     infos = drive(env, robot_0=Target(3.0, 0.0), robot_1=None)[4]
     assert env.agents == []

@@ -17,9 +17,7 @@ from lidarium.evaluation.episodes.runner import run_episode
 from lidarium.mapping.grids.occupancy import UNKNOWN, three_levels
 
 HALL = Floor("hall", (0.0, 0.0, 30.0, 12.0))
-WALLED = Floor(
-    "walled", (0.0, 0.0, 12.0, 12.0), (Solid(np.array([[6.0, 0.0], [6.2, 0.0], [6.2, 8.0], [6.0, 8.0]])),)
-)
+WALLED = Floor("walled", (0.0, 0.0, 12.0, 12.0), (Solid(np.array([[6.0, 0.0], [6.2, 0.0], [6.2, 8.0], [6.0, 8.0]])),))
 IDLE = np.zeros(2, np.float32)
 AHEAD = np.array([0.4, 0.0], np.float32)
 
@@ -44,9 +42,9 @@ def is_as_now(env, row, report):
     """Whether a report has what a robot's own map knows now, and where."""
     perception, resolution = env.unwrapped.perception, env.unwrapped.settings.occupancy.resolution
     known = three_levels(np.asarray(perception.own_map(row).log_odds))
-    low_x, low_y = np.rint(
-        (np.array(report.map.origin) - perception.poses.origin_in_frame(row)) / resolution
-    ).astype(int)
+    low_x, low_y = np.rint((np.array(report.map.origin) - perception.poses.origin_in_frame(row)) / resolution).astype(
+        int
+    )
     reported = np.full_like(known, UNKNOWN)
     rows, columns = report.map.levels.shape
     reported[low_y : low_y + rows, low_x : low_x + columns] = report.map.levels
@@ -231,9 +229,7 @@ def test_a_link_to_a_place_is_as_one_to_a_robot_there():
     places = generator.uniform(0.5, 11.5, (12, 2))
     for kind in ("all", "none", "range", "line_of_sight", "signal"):
         radio = RadioSettings(kind=kind, reach=5.0)
-        assert np.array_equal(
-            links_to(radio, places[1:], places[0], solid), links(radio, places, solid)[0, 1:]
-        )
+        assert np.array_equal(links_to(radio, places[1:], places[0], solid), links(radio, places, solid)[0, 1:])
 
 
 def test_a_decentralised_policy_has_no_station():
@@ -247,7 +243,5 @@ def test_a_decentralised_policy_has_no_station():
             assert self.team.operating_state(self.team.agents[0]) is OperatingState.OPERATING
             return {agent: self.team.report(agent) for agent in observations}
 
-    with pytest.raises(
-        ValueError, match="asked for the report of robot_0; a decentralised policy has no station"
-    ):
+    with pytest.raises(ValueError, match="asked for the report of robot_0; a decentralised policy has no station"):
         run_episode(PerRobot(Asks), team([(3.0, 3.0, 0.0)]), seed=0)

@@ -14,9 +14,7 @@ def test_the_rim_of_an_image_is_at_half_the_field_of_view():
     left, right = ((column - pinhole.cx) / pinhole.fx for column in (-0.5, 639.5))
     assert (left, right) == pytest.approx((-1.0, 1.0))
     assert pinhole.cy == 239.5
-    assert camera.calibration["intrinsics"] == pytest.approx(
-        {"fx": 320.0, "fy": 320.0, "cx": 319.5, "cy": 239.5}
-    )
+    assert camera.calibration["intrinsics"] == pytest.approx({"fx": 320.0, "fy": 320.0, "cx": 319.5, "cy": 239.5})
 
 
 def test_a_mount_is_where_and_how_the_camera_looks():
@@ -35,7 +33,5 @@ def test_any_noise_makes_a_camera_noisy():
 
 
 def test_a_camera_that_measures_nothing_is_refused():
-    with pytest.raises(
-        ValueError, match=r"depth_min of the camera is 4\.0 m; want less than depth_max, 4\.0 m"
-    ):
+    with pytest.raises(ValueError, match=r"depth_min of the camera is 4\.0 m; want less than depth_max, 4\.0 m"):
         DepthCamera(depth_min=4.0)

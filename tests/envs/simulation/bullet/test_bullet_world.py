@@ -27,9 +27,7 @@ def hall(*solids):
 
 
 def box(x_low, y_low, x_high, y_high, z_low=0.0, z_high=math.inf):
-    return Solid(
-        np.array([(x_low, y_low), (x_high, y_low), (x_high, y_high), (x_low, y_high)]), z_low, z_high
-    )
+    return Solid(np.array([(x_low, y_low), (x_high, y_low), (x_high, y_high), (x_low, y_high)]), z_low, z_high)
 
 
 def placed(floor, starts, robot="kobuki", kind=BulletWorld, lidar=LIDAR, seed=0, **options):

@@ -93,8 +93,7 @@ def test_no_client_is_left_and_memory_stays_flat_after_many_episodes():
 def test_scans_scores_and_maps_are_the_kinematic_ones_at_the_same_poses():
     options = {"robots": 2, "resolution": 0.05, "noise": "thesis"}
     bullet, kinematic = (
-        ExplorationEnv(FLOOR, make_settings(backend=backend, **options))
-        for backend in ("bullet", "kinematic")
+        ExplorationEnv(FLOOR, make_settings(backend=backend, **options)) for backend in ("bullet", "kinematic")
     )
     bullet.reset(seed=3)
     kinematic.reset(seed=3)

@@ -13,9 +13,7 @@ from linked_rooms import TWO_ROOMS
 from lidarium.envs.simulation.bullet.bullet_world import BulletWorld
 from lidarium.envs.simulation.bullet.making import make_bullet
 
-SETTINGS = make_settings(
-    robots=2, backend="bullet", kinds=("kobuki", "pioneer"), time_step=0.05, camera="depth_64x48"
-)
+SETTINGS = make_settings(robots=2, backend="bullet", kinds=("kobuki", "pioneer"), time_step=0.05, camera="depth_64x48")
 
 
 def test_it_has_the_team_the_step_and_the_camera_of_the_settings():
@@ -31,9 +29,7 @@ def test_it_has_the_team_the_step_and_the_camera_of_the_settings():
 
 def test_the_backend_of_that_name_drives_and_maps():
     simulation = BACKENDS["bullet"](SETTINGS, 1)
-    tables = FloorTables.of_floor(
-        TWO_ROOMS, SETTINGS.raster_resolution, SETTINGS.lidar.height, SETTINGS.robot.height
-    )
+    tables = FloorTables.of_floor(TWO_ROOMS, SETTINGS.raster_resolution, SETTINGS.lidar.height, SETTINGS.robot.height)
     simulation.place(0, tables, TWO_ROOMS.starts, 1)
     simulation.step(np.zeros((2, 2)), moves_bodies=False)
     seen = simulation.score.coverage(0)

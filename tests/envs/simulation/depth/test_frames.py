@@ -31,9 +31,7 @@ def half_spaces(solids, bodies, ceiling=2.5):
     """Convex bodies as half-spaces n . x <= d: solids and upright cylinders of many sides."""
     rings = [(solid.polygon, max(solid.z_low, 0.0), min(solid.z_high, ceiling)) for solid in solids]
     angles = np.linspace(0.0, 2.0 * math.pi, 720, endpoint=False)
-    rings += [
-        (np.stack([x + r * np.cos(angles), y + r * np.sin(angles)], axis=1), 0.0, h) for x, y, r, h in bodies
-    ]
+    rings += [(np.stack([x + r * np.cos(angles), y + r * np.sin(angles)], axis=1), 0.0, h) for x, y, r, h in bodies]
     for ring, low, high in rings:
         if low < high:
             edges = np.roll(ring, -1, axis=0) - ring
@@ -156,9 +154,7 @@ def test_what_is_too_near_or_too_far_is_no_measurement():
 
 
 def test_noise_has_the_deviation_of_the_settings_and_comes_from_the_seed():
-    camera = DepthCamera(
-        columns=200, rows=150, depth_max=6.0, noise_floor=0.01, noise_share=0.005, field_of_view=0.2
-    )
+    camera = DepthCamera(columns=200, rows=150, depth_max=6.0, noise_floor=0.01, noise_share=0.005, field_of_view=0.2)
     room = Floor("room", BOUNDS)
     images = {}
     for seed in (1, 1, 2):

@@ -28,9 +28,7 @@ def middle_of(camera, depth):
 )
 def test_the_middle_of_an_image_is_where_the_camera_looks(mount, direction):
     camera = DepthCamera(columns=65, rows=49, forward=0.1, left=0.2, height=0.5, **mount)
-    assert middle_of(camera, 2.0) == pytest.approx(
-        np.array([0.1, 0.2, 0.5]) + 2.0 * np.array(direction), abs=1e-5
-    )
+    assert middle_of(camera, 2.0) == pytest.approx(np.array([0.1, 0.2, 0.5]) + 2.0 * np.array(direction), abs=1e-5)
 
 
 def test_a_pose_turns_and_does_not_stretch():

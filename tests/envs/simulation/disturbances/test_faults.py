@@ -22,9 +22,7 @@ def run(*faults, steps=30, action=(0.4, 0.0), robots=2, **options):
     )
     env.reset(seed=1, options={"starts": [[4.0, 4.0 + 4.0 * k, 0.0] for k in range(robots)]})
     outcomes = [
-        env.step({agent: np.array(action, np.float32) for agent in env.agents})
-        for _ in range(steps)
-        if env.agents
+        env.step({agent: np.array(action, np.float32) for agent in env.agents}) for _ in range(steps) if env.agents
     ]
     return env, outcomes
 
@@ -62,9 +60,7 @@ def test_a_blind_sector_takes_its_beams_and_no_others():
 
 
 def test_a_blind_sector_behind_a_robot_that_sees_all_around_wraps():
-    env, outcomes = run(
-        Fault(kind="blind_sector", bearing=math.pi, width=math.radians(40.0)), lidar="lidar_360_6m"
-    )
+    env, outcomes = run(Fault(kind="blind_sector", bearing=math.pi, width=math.radians(40.0)), lidar="lidar_360_6m")
     angles = env.settings.lidar.angles
     behind = math.pi - np.abs(angles) <= math.radians(20.0) + 1e-9
     assert np.array_equal((scans(outcomes) == 0.0).all(axis=0), behind)
@@ -83,9 +79,7 @@ def test_a_stuck_wheel_lets_the_robot_turn_about_it(wheel, sign):
 
 
 def test_a_kidnapped_robot_is_elsewhere_and_what_it_knows_is_not_told():
-    env, outcomes = run(
-        Fault(kind="kidnapping", at_s=1.0, place=(20.0, 12.0, 1.5)), steps=20, localization="odometry"
-    )
+    env, outcomes = run(Fault(kind="kidnapping", at_s=1.0, place=(20.0, 12.0, 1.5)), steps=20, localization="odometry")
     poses = np.array([outcome[4]["robot_0"]["truth"]["pose"] for outcome in outcomes])
     assert np.hypot(*(poses[9, :2] - [4.0, 4.0])) < 1.0
     assert np.hypot(*(poses[10, :2] - [20.0, 12.0])) < 0.1
@@ -96,9 +90,7 @@ def test_a_kidnapped_robot_is_elsewhere_and_what_it_knows_is_not_told():
 
 def test_a_kidnapped_robot_is_never_put_into_another():
     env, outcomes = run(Fault(kind="kidnapping", robot=0, at_s=0.5, place=(4.5, 8.0, 0.0)), steps=60)
-    poses = np.array(
-        [[outcome[4][agent]["truth"]["pose"] for agent in ("robot_0", "robot_1")] for outcome in outcomes]
-    )
+    poses = np.array([[outcome[4][agent]["truth"]["pose"] for agent in ("robot_0", "robot_1")] for outcome in outcomes])
     gaps = np.hypot(*(poses[:, 0, :2] - poses[:, 1, :2]).T)
     assert gaps.min() >= 2.0 * env.settings.robot.radius - 1e-6
     # As soon as the other has left, it is put there.
@@ -148,10 +140,7 @@ def test_every_kind_comes_at_its_rate_and_is_survived(kind):
 
 def test_rates_draw_as_many_faults_as_they_say():
     settings = FaultSettings(laser_dropout=6.0, stuck_wheel=3.0)
-    tables = [
-        plan_faults(settings, 4, seed, 0.1, 3600.0, PLACES).reshape(4, -1, FAULT_NUMBERS)
-        for seed in range(40)
-    ]
+    tables = [plan_faults(settings, 4, seed, 0.1, 3600.0, PLACES).reshape(4, -1, FAULT_NUMBERS) for seed in range(40)]
     kinds = np.stack(tables)[..., 0]
     assert (kinds == KINDS.index("laser_dropout")).sum() / 160 == pytest.approx(6.0, rel=0.1)
     assert (kinds == KINDS.index("stuck_wheel")).sum() / 160 == pytest.approx(3.0, rel=0.15)

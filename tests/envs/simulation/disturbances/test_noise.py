@@ -25,9 +25,7 @@ def fill_streams(seeds, robots, steps, table, values):
 
 
 def draws(seeds, robots, steps, beams=727):
-    seeds, robots, steps = np.broadcast_arrays(
-        np.asarray(seeds, np.uint64), np.asarray(robots), np.asarray(steps)
-    )
+    seeds, robots, steps = np.broadcast_arrays(np.asarray(seeds, np.uint64), np.asarray(robots), np.asarray(steps))
     values = np.empty((seeds.size, beams), np.float32)
     fill_streams(seeds.ravel().copy(), robots.ravel().copy(), steps.ravel().copy(), GAUSSIAN_TABLE, values)
     return values.astype(np.float64)
@@ -78,9 +76,7 @@ def test_robots_and_seeds_have_streams_of_their_own():
 
 
 def test_no_two_of_many_streams_are_the_same():
-    values = draws(
-        np.arange(40)[:, None, None], np.arange(8)[None, :, None], np.arange(-1, 99)[None, None, :], beams=4
-    )
+    values = draws(np.arange(40)[:, None, None], np.arange(8)[None, :, None], np.arange(-1, 99)[None, None, :], beams=4)
     assert len(np.unique(values, axis=0)) == len(values)
 
 
@@ -93,9 +89,7 @@ def hall(rows=120, columns=160):
 
 def simulation(episodes=1, robots=2, floor=0.01, share=0.01, range_max=5.6):
     lidar = Lidar(beams=200, noise_floor=floor, noise_share=share, range_max=range_max)
-    return KinematicSimulation.of_team(
-        [ROBOTS["kobuki"]] * robots, lidar, OccupancySettings(), episodes=episodes
-    )
+    return KinematicSimulation.of_team([ROBOTS["kobuki"]] * robots, lidar, OccupancySettings(), episodes=episodes)
 
 
 STARTS = np.array([[1.0, 1.0, 0.3], [2.5, 1.5, 2.0]])
@@ -106,9 +100,7 @@ def test_the_same_seed_gives_the_same_ranges_in_any_row():
     alone, among = simulation(), simulation(episodes=4)
     alone.place(0, tables, STARTS, 99)
     for episode in range(4):
-        among.place(
-            episode, tables, STARTS if episode == 2 else STARTS[::-1].copy(), 99 if episode == 2 else episode
-        )
+        among.place(episode, tables, STARTS if episode == 2 else STARTS[::-1].copy(), 99 if episode == 2 else episode)
     for step in range(20):
         alone.step(commands, moves_bodies=step > 0)
         among.step(np.tile(commands, (4, 1)), moves_bodies=step > 0)

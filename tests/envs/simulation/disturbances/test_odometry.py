@@ -42,9 +42,7 @@ def test_wheels_that_nobody_reckons_with_change_nothing():
     )
     assert np.array_equal(plain.world.poses, biased.world.poses)
     assert np.array_equal(plain.ranges, biased.ranges)
-    assert all(
-        np.array_equal(a, b) for a, b in zip(plain.beliefs.log_odds, biased.beliefs.log_odds, strict=True)
-    )
+    assert all(np.array_equal(a, b) for a, b in zip(plain.beliefs.log_odds, biased.beliefs.log_odds, strict=True))
     assert not np.array_equal(plain.measured, biased.measured)
 
 
@@ -77,19 +75,12 @@ def test_signs_of_biases_are_drawn_for_each_robot_and_episode():
 def test_encoders_count_whole_ticks_and_lose_none():
     simulation = drive((0.37, 0.21), 80, robot="pioneer", odometry=bias(counts_ticks=True))
     robot = ROBOTS["pioneer"]
-    ways = (
-        simulation.measured[0, 0] * 0.1
-        + np.array([-0.5, 0.5]) * simulation.measured[0, 1] * 0.1 * robot.wheel_base
-    )
+    ways = simulation.measured[0, 0] * 0.1 + np.array([-0.5, 0.5]) * simulation.measured[0, 1] * 0.1 * robot.wheel_base
     ticks = ways * robot.ticks_per_metre
     assert np.allclose(ticks, np.round(ticks), atol=1e-6)
     # What is left of a tick counts in the next step: never more than a tick and a half is missing.
     assert (
-        abs(
-            math.hypot(*simulation.odometry[0, :2])
-            - math.hypot(*(simulation.world.poses[0, :2] - [4.0, 4.0]))
-        )
-        < 0.02
+        abs(math.hypot(*simulation.odometry[0, :2]) - math.hypot(*(simulation.world.poses[0, :2] - [4.0, 4.0]))) < 0.02
     )
     assert (
         abs(wrapped(simulation.odometry[0, 2] - simulation.world.poses[0, 2]))
@@ -118,9 +109,7 @@ def test_drives_do_not_quite_what_they_are_told_and_the_wheels_know_it():
 
 
 def test_the_same_seed_is_the_same_run_to_the_bit():
-    one, other, another = (
-        drive((0.5, 0.2), seed=seed, odometry="poor", noise="datasheet") for seed in (3, 3, 4)
-    )
+    one, other, another = (drive((0.5, 0.2), seed=seed, odometry="poor", noise="datasheet") for seed in (3, 3, 4))
     assert np.array_equal(one.beliefs.believed, other.beliefs.believed)
     assert np.array_equal(one.beliefs.log_odds[0], other.beliefs.log_odds[0])
     assert not np.array_equal(one.beliefs.believed, another.beliefs.believed)
@@ -144,10 +133,7 @@ def test_presets_grow_worse_by_their_names():
     names = ["ideal", "good", "typical", "poor"]
     assert list(ODOMETRY) == names
     errors = [drive((0.4, 0.05), 150, seed=2, odometry=name) for name in names]
-    away = [
-        float(np.hypot(*(simulation.beliefs.believed - simulation.world.poses)[0, :2]))
-        for simulation in errors
-    ]
+    away = [float(np.hypot(*(simulation.beliefs.believed - simulation.world.poses)[0, :2])) for simulation in errors]
     assert away == sorted(away)
 
 

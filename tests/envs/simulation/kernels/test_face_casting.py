@@ -25,9 +25,7 @@ def test_the_casters_agree_with_each_other_on_real_sizes():
     geometry = ScanGeometry()
     for _ in range(20):
         x, y = free_position(solid, generator)
-        _, (squares, faces, chosen) = all_casts(
-            tables, x, y, generator.uniform(-math.pi, math.pi), geometry, 224.0
-        )
+        _, (squares, faces, chosen) = all_casts(tables, x, y, generator.uniform(-math.pi, math.pi), geometry, 224.0)
         assert np.abs(squares - faces).max() < 1e-6
         assert np.abs(squares - chosen).max() < 1e-6
 

@@ -219,9 +219,7 @@ def test_the_map_is_that_of_the_occupancy_grid_fed_with_the_same_scans(tables):
         grid.integrate(one.world.poses[0], one.ranges[0], geometry, noise=(0.01, 0.01))
     column, row = (round((a - b) / 0.05) for a, b in zip(grid.origin, one.beliefs.origins[0], strict=True))
     rows, columns = np.nonzero(one.beliefs.log_odds[0])
-    assert (
-        grid.log_odds[rows - row, columns - column] == one.beliefs.log_odds[0][rows, columns]
-    ).mean() > 0.999
+    assert (grid.log_odds[rows - row, columns - column] == one.beliefs.log_odds[0][rows, columns]).mean() > 0.999
 
 
 def hall(rows=160, columns=240):

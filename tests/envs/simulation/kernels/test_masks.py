@@ -31,9 +31,7 @@ def between_beams(simulation, row):
     world, lidar = simulation.world, simulation.lidar
     x, y, heading = world.poses[row]
     ranges = np.minimum(simulation.ranges[row], lidar.range_max)
-    ends = np.stack(
-        [x + ranges * np.cos(heading + lidar.angles), y + ranges * np.sin(heading + lidar.angles)]
-    )
+    ends = np.stack([x + ranges * np.cos(heading + lidar.angles), y + ranges * np.sin(heading + lidar.angles)])
     polygon = Path(np.concatenate([[[x, y]], ends.T]))
     rows, columns = simulation.beliefs.log_odds[row].shape
     centres = (np.stack(np.meshgrid(np.arange(columns), np.arange(rows)), -1) + 0.5) * RESOLUTION

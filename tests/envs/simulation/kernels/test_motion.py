@@ -14,9 +14,7 @@ from lidarium.envs.simulation.kernels.motion import move_robots
 
 RESOLUTION = 0.025
 KOBUKI = Robot()
-UNLIMITED = Robot(
-    max_speed=5.0, cruise_speed=1.0, max_turn_rate=50.0, max_acceleration=1e6, max_turn_acceleration=1e6
-)
+UNLIMITED = Robot(max_speed=5.0, cruise_speed=1.0, max_turn_rate=50.0, max_acceleration=1e6, max_turn_acceleration=1e6)
 
 
 class Bodies:

@@ -27,11 +27,7 @@ def largest_square(solid, row, column, quadrant):
     side = 0
     while True:
         rows, columns = row + step_row * np.arange(side + 1), column + step_column * np.arange(side + 1)
-        is_on = (
-            min(rows.min(), columns.min()) >= 0
-            and rows.max() < solid.shape[0]
-            and columns.max() < solid.shape[1]
-        )
+        is_on = min(rows.min(), columns.min()) >= 0 and rows.max() < solid.shape[0] and columns.max() < solid.shape[1]
         if not is_on or solid[np.ix_(rows, columns)].any():
             return side
         side += 1

@@ -84,9 +84,7 @@ def test_times_of_a_bag_are_those_of_its_messages(tmp_path):
 def test_a_bag_without_scans_is_refused(tmp_path):
     with bag(tmp_path / "empty.mcap") as writer:
         writer.odometry("/odom", "odom", "base_link", 0.0, np.zeros(3))
-    with pytest.raises(
-        ValueError, match=r"empty.mcap holds no scans; want a topic of sensor_msgs/msg/LaserScan"
-    ):
+    with pytest.raises(ValueError, match=r"empty.mcap holds no scans; want a topic of sensor_msgs/msg/LaserScan"):
         read_bag_log(tmp_path / "empty.mcap")
 
 
@@ -162,9 +160,7 @@ def test_a_bag_of_something_else_is_refused(tmp_path):
     with open(tmp_path / "json.mcap", "wb") as file:
         writer = Writer(file)
         writer.start()
-        channel = writer.register_channel(
-            "/scan", "json", writer.register_schema("Scan", "jsonschema", b"{}")
-        )
+        channel = writer.register_channel("/scan", "json", writer.register_schema("Scan", "jsonschema", b"{}"))
         writer.add_message(channel, 0, b"{}", 0)
         writer.finish()
     with pytest.raises(ValueError, match=r"json.mcap holds no scans"):
@@ -222,9 +218,7 @@ def test_scans_that_pack_too_well_are_refused(log, tmp_path):
 
 
 def same_logs(found, log):
-    return np.array_equal(found.ranges, log.ranges, equal_nan=True) and np.array_equal(
-        found.odometry, log.odometry
-    )
+    return np.array_equal(found.ranges, log.ranges, equal_nan=True) and np.array_equal(found.odometry, log.odometry)
 
 
 @pytest.mark.parametrize("name", ["a.db3", "a.db3.zstd", "a.bag", "lz4.bag", "bz2.bag"])

@@ -103,9 +103,7 @@ def test_bytes_are_those_that_mcap_ros2_encodes_by_the_definition_in_the_bag(nam
     writer.finish()
     reader = make_reader(io.BytesIO(file.getvalue()))
     ((definition, ours),) = [
-        (schema.data.decode(), message.data)
-        for schema, _, message in reader.iter_messages()
-        if schema.name == name
+        (schema.data.decode(), message.data) for schema, _, message in reader.iter_messages() if schema.name == name
     ]
     encode = serialize_dynamic(name, definition)[name]
     assert ours == bytes(encode(expected_messages()[name]))

@@ -50,9 +50,7 @@ def test_the_smallest_sum_is_subtracted_from_a_cap(numbers, costs, count, cap):
 def test_blocks_are_compared_and_raised(log_odds, block, other, number):
     differ = assert_forms_agree(clearance.cells_that_differ, log_odds, block, number)[0]
     assert differ == bits_of((log_odds > 0) ^ (block == number))
-    assert assert_forms_agree(clearance.same_cells, block, other)[0] == bits_of(
-        (block == other) & (block > 0)
-    )
+    assert assert_forms_agree(clearance.same_cells, block, other)[0] == bits_of((block == other) & (block > 0))
     raised = np.maximum(block, other)
     clearance.raise_block(block.ctypes.data, other.ctypes.data)
     assert np.array_equal(block, raised)

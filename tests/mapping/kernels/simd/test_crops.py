@@ -10,9 +10,7 @@ from hypothesis.extra.numpy import arrays
 from lidarium.mapping.kernels.simd import crops
 from lidarium.mapping.kernels.simd.crops import COLUMNS, PLACES, ROWS, SIDE
 
-pytestmark = pytest.mark.skipif(
-    not crops.CAN_LOOK_UP_IN_REGISTERS, reason="this processor has no AVX-512 VBMI"
-)
+pytestmark = pytest.mark.skipif(not crops.CAN_LOOK_UP_IN_REGISTERS, reason="this processor has no AVX-512 VBMI")
 
 maps = arrays(np.int8, (ROWS, COLUMNS))
 indices = arrays(np.uint8, 64, elements=st.integers(0, 16 * 11 + 10))

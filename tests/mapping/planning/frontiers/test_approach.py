@@ -66,10 +66,7 @@ def test_approaches_are_the_cheapest_cells_in_reach_and_sight_and_the_nearest_is
         if math.isfinite(best):
             assert found.cost(tuple(result.cells[k])) == result.costs[k]
             assert np.hypot(*(result.cells[k] - result.frontier_cells[k])) <= reach / RESOLUTION
-            assert (
-                visible(belief, tuple(result.cells[k]), result.frontier_cells[k][None])[0]
-                == result.in_sight[k]
-            )
+            assert visible(belief, tuple(result.cells[k]), result.frontier_cells[k][None])[0] == result.in_sight[k]
             assert result.reasons[k] == ("" if result.in_sight[k] else "hidden")
         else:
             assert result.reasons[k] == "blocked"
@@ -97,9 +94,7 @@ def test_a_frontier_behind_a_gap_that_is_too_narrow_is_said_to_be_so():
         frontiers.update(belief)
         clusters = frontiers.clusters()
         found = search(space, belief, field, (40, 30), Footprint())
-        thin = approach(
-            clusters, search(thin_space, belief, field, (40, 30), Footprint(0.0, 0.1)), belief, 0.23
-        )
+        thin = approach(clusters, search(thin_space, belief, field, (40, 30), Footprint(0.0, 0.1)), belief, 0.23)
         return approach(clusters, found, belief, 0.23, thin.reachable).reasons
 
     assert reasons() == ("blocked",)

@@ -38,10 +38,7 @@ def test_an_empty_map_has_no_frontiers():
     field, frontiers = made(np.full((30, 30), -5, np.int8))
     assert len(frontiers.clusters()) == 0
     space = SearchSpace((30, 30), RESOLUTION)
-    assert (
-        nearest_frontier(frontiers, space, np.full((30, 30), -5, np.int8), field, (10, 10), Footprint())
-        is None
-    )
+    assert nearest_frontier(frontiers, space, np.full((30, 30), -5, np.int8), field, (10, 10), Footprint()) is None
 
 
 def test_bad_input_is_named():

@@ -42,9 +42,7 @@ def test_beyond_the_first_target_costs_are_those_of_the_full_search(seed, beyond
     found = search(space, belief, field, start, footprint, until=Until(targets=targets, beyond=beyond))
     np.testing.assert_array_equal(found.hits, first)
     most = found.cost(tuple(found.hits[0])) + beyond if len(found.hits) else np.inf
-    np.testing.assert_array_equal(
-        np.where(full <= most, found.costs(), np.inf), np.where(full <= most, full, np.inf)
-    )
+    np.testing.assert_array_equal(np.where(full <= most, found.costs(), np.inf), np.where(full <= most, full, np.inf))
     further = found.costs()[np.isfinite(found.costs())].max()
     assert further <= most + 3 * 4096 * found.unit
 

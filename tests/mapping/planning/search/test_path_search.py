@@ -53,9 +53,7 @@ def test_a_path_is_that_of_the_search_of_all_and_the_memory_is_blank_again(seed)
     bodies = [tuple(disc) for disc in discs.tolist()]
     for _ in range(4):
         start, goal = generator.integers(0, (40, 64), (2, 2)).tolist()
-        found = search(
-            SearchSpace(log_odds.shape, RESOLUTION), log_odds, clearance, tuple(start), BODY, blocked=bodies
-        )
+        found = search(SearchSpace(log_odds.shape, RESOLUTION), log_odds, clearance, tuple(start), BODY, blocked=bodies)
         cost, cells = find_path(
             Terrain(log_odds, clearance.closeness, passage, discs),
             memory.table[1],
@@ -91,9 +89,7 @@ def test_a_memory_serves_grids_of_any_shape_one_after_the_other():
             log_odds, clearance = belief(k, shape)
             log_odds[5:9, 5:9] = -20
             clearance.update(log_odds)
-            remaining, _, count, least = search_all(
-                log_odds, clearance.closeness, passage, memory.table[0], 7, 7
-            )
+            remaining, _, count, least = search_all(log_odds, clearance.closeness, passage, memory.table[0], 7, 7)
             results.append((np.where(remaining >= least, remaining, 0).tobytes(), count))
             clear_memory(memory.table[0], *shape, count)
     assert results[:3] == results[3:]

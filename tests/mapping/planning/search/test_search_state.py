@@ -28,9 +28,7 @@ def test_discs_close_the_cells_whose_centres_lie_inside_once():
     discs = np.array([(10.0, 12.0, 4.5), (12.5, 14.0, 3.0), (0.0, 39.0, 2.0), (-20.0, 5.0, 3.0)])
     count = close_discs(remaining, touched, discs)
     row, column = np.indices(remaining.shape)
-    inside = np.any(
-        [(row - r) ** 2 + (column - c) ** 2 < radius**2 for r, c, radius in discs.tolist()], axis=0
-    )
+    inside = np.any([(row - r) ** 2 + (column - c) ** 2 < radius**2 for r, c, radius in discs.tolist()], axis=0)
     np.testing.assert_array_equal(remaining == NO_ENTRY, inside)
     assert count == inside.sum()
     packed = touched[:count]

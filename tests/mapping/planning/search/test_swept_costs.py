@@ -48,9 +48,7 @@ def searched(log_odds, clearance, passage, start):
     """Costs by the search cell by cell; ``FAR`` where the body cannot be but to leave a tight place."""
     memory = SearchMemory(1)
     memory.fit(log_odds.size, passage.slots)
-    remaining, parent, count, least = search_all(
-        log_odds, clearance.closeness, passage, memory.table[0], *start
-    )
+    remaining, parent, count, least = search_all(log_odds, clearance.closeness, passage, memory.table[0], *start)
     touched = touched_in(memory.table[0], *log_odds.shape)[:count].copy()
     is_reached = remaining >= least
     is_reached[is_reached] &= parent[is_reached] < LEAVING

@@ -27,9 +27,7 @@ def lengths_by_heap(is_open, start):
         for i in (-1, 0, 1):
             for j in (-1, 0, 1):
                 other = row + i, column + j
-                if (i, j) == (0, 0) or not (
-                    0 <= other[0] < is_open.shape[0] and 0 <= other[1] < is_open.shape[1]
-                ):
+                if (i, j) == (0, 0) or not (0 <= other[0] < is_open.shape[0] and 0 <= other[1] < is_open.shape[1]):
                     continue
                 further = length + (7 if i and j else 5)
                 if is_open[other] and further < lengths[other]:

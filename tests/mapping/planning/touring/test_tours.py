@@ -54,8 +54,7 @@ def test_tours_are_nearly_the_best(robots, weights):
         found = team_tours(first, between, worth, weights)
         assert sorted(found) == list(range(5 + robots - 1))
         best = min(
-            cost_of(order, first, between, worth, weights)
-            for order in itertools.permutations(range(5 + robots - 1))
+            cost_of(order, first, between, worth, weights) for order in itertools.permutations(range(5 + robots - 1))
         )
         ratios.append(cost_of(found, first, between, worth, weights) / best)
     assert min(ratios) >= 1.0 - 1e-9
@@ -132,9 +131,7 @@ def test_a_tour_is_never_longer_than_that_of_the_nearest_place_again_and_again(s
     nearest = [int(np.argmin(first))]
     while len(nearest) < count:
         nearest.append(min(set(range(count)) - set(nearest), key=lambda place: between[nearest[-1], place]))
-    assert (
-        length_of(shortest_tour(first, between), first, between) <= length_of(nearest, first, between) + 1e-9
-    )
+    assert length_of(shortest_tour(first, between), first, between) <= length_of(nearest, first, between) + 1e-9
 
 
 def test_what_lies_on_the_shorter_side_is_visited_first_though_another_place_is_nearer():

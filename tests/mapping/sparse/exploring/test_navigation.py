@@ -66,9 +66,7 @@ def test_routes_are_cut_short_over_seen_ground_alone():
 def test_a_robot_too_near_to_a_wall_first_goes_to_where_it_can_stand():
     navigation = known(WALL, floor_codes((0.0, 0.0), (7.0, 5.0)), [[0.5, 1.5, 0.0]])
     start = np.array([2.75, 1.5])
-    assert not is_free(
-        navigation.index, np.array([*start, 0.0]), np.array([*start, 0.0]), navigation.body.numbers
-    )
+    assert not is_free(navigation.index, np.array([*start, 0.0]), np.array([*start, 0.0]), navigation.body.numbers)
     route = navigation.route(start, np.array([0.5, 0.5]))
     assert not route.reason
     assert route.points[0][:2] == pytest.approx(start)

@@ -34,9 +34,7 @@ def scene(seed, boxes=WALL):
     count = 30
     costs = np.sort(generator.uniform(0.0, 6.0, count))
     costs[0] = 0.0
-    places = Places(
-        on_floor(generator.uniform(-3.0, 5.0, (count, 2))), costs, generator.uniform(-3.0, 3.0, count)
-    )
+    places = Places(on_floor(generator.uniform(-3.0, 5.0, (count, 2))), costs, generator.uniform(-3.0, 3.0, count))
     frontier, samples = generator.uniform(-3.0, 5.0, (60, 2)), generator.uniform(-4.0, 6.0, (90, 2))
     return index_boxes(boxes), places, Unknown(on_floor(frontier), 0.1, on_floor(samples), 0.09)
 

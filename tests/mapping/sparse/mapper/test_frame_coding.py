@@ -203,9 +203,7 @@ ROOM_OF_FRAME_CODING, LEVEL = room_points(0.05), FloorPlane()
 SETTINGS = MapperSettings()
 
 
-@pytest.mark.parametrize(
-    ("count", "share", "expected"), [(100, 0.3, (70, 30)), (2, 0.9, (1, 1)), (50, 0.0, (49, 1))]
-)
+@pytest.mark.parametrize(("count", "share", "expected"), [(100, 0.3, (70, 30)), (2, 0.9, (1, 1)), (50, 0.0, (49, 1))])
 def test_both_kinds_get_at_least_a_code(count, share, expected):
     assert code_counts(count, share) == expected
 

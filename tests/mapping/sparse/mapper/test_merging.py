@@ -108,9 +108,7 @@ def test_a_box_within_another_goes():
 
 
 def test_pieces_of_a_wall_become_one_box():
-    boxes = np.array(
-        [[[0.3 * i, 0, 0.5 * j], [0.3 * i + 0.3, 0, 0.5 * j + 0.5]] for i in range(9) for j in range(3)]
-    )
+    boxes = np.array([[[0.3 * i, 0, 0.5 * j], [0.3 * i + 0.3, 0, 0.5 * j + 0.5]] for i in range(9) for j in range(3)])
     merged, _ = _merged_boxes(boxes, NOTHING_FREE, 0.01, 100)
     np.testing.assert_allclose(merged, [[[0.0, 0.0, 0.0], [2.7, 0.0, 1.5]]])
 

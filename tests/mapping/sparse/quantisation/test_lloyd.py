@@ -160,9 +160,7 @@ def test_means_and_covariances_are_weighted(summary):
     labels, _ = searched(POINTS, CODES)
     for code in range(3):
         own, mass = POINTS[labels == code].astype(float), WEIGHTS[labels == code]
-        np.testing.assert_allclose(
-            summary.means(CODES)[code], np.average(own, axis=0, weights=mass), atol=1e-5
-        )
+        np.testing.assert_allclose(summary.means(CODES)[code], np.average(own, axis=0, weights=mass), atol=1e-5)
         expected = np.cov(own.T, aweights=mass, ddof=0)
         np.testing.assert_allclose(summary.covariances()[code], expected, atol=1e-4)
 

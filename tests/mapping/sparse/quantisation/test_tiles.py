@@ -11,8 +11,7 @@ def plain_keys(points, low, per_metre):
     """Keys of cells whose bits alternate, from z down to x."""
     cells = np.clip(((points - np.float32(low)) * np.float32(per_metre)).astype(int), 0, CELLS - 1)
     return [
-        sum((int(cell[axis]) >> bit & 1) << (3 * bit + axis) for bit in range(8) for axis in range(3))
-        for cell in cells
+        sum((int(cell[axis]) >> bit & 1) << (3 * bit + axis) for bit in range(8) for axis in range(3)) for cell in cells
     ]
 
 
