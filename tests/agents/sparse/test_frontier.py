@@ -208,8 +208,8 @@ def test_a_robot_that_does_not_get_on_takes_something_to_stand_there_and_then_gi
     while policy._work["robot_0"].view is None or policy._work["robot_0"].view.cost < 0.9:
         observations = level.step(policy.act(observations))[0]
     # From now on the wheels are stuck.
-    move = env.drive_at
-    env.drive_at = lambda commands: move(np.zeros_like(commands))
+    move = env.engine._step
+    env.engine._step = lambda commands, **options: move(np.zeros_like(commands), **options)
     stuck, obstacles = policy.team.time_s, 0
     while not any(entry.reason == "no_progress" for entry in policy.given_up):
         assert policy.team.time_s < stuck + 1.5 * PATIENCE_S
