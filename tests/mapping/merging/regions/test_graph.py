@@ -1,7 +1,6 @@
 """Regions of a map: their shapes, and the doors between them."""
 
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -127,14 +126,6 @@ def test_what_is_known_may_lie_anywhere_in_the_array():
     shift = Transform(200 * RESOLUTION, 150 * RESOLUTION, 0.0)
     np.testing.assert_allclose(found.doors.places, shift.apply(still.doors.places))
     np.testing.assert_allclose(found.centres, shift.apply(still.centres))
-
-
-def test_the_code_of_the_reference_page_runs(capsys):
-    text = (Path(__file__).parents[4] / "docs" / "reference" / "merging.md").read_text(encoding="utf-8")
-    section = text[text.index("## Regions and doors") :]
-    code = section[section.index("```python\n") + 10 :].partition("```")[0]
-    exec(compile(code, "merging.md", "exec"), {"jade_levels": suite()})
-    assert "{0: [" in capsys.readouterr().out
 
 
 def test_settings_that_make_no_sense_are_named():
