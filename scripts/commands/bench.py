@@ -27,7 +27,7 @@ class _Bench(Command):
     """
 
 
-def _execute(command: _Bench) -> Answer:
+def execute(command: _Bench) -> Answer:
     """Measure, print, and write ``speed.md`` and ``speed.json`` if asked to."""
     from lidarium.benchmarks.speed.all import QUESTIONS, ask, result_of
     from lidarium.benchmarks.speed.harness.report import write_speed

@@ -31,7 +31,7 @@ class _Bound(TeamCommand):
     """metres per pixel, if the floor is a plain image"""
 
 
-def _execute(command: _Bound) -> Answer:
+def execute(command: _Bound) -> Answer:
     """Plan and drive the tours."""
     from lidarium.envs.floors.catalogue.names import load_floor
     from lidarium.envs.settings.making import make_settings

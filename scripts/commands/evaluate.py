@@ -74,7 +74,7 @@ class _Evaluate(TeamCommand):
     """keep a record of every episode, for replays and for the pictures of the report"""
 
 
-def _execute(command: _Evaluate) -> Answer:
+def execute(command: _Evaluate) -> Answer:
     """Run the missing episodes of a suite."""
     from lidarium.evaluation.suites.campaign import Campaign
     from lidarium.mapping.files.output import check_writable

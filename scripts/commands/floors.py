@@ -120,7 +120,7 @@ class _Floors:
         return self.command.compiles
 
 
-def _execute(command: _Floors) -> Answer:
+def execute(command: _Floors) -> Answer:
     """Run the command about floors that was chosen."""
     chosen = command.command
     if isinstance(chosen, _List):

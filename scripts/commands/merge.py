@@ -97,7 +97,7 @@ class _Merge(Command):
         return factor
 
 
-def _execute(command: _Merge) -> Answer:
+def execute(command: _Merge) -> Answer:
     """Merge maps and write the results."""
     from lidarium.mapping.files.output import check_writable
     from lidarium.mapping.merging.settings import TOLERANCES, merge_settings

@@ -34,7 +34,7 @@ class _Plan(Command):
     """additional cost of paths near obstacles, as a share"""
 
 
-def _execute(command: _Plan) -> Answer:
+def execute(command: _Plan) -> Answer:
     """Plan a path."""
     import numpy as np
 

@@ -50,7 +50,7 @@ class _Replay(FilmFiles, Command):
     """run the record again and write the sensor data as a bag of ROS 2 (extra bags)"""
 
 
-def _execute(command: _Replay) -> Answer:
+def execute(command: _Replay) -> Answer:
     """Run a record again, or draw it."""
     from lidarium.evaluation.record import read_record
     from lidarium.mapping.files.output import check_writable, write_json

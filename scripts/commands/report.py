@@ -42,7 +42,7 @@ class _Report(FilmFiles, Command):
     """policies that a film shows, in this order; all of them by default, nine at most"""
 
 
-def _execute(command: _Report) -> Answer:
+def execute(command: _Report) -> Answer:
     """Write the report of a directory."""
     from lidarium.evaluation.report import write_report
 

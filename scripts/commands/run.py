@@ -113,7 +113,7 @@ class Run(FilmOptions, TeamCommand, ViewOptions):
         return ["run.mp4"] * self.video + ["run.gif"] * self.gif
 
 
-def _execute(command: Run) -> Answer:
+def execute(command: Run) -> Answer:
     """Run one episode and write its results."""
     import lidarium
     from lidarium.mapping.files.output import check_writable

@@ -44,7 +44,7 @@ class Show(Command):
     """kind of the list"""
 
 
-def _execute(command: Show) -> Answer:
+def execute(command: Show) -> Answer:
     """List the choices of a kind."""
     from lidarium.mapping.files.output import check_writable, write_json, write_text
 

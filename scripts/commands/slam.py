@@ -93,7 +93,7 @@ class _Slam(Command):
             raise ValueError(f"clock-shift is {self.clock_shift} s; want a number")
 
 
-def _execute(command: _Slam) -> Answer:
+def execute(command: _Slam) -> Answer:
     """Run SLAM over a log and write the results."""
     from lidarium.mapping.files.output import check_writable
     from lidarium.mapping.files.trajectories import read_tum

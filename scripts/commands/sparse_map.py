@@ -58,7 +58,7 @@ class _SparseMapping(Command):
         return self.out if self.out.suffix in SUFFIXES else self.out / "map.smap"
 
 
-def _execute(command: _SparseMapping) -> Answer:
+def execute(command: _SparseMapping) -> Answer:
     """Make a map and write it."""
     from lidarium.evaluation.drawing.sparse_picture import save_sparse_pictures
     from lidarium.mapping.files.output import check_writable

@@ -46,7 +46,7 @@ class _EditSparseMap(Command):
         return self.out if self.out.suffix in SUFFIXES else self.out / "edited.smap"
 
 
-def _execute(command: _EditSparseMap) -> Answer:
+def execute(command: _EditSparseMap) -> Answer:
     """Edit a map and write the new one."""
     from lidarium.evaluation.drawing.sparse_picture import save_sparse_pictures
     from lidarium.mapping.files.output import check_writable

@@ -41,7 +41,7 @@ class _Train(Command):
     """processes; 0 for as many as there are cores"""
 
 
-def _execute(command: _Train) -> Answer:
+def execute(command: _Train) -> Answer:
     """Do the missing parts of a training."""
     from lidarium.mapping.files.output import check_writable
 
