@@ -99,7 +99,7 @@ def test_settings_that_are_each_within_bounds_may_ask_for_too_much_together(opti
 
 
 @pytest.mark.parametrize("row", _rows(ExplorationSettings()), ids=lambda row: row.name)
-@pytest.mark.parametrize("end", ["least", "most"])
+@pytest.mark.parametrize("end", ["minimum", "maximum"])
 def test_the_ends_of_each_bound_can_be_simulated_or_are_refused(row, end):
     """One at a time, all else usual; a step takes a moment, and what is observed are numbers."""
     value = getattr(row.bounds, end)
