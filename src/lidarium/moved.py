@@ -317,10 +317,13 @@ MOVED: dict[str, str] = {
 
 
 def check_moved(name: str) -> None:
-    """Raise ImportError that names the new path, if a module has moved."""
-    new = MOVED.get(name.removeprefix("lidarium."))
-    if new is not None:
-        raise ImportError(
-            f"{name} has moved to lidarium.{new}, which is internal; users import from lidarium alone, see "
-            "docs/reference/api.md"
-        )
+    """Raise ImportError that names the new path, if a module or a package has moved."""
+    old = name.removeprefix("lidarium.")
+    inner = [f"{module} to lidarium.{new}" for module, new in MOVED.items() if module.startswith(f"{old}.")]
+    if old in MOVED:
+        moved = f"{name} has moved to lidarium.{MOVED[old]}"
+    elif inner:
+        moved = f"{name} is gone; its modules have moved: {', '.join(inner)}"
+    else:
+        return
+    raise ImportError(f"{moved}; these are internal: users import from lidarium alone, see docs/reference/api.md")
