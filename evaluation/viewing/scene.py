@@ -299,7 +299,7 @@ class RobotNodes:
             np.zeros((0, 3), np.float32),
             colour,
             point_size=size,
-            point_shape="_circle",
+            point_shape="circle",
             point_shading="flat",
             precision="float32",
         )
@@ -345,7 +345,7 @@ class TeamScene:
             np.zeros((0, 3), np.float32),
             FRONTIER,
             point_size=0.6 * maps.cell_m,
-            point_shape="_circle",
+            point_shape="circle",
             point_shading="flat",
             precision="float32",
         )
