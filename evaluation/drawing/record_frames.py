@@ -34,6 +34,7 @@ from lidarium.envs.drawing.views import camera_panel, views_of
 from lidarium.envs.engine.tally import THRESHOLDS
 from lidarium.envs.floors.floor import Floor
 from lidarium.envs.settings.cameras import DepthCamera
+from lidarium.envs.settings.exploration import with_parts
 from lidarium.envs.settings.robots import Robot
 from lidarium.evaluation.drawing.picture_parts import (
     INK,
@@ -83,8 +84,8 @@ class TrackFrames:
         self._agents = [f"robot_{robot}" for robot in range(display.poses.shape[1])]
         self._colours = team_colours(len(self._agents))
         camera, robot = (record.header["settings"].get(name) for name in ("camera", "robot"))
-        self._camera = DepthCamera(**camera) if floor is not None and camera else None
-        self._views = None if floor is None else views_of(floor, Robot(**robot), len(self._agents))
+        self._camera = with_parts(DepthCamera, camera) if floor is not None and camera else None
+        self._views = None if floor is None else views_of(floor, with_parts(Robot, robot), len(self._agents))
 
     def draw(self, time_s: float) -> Frame:
         """Return the frame at a time: `picture` below a header, next to a camera's view."""
