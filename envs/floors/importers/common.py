@@ -142,11 +142,15 @@ def enclosed(
     drawn = np.zeros((int(size[1] / resolution) + 1, int(size[0] / resolution) + 1), dtype=np.uint8)
     fill_shapes(drawn, origin, resolution, strip_edges(lines, WALL_THICKNESS, 0.5), 1)
     distance = _distance(1 - drawn, resolution)
+    # All that any widening encloses lies within what the widest keeps from the border.
+    bound = np.count_nonzero(_kept_apart(distance, _GAPS[-1] / 2.0))
     union, insides, areas = np.zeros_like(drawn), [], []
     for gap in _GAPS:
         union |= _inside(distance, gap / 2.0, resolution)
         insides.append(np.packbits(union))  # five of them, of up to 20 MB each
         areas.append(np.count_nonzero(union))
+        if areas[0] >= _CLOSED_SHARE * bound:
+            break
     closed = next(k for k, area in enumerate(areas) if area >= _CLOSED_SHARE * areas[-1])
     inside = np.unpackbits(insides[closed], count=union.size).reshape(union.shape)
     contours, _ = cv2.findContours(inside, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
@@ -162,9 +166,15 @@ def _inside(distance: NDArray[np.float32], widening: float, resolution: float) -
 
     It cannot be reached from the border; half of the wall is taken off it.
     """
+    apart = _kept_apart(distance, widening).view(np.uint8)
+    return np.asarray(_distance(apart, resolution) > widening + WALL_THICKNESS / 2.0)
+
+
+def _kept_apart(distance: NDArray[np.float32], widening: float) -> NDArray[np.bool_]:
+    """Return the cells that cannot be reached from the border past the widened lines."""
     reached = (distance > widening).astype(np.uint8)
     cv2.floodFill(reached, None, (0, 0), (2,))
-    return np.asarray(_distance((reached != 2).view(np.uint8), resolution) > widening + WALL_THICKNESS / 2.0)
+    return np.asarray(reached != 2)
 
 
 def _distance(cells: NDArray[np.uint8], resolution: float) -> NDArray[np.float32]:
