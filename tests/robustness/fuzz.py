@@ -13,7 +13,6 @@ import collections
 import json
 import os
 import queue
-import statistics
 import subprocess
 import sys
 import tempfile
@@ -22,28 +21,10 @@ import time
 from dataclasses import dataclass, field
 from pathlib import Path
 
-import cv2
-import numpy as np
 from robustness.samples import make_samples
 
 HANGS_S = 5.0
 MOST_S, MOST_MB = 1.0, 512.0
-REFERENCE_S = 0.036
-"""Time of `slowness`'s reference on a core that no other thread shares [s]."""
-
-
-def slowness() -> float:
-    """Return how many times as long as usual this core takes now, at least 1: busy cores share their units."""
-    cells = np.ones((2000, 2000), np.uint8)
-    cells[::97] = 0
-    times = []
-    for _ in range(5):
-        began = time.process_time()
-        cv2.distanceTransform(cells, cv2.DIST_L2, 5)
-        times.append(time.process_time() - began)
-    return max(1.0, statistics.median(times) / REFERENCE_S)
-
-
 """What reading a file may take: time of the processor, and memory beyond what its process held."""
 
 WAITS = 6
@@ -84,7 +65,7 @@ class Tally:
             self.faults.append((number, f"{found['kind']} {found.get('error', '')} {found.get('at', '')}"))
         took_s, took_mb = (float(str(found.get(name, 0.0))) for name in ("cpu_s", "mb"))
         self.slowest, self.largest = max(self.slowest, (took_s, number)), max(self.largest, (took_mb, number))
-        if took_mb > MOST_MB or (took_s > MOST_S and took_s > MOST_S * slowness()):
+        if took_s > MOST_S or took_mb > MOST_MB:
             self.costly.append((number, took_s, took_mb))
 
 

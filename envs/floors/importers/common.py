@@ -141,18 +141,24 @@ def enclosed(
     origin = (float(low[0] - widest), float(low[1] - widest))
     drawn = np.zeros((int(size[1] / resolution) + 1, int(size[0] / resolution) + 1), dtype=np.uint8)
     fill_shapes(drawn, origin, resolution, strip_edges(lines, WALL_THICKNESS, 0.5), 1)
+    union = _inside((1 - drawn).astype(np.float32), 0.0, resolution).view(np.uint8)
+    # No widening encloses more than the box of the lines: lines without gaps are not widened at all.
+    if np.count_nonzero(union) >= _CLOSED_SHARE * np.prod((high - low) / resolution + 4.0):
+        return _outlines(path, union, origin, resolution)
     distance = _distance(1 - drawn, resolution)
-    # All that any widening encloses lies within what the widest keeps from the border.
-    bound = np.count_nonzero(_kept_apart(distance, _GAPS[-1] / 2.0))
-    union, insides, areas = np.zeros_like(drawn), [], []
+    insides, areas = [], []
     for gap in _GAPS:
         union |= _inside(distance, gap / 2.0, resolution)
         insides.append(np.packbits(union))  # five of them, of up to 20 MB each
         areas.append(np.count_nonzero(union))
-        if areas[0] >= _CLOSED_SHARE * bound:
-            break
     closed = next(k for k, area in enumerate(areas) if area >= _CLOSED_SHARE * areas[-1])
     inside = np.unpackbits(insides[closed], count=union.size).reshape(union.shape)
+    return _outlines(path, inside, origin, resolution)
+
+
+def _outlines(
+    path: Path, inside: NDArray[np.uint8], origin: tuple[float, float], resolution: float
+) -> tuple[NDArray[np.float64], ...]:
     contours, _ = cv2.findContours(inside, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
     rings = [contour[:, 0, :].astype(np.float64) for contour in contours if len(contour) >= 3]
     # The middle of a widened line may count by a rounding, as a row of cells without an area.
@@ -166,15 +172,9 @@ def _inside(distance: NDArray[np.float32], widening: float, resolution: float) -
 
     It cannot be reached from the border; half of the wall is taken off it.
     """
-    apart = _kept_apart(distance, widening).view(np.uint8)
-    return np.asarray(_distance(apart, resolution) > widening + WALL_THICKNESS / 2.0)
-
-
-def _kept_apart(distance: NDArray[np.float32], widening: float) -> NDArray[np.bool_]:
-    """Return the cells that cannot be reached from the border past the widened lines."""
     reached = (distance > widening).astype(np.uint8)
     cv2.floodFill(reached, None, (0, 0), (2,))
-    return np.asarray(reached != 2)
+    return np.asarray(_distance((reached != 2).view(np.uint8), resolution) > widening + WALL_THICKNESS / 2.0)
 
 
 def _distance(cells: NDArray[np.uint8], resolution: float) -> NDArray[np.float32]:
