@@ -37,8 +37,11 @@ def called_kernels() -> list[dict[str, Any]]:
 
 def _code_size(kernel: Any) -> int:  # noqa: ANN401
     """Return the bytes of a kernel's machine code with all that it calls: how long compiling takes."""
+    folder = kernel.stats.cache_path
+    if folder is None:  # it cannot be cached
+        return 0
     stem = f"{kernel.__module__.rpartition('.')[2]}.{kernel.py_func.__qualname__}-"
-    return max((path.stat().st_size for path in Path(kernel.stats.cache_path).glob(f"{stem}*.nbc")), default=0)
+    return max((path.stat().st_size for path in Path(folder).glob(f"{stem}*.nbc")), default=0)
 
 
 def _run_and_list(caches: Path | None) -> list[dict[str, Any]]:
