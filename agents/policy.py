@@ -1,35 +1,26 @@
 """The interface of policies: they decide by observations and beliefs."""
 
+import math
 from abc import ABC, abstractmethod
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import Protocol
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import replace
+from functools import wraps
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.agents.report import GivenUp, PolicyReport, TeamMaps
 from lidarium.envs.faces.parallel import Observation
+from lidarium.envs.levels import LEVELS
 from lidarium.envs.onboard.belief import Belief
-from lidarium.envs.onboard.radio.messages import DriveState, OperatingState, Order, Route, Target
+from lidarium.envs.onboard.radio.messages import DriveState, OperatingState, Order, Route, Stop, Target
 from lidarium.envs.onboard.station.reports import Report
 from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.mapping.merging.fusion import FusedMap
 
-
-@dataclass(frozen=True, slots=True)
-class Stop:
-    """A robot ends its work, with a reason.
-
-    Attributes
-    ----------
-    reason : str
-        ``no_frontier``, ``frontier_unreachable``, ``unreachable``, ``stopped`` or a policy's own word.
-    """
-
-    reason: str
-
+_DONE = (DriveState.ARRIVED, DriveState.NO_PATH, DriveState.BLOCKED)
 
 Action = NDArray[np.float32] | Target | Route | int | Stop | Order | None
 
@@ -43,6 +34,11 @@ class Team(Protocol):
     @property
     def agents(self) -> list[str]:
         """Live agents."""
+        ...
+
+    @property
+    def level(self) -> str:
+        """The level of decision of its actions."""
         ...
 
     @property
@@ -95,7 +91,11 @@ class Team(Protocol):
 
 
 class Policy(ABC):
-    """Drives a team: one object for all of its robots; a policy is a subclass.
+    """Drives a team, or some of its robots: one object for all of them; a policy is a subclass.
+
+    A subclass has `reset` and `act`. Its ``reset(team, seed=0)`` also takes an environment or a wrapper around one, and
+    refuses levels that do not carry out its actions; its ``act(observations, agents=None)`` also takes the names of the
+    agents that it is to decide for. A policy of waypoints drives robots in environments of all three levels.
 
     Attributes
     ----------
@@ -117,12 +117,38 @@ class Policy(ABC):
     decision_period_s: float | None = None
 
     @abstractmethod
-    def reset(self, team: Team, seed: int) -> None:
-        """Start an episode."""
+    def reset(self, team: Any, seed: int = 0) -> None:  # noqa: ANN401
+        """Start an episode, after the environment has started it.
+
+        Parameters
+        ----------
+        team : Team
+            The environment of ``lidarium.parallel_env``, also in wrappers, or ``vector_env(...).team(episode)``.
+        seed : int, optional
+            Seed of all draws of the policy. 0 by default.
+
+        Raises
+        ------
+        ValueError
+            If the environment's level of decision does not carry out the actions of the policy, or robots do not
+            observe what it reads.
+        """
 
     @abstractmethod
-    def act(self, observations: Mapping[str, Observation]) -> dict[str, Action]:
-        """Decide for every agent in ``observations``."""
+    def act(self, observations: Mapping[str, Observation], agents: Collection[str] | None = None) -> dict[str, Action]:
+        """Return an action for every agent in ``observations``, or for some agents, for ``step`` of the environment.
+
+        Subclasses need no ``agents``: they get the observations of the chosen ones.
+        """
+
+    _pace: "_Pace | None" = None
+
+    def __init_subclass__(cls, **options: Any) -> None:  # noqa: ANN401
+        super().__init_subclass__(**options)
+        if "reset" in vars(cls):
+            cls.reset = _checked(cls.reset)  # type: ignore[method-assign]
+        if "act" in vars(cls):
+            cls.act = _for_agents(cls.act)  # type: ignore[method-assign]
 
     @property
     def given_up(self) -> Sequence[GivenUp]:
@@ -141,6 +167,94 @@ class Policy(ABC):
     def team_maps(self) -> TeamMaps | None:
         """Return how a station has joined the robots' maps; None if there is no station."""
         return None
+
+
+def _checked(reset: Callable[..., None]) -> Callable[..., None]:
+    """Return a method ``reset`` that finds the team of an environment and checks that the policy can drive it."""
+
+    @wraps(reset)
+    def checked(policy: Policy, team: Any, seed: int = 0) -> None:  # noqa: ANN401
+        if not hasattr(team, "belief"):
+            team = getattr(team, "unwrapped", team)
+        level = getattr(team, "level", policy.level)
+        if level != policy.level and policy.level not in LEVELS[level].carries:
+            raise ValueError(
+                f"{type(policy).__name__} decides at the level {policy.level!r}, which an environment of level "
+                f"{level!r} does not carry out; want level={policy.level!r}"
+            )
+        if (settings := getattr(team, "settings", None)) is not None:
+            check_observed(policy, type(policy).__name__, settings.observe)
+        policy._pace = _Pace(policy, team) if (policy.level, level) == ("waypoint", "velocity") else None
+        reset(policy, team, seed)
+
+    return checked
+
+
+def _for_agents(act: Callable[..., dict[str, Action]]) -> Callable[..., dict[str, Action]]:
+    """Return a method ``act`` that can decide for some agents."""
+
+    @wraps(act)
+    def for_agents(
+        policy: Policy, observations: Mapping[str, Observation], agents: Collection[str] | None = None
+    ) -> dict[str, Action]:
+        if agents is not None:
+            missing = [agent for agent in agents if agent not in observations]
+            if missing:
+                raise ValueError(f"there is no observation of {missing[0]!r}; want agents among {list(observations)}")
+            observations = {agent: observations[agent] for agent in agents}
+        if not observations:
+            return {}
+        pace = policy._pace
+        return act(policy, observations) if pace is None else pace.act(act, policy, observations)
+
+    return for_agents
+
+
+class _Pace:
+    """Lets a policy of waypoints decide as often in an environment of velocities as in one of waypoints.
+
+    It decides when the period is over, a robot with a target arrives or finds no path, or other robots take part; in
+    between, robots are given their last targets again.
+    """
+
+    def __init__(self, policy: Policy, team: Any) -> None:  # noqa: ANN401
+        settings = getattr(team, "settings", None)
+        period_s = 0.0 if settings is None else settings.decision_period_s
+        self._period_s = policy.decision_period_s or period_s
+        self._team = team
+        self._due_s = -math.inf
+        self._actions: dict[str, Action] = {}
+        self._agents: list[str] = []
+        self._waiting: set[str] = set()
+        self._is_deciding = False
+        self._drives = False
+
+    def act(
+        self,
+        act: Callable[..., dict[str, Action]],
+        policy: Policy,
+        observations: Mapping[str, Observation],
+    ) -> dict[str, Action]:
+        """Return the actions of a method ``act``, new ones or the last."""
+        if self._is_deciding:  # a method that calls that of its base class
+            return act(policy, observations)
+        waiting = {agent for agent in observations if self._team.drive_state(agent) in _DONE}
+        agents, now = list(observations), self._team.time_s
+        if agents == self._agents and waiting <= self._waiting and now < self._due_s - 1e-9:
+            return dict(self._actions)
+        self._is_deciding = True
+        try:
+            actions = act(policy, observations)
+        finally:
+            self._is_deciding = False
+        self._drives |= any(isinstance(action, Target | Route) for action in actions.values())
+        if not self._drives:  # no driver is there yet: robots stay by standing still
+            actions = {agent: np.zeros(2, np.float32) if act is None else act for agent, act in actions.items()}
+        self._due_s = now + self._period_s
+        self._agents = agents
+        self._waiting = waiting
+        self._actions = {agent: action for agent, action in actions.items() if not isinstance(action, Stop | Order)}
+        return actions
 
 
 def check_observed(policy: Policy, name: str, observe: Sequence[str]) -> None:
@@ -225,6 +339,10 @@ class _Alone:
     @property
     def time_s(self) -> float:
         return self._team.time_s
+
+    @property
+    def level(self) -> str:
+        return self._team.level
 
     def belief(self, agent: str) -> Belief:
         if agent != self._agent:

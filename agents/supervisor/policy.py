@@ -153,6 +153,11 @@ class _LedTeam:
         return self._team.agents
 
     @property
+    def level(self) -> str:
+        """The level of decision of the actions."""
+        return self._team.level
+
+    @property
     def time_s(self) -> float:
         """Simulated time [s]."""
         return self._team.time_s

@@ -193,7 +193,7 @@ class Engine:
         check_level(self.settings.observe, name)
         self.level: Level = LEVELS[name](self.perception, self.settings, shares_map, decision_period_s)
         self.level_name = name
-        self.operating.attach(self.level.driver)
+        self.operating.attach(self.level.driver, self.level.make_driver)
         known = observation_space(self.settings, self.has_goal).spaces
         self.observation_space = spaces.Dict({**known, **self.level.boxes})
         self.action_space = self.level.action_space

@@ -1,7 +1,7 @@
 """The environment of a team of lidar robots (PettingZoo parallel API)."""
 
 import copy
-from collections.abc import Collection, Mapping
+from collections.abc import Collection
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -24,7 +24,6 @@ from lidarium.envs.onboard.station.reports import Report
 from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.settings.reset_options import Curriculum, checked_seed, read_options
 from lidarium.mapping.merging.fusion import FusedMap
-from lidarium.registry import unknown
 
 if TYPE_CHECKING:
     from lidarium.envs.drawing.rendering import Scene
@@ -222,8 +221,9 @@ class ExplorationEnv(ParallelEnv[str, Any, Any]):
         Parameters
         ----------
         actions : dict
-            An action for each live agent, of its level. An agent that was given an order may be left out: it goes on
-            with its last order.
+            An action for each live agent, of its level: ``Stop`` ends the agent, an ``Order`` is sent to it, and at
+            any level a ``Target`` or ``Route`` lets the onboard driver take the robot there. An agent that was given
+            an order may be left out: it goes on with its last order.
 
         Returns
         -------
@@ -235,26 +235,8 @@ class ExplorationEnv(ParallelEnv[str, Any, Any]):
             if self.floor is None:
                 raise RuntimeError("the environment was not reset; call reset() before step()")
             return {}, {}, {}, {}, {}
-        self._rows.step_each(self._by_row(actions), self.possible_agents, self._after_step)
+        self._rows.step_each(self._rows.by_row(actions), after_step=self._after_step)
         return self._outcome()
-
-    def _by_row(self, actions: Any) -> dict[int, Any]:  # noqa: ANN401
-        """Return the actions of live agents by row."""
-        _check_agents(actions, self._index)
-        live, operating, index = self.engine.live, self.operating, self._index
-        takes_none = self.engine.level.takes_none
-        given = {}
-        for agent in self.agents:
-            row = index[agent]
-            if not live[row]:
-                continue
-            action = actions.get(agent, self)
-            if action is self or (action is None and not takes_none):
-                if row not in operating.stopping and not operating.is_addressed(row):
-                    raise ValueError(f"no action for {agent}; step() needs one for every agent in env.agents")
-                continue
-            given[row] = action
-        return given
 
     def _after_step(self, commands: NDArray[np.float64]) -> None:
         self.scorer.advance()
@@ -362,6 +344,11 @@ class ExplorationEnv(ParallelEnv[str, Any, Any]):
             If the agent does not exist; an agent that has ended takes no order, which is not an error.
         """
         self.operating.order(self._row(agent), order)
+
+    @property
+    def level(self) -> str:
+        """The level of decision of the actions."""
+        return self.engine.level_name
 
     @property
     def time_s(self) -> float:
@@ -490,23 +477,3 @@ def _listed(values: Any) -> list[Any]:  # noqa: ANN401
         return [dict(zip(values, row)) for row in zip(*columns)]  # noqa: B905 (hot)
     listed: list[Any] = values.tolist() if values.ndim == 1 else list(values)
     return listed
-
-
-def _check_agents(actions: Any, agents: Collection[str]) -> None:  # noqa: ANN401
-    """Check that actions are given by agent, and that there are such agents.
-
-    Actions of agents that have ended are not an error: trainers continue to send them.
-
-    Raises
-    ------
-    ValueError
-        If these are no actions by agent, or an agent is unknown.
-    """
-    if not isinstance(actions, Mapping):
-        raise ValueError(
-            f"actions are a {type(actions).__name__}; want a dict with an action for each agent in "
-            "env.agents, such as {agent: env.action_space(agent).sample() for agent in env.agents}"
-        )
-    for agent in actions:
-        if agent not in agents:
-            raise ValueError(f"actions have an {unknown('agent', agent, agents)}")

@@ -323,6 +323,17 @@ class RandomizedRows:
                 part, first = self.parts[episode], episode * self.robots
                 part.step(_of_rows(actions, slice(first, first + part.robots), self.rows))
 
+    def step_teams(self, teams: Sequence[Any], beginning: NDArray[np.int64]) -> None:
+        """Run all live episodes by the actions of each team, by agent, and begin others."""
+        if len(teams) != self.episodes:
+            raise ValueError(f"actions are of {len(teams)} teams; want a dict for each of {self.episodes} episodes")
+        begins = set(beginning.tolist())
+        for episode, actions in enumerate(teams):
+            if episode in begins:
+                self._begin(episode, None, None)
+            else:
+                self.parts[episode].step_teams([actions])
+
     @property
     def rewards(self) -> NDArray[np.float64]:
         """Rewards of the last step, (rows,)."""
@@ -410,7 +421,7 @@ class RandomizedRows:
 
     def team(self, episode: int) -> EpisodeTeam:
         """Return the handle of an episode's team; it holds until the episode begins again."""
-        return EpisodeTeam(self.parts[episode].engine)
+        return self.parts[episode].team(0)
 
     def close(self) -> None:
         """Release everything that the worlds hold beyond arrays."""

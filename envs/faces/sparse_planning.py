@@ -23,11 +23,10 @@ class SparsePlanning(TeamWrapper):
     """Lets robots drive to their goals along routes on their sparse maps, instead of paths on grids.
 
     A robot codes the images of its depth camera, and plans on the resulting graph; if the graph has no path to the
-    goal, ground that the camera has not seen counts as free. The robot keeps a route until a new obstacle blocks it,
+    goal, ground that the camera has not seen counts as free. The robot keeps a route until a new obstacle blocks it.
     Observations, actions and infos are those of the environment below; ``infos[agent]["route"]`` gives the reason if
     there is no route to a robot's goal: ``start in collision``, ``goal in collision`` or ``no path``; otherwise it is
     empty.
-    route to a robot's goal: ``start in collision``, ``goal in collision`` or ``no path``; otherwise it is empty.
 
     Parameters
     ----------

@@ -1,5 +1,8 @@
 """The handle of an episode's team that policies ask; it never shows the truth."""
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -20,13 +23,16 @@ class EpisodeTeam:
         The episodes.
     episode : int, optional
         Which one. The first by default.
+    observe : callable, optional
+        Returns the observation of a row. Without it `observations` is not there.
     """
 
-    def __init__(self, engine: Engine, episode: int = 0) -> None:
+    def __init__(self, engine: Engine, episode: int = 0, observe: Callable[[int], Any] | None = None) -> None:
         if not 0 <= episode < engine.episodes:
             raise ValueError(f"episode is {episode}; want a number from 0 to {engine.episodes - 1}")
         self._engine = engine
         self._episode = episode
+        self._observe = observe
         self._first = episode * engine.robots
         self._index = {agent: robot for robot, agent in enumerate(engine.settings.agents)}
 
@@ -39,6 +45,19 @@ class EpisodeTeam:
     def agents(self) -> list[str]:
         """Live agents."""
         return [agent for agent, robot in self._index.items() if self._engine.live[self._first + robot]]
+
+    @property
+    def observations(self) -> dict[str, Any]:
+        """The last observations of the live agents."""
+        observe = self._observe
+        if observe is None:
+            raise AttributeError("this handle has no observations; want that of vector_env(...).team(episode)")
+        return {agent: observe(self.row(agent)) for agent in self.agents}
+
+    @property
+    def level(self) -> str:
+        """The level of decision of the actions."""
+        return self._engine.level_name
 
     @property
     def settings(self) -> ExplorationSettings:

@@ -1,6 +1,6 @@
 """The rows of an engine in the forms of conventions; every face reads its results here."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -21,8 +21,10 @@ from lidarium.envs.faces.conventions import (
 from lidarium.envs.faces.messages import MESSAGES, MessageBoard, split_action, talking_space
 from lidarium.envs.faces.team import EpisodeTeam
 from lidarium.envs.faces.team_exchange import MergedRows, MergingSettings
+from lidarium.envs.onboard.radio.messages import Order, Route, Stop, Target
 from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.settings.reset_options import ResetOptions
+from lidarium.registry import unknown
 
 ACTIVE = "active"
 """Info: whether a robot had not ended before this step."""
@@ -67,6 +69,7 @@ class TeamRows:
         self.engine = engine
         self.conventions = conventions
         self.rows, self.episodes, self.robots = engine.rows, engine.episodes, engine.robots
+        self._robot_of = {agent: robot for robot, agent in enumerate(engine.settings.agents)}
         self._keeps = conventions.ended_agents == "zeros"
         self._merged = None if merging is None else MergedRows(engine, merging)
         self._board: MessageBoard | None = None
@@ -124,9 +127,17 @@ class TeamRows:
         engine.run(decoded, beginning)
         self.came_out(masked)
 
-    def step_each(self, actions: Mapping[int, Any], names: list[str], after_step: AfterStep | None) -> None:
-        """Run all live episodes by actions of rows; robots without one continue with their last orders."""
-        engine = self.engine
+    def step_each(
+        self,
+        actions: Mapping[int, Any],
+        beginning: NDArray[np.int64] = NO_EPISODES,
+        after_step: AfterStep | None = None,
+    ) -> None:
+        """Run all live episodes by actions of rows, and begin others; see `by_row`."""
+        engine, names = self.engine, self.engine.settings.agents
+        told = {row: action for row, action in actions.items() if type(action) is Stop or type(action) is Order}
+        if told:
+            actions = {row: action for row, action in actions.items() if row not in told}
         if self._board is not None:
             has_vectors = isinstance(engine.action_space, spaces.Box)
             self._sent[:] = 0.0
@@ -137,13 +148,59 @@ class TeamRows:
                 )
             actions = rest
         decoded = engine.level.read(actions, names)
+        for row, action in told.items():
+            if isinstance(action, Stop):
+                engine.operating.stopping[row] = action.reason
+            else:
+                engine.operating.order(row, action)
         given = None
         if len(actions) < self.rows:
             given = np.zeros(self.rows, np.bool_)
             given[[*actions, *engine.operating.stopping]] = True
         masked = self._nobody if engine.is_whole else ~engine.live
-        engine.run(decoded, given=given, after_step=after_step)
+        if len(beginning):
+            masked = masked & ~np.repeat(engine.is_over, self.robots)
+        engine.run(decoded, beginning, given=given, after_step=after_step)
         self.came_out(masked, given)
+
+    def step_teams(self, teams: Sequence[Any], beginning: NDArray[np.int64] = NO_EPISODES) -> None:
+        """Run all live episodes by the actions of each team, by agent, and begin others."""
+        if len(teams) != self.episodes:
+            raise ValueError(f"actions are of {len(teams)} teams; want a dict for each of {self.episodes} episodes")
+        waiting = set(beginning.tolist())
+        actions: dict[int, Any] = {}
+        for episode, each in enumerate(teams):
+            if episode not in waiting:
+                actions |= self.by_row(each, episode)
+        self.step_each(actions, beginning)
+
+    def by_row(self, actions: Any, episode: int = 0) -> dict[int, Any]:  # noqa: ANN401
+        """Return the actions of the live agents of an episode by row.
+
+        An agent that was given an order may be left out: it goes on with that.
+
+        Raises
+        ------
+        ValueError
+            If these are not actions by agent, an agent is unknown, or one has no action.
+        """
+        _check_agents(actions, self._robot_of)
+        engine, first = self.engine, episode * self.robots
+        live, operating, takes_none = engine.live, engine.operating, engine.level.takes_none
+        given = {}
+        for agent, robot in self._robot_of.items():
+            row = first + robot
+            if not live[row]:
+                continue
+            action = actions.get(agent, self)
+            if action is None and not takes_none:
+                takes_none = any(isinstance(each, Target | Route) for each in actions.values())
+            if action is self or (action is None and not takes_none):
+                if row not in operating.stopping and not operating.is_addressed(row):
+                    raise ValueError(f"no action for {agent}; step() needs one for every agent in env.agents")
+                continue
+            given[row] = action
+        return given
 
     def came_out(self, masked: NDArray[np.bool_], spoke: NDArray[np.bool_] | None = None, is_step: bool = True) -> None:
         """Take in the results of a run; ``masked`` are the rows of robots that had ended before it."""
@@ -299,8 +356,28 @@ class TeamRows:
 
     def team(self, episode: int) -> EpisodeTeam:
         """Return the handle of an episode's team."""
-        return EpisodeTeam(self.engine, episode)
+        return EpisodeTeam(self.engine, episode, self.observation)
 
     def close(self) -> None:
         """Release everything that the world holds beyond arrays."""
         self.engine.simulation.close()
+
+
+def _check_agents(actions: Any, agents: Collection[str]) -> None:  # noqa: ANN401
+    """Check that actions are given by agent, and that there are such agents.
+
+    Actions of agents that have ended are not an error: trainers continue to send them.
+
+    Raises
+    ------
+    ValueError
+        If these are no actions by agent, or an agent is unknown.
+    """
+    if not isinstance(actions, Mapping):
+        raise ValueError(
+            f"actions are a {type(actions).__name__}; want a dict with an action for each agent in "
+            "env.agents, such as {agent: env.action_space(agent).sample() for agent in env.agents}"
+        )
+    for agent in actions:
+        if agent not in agents:
+            raise ValueError(f"actions have an {unknown('agent', agent, agents)}")

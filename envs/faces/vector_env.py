@@ -1,6 +1,6 @@
 """Many episodes as one Gymnasium vector environment, a row for every robot of every episode."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -122,9 +122,10 @@ class ExplorationVectorEnv(VectorEnv[Any, NDArray[Any], NDArray[Any]]):
 
         Parameters
         ----------
-        actions : (rows, ...) array
-            An action a row; those of rows that repeat or begin again are ignored. At the level of waypoints an array
-            of objects may hold ``Target``, ``Route`` and None.
+        actions : (rows, ...) array or list of dict
+            An action for each row; those of rows that repeat or begin again are ignored. At the level of waypoints an
+            array of objects may hold ``Target``, ``Route`` and None. Or the actions of each episode by agent, as for
+            ``ExplorationEnv.step``: what policies return.
         """
         self._check_open()
         batch = self.batch
@@ -132,7 +133,9 @@ class ExplorationVectorEnv(VectorEnv[Any, NDArray[Any], NDArray[Any]]):
             raise RuntimeError("the environment was not reset; call reset() before step()")
         if actions is None:
             raise ValueError("actions is None; want an action for each row, row = episode * robots + robot")
-        batch.step(actions, NO_EPISODES if batch.live.all() else np.flatnonzero(batch.is_over))
+        beginning = NO_EPISODES if batch.live.all() else np.flatnonzero(batch.is_over)
+        is_by_agent = isinstance(actions, list) and all(isinstance(each, Mapping) for each in actions)
+        (batch.step_teams if is_by_agent else batch.step)(actions, beginning)
         return batch.observations, batch.rewards, batch.terminated, batch.truncated, self._infos()
 
     def _infos(self) -> dict[str, Any]:

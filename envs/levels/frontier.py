@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from gymnasium import spaces
@@ -19,7 +19,7 @@ from lidarium.envs.levels.frontier_choices import (
     renew_teams,
 )
 from lidarium.envs.levels.level import STEPS, Mask, Turn, add_info, check_rows
-from lidarium.envs.levels.waypoint import WaypointLevel, Ways
+from lidarium.envs.levels.waypoint import WaypointLevel, Ways, is_way, read_ways
 from lidarium.envs.onboard.driving.team_driver import TeamDriver, footprint_of
 from lidarium.envs.onboard.perception import Perception
 from lidarium.envs.onboard.radio.messages import Orders, Target
@@ -179,8 +179,26 @@ class FrontierOffers:
         return "frontier_unreachable" if navigation.frontiers.flags.any() else "no_frontier"
 
 
+class _Picks(NamedTuple):
+    """Frontiers that some robots choose, and targets of the others.
+
+    Attributes
+    ----------
+    numbers : (rows,) int64
+        Numbers of frontiers; that of staying for robots with targets.
+    has_way : (rows,) bool
+        Robots with targets, routes or None.
+    ways : Ways
+        Their targets and routes.
+    """
+
+    numbers: NDArray[np.int64]
+    has_way: Mask
+    ways: Ways
+
+
 class FrontierLevel(WaypointLevel):
-    """An action is the number of a frontier.
+    """An action is the number of a frontier, or a ``Target``, a ``Route`` or None as at the level of waypoints.
 
     Observations have ``frontiers`` float32 (F, 4): position along the axes of the map frame from the believed
     position of the robot [m], cost of the path [m] and size [m] of each frontier on offer, cheapest path first, zeros
@@ -191,6 +209,8 @@ class FrontierLevel(WaypointLevel):
     ``given_up`` names it with the reason. Robots without a frontier in reach stay idle; if no robot has one, all end
     with ``no_frontier`` or ``frontier_unreachable``.
     """
+
+    carries = frozenset({"waypoint"})
 
     def __init__(
         self,
@@ -216,10 +236,15 @@ class FrontierLevel(WaypointLevel):
         super().start(episode)
         self.offers.start(episode)
 
-    def read(self, actions: Mapping[int, Any], names: list[str]) -> NDArray[np.int64]:  # type: ignore[override]
-        """Return the numbers of frontiers (rows,)."""
+    def read(  # type: ignore[override]
+        self, actions: Mapping[int, Any], names: list[str]
+    ) -> NDArray[np.int64] | _Picks:
+        """Return the numbers of frontiers (rows,), and targets."""
         numbers = np.full(self.rows, self._stay)
+        ways = {row: action for row, action in actions.items() if is_way(action)}
         for row, action in actions.items():
+            if row in ways:
+                continue
             number = _whole_number(action, self._stay)
             if number is None:
                 raise ValueError(
@@ -227,7 +252,11 @@ class FrontierLevel(WaypointLevel):
                     f"{self._stay - 1}, or {self._stay} to stay"
                 )
             numbers[row] = number
-        return numbers
+        if not ways:
+            return numbers
+        has_way = np.zeros(self.rows, np.bool_)
+        has_way[list(ways)] = True
+        return _Picks(numbers, has_way, read_ways(ways, self.rows))
 
     def read_rows(self, actions: Any, live: Mask) -> NDArray[np.int64]:  # type: ignore[override]  # noqa: ANN401
         """Return the numbers of frontiers (rows,)."""
@@ -239,12 +268,15 @@ class FrontierLevel(WaypointLevel):
             raise ValueError(f"the action of row {bad} is {numbers[bad]}; want {wanted}, {self._stay} to stay")
         return np.where(live, numbers, self._stay).astype(np.int64)
 
-    def carry_out(self, decoded: NDArray[np.int64], turn: Turn) -> None:  # type: ignore[override]
-        """Drive to the chosen frontiers; end teams of which no robot is offered any.
+    def carry_out(self, decoded: NDArray[np.int64] | _Picks, turn: Turn) -> None:  # type: ignore[override]
+        """Drive to the chosen frontiers; end teams of which no robot is offered any or has a target.
 
         A robot that an order sends elsewhere has no choice any more; a paused one keeps its own.
         """
         operating, robots = turn.operating, self.settings.robots
+        picks = decoded if isinstance(decoded, _Picks) else None
+        if picks is not None:
+            decoded = picks.numbers
         is_sent = np.zeros(self.rows, np.bool_)
         is_sent[list(operating.sent)] = True
         is_stopping = np.zeros(self.rows, np.bool_)
@@ -254,11 +286,21 @@ class FrontierLevel(WaypointLevel):
         orders = self.offers.choose(choosing, numbers)
         is_free = (turn.given | ~turn.acting).reshape(-1, robots).all(axis=1)
         is_free &= ~is_sent.reshape(-1, robots).any(axis=1)
-        has_work = (turn.acting & (self.offers.offers.counts > 0)).reshape(-1, robots).any(axis=1)
+        is_busy = self.offers.offers.counts > 0
+        if picks is not None:
+            is_driven = picks.has_way & turn.given
+            is_busy |= is_driven & picks.ways.orders.is_ordered
+            given = picks.ways.orders
+            orders = Orders(
+                np.where(is_driven, given.is_ordered, orders.is_ordered),
+                np.where(is_driven[:, None], given.targets, orders.targets),
+                np.where(is_driven, given.headings, orders.headings),
+            )
+        has_work = (turn.acting & is_busy).reshape(-1, robots).any(axis=1)
         is_idle = np.repeat((turn.modes == STEPS) & is_free & ~has_work, robots)
         for row in np.flatnonzero(is_idle & turn.acting & ~is_stopping).tolist():
             operating.stopping[row] = self.offers.why_without_work(row)
-        super().carry_out(Ways(orders, {}), turn)
+        super().carry_out(Ways(orders, {} if picks is None else picks.ways.routes), turn)
 
     def observe(self, acted: Mask, live: Mask, seen: Mask, out: dict[str, NDArray[Any]], infos: dict[str, Any]) -> None:
         """Give up unreachable or unproductive choices, offer again, and report both."""

@@ -1,7 +1,7 @@
 """The base class of levels of decision."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -83,8 +83,11 @@ class Level(ABC):
         Drives that kernels follow during a decision.
     """
 
-    takes_none: ClassVar[bool] = False
+    takes_none: bool = False
     """Whether None is an action; otherwise it counts as a missing one."""
+
+    carries: ClassVar[frozenset[str]] = frozenset()
+    """Levels of policies of which it takes the actions, besides its own."""
 
     observes: ClassVar[bool] = True
     """Whether `observe` does anything."""
@@ -119,6 +122,9 @@ class Level(ABC):
             np.zeros(1, np.uint8),
             FORESIGHT_TIMES,
         )
+
+    make_driver: Callable[[], TeamDriver] | None = None
+    """Makes the driver when a robot first has a target, if the level has none before."""
 
     def start(self, episode: int) -> None:  # noqa: B027
         """Begin an episode."""

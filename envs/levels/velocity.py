@@ -1,14 +1,17 @@
-"""Decisions by speed and turn rate, for one step."""
+"""Decisions by speed and turn rate, for one step; robots with targets are driven there."""
 
 import math
 from collections.abc import Mapping
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from lidarium.envs.levels.level import Level, Mask, Turn, check_rows, numbers_of
+from lidarium.envs.levels.level import STEPS, Level, Mask, Turn, check_rows, numbers_of
+from lidarium.envs.levels.waypoint import Ways, give_ways, is_way, read_ways
+from lidarium.envs.onboard.driving.path_following import IDLE
+from lidarium.envs.onboard.driving.team_driver import TeamDriver
 from lidarium.envs.onboard.perception import Perception
 from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.mapping.geometry.bounds import shown
@@ -31,10 +34,39 @@ def _scale_shares(commands: Array, limits: Array) -> bool:
     return True
 
 
+class _Mixed(NamedTuple):
+    """Speeds of some robots, and targets of the others.
+
+    Attributes
+    ----------
+    commands : (rows, 2) float64
+        Speeds and turn rates [m/s, rad/s].
+    has_speeds : (rows,) bool
+        Robots that are given speeds.
+    ways : Ways
+        Targets and routes of the others.
+    """
+
+    commands: NDArray[np.float64]
+    has_speeds: Mask
+    ways: Ways
+
+
 class VelocityLevel(Level):
-    """An action is speed and turn rate as shares of the robot's limits."""
+    """An action is speed and turn rate as shares of the robot's limits.
+
+    A ``Target`` or ``Route`` is an action as well, so that policies of waypoints drive robots among those that are
+    driven by speeds: the onboard driver then takes the robot there, step by step, until it is given another action.
+    From the first target on, None lets a robot stay and give way, and orders of a station to drive are taken.
+
+    Attributes
+    ----------
+    driver : TeamDriver or None
+        Drives robots to targets; None before the first target.
+    """
 
     observes: ClassVar[bool] = False
+    carries = frozenset({"waypoint"})
 
     def __init__(
         self,
@@ -46,9 +78,29 @@ class VelocityLevel(Level):
         super().__init__(perception, settings, shares_map, decision_period_s)
         self.action_space = spaces.Box(-1.0, 1.0, (2,), np.float32)
         self._limits = settings.speed_limits.ravel()
+        self._shares_map = shares_map
+        self._plan_steps = max(round(settings.decision_period_s / settings.time_step), 1)
+        self._steps_left = np.zeros(self.rows // settings.robots, np.int64)
 
-    def read(self, actions: Mapping[int, Any], names: list[str]) -> NDArray[np.float64]:
-        """Return speeds and turn rates (rows, 2) [m/s, rad/s], zero for rows without an action."""
+    def start(self, episode: int) -> None:
+        """Begin an episode: no robot has a target."""
+        if self.driver is not None:
+            self.driver.start(episode)
+
+    def read(self, actions: Mapping[int, Any], names: list[str]) -> NDArray[np.float64] | _Mixed:
+        """Return speeds and turn rates (rows, 2) [m/s, rad/s], zero for rows without an action, and targets."""
+        for action in actions.values():
+            if not isinstance(action, np.ndarray) and is_way(action):
+                break
+        else:
+            return self._speeds(actions, names)
+        ways = {row: action for row, action in actions.items() if is_way(action)}
+        speeds = {row: action for row, action in actions.items() if row not in ways}
+        has_speeds = np.zeros(self.rows, np.bool_)
+        has_speeds[list(speeds)] = True
+        return _Mixed(self._speeds(speeds, names), has_speeds, read_ways(ways, self.rows))
+
+    def _speeds(self, actions: Mapping[int, Any], names: list[str]) -> NDArray[np.float64]:
         commands = np.zeros((self.rows, 2))
         for row, action in actions.items():
             shares = action if isinstance(action, np.ndarray) else numbers_of(action)
@@ -74,6 +126,33 @@ class VelocityLevel(Level):
         _scale_shares(commands, self._limits)
         return commands
 
-    def carry_out(self, decoded: NDArray[np.float64], turn: Turn) -> None:
-        """Drive at the speeds."""
-        turn.commands[:] = decoded
+    def carry_out(self, decoded: NDArray[np.float64] | _Mixed, turn: Turn) -> None:
+        """Drive at the speeds, or along paths to the targets."""
+        if not isinstance(decoded, _Mixed):
+            if self.driver is None:
+                turn.commands[:] = decoded
+                return
+            decoded = _Mixed(decoded, turn.given, read_ways({}, self.rows))
+        driver = self.driver
+        if driver is None:
+            driver = self.make_driver()
+            turn.operating.attach(driver)
+        give_ways(driver, decoded.ways, turn)
+        # Paths are planned as often as at the level of waypoints: at new targets, and once in a decision period.
+        drives, left = driver.drives, self._steps_left
+        is_new = drives.is_ordered & ~drives.has_path & (drives.states == IDLE)
+        left[is_new.reshape(len(left), -1).any(axis=1)] = 0
+        is_due = (turn.modes == STEPS) & (left <= 0)
+        left -= 1
+        left[is_due] = self._plan_steps - 1
+        driver.prepare(np.flatnonzero(is_due))
+        turn.commands[:] = np.where((turn.given & decoded.has_speeds)[:, None], decoded.commands, driver.commands())
+        turn.commands[list(turn.operating.stopping)] = 0.0
+
+    def make_driver(self) -> TeamDriver:
+        """Return a driver for robots with targets, from now on the driver of the level."""
+        self.driver = driver = TeamDriver(self.perception, self.settings, self._shares_map)
+        for episode in range(self.perception.world.episodes):
+            driver.start(episode)
+        self.takes_none = True
+        return driver

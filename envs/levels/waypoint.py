@@ -1,7 +1,7 @@
 """Decisions by waypoints: the onboard driver takes a robot to its waypoint."""
 
 from collections.abc import Callable, Mapping
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from gymnasium import spaces
@@ -31,6 +31,36 @@ class Ways(NamedTuple):
     routes: dict[int, Route]
 
 
+def is_way(action: Any) -> bool:  # noqa: ANN401
+    """Whether an action is a target, a route, or None to stay."""
+    return action is None or isinstance(action, Target | Route)
+
+
+def read_ways(actions: Mapping[int, Target | Route | None], rows: int) -> Ways:
+    """Return the targets and routes of some rows; the others stay."""
+    targets: list[Target | None] = [None] * rows
+    routes: dict[int, Route] = {}
+    for row, action in actions.items():
+        if isinstance(action, Route):
+            routes[row] = action
+            targets[row] = action.target
+        else:
+            targets[row] = action
+    return Ways(Orders.of(targets), routes)
+
+
+def give_ways(driver: TeamDriver, ways: Ways, turn: Turn) -> None:
+    """Give the robots that decide their targets; an order of the station has priority, a paused robot keeps its own."""
+    is_assigned = turn.given & ~turn.operating.held
+    driver.assign(is_assigned, ways.orders)
+    for row, route in ways.routes.items():
+        if is_assigned[row]:
+            driver.follow(row, route)
+    rows = len(is_assigned)
+    for row, target in turn.operating.take_sent().items():
+        driver.assign(np.arange(rows) == row, Orders.of([target] * rows))
+
+
 class WaypointLevel(Level):
     """An action is a point within the observed map.
 
@@ -52,7 +82,7 @@ class WaypointLevel(Level):
         driver follow routes to the targets. None by default: paths are planned on grids.
     """
 
-    takes_none: ClassVar[bool] = True
+    takes_none = True
     driver: TeamDriver
 
     def __init__(
@@ -82,16 +112,13 @@ class WaypointLevel(Level):
         if self.action_space is not self._points:  # a level of a user's own, which decodes arrays
             ways: Ways = super().read(actions, names)
             return ways
-        targets: list[Target | None] = [None] * self.rows
-        routes: dict[int, Route] = {}
-        for row, action in actions.items():
-            if isinstance(action, Route):
-                routes[row], targets[row] = action, action.target
-            elif action is None or isinstance(action, Target):
-                targets[row] = action
-            else:
-                targets[row] = self._target(row, action, names[row % len(names)])
-        return Ways(Orders.of(targets), routes)
+        return read_ways(
+            {
+                row: action if is_way(action) else self._target(row, action, names[row % len(names)])
+                for row, action in actions.items()
+            },
+            self.rows,
+        )
 
     def read_rows(self, actions: Any, live: Mask) -> Ways:  # noqa: ANN401
         """Return the targets of all rows; an array of objects may hold ``Target``, ``Route`` and None."""
@@ -119,18 +146,9 @@ class WaypointLevel(Level):
         return Target(float(x), float(y))
 
     def carry_out(self, decoded: Ways, turn: Turn) -> None:
-        """Give robots their targets and plan; an episode in which a robot should end takes one step only.
-
-        A paused robot keeps its target, and an order of the station has priority over the policy's choice.
-        """
+        """Give robots their targets and plan; an episode in which a robot should end takes one step only."""
         operating, modes = turn.operating, turn.modes
-        is_assigned = turn.given & ~operating.held
-        self.driver.assign(is_assigned, decoded.orders)
-        for row, route in decoded.routes.items():
-            if is_assigned[row]:
-                self.driver.follow(row, route)
-        for row, target in operating.take_sent().items():
-            self.driver.assign(np.arange(self.rows) == row, Orders.of([target] * self.rows))
+        give_ways(self.driver, decoded, turn)
         if self.router is not None:
             self.router(np.flatnonzero(turn.acting))
         running = modes == STEPS

@@ -6,17 +6,13 @@ from contextlib import nullcontext
 from dataclasses import dataclass, field
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-from lidarium.agents.policy import Policy, Stop, check_observed
+from lidarium.agents.policy import Policy, check_observed
 from lidarium.agents.report import GivenUp
 from lidarium.envs.faces.merged_maps import MergedMaps, true_frames
-from lidarium.envs.faces.parallel import ExplorationEnv, Observation
+from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.faces.sparse_planning import SparsePlanning
 from lidarium.envs.faces.team import EpisodeTeam
 from lidarium.envs.faces.team_exchange import MergeEvent, MergingSettings
-from lidarium.envs.onboard.radio.messages import Order
 from lidarium.evaluation.episodes.events import merge_event
 from lidarium.evaluation.episodes.watching import WatchedExploration
 from lidarium.evaluation.processes import PatientInterrupt
@@ -127,7 +123,7 @@ def run_episode(
                 on_decision(env)
             while env.agents and not (interrupt and interrupt.is_asked):
                 decided = time.perf_counter()
-                actions = _decide(policy, world, observations)
+                actions = policy.act(observations)
                 episode.decision_seconds.append(time.perf_counter() - decided)
                 observations = world.step(actions)[0]
                 observations = {agent: observations[agent] for agent in env.agents}
@@ -183,23 +179,3 @@ def _merges_of(policy: Policy, env: ExplorationEnv) -> list[MergeEvent]:
         )
         for join, found, true in poses
     ]
-
-
-def _decide(
-    policy: Policy,
-    world: World,
-    observations: Mapping[str, Observation],
-) -> dict[str, NDArray[np.float32] | Any]:
-    """Ask a policy for actions, and pass ``Stop`` and ``Order`` to the environment.
-
-    Agents with one of these have no action.
-    """
-    actions: dict[str, Any] = {}
-    for agent, action in policy.act(observations).items():
-        if isinstance(action, Stop):
-            world.stop(agent, action.reason)
-        elif isinstance(action, Order):
-            world.order(agent, action)
-        else:
-            actions[agent] = action
-    return actions

@@ -58,6 +58,8 @@ def encode_type(argument: Any) -> Any:  # noqa: ANN401
         }
     if isinstance(argument, types.BaseTuple):
         return [encode_type(each) for each in argument.types]
+    if isinstance(argument, types.Literal):  # a constant of the caller
+        return {"literal": argument.literal_value}
     if isinstance(argument, types.Number | types.Boolean):
         return str(argument)
     raise ValueError(f"the type {argument!r} of a kernel's argument cannot be written; want numbers or arrays")
@@ -66,6 +68,8 @@ def encode_type(argument: Any) -> Any:  # noqa: ANN401
 def decode_type(text: Any) -> Any:  # noqa: ANN401
     """Return the type that ``encode_type`` wrote."""
     types = _numba_types()
+    if isinstance(text, dict) and "literal" in text:
+        return types.literal(text["literal"])
     if isinstance(text, dict):
         module, name = text["class"].split(":")
         made = getattr(importlib.import_module(module), name)

@@ -92,6 +92,19 @@ class Route:
         return Target(x, y, self.heading)
 
 
+@dataclass(frozen=True, slots=True)
+class Stop:
+    """An action by which a robot ends its work, at any level of decision.
+
+    Attributes
+    ----------
+    reason : str
+        ``no_frontier``, ``frontier_unreachable``, ``unreachable``, ``stopped`` or a policy's own word.
+    """
+
+    reason: str
+
+
 class OperatingState(Enum):
     """Whether a robot takes part in the work of its team."""
 

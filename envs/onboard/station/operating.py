@@ -9,7 +9,7 @@ otherwise it would not have driven there: when it resumes, it first backs out a 
 continues to its target.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -63,7 +63,7 @@ class OperatingEvent:
         The state's or the order's name.
     reason : str
         Why: of a state ``order``, ``contact``, ``blocked`` or the reason of its ending; of an order that of
-        the order; of a refused one the robot's state, ``no_driver`` (its level of decision knows no targets),
+        the order; of a refused one the robot's state, ``no_driver`` (no driver serves its level of decision),
         ``outside`` or ``occupied`` (the target on its map).
     target : Target or None
         Target of an order to drive, in the robot's map frame.
@@ -90,7 +90,7 @@ class Operating:
     Attributes
     ----------
     driver : TeamDriver or None
-        Drives the robots to targets; None at the velocity level.
+        Drives the robots to targets; None at the velocity level before the first target.
     states : list of OperatingState
         State of each row.
     orders : list of Order or None
@@ -119,6 +119,7 @@ class Operating:
         episodes = perception.world.episodes
         rows = settings.robots * episodes
         self.driver: TeamDriver | None = None
+        self._make_driver: Callable[[], TeamDriver] | None = None
         self.states = [OperatingState.OPERATING] * rows
         self.orders: list[Order | None] = [None] * rows
         self.events: list[list[OperatingEvent]] = [[] for _ in range(episodes)]
@@ -157,8 +158,12 @@ class Operating:
         self._rename("order_names", whole, "")
         self._note_activity()
 
-    def attach(self, driver: TeamDriver | None) -> None:
-        """Let a driver drive the robots to the targets of their orders, except paused robots."""
+    def attach(self, driver: TeamDriver | None, make_driver: Callable[[], TeamDriver] | None = None) -> None:
+        """Let a driver drive the robots to the targets of their orders, except paused robots.
+
+        Without one, ``make_driver`` makes it when a robot is first ordered to a target.
+        """
+        self._make_driver = make_driver
         self.driver = driver
         if driver is not None:
             driver.planner.held = self.held
@@ -268,6 +273,8 @@ class Operating:
             return self.states[row].value
         if order.target is None:
             return ""
+        if self.driver is None and self._make_driver is not None:
+            self.attach(self._make_driver())
         if self.driver is None:
             return "no_driver"
         navigation = self._perception.planning_map(row, self.driver.shares_map)

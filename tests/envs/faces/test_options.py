@@ -44,7 +44,7 @@ def test_the_action_of_an_agent_that_has_ended_is_no_error():
 
 
 @pytest.mark.parametrize(
-    "action", [1.7, np.float32(0.5), [0, 1], np.zeros((2, 1)), "0", None, -1, 99, float("nan"), [[1], [1, 2]]]
+    "action", [1.7, np.float32(0.5), [0, 1], np.zeros((2, 1)), "0", -1, 99, float("nan"), [[1], [1, 2]]]
 )
 def test_what_is_no_number_of_a_frontier_is_refused(teams, action):
     with pytest.raises(ValueError, match=r"action of robot_0 is .*; want a frontier from 0 to \d+, or \d+"):

@@ -60,7 +60,7 @@ def ordered():
         2: {"robot_0": Order(OrderKind.PAUSE, reason="wait")},
         3: {"robot_0": Order(OrderKind.EXPLORE)},
         6: {"robot_0": Order(OrderKind.RESUME)},
-        9: {"robot_1": Order(OrderKind.GO_TO, Target(2.0, 1.0))},
+        9: {"robot_1": Order(OrderKind.GO_TO, Target(500.0, 1.0))},
         12: {"robot_0": Order(OrderKind.STOP, reason="enough"), "robot_1": Order(OrderKind.STOP)},
     }
     return run(orders)
@@ -82,8 +82,8 @@ def test_orders_and_states_are_in_the_result_with_places_in_the_floors_frame(ord
         "agent": "robot_1",
         "order": "go_to",
         "x": 2.0,
-        "y": 11.0,
-        "reason": "no_driver",
+        "y": 509.0,
+        "reason": "outside",
     }
     assert result["energy_j"] is None
 

@@ -28,6 +28,7 @@ CASES = [
     (types.Array(types.float32, 1, "C", readonly=True), "float32:1C:readonly"),
     (types.UniTuple(types.float64, 3), ["float64"] * 3),
     (types.Tuple([ARRAY, types.int64]), ["int8:2C", "int64"]),
+    (types.literal(True), {"literal": True}),
 ]
 TAKE = {"name": "lidarium.mapping.kernels.work_queue:take_next", "signature": ["int64:1C"], "needs": []}
 SCRIPT = f"""

@@ -204,10 +204,15 @@ def test_a_goal_behind_a_wall_that_is_not_known_yet_ends_in_a_drive_without_a_pa
     assert infos["robot_0"]["drive"].value == "no_path"
 
 
-def test_at_the_level_of_velocities_there_is_nobody_to_drive_to_a_goal():
+def test_at_the_level_of_velocities_the_onboard_driver_takes_a_robot_to_the_goal_of_an_order():
     env = hall("velocity")
     env.order("robot_0", go_to(1.0, 0.0))
-    assert told(env) == [("refused", "go_to", "no_driver")]
+    stands = np.zeros(2, np.float32)
+    for _ in range(60):
+        drive(env, robot_1=stands)
+    assert told(env) == [("order", "go_to", "")]
+    assert np.allclose(env.belief("robot_0").pose[:2], [1.0, 0.0], atol=0.15)
+    assert np.array_equal(env.world.poses[1], env.engine.starts[0].starts[1])
 
 
 def test_who_has_ended_takes_no_order_and_nothing_happens():
