@@ -42,6 +42,11 @@ class Team(Protocol):
         ...
 
     @property
+    def settings(self) -> ExplorationSettings:
+        """The settings of the team."""
+        ...
+
+    @property
     def time_s(self) -> float:
         """Simulated time [s]."""
         ...
@@ -343,6 +348,10 @@ class _Alone:
     @property
     def level(self) -> str:
         return self._team.level
+
+    @property
+    def settings(self) -> ExplorationSettings:
+        return self._team.settings
 
     def belief(self, agent: str) -> Belief:
         if agent != self._agent:

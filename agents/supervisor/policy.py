@@ -24,6 +24,7 @@ from lidarium.envs.onboard.belief import Belief
 from lidarium.envs.onboard.driving.path_planner import footprint_of
 from lidarium.envs.onboard.radio.messages import DriveState, OperatingState, Order, OrderKind
 from lidarium.envs.onboard.station.reports import Report
+from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.mapping.merging.fusion import FusedMap
 from lidarium.mapping.planning.frontiers.frontier_map import FRONTIER
 from lidarium.mapping.planning.grid_planning import cells_of
@@ -158,6 +159,11 @@ class _LedTeam:
         return self._team.level
 
     @property
+    def settings(self) -> ExplorationSettings:
+        """The settings of the team."""
+        return self._team.settings
+
+    @property
     def time_s(self) -> float:
         """Simulated time [s]."""
         return self._team.time_s
@@ -192,12 +198,20 @@ class _LedTeam:
 
 
 class Supervised(Policy):
-    """A supervisor over a policy.
+    """A supervisor over a policy, or over an environment in which anything else decides.
 
-    Robots explore by that policy, the station merges their maps, and the tree redirects and stops them.
+    Robots explore by that policy, the station merges their maps, and the tree redirects and stops them. Joined robots
+    are sent the maps of the others, so the policy explores on the merged map if it uses the shared one. Around an
+    environment or a batch it is a wrapper: see `SupervisedTeam` and `SupervisedBatch`.
 
-    Joined robots are sent the maps of the others, so the policy explores on the merged map if it
-    uses the shared one.
+    Parameters
+    ----------
+    policy : Policy, ParallelEnv or VectorEnv
+        Who decides for robots that have no order.
+    settings : SupervisorSettings, optional
+        Settings of the supervisor. Those of `SupervisorSettings` by default.
+    **options
+        Any of these settings by name, instead; of a wrapper also ``masks_orders``.
 
     Attributes
     ----------
@@ -210,11 +224,15 @@ class Supervised(Policy):
         merge between decisions [s].
     """
 
+    def __new__(cls, policy: Any, settings: SupervisorSettings | None = None, **options: Any) -> Any:  # noqa: ANN401
+        """Return the policy, or the wrapper of an environment."""
+        if isinstance(policy, Policy):
+            return super().__new__(cls)
+        from lidarium.agents.supervisor.wrappers import supervise
+
+        return supervise(policy, settings, **options)
+
     def __init__(self, policy: Policy, settings: SupervisorSettings | None = None, **options: Any) -> None:  # noqa: ANN401
-        if policy.level not in ("waypoint", "frontier"):
-            raise ValueError(
-                f"a policy of level {policy.level!r} goes to no goals; want one of level 'waypoint' or 'frontier'"
-            )
         if settings is not None and options:
             raise ValueError(
                 f"settings of the supervisor are given twice, also as {', '.join(options)}; want one or the other"
@@ -225,6 +243,8 @@ class Supervised(Policy):
         self.has_begun = False
         self.tick_seconds: list[float] = []
         self.merge_seconds: list[float] = []
+        self._stops: dict[str, Action] = {}
+        self._free: list[str] = []
 
     @property
     def decisions(self) -> list[Decision]:
@@ -311,20 +331,30 @@ class Supervised(Policy):
 
     def act(self, observations: Mapping[str, Observation]) -> dict[str, Action]:
         """Let the policy decide for all robots that the supervisor has not sent anywhere."""
-        stops = self._supervise()
-        for agent in observations:
+        free = self.direct(list(observations))
+        actions: dict[str, Action] = self.policy.act({agent: observations[agent] for agent in free}) if free else {}
+        return self.complete(list(observations), actions)
+
+    def direct(self, agents: Sequence[str]) -> list[str]:
+        """Merge and decide by the tree if it is time; return which of some robots its policy decides for now."""
+        self._stops = self._supervise()
+        for agent in agents:
             self._errands.review(agent)
         standing = self._supervisor.standing_by
-        free = {
-            agent: observation
-            for agent, observation in observations.items()
-            if agent not in stops and agent not in standing and not self._errands.is_away(agent)
-        }
-        actions: dict[str, Action] = self.policy.act(free) if free else {}
+        self._free = [
+            agent
+            for agent in agents
+            if agent not in self._stops and agent not in standing and not self._errands.is_away(agent)
+        ]
+        return self._free
+
+    def complete(self, agents: Sequence[str], actions: dict[str, Action]) -> dict[str, Action]:
+        """Add the orders of the other robots to the actions of those that `direct` has returned."""
+        stops, standing = self._stops, self._supervisor.standing_by
         self._exploring.clear()
-        self._exploring.update(free)
+        self._exploring.update(self._free)
         is_work_left = any(not isinstance(action, Stop) for action in actions.values()) or len(self._errands) > 0
-        for agent in observations:
+        for agent in agents:
             if agent in stops:
                 actions[agent] = stops[agent]
             elif self._errands.is_away(agent):
@@ -332,10 +362,10 @@ class Supervised(Policy):
                 if (action := self._errands.action(agent)) is not None:
                     actions[agent] = action
             elif agent in standing:
-                actions[agent] = self._rest(agent, observations[agent]) if is_work_left else Stop("no_frontier")
-            elif is_work_left and isinstance(actions[agent], Stop):
+                actions[agent] = self._rest() if is_work_left else Stop("no_frontier")
+            elif is_work_left and isinstance(actions.get(agent), Stop):
                 # It may have to move aside, or get work when the others find more.
-                actions[agent] = self._rest(agent, observations[agent])
+                actions[agent] = self._rest()
         return actions
 
     def _supervise(self) -> dict[str, Action]:
@@ -419,8 +449,11 @@ class Supervised(Policy):
         else:
             self._errands.begin(command)
 
-    def _rest(self, agent: str, observation: Observation) -> Action:
-        return len(observation["frontiers"]) if self.level == "frontier" else None
+    def _rest(self) -> Action:
+        """Return the action of a robot that stays."""
+        if self.level == "velocity":
+            return np.zeros(2, np.float32)
+        return self._team.settings.frontiers if self.level == "frontier" else None
 
 
 def _trusting(settings: SupervisorSettings) -> SupervisorSettings:

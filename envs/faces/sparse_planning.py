@@ -5,18 +5,10 @@ It works with any policy: waypoints, chosen frontiers and orders of a station na
 
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-from lidarium.envs.engine.engine import Engine
 from lidarium.envs.faces.parallel import Observation, Outcome
+from lidarium.envs.faces.sparse_routes import SparseRouter
 from lidarium.envs.faces.wrapper import TeamWrapper, exploration_below
-from lidarium.envs.levels.waypoint import WaypointLevel
-from lidarium.envs.onboard.radio.messages import DriveState, Route, Target
-from lidarium.envs.simulation.kernels.arrays import ENDED
-
-NEAR_GOAL_M = 0.6
-"""Maximum distance to a goal of a substitute position if the body cannot stand at the goal [m]."""
+from lidarium.envs.onboard.radio.messages import DriveState
 
 
 class SparsePlanning(TeamWrapper):
@@ -26,7 +18,7 @@ class SparsePlanning(TeamWrapper):
     goal, ground that the camera has not seen counts as free. The robot keeps a route until a new obstacle blocks it.
     Observations, actions and infos are those of the environment below; ``infos[agent]["route"]`` gives the reason if
     there is no route to a robot's goal: ``start in collision``, ``goal in collision`` or ``no path``; otherwise it is
-    empty.
+    empty. In a batch: ``vector_env(plans_sparsely=True)``.
 
     Parameters
     ----------
@@ -45,7 +37,7 @@ class SparsePlanning(TeamWrapper):
         base = exploration_below(getattr(env, "unwrapped", env), "SparsePlanning")
         super().__init__(env)
         self.metadata = {**env.metadata, "name": str(env.metadata["name"]).replace("_v1", "_sparse_v1")}
-        self._router = _Router(base.engine, shares_map)
+        self._router = SparseRouter(base.engine, shares_map)
 
     def reset(
         self, seed: int | None = None, options: dict[str, Any] | None = None
@@ -68,68 +60,3 @@ class SparsePlanning(TeamWrapper):
         for agent, info in infos.items():
             info["route"] = self._router.reasons[self.possible_agents.index(agent)]
         return infos
-
-
-class _Router:
-    """Plans the routes of all robots of an engine on their sparse maps.
-
-    Parameters
-    ----------
-    engine : Engine
-        The episodes, at the level of waypoints or frontiers.
-    shares_map : bool
-        Whether robots plan on the map of the whole team.
-
-    Attributes
-    ----------
-    reasons : list of str
-        Why there is no route to the goal of each row; empty if there is one.
-    """
-
-    def __init__(self, engine: Engine, shares_map: bool) -> None:
-        level = engine.level
-        if not isinstance(level, WaypointLevel):
-            raise ValueError(
-                f"SparsePlanning is put around the level {engine.level_name!r}; want waypoints or frontiers"
-            )
-        self._perception = engine.perception
-        self._driver = level.driver
-        self._held = engine.operating.held
-        self._shares_map = shares_map
-        self._rows = engine.rows
-        self.reasons = [""] * engine.rows
-        self._perception.sparse_maps.check()
-        level.router = self.route
-
-    def start(self) -> None:
-        """Begin an episode: robots map from the start on."""
-        self.reasons = [""] * self._rows
-        for row in range(self._rows):
-            self._perception.sparse_maps.of(row)
-
-    def route(self, rows: NDArray[np.int64]) -> None:
-        """Plan routes for robots that have a goal and no good route to it."""
-        driver, world = self._driver, self._perception.world
-        for row in rows.tolist():
-            target, state = driver.target(row), driver.state(row)
-            if target is None or world.flags[row] & ENDED or self._held[row] or state is DriveState.GIVING_WAY:
-                continue
-            known = self._perception.sparse_maps.belief(row, self._shares_map)
-            left = driver.route_left(row)
-            if left is not None and (state is DriveState.ARRIVED or known.is_free(left)):
-                continue
-            driver.follow(row, self._planned(row, target))
-
-    def _planned(self, row: int, target: Target) -> Route | None:
-        """Return the route of a robot to its goal, or near it; None if no route exists."""
-        perception = self._perception
-        known = perception.sparse_maps.belief(row, self._shares_map)
-        start, goal = perception.poses.pose_in_frame(row, row)[:2], np.array([target.x, target.y])
-        found = known.route(start, goal)
-        if found.reason:
-            near = known.nearest_standing(goal, NEAR_GOAL_M)
-            found = found if near is None else known.route(start, near)
-        if found.reason:
-            found = known.hopeful(goal).route(start, goal)
-        self.reasons[row] = found.reason
-        return None if found.reason else Route(found.points, found.room, target.heading)

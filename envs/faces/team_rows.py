@@ -19,6 +19,7 @@ from lidarium.envs.faces.conventions import (
     shared_rewards,
 )
 from lidarium.envs.faces.messages import MESSAGES, MessageBoard, split_action, talking_space
+from lidarium.envs.faces.sparse_routes import SparseRouter
 from lidarium.envs.faces.team import EpisodeTeam
 from lidarium.envs.faces.team_exchange import MergedRows, MergingSettings
 from lidarium.envs.onboard.radio.messages import Order, Route, Stop, Target
@@ -45,6 +46,8 @@ class TeamRows:
         The forms. Those of a plain environment by default.
     merging : MergingSettings, optional
         Settings of map merging. No merging by default.
+    plans_sparsely : bool, optional
+        Whether robots drive along routes on their sparse maps; see `SparsePlanning`. False by default.
 
     Attributes
     ----------
@@ -64,7 +67,11 @@ class TeamRows:
     """
 
     def __init__(
-        self, engine: Engine, conventions: Conventions = PLAIN, merging: MergingSettings | None = None
+        self,
+        engine: Engine,
+        conventions: Conventions = PLAIN,
+        merging: MergingSettings | None = None,
+        plans_sparsely: bool = False,
     ) -> None:
         self.engine = engine
         self.conventions = conventions
@@ -72,6 +79,7 @@ class TeamRows:
         self._robot_of = {agent: robot for robot, agent in enumerate(engine.settings.agents)}
         self._keeps = conventions.ended_agents == "zeros"
         self._merged = None if merging is None else MergedRows(engine, merging)
+        self._router = SparseRouter(engine) if plans_sparsely else None
         self._board: MessageBoard | None = None
         self._seen = np.ones(self.rows, np.bool_)
         self._kept = np.zeros(self.rows, np.bool_)
@@ -207,6 +215,8 @@ class TeamRows:
         engine = self.engine
         self._kept = masked
         self.active = engine.everyone if masked is self._nobody else ~masked
+        if self._router is not None:
+            self._router.start(np.flatnonzero(np.repeat(engine.world.steps <= 0, self.robots)))
         if self._board is not None or self._merged is not None:
             self.exchange(spoke)
         self.terminated = self.truncated = self._nobody
@@ -282,6 +292,8 @@ class TeamRows:
         infos, everyone = self._infos, self.engine.everyone
         if self._merged is not None:
             infos = self._merged.infos(infos, self._seen)
+        if self._router is not None:
+            infos = {**infos, "route": np.array(self._router.reasons, object), "_route": everyone}
         form = self.conventions.infos
         if form == "flat":
             infos = flat_row_infos(infos, self.rows)

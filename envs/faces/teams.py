@@ -55,24 +55,26 @@ def make_rows(
     Kernels use all threads of the machine by default.
     """
     conventions, others = split_options(options)
-    merging, randomize = others.pop("merging", None), others.pop("randomize", None)
+    merging, plans_sparsely = others.pop("merging", None), others.pop("plans_sparsely", False)
+    randomize = others.pop("randomize", None)
     reports, settings = others.pop("reports", False), others.pop("settings", None)
     if settings is None and randomize is None:
         others.setdefault("threads", available_threads())
     chosen = makers_settings(settings, others)
 
     if randomize is not None:
-        make = partial(_make_episode, (floor, level, image_resolution, curriculum, reports, conventions, merging))
+        forms = (conventions, merging, plans_sparsely)
+        make = partial(_make_episode, (floor, level, image_resolution, curriculum, reports, forms))
         return RandomizedRows(episodes, make, chosen, randomize)
     engine = Engine(episodes, floor, chosen, level, image_resolution, copy, curriculum, reports)
-    return TeamRows(engine, conventions, merging)
+    return TeamRows(engine, conventions, merging, plans_sparsely)
 
 
 def _make_episode(options: tuple[Any, ...], settings: ExplorationSettings, episode: int) -> TeamRows:
-    floor, level, image_resolution, curriculum, reports, conventions, merging = options
+    floor, level, image_resolution, curriculum, reports, forms = options
     taught = _taught(curriculum, episode)
     engine = Engine(1, floor, settings, level, image_resolution, True, taught, reports)
-    return TeamRows(engine, conventions, merging)
+    return TeamRows(engine, *forms)
 
 
 def _taught(curriculum: Curriculum | None, episode: int | None) -> Curriculum | None:

@@ -50,8 +50,9 @@ class ExplorationVectorEnv(VectorEnv[Any, NDArray[Any], NDArray[Any]]):
         As for ``lidarium.parallel_env``; episodes are counted over all as they begin.
     **options
         As for ``lidarium.parallel_env``; ``threads`` is that of the machine by default. ``merging``
-        (``MergingSettings``) for merged maps, ``reports=True`` for stations, which supervised policies need; with
-        ``randomize`` each episode is an engine of its own.
+        (``MergingSettings``) for merged maps, ``plans_sparsely=True`` for routes on sparse maps (`SparsePlanning`),
+        ``reports=True`` for stations, which supervised policies need; with ``randomize`` each episode is an engine of
+        its own.
 
     Raises
     ------

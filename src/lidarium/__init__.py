@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from lidarium.agents.catalogue import make_policy as policy
     from lidarium.agents.catalogue import register_policy
     from lidarium.agents.policy import PerRobot, Policy, Stop
+    from lidarium.agents.supervisor.policy import Supervised
     from lidarium.envs.engine.reward_terms import reward_term
     from lidarium.envs.faces.makers import env, parallel_env, sb3_vec_env, vector_env
     from lidarium.envs.faces.merged_maps import MergedMaps
@@ -101,6 +102,7 @@ _FACE: dict[str, str] = {
     "Solid": "lidarium.envs.floors.floor",
     "SparsePlanning": "lidarium.envs.faces.sparse_planning",
     "Stop": "lidarium.agents.policy",
+    "Supervised": "lidarium.agents.supervisor.policy",
     "SweptBody": "lidarium.mapping.sparse.swept_body",
     "Target": "lidarium.envs.onboard.radio.messages",
     "VelocityLevel": "lidarium.envs.levels.velocity",

@@ -1,0 +1,108 @@
+"""A supervisor around environments: learners and policies decide for robots that have no order."""
+
+import numpy as np
+import pytest
+from gymnasium.vector import SyncVectorEnv
+from pettingzoo.test import parallel_api_test
+
+import lidarium
+
+UNKNOWN = {"robots": 3, "known_starts": False, "map_cells": 64}
+
+
+def greedy(env, observations, agents):
+    """Take the first frontier on offer, else stay."""
+    return {agent: int(np.argmax(observations[agent]["action_mask"])) for agent in agents}
+
+
+def test_the_wrapper_has_the_parallel_api():
+    parallel_api_test(lidarium.Supervised(lidarium.parallel_env("apartment", level="frontier", **UNKNOWN)), 30)
+
+
+def test_a_policy_inside_the_wrapper_explores_as_the_supervised_policy():
+    ended = []
+    inner = lidarium.policy("nearest_frontier")
+    wrapped = lidarium.Supervised(lidarium.parallel_env("apartment", level="waypoint", horizon_s=60.0, **UNKNOWN))
+    observations, _ = wrapped.reset(seed=4)
+    inner.reset(wrapped, seed=4)
+    while wrapped.agents:
+        observations, *_ = wrapped.step(inner.act(observations))
+        observations = {agent: observations[agent] for agent in wrapped.agents}
+    ended.append(wrapped.unwrapped)
+    other = lidarium.parallel_env("apartment", horizon_s=60.0, **UNKNOWN)
+    supervised = lidarium.Supervised(lidarium.policy("nearest_frontier"))
+    lidarium.run_episode(supervised, other, seed=4)
+    assert wrapped.supervisor.joins
+    assert {(join.a, join.b) for join in wrapped.supervisor.joins} == {(join.a, join.b) for join in supervised.joins}
+    assert wrapped.unwrapped.scorer.coverage == pytest.approx(other.scorer.coverage, abs=0.05)
+
+
+def test_robots_that_are_directed_follow_their_orders_and_masks_say_so():
+    env = lidarium.Supervised(
+        lidarium.parallel_env("apartment", level="frontier", resolution=0.05, **UNKNOWN),
+        masks_orders=True,
+        period_s=4.0,
+    )
+    observations, infos = env.reset(seed=2)
+    directed = 0
+    while env.agents and env.unwrapped.time_s < 90.0:
+        for agent in env.agents:
+            if infos[agent]["directed"]:
+                directed += 1
+                mask = observations[agent]["action_mask"]
+                assert mask[-1] == 1
+                assert mask.sum() == 1
+        observations, _, _, _, infos = env.step(greedy(env, observations, env.agents))
+    assert directed > 0
+    assert env.supervisor.joins, "the maps of robots with unknown starts are joined"
+    orders = [decision for decision in env.supervisor.decisions if decision.order == "go_to"]
+    taken = [event for event in env.unwrapped.operating.events[0] if event.kind == "order" and event.what == "go_to"]
+    assert bool(orders) == bool(taken)
+
+
+@pytest.mark.parametrize("level", ["velocity", "waypoint", "frontier"])
+def test_a_batch_is_supervised_as_its_episodes_are_alone(level):
+    options = {"level": level, "horizon_s": 24.0, **UNKNOWN}
+    batch = lidarium.Supervised(lidarium.vector_env(2, "apartment", reports=True, **options), period_s=4.0)
+    alone = [lidarium.Supervised(lidarium.parallel_env("apartment", **options), period_s=4.0) for _ in range(2)]
+    observations, infos = batch.reset(seed=7)
+    for episode, env in enumerate(alone):
+        env.reset(seed=7 + episode)
+    generator = np.random.default_rng(0)
+    while all(env.agents for env in alone):
+        if level == "frontier":
+            actions = observations["action_mask"].argmax(axis=1)
+        else:
+            actions = generator.uniform(-1.0, 1.0, (6, 2)).astype(np.float32)
+        for episode, env in enumerate(alone):
+            rows = {agent: 3 * episode + robot for robot, agent in enumerate(env.possible_agents)}
+            _, _, _, _, own = env.step({agent: actions[rows[agent]] for agent in env.agents})
+            poses = env.unwrapped.world.poses
+            expected = {agent: info["directed"] for agent, info in own.items()}
+            if episode == 0:
+                observations, _, _, truncated, infos = batch.step(actions)
+            assert np.array_equal(batch.unwrapped.engine.world.poses[3 * episode : 3 * episode + 3], poses)
+            if not truncated.any():
+                assert {agent: infos["directed"][rows[agent]] for agent in expected} == expected
+
+
+def test_episodes_of_a_batch_that_begin_again_are_supervised_anew():
+    batch = lidarium.Supervised(
+        lidarium.vector_env(2, "apartment", level="frontier", reports=True, horizon_s=6.0, **UNKNOWN)
+    )
+    observations, _ = batch.reset(seed=0)
+    for _ in range(12):
+        observations, _, _, _, infos = batch.step(observations["action_mask"].argmax(axis=1))
+    assert infos["directed"].shape == (6,)
+    assert all(supervisor.report().supervision is not None for supervisor in batch.supervisors)
+
+
+def test_what_cannot_be_supervised_is_refused():
+    with pytest.raises(ValueError, match="masks_orders is set, but there are no masks; want level='frontier'"):
+        lidarium.Supervised(lidarium.parallel_env("apartment", **UNKNOWN), masks_orders=True)
+    with pytest.raises(ValueError, match="make it with reports=True"):
+        lidarium.Supervised(lidarium.vector_env(1, "apartment", **UNKNOWN)).reset(seed=0)
+    with pytest.raises(ValueError, match=r"want a batch of lidarium.vector_env"):
+        lidarium.Supervised(SyncVectorEnv([lambda: __import__("gymnasium").make("CartPole-v1")]))
+    with pytest.raises(ValueError, match="Supervised is put around int"):
+        lidarium.Supervised(3)
