@@ -63,9 +63,19 @@ POLICIES.register(
     "grows a tree of safe regions towards openings and the goal (sensor-based random tree)",
 )
 POLICIES.register(
+    "srt:thesis",
+    "lidarium.agents.srt.policy:srt_thesis",
+    "srt with the settings of its thesis as printed",
+)
+POLICIES.register(
     "supervised",
     "lidarium.agents.supervisor.factories:supervised",
     "robots explore alone; a station merges their maps, and redirects and stops them by a tree of rules",
+)
+POLICIES.register(
+    "supervised:thesis",
+    "lidarium.agents.supervisor.factories:supervised_thesis",
+    "as supervised, with merging, periods and final stops of its thesis as printed",
 )
 POLICIES.register(
     "supervised_tours",
@@ -145,7 +155,8 @@ def make_policy(name: str, **settings: Any) -> Policy:  # noqa: ANN401
     >>> lidarium.policy("nearest_frontier").level
     'waypoint'
     """
-    maker = POLICIES[name] if not isinstance(name, str) or ":" not in name else maker_at(name)
+    is_own = isinstance(name, str) and ":" in name and name not in POLICIES.summaries
+    maker = maker_at(name) if is_own else POLICIES[name]
     try:
         policy = maker(**settings)
     except TypeError as error:

@@ -82,6 +82,10 @@ class TeamCommand(Command):
     """robots do not know their start poses, nor those of the others"""
     map_resolution: float = 0.025
     """side of a cell of the maps, a whole multiple of 0.025 [m]"""
+    merging: bool = False
+    """robots in reach of each other exchange and merge their maps every few seconds"""
+    plans_sparsely: bool = False
+    """robots drive along routes on sparse maps of their depth cameras, instead of paths on grids"""
 
     set: tuple[str, ...] = ()
     """any other settings as NAME=VALUE, such as reward.time=0.02 or localizer.particles=400; `lidarium show
@@ -115,6 +119,11 @@ class TeamCommand(Command):
             "resolution": self.map_resolution,
             **({"assigned": self.set} if self.set else {}),
         }
+
+    @property
+    def run_options(self) -> dict[str, bool]:
+        """Options of ``run_episode`` that are set."""
+        return {name: True for name in ("merging", "plans_sparsely") if getattr(self, name)}
 
 
 @dataclass(frozen=True, slots=True)

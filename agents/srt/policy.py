@@ -82,3 +82,8 @@ class SensorBasedRandomTree(Policy):
 
 def _shares(speed: float, turn_rate: float) -> NDArray[np.float32]:
     return np.clip(np.array([speed, turn_rate], np.float32), -1.0, 1.0)
+
+
+def srt_thesis(**settings: Any) -> SensorBasedRandomTree:  # noqa: ANN401
+    """Return the policy with the settings of the thesis as printed."""
+    return SensorBasedRandomTree(mode="thesis", **settings)

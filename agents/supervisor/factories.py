@@ -13,6 +13,14 @@ def supervised(explorer: str = "nearest_frontier", **options: Any) -> Supervised
     return Supervised(make_policy(explorer), **options)
 
 
+def supervised_thesis(**options: Any) -> Supervised:  # noqa: ANN401
+    """Return explorers under the supervisor of the thesis: its merging, periods and final stops."""
+    thesis: dict[str, Any] = {"merging": "thesis", "merge_period_s": 1.0, "is_stop_final": True}
+    policy = supervised(**{**thesis, **options})
+    policy.decision_period_s = 1.0  # the station merges between decisions
+    return policy
+
+
 def supervised_tours(**options: Any) -> Supervised:  # noqa: ANN401
     """Return tour explorers under a supervisor; options as for ``supervised``."""
     return supervised("tour_frontier", **options)

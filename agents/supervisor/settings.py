@@ -8,6 +8,7 @@ from typing import Annotated, Literal, get_args
 
 from lidarium.envs.onboard.station.joining import GROWTH_M2, OWN_M2, WALL_M
 from lidarium.mapping.geometry.bounds import Count, Distance, FromZero, Length, above, check_settings
+from lidarium.mapping.merging.settings import MODES
 
 Assignment = Literal["pairs", "hungarian", "utility"]
 Period = Annotated[float, above(0.0, 1e7)]
@@ -73,6 +74,9 @@ class SupervisorSettings:
     pauses_idle : bool
         Whether a robot that has no goal of its own while its teammates work is paused by an order, and
         ordered to resume when there is one; else its policy lets it wait.
+    merging : str
+        Rules by which maps are merged: ``default``, or ``thesis`` for those of the thesis as printed, by which maps
+        are joined the first time that they are found.
     trusts_starts : bool
         Whether robots that know how their frames lie in a common one are joined by that; nothing is searched
         for then.
@@ -106,6 +110,7 @@ class SupervisorSettings:
     battery_margin: FromZero = 0.0
     resumes_paused: bool = False
     pauses_idle: bool = False
+    merging: Literal["default", "thesis"] = "default"
     trusts_starts: bool = False
 
     def __post_init__(self) -> None:
@@ -114,6 +119,8 @@ class SupervisorSettings:
             raise ValueError(
                 f"assignment of the supervisor is {self.assignment!r}; want one of {', '.join(get_args(Assignment))}"
             )
+        if self.merging not in MODES:
+            raise ValueError(f"merging of the supervisor is {self.merging!r}; want one of {', '.join(MODES)}")
         if self.pauses_idle and self.is_stop_final:
             raise ValueError(
                 "pauses_idle and is_stop_final of the supervisor are both true; want one: robots without a "

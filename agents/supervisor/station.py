@@ -11,19 +11,18 @@ from lidarium.agents.report import Join, JoinedGroup, TeamMaps
 from lidarium.agents.supervisor.log import StationEvent
 from lidarium.agents.supervisor.settings import SupervisorSettings
 from lidarium.envs.onboard.radio.messages import OperatingState
-from lidarium.envs.onboard.station.joining import TEAM_CONFIRMATION, team_confirmation
+from lidarium.envs.onboard.station.joining import team_confirmation
 from lidarium.envs.onboard.station.reports import Report
 from lidarium.envs.onboard.station.trails import without_bodies, without_own_trail
 from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.grids.occupancy import UNKNOWN
-from lidarium.mapping.merging.agreement import ValidationSettings
 from lidarium.mapping.merging.described_map import resampled
 from lidarium.mapping.merging.frame_tree import Edge, FrameTree
 from lidarium.mapping.merging.fusion import FusedMap, fuse
 from lidarium.mapping.merging.incremental import GrowingMap, IncrementalMerger
 from lidarium.mapping.merging.joining import Merged, placed
 from lidarium.mapping.merging.pair import PairResult
-from lidarium.mapping.merging.settings import MergeSettings
+from lidarium.mapping.merging.settings import merge_settings
 
 
 class _ReceivedReports:
@@ -109,11 +108,7 @@ class MergeStation:
     radius : float
         Of the robots' bodies [m].
     settings : SupervisorSettings
-        How maps are joined.
-    merge : MergeSettings or None
-        How maps are merged; by default as `lidarium merge` does.
-    confirmation : ValidationSettings or None
-        Conditions for joined maps; by default `TEAM_CONFIRMATION` if ``merge`` is not given either.
+        How maps are merged and joined.
 
     Attributes
     ----------
@@ -131,20 +126,22 @@ class MergeStation:
         resolution: float,
         radius: float,
         settings: SupervisorSettings,
-        merge: MergeSettings | None = None,
-        confirmation: ValidationSettings | None = None,
     ) -> None:
         self.agents, self.resolution, self.settings, self._radius = list(agents), resolution, settings, radius
-        if merge is None:
-            merge, confirmation = MergeSettings(), confirmation or TEAM_CONFIRMATION
         self._merge_resolution = max(resolution, settings.merge_resolution_m)
-        self._merger = IncrementalMerger(
-            self._merge_resolution,
-            merge,
-            confirmation_growth_m2=settings.confirmation_growth_m2,
-            confirmation=team_confirmation(settings.confirmation_own_m2, settings.confirmation_wall_m, confirmation),
-            searches_per_update=settings.searches_per_merge,
-        )
+        merge = merge_settings(settings.merging, self._merge_resolution)
+        if settings.merging == "thesis":
+            self._merger = IncrementalMerger(
+                self._merge_resolution, merge, searches_per_update=settings.searches_per_merge
+            )
+        else:
+            self._merger = IncrementalMerger(
+                self._merge_resolution,
+                merge,
+                confirmation_growth_m2=settings.confirmation_growth_m2,
+                confirmation=team_confirmation(settings.confirmation_own_m2, settings.confirmation_wall_m),
+                searches_per_update=settings.searches_per_merge,
+            )
         self._merge = merge
         self._tree: FrameTree[str] = FrameTree(merge.cycle_distance_m, merge.cycle_angle)
         self._merged: Merged | None = None

@@ -8,6 +8,7 @@ from lidarium.envs.engine.engine import Engine
 from lidarium.envs.faces.conventions import split_options
 from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.faces.randomized import RandomizedRows, RandomizedTeam
+from lidarium.envs.faces.team_exchange import MergingSettings
 from lidarium.envs.faces.team_rows import TeamRows
 from lidarium.envs.floors.floor_choice import Floors
 from lidarium.envs.settings.exploration import ExplorationSettings
@@ -56,6 +57,8 @@ def make_rows(
     """
     conventions, others = split_options(options)
     merging, plans_sparsely = others.pop("merging", None), others.pop("plans_sparsely", False)
+    if isinstance(merging, bool):
+        merging = MergingSettings() if merging else None
     randomize = others.pop("randomize", None)
     reports, settings = others.pop("reports", False), others.pop("settings", None)
     if settings is None and randomize is None:

@@ -64,7 +64,7 @@ def run_episode(
     options: Mapping[str, Any] | None = None,
     on_decision: Progress | None = None,
     raise_interrupt: bool = True,
-    merging: MergingSettings | None = None,
+    merging: bool | MergingSettings | None = None,
     plans_sparsely: bool = False,
 ) -> Episode:
     """Run a policy from reset until every robot has ended.
@@ -84,8 +84,8 @@ def run_episode(
     raise_interrupt : bool, optional
         Whether ``KeyboardInterrupt`` is raised, True by default. If False, a first Ctrl-C ends the episode
         after the current step and the episode so far is returned; a second one is raised.
-    merging : MergingSettings, optional
-        Settings of map merging (`MergedMaps`); no merging by default.
+    merging : bool or MergingSettings, optional
+        Whether robots exchange and merge their maps (`MergedMaps`), and with which settings. No merging by default.
     plans_sparsely : bool, optional
         Whether robots drive along routes on their sparse maps (`SparsePlanning`); False by default.
 
@@ -112,7 +112,8 @@ def run_episode(
     if plans_sparsely and env.driver is None:
         raise ValueError("plans_sparsely is set, but the policy decides speeds; want waypoints or frontiers")
     world: World = SparsePlanning(env, policy.shares_map) if plans_sparsely else env
-    world = world if merging is None else MergedMaps(world, merging)
+    if merging not in (None, False):
+        world = MergedMaps(world, None if merging is True else merging)
     episode = Episode(env, policy, seed)
     began = time.perf_counter()
     observations, _ = world.reset(seed=seed, options=None if options is None else dict(options))

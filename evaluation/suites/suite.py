@@ -26,6 +26,9 @@ MOST_EACH = 1_000_000
 MOST_TRIALS = 10_000_000
 """Maximum number of episodes of a suite."""
 
+RUN_OPTIONS = ("merging", "plans_sparsely")
+"""Options of ``run_episode`` that variants may set, besides settings."""
+
 ROBOTS = Rule(int, bounds=within(1, 64))
 SEED = Rule(int, bounds=within(0, 2**63 - 1))
 SIDE = Rule(float, True, above(0.0, 1000.0))
@@ -133,7 +136,8 @@ class Suite:
     robots, seeds : tuple of int
         Sizes of teams; seeds.
     variants : dict
-        Settings by name, as the options of ``lidarium.parallel_env``.
+        Settings by name, as the options of ``lidarium.parallel_env``, and ``merging`` and ``plans_sparsely`` as
+        for ``lidarium.run_episode``.
     starts : dict
         By floor: teams of starts (x, y, theta) in the floor's frame [m, rad], tried one after the other in
         place of drawn ones; a team takes as many of them as it has robots.
@@ -180,6 +184,9 @@ class Suite:
         for floor in self.floors:
             _check_floor(floor, self.image_resolution)
         for variant in self.variants:
+            for name, value in self.run_options(variant).items():
+                if not isinstance(value, bool):
+                    raise ValueError(f"{name} of variant {variant!r} is {shown(value)}; want true or false")
             for robots in self.robots:
                 settings = self.settings(variant, robots)
                 for name, policy in made.items():
@@ -197,7 +204,7 @@ class Suite:
 
     def settings(self, variant: str, robots: int) -> ExplorationSettings:
         """Return the settings of a variant for a team; each episode runs on one thread."""
-        options = dict(self.variants[variant])
+        options = {name: value for name, value in self.variants[variant].items() if name not in RUN_OPTIONS}
         for name, why in (("robots", "the suite's robots"), ("threads", "one thread an episode")):
             if name in options:
                 raise ValueError(f"variant {variant!r} sets {name}, which is fixed by {why}; leave it out")
@@ -205,6 +212,10 @@ class Suite:
             return make_settings(robots=robots, **options)
         except (ValueError, TypeError, AttributeError) as error:
             raise ValueError(f"variant {variant!r} with {robots} robots cannot be used: {error}") from error
+
+    def run_options(self, variant: str) -> dict[str, Any]:
+        """Return the options of ``run_episode`` that a variant sets."""
+        return {name: value for name, value in self.variants[variant].items() if name in RUN_OPTIONS}
 
     def make_policy(self, name: str) -> Policy:
         """Return a new policy by its name among the policies."""

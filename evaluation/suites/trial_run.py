@@ -80,6 +80,7 @@ def run_trial(suite: Suite, trial: Trial, records: Path | None = None) -> dict[s
         trial.seed,
         options,
         None if rule is None else Stopper(rule, history),
+        **suite.run_options(trial.variant),
     )
     result = result_of(episode, trial.policy, history)
     if records is not None:

@@ -138,6 +138,7 @@ def _suite(command: _Evaluate) -> "Suite":
         return preset_suite(command.preset, command.policies, seeds, command.data, command.floors)
     settings = {
         **command.team_options,
+        **command.run_options,
         "horizon_s": command.horizon_s,
         "stop_coverage": command.stop_coverage,
     }

@@ -251,7 +251,9 @@ def _explore(
         progress.show(current)
 
     with closing(progress), films.kept():
-        episode = run_episode(policy, env, command.seed, options, on_decision, raise_interrupt=False)
+        episode = run_episode(
+            policy, env, command.seed, options, on_decision, raise_interrupt=False, **command.run_options
+        )
         if not episode.is_interrupted:
             films.end()
     return episode
