@@ -4,7 +4,8 @@ import importlib
 import inspect
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from pathlib import Path
 from typing import Any
 
 from lidarium.agents.policy import Policy
@@ -157,6 +158,7 @@ def make_policy(name: str, **settings: Any) -> Policy:  # noqa: ANN401
     """
     is_own = isinstance(name, str) and ":" in name and name not in POLICIES.summaries
     maker = maker_at(name) if is_own else POLICIES[name]
+    _check_named(name, maker, settings)
     try:
         policy = maker(**settings)
     except TypeError as error:
@@ -166,6 +168,31 @@ def make_policy(name: str, **settings: Any) -> Policy:  # noqa: ANN401
     if not isinstance(policy, Policy):
         raise ValueError(f"policy {name!r} makes {type(policy).__name__}; want a subclass of Policy")
     return policy
+
+
+def _check_named(name: str, maker: Callable[..., Any], settings: Mapping[str, Any]) -> None:
+    """Check that the factory of a policy has the parameters that settings name, and needs no others."""
+    try:
+        parameters = inspect.signature(maker).parameters
+    except (TypeError, ValueError):  # a factory that does not tell
+        return
+    takes_any = any(each.kind is each.VAR_KEYWORD for each in parameters.values())
+    for setting in settings:
+        if not takes_any and setting not in parameters:
+            raise ValueError(f"policy {name!r}: {unknown('setting', setting, parameters)}")
+    named = (inspect.Parameter.POSITIONAL_OR_KEYWORD, inspect.Parameter.KEYWORD_ONLY)
+    needed = [each.name for each in parameters.values() if each.default is each.empty and each.kind in named]
+    lacking = [each for each in needed if each not in settings]
+    if lacking:
+        raise ValueError(f"policy {name!r} needs the setting {lacking[0]!r}; want --policy-set {lacking[0]}=VALUE")
+
+
+def source_of(name: str) -> Path | None:
+    """Return the file of a policy that is not of the package, None of one that is."""
+    maker = maker_at(name) if ":" in name and name not in POLICIES.summaries else POLICIES[name]
+    module = sys.modules.get(getattr(maker, "__module__", ""))
+    file = getattr(module, "__file__", None)
+    return None if file is None or str(getattr(module, "__name__", "")).startswith("lidarium.") else Path(file)
 
 
 def _unknown_setting(maker: Callable[..., Any], error: TypeError) -> str:

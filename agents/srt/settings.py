@@ -18,6 +18,7 @@ from lidarium.mapping.geometry.bounds import (
     share,
     within,
 )
+from lidarium.registry import unknown
 
 SHAPES = ("ball", "star", "radial")
 """Shapes of safe regions: one radius, one for each laser region, one for each ray."""
@@ -177,5 +178,5 @@ def make_srt_settings(mode: str = "default", **settings: Any) -> SrtSettings:  #
     known = [field.name for field in fields(SrtSettings)]
     for name in settings:
         if name not in known:
-            raise TypeError(f"unknown setting {name!r} of the tree; known are mode, {', '.join(known)}")
+            raise ValueError(unknown("setting", name, ["mode", *known]))
     return SrtSettings(**{**modes[mode], **settings})

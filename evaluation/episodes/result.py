@@ -151,12 +151,14 @@ def result_of(episode: Episode, policy: str | None = None, history: History | No
 
     Times are simulated [s], lengths are in metres, positions of ``given_up`` in the floor's frame. Figures over
     time are None without a history. ``ended_because`` is None for robots that an interrupted run left at work. A
-    ValueError if the episode was interrupted before it began.
+    ValueError if the episode was interrupted before it began. A metric that fails is None, and
+    ``failed_metrics`` says why.
     """
     env, settings = episode.env, episode.env.settings
     if env.floor is None:
         raise ValueError("the episode was interrupted before it began, there is no result")
     data = EpisodeData(env, episode, history)
+    figures, failed = _figures_or_errors(data)
     return {
         "floor": env.floor.name,
         "robots": settings.robots,
@@ -167,11 +169,25 @@ def result_of(episode: Episode, policy: str | None = None, history: History | No
         "seed": episode.seed,
         "horizon_s": settings.horizon_s,
         "interrupted": episode.is_interrupted,
-        **figures_of(data, METRICS),
+        **figures,
+        **({"failed_metrics": failed} if failed else {}),
         "version": lidarium.__version__,
         "floor_sha256": env.floor.sha256,
         "settings_sha256": settings_sha256(settings),
     }
+
+
+def _figures_or_errors(data: EpisodeData) -> tuple[dict[str, Any], dict[str, str]]:
+    """Return all metrics of an episode, and why some of them, which are None, failed: an episode is never lost."""
+    figures: dict[str, Any] = {}
+    failed: dict[str, str] = {}
+    for name in METRICS:
+        try:
+            figures |= figures_of(data, [name])
+        except Exception as error:  # of a metric of a user's own, anything
+            figures[name] = None
+            failed[name] = f"{type(error).__name__}: {error}"
+    return figures, failed
 
 
 def figures_of(data: EpisodeData, names: Iterable[str]) -> dict[str, Any]:

@@ -14,7 +14,11 @@ def realism_of(settings: ExplorationSettings) -> str:
     It is ``custom`` if they are of none.
     """
     for name in REALISM:
-        if make_settings(settings, realism=name) == settings:
+        try:
+            made = make_settings(settings, realism=name)
+        except ValueError:  # settings of a localizer do not go with true poses, for example
+            continue
+        if made == settings:
             return name
     return "custom"
 
@@ -34,15 +38,18 @@ LATER = (
 """Settings that older records do not have."""
 
 
-def settings_sha256(settings: ExplorationSettings) -> str:
-    """Return a hash of all settings that can change a result.
+def settings_sha256(settings: ExplorationSettings, has_observe: bool = False) -> str:
+    """Return a hash of the world that settings describe: of all that can change a result except the policy.
 
-    It is of their JSON with sorted keys, without ``threads``, and without settings that older records do not have
-    if it is not used: `LATER` settings at their defaults, more rewards, the build of robots without forces, sparse
-    maps of robots without cameras.
+    It is of their JSON with sorted keys, without ``threads``, without settings that older records do not have if it is
+    not used (`LATER` settings at their defaults, more rewards, the build of robots without forces, sparse maps of
+    robots without cameras), and with the default of ``observe``: policies may see different things in one world.
+    Hashes before 0.3 have ``has_observe``.
     """
     values, plain = asdict(settings), ExplorationSettings()
     del values["threads"]
+    if not has_observe:
+        values["observe"] = plain.observe
     if values["camera"] is None:
         del values["sparse_map"]
     for name in LATER:

@@ -165,7 +165,7 @@ def _settings_of(header: dict[str, Any]) -> ExplorationSettings:
             f"the settings of the record are not those of lidarium {lidarium.__version__}: {said_by(error)}"
         ) from error
     found = settings_sha256(settings)
-    if found != header["settings_sha256"]:
+    if header["settings_sha256"] not in (found, settings_sha256(settings, has_observe=True)):
         raise ValueError(
             f"the settings of the record have the hash {found}, not {header['settings_sha256']} as recorded"
         )

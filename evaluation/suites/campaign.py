@@ -7,7 +7,10 @@ A folder holds ``suite.json`` (the request), ``episodes.jsonl`` (a line per fini
 before, so that any number of workers leaves the same lines, though in another order.
 """
 
+import hashlib
 import json
+import os
+import sys
 from collections.abc import Generator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field
@@ -17,6 +20,8 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 import lidarium
+from lidarium.agents.catalogue import source_of
+from lidarium.envs.floors.catalogue.names import is_file_name, load_floor
 from lidarium.evaluation.processes import shared_out
 from lidarium.evaluation.suites.episodes_file import KEY, EpisodesFile, read_episodes
 from lidarium.evaluation.suites.suite import MOST_SUITE_BYTES, Suite, suite_of
@@ -24,6 +29,7 @@ from lidarium.evaluation.suites.trial import Trial
 from lidarium.evaluation.suites.trial_run import RECORDS_FOLDER, RecordNotWrittenError, run_trial
 from lidarium.mapping.files.guarded_reading import read_text, reason
 from lidarium.mapping.files.output import clear_unfinished, write_json
+from lidarium.registry import IMPORTS_VARIABLE
 
 SUITE_FILE, EPISODES_FILE = "suite.json", "episodes.jsonl"
 
@@ -59,8 +65,10 @@ class Campaign:
         trials = list(self.suite.trials() if self.trials is None else self.trials)
         self.total, self.failures = len(trials), []
         with EpisodesFile(self.folder / EPISODES_FILE) as file:
+            inputs = _inputs_of(self.suite)
             _check_same(file.episodes, self.suite, self.folder)
-            _write_suite(self.folder / SUITE_FILE, self.suite)
+            _check_same_inputs(self.folder, inputs)
+            _write_suite(self.folder / SUITE_FILE, self.suite, inputs)
             records = self.folder / RECORDS_FOLDER if self.records else None
             clear_unfinished(self.folder / RECORDS_FOLDER, ".npz")
             finished = {episode[KEY] for episode in file.episodes}
@@ -176,6 +184,53 @@ def _rows_of(campaign: Campaign) -> list[dict[str, Any]]:
     return [rows[trial.key] for trial in campaign.suite.trials()]
 
 
+def _inputs_of(suite: Suite) -> dict[str, str]:
+    """Return hashes of the files that a suite's results depend on, by what they are.
+
+    They are floors in files, the modules of own policies, files that settings of policies name, such as weights, and
+    modules that are imported for what they register.
+    """
+    found = {
+        f"floor {floor!r}": load_floor(floor, suite.image_resolution).sha256
+        for floor in suite.floors
+        if is_file_name(floor)
+    }
+    for name in suite.policies:
+        options = dict(suite.policy_settings.get(name, {}))
+        source = source_of(options.pop("policy", name))
+        files = [] if source is None else [source]
+        files += [Path(value) for value in options.values() if isinstance(value, str) and _is_file(value)]
+        if files:
+            found[f"policy {name!r}"] = _hash_of(files)
+    for module in filter(None, os.environ.get(IMPORTS_VARIABLE, "").split(",")):
+        file = getattr(sys.modules.get(module.strip()), "__file__", None)
+        if file is not None:
+            found[f"module {module.strip()!r}"] = _hash_of([Path(file)])
+    return found
+
+
+def _is_file(text: str) -> bool:
+    try:
+        return bool(text) and Path(text).is_file()
+    except (OSError, ValueError):  # no name of a file
+        return False
+
+
+def _hash_of(files: Sequence[Path]) -> str:
+    return hashlib.sha256(b"".join(hashlib.sha256(file.read_bytes()).digest() for file in files)).hexdigest()
+
+
+def _check_same_inputs(folder: Path, inputs: Mapping[str, str]) -> None:
+    """Check that files that earlier episodes depend on have not changed."""
+    before = _kept_suite(folder / SUITE_FILE).get("inputs", {})
+    for name, found in inputs.items():
+        if before.get(name, found) != found:
+            raise ValueError(
+                f"{folder} holds episodes of {name} as it was before its file changed; results of both are not "
+                "pooled, choose another folder"
+            )
+
+
 def _check_same(episodes: list[dict[str, Any]], suite: Suite, folder: Path) -> None:
     """Check that existing episodes are of this version and the suite's settings."""
     for episode in episodes:
@@ -227,9 +282,9 @@ def _kept_suite(path: Path) -> dict[str, Any]:
     return kept
 
 
-def _write_suite(path: Path, suite: Suite) -> None:
+def _write_suite(path: Path, suite: Suite, inputs: Mapping[str, str]) -> None:
     """Write the requests of this and of earlier calls."""
-    kept, asked = _kept_suite(path), suite.as_dict()
+    kept, asked = _kept_suite(path), {**suite.as_dict(), "inputs": dict(inputs)}
     joined: dict[str, Any] = {"version": lidarium.__version__}
     for name, value in asked.items():
         before = kept.get(name)

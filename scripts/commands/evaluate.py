@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from tyro.conf import Positional
 
 from lidarium.scripts import first_start
-from lidarium.scripts.common import DEFECT, INTERRUPTED, Answer, TeamCommand, counted, notify, table
+from lidarium.scripts.common import DEFECT, DONE, DOUBTFUL, INTERRUPTED, Answer, TeamCommand, counted, notify, table
 from lidarium.scripts.options import check_supervised, is_supervised, options_by_policy, supervisor_options
 
 if TYPE_CHECKING:
@@ -210,7 +210,12 @@ def _answer(campaign: "Campaign", folder: Path, is_interrupted: bool) -> Answer:
             f"  {folder}; `lidarium report {folder}` makes tables with intervals, and plots",
         ]
     )
-    code = INTERRUPTED if is_interrupted else (DEFECT if campaign.failures else 0)
+    failing = {name: said for episode in episodes for name, said in episode.get("failed_metrics", {}).items()}
+    for name, said in failing.items():
+        count = sum(name in episode.get("failed_metrics", {}) for episode in episodes)
+        notify(f"metric {name!r} failed in {count} of {len(episodes)} episodes: {said}")
+    code = DONE if not failing else DOUBTFUL
+    code = INTERRUPTED if is_interrupted else DEFECT if campaign.failures else code
     return Answer(result, text, code)
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from lidarium.scripts import first_start
-from lidarium.scripts.common import INTERRUPTED, Answer, Progress, TeamCommand, file_name
+from lidarium.scripts.common import DONE, DOUBTFUL, INTERRUPTED, Answer, Progress, TeamCommand, file_name
 from lidarium.scripts.options import (
     FilmOptions,
     ViewOptions,
@@ -148,7 +148,7 @@ def _answer(command: Run, policy: "Policy", options: dict[str, Any], views: "Seq
     return Answer(
         result,
         run_summary(command.chosen_policy, episode, result, folder, files),
-        INTERRUPTED if episode.is_interrupted else 0,
+        INTERRUPTED if episode.is_interrupted else DOUBTFUL if "failed_metrics" in result else DONE,
     )
 
 
