@@ -1,0 +1,126 @@
+"""What the results of an evaluation depend on besides its settings: own files, and what fails after an episode."""
+
+import json
+
+import numpy as np
+import pytest
+
+import lidarium
+from lidarium.evaluation.episodes.settings_identity import settings_sha256
+from lidarium.registry import registry
+from lidarium.scripts.main import main
+
+SHORT = ["--robots", "1", "--horizon-s", "2", "--workers", "1"]
+POLICY = """
+import lidarium
+
+class Mine(lidarium.Policy):
+    level = "velocity"
+    observes = ("time_left",)
+
+    def reset(self, team, seed=0):
+        pass
+
+    def act(self, observations):
+        return {agent: [0.2, 0.0] for agent in observations}
+"""
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    return tmp_path
+
+
+def evaluate(*more, seeds=1):
+    return main(["evaluate", *more, *SHORT, "--seeds", str(seeds), "--out", "out"])
+
+
+def test_a_policy_that_observes_more_is_reported_beside_the_others(here):
+    (here / "observes_more.py").write_text(POLICY)
+    assert evaluate("--policies", "observes_more:Mine", "random_walk") == 0
+    assert main(["report", "out"]) == 0
+
+
+def test_what_is_observed_is_no_part_of_the_world_but_all_else_is():
+    plain = lidarium.make_settings()
+    assert settings_sha256(lidarium.make_settings(observe=("scan", "pose"))) == settings_sha256(plain)
+    assert settings_sha256(lidarium.make_settings(time_step=0.05)) != settings_sha256(plain)
+
+
+@pytest.mark.parametrize("changed", ["policy", "floor", "weights"])
+def test_an_evaluation_does_not_go_on_after_a_file_that_it_depends_on_has_changed(here, changed, capsys):
+    import imageio.v3 as imageio
+
+    picture = np.full((80, 80), 255, np.uint8)
+    picture[[0, -1]] = picture[:, [0, -1]] = 0
+    imageio.imwrite(here / "room.png", picture)
+    (here / f"own_{changed}.py").write_text(
+        POLICY.replace("pass", "pass\n\n    def __init__(self, weights=''):\n        pass")
+    )
+    (here / "weights.bin").write_bytes(b"1")
+    name = f"own_{changed}:Mine"
+    asked = ["--policies", name, "--policy-set", f"{name}.weights=weights.bin", "--floors", "room.png"]
+    asked += ["--resolution", "0.1"]
+    assert evaluate(*asked) == 0
+    assert evaluate(*asked, seeds=2) == 0, "unchanged files are no obstacle"
+    if changed == "policy":
+        (here / f"own_{changed}.py").write_text(POLICY)
+    elif changed == "floor":
+        picture[40, 20:60] = 0
+        imageio.imwrite(here / "room.png", picture)
+    else:
+        (here / "weights.bin").write_bytes(b"2")
+    capsys.readouterr()
+    before = (here / "out" / "episodes.jsonl").read_bytes()
+    assert evaluate(*asked, seeds=3) == 2
+    said = capsys.readouterr().err
+    assert "before its file changed" in said
+    assert ("room.png" if changed == "floor" else name) in said
+    assert (here / "out" / "episodes.jsonl").read_bytes() == before
+
+
+def test_a_metric_that_fails_loses_no_episode(here, capsys):
+    @lidarium.metric("failing", unit="m", summary="always fails")
+    def failing(episode):
+        raise KeyError("no such wall")
+
+    try:
+        assert evaluate("--policies", "random_walk") == 4
+        assert "metric 'failing' failed in 1 of 1 episodes: KeyError: 'no such wall'" in capsys.readouterr().err
+        run = ["run", "--policy", "random_walk", "--robots", "1", "--horizon-s", "2", "--out", "run"]
+        assert main(run) == 4
+    finally:
+        registry("metric").unregister("failing")
+    for row in (
+        json.loads((here / "out" / "episodes.jsonl").read_text()),
+        json.loads((here / "run/result.json").read_text()),
+    ):
+        assert row["failing"] is None
+        assert row["failed_metrics"] == {"failing": "KeyError: 'no such wall'"}
+        assert row["coverage_final"] > 0.0
+
+
+def test_settings_of_a_localizer_come_to_a_result(here):
+    options = ["--localization", "slam", "--set", "localizer.matching.wide_share=0.1"]
+    assert main(["run", "--policy", "random_walk", "--robots", "1", "--horizon-s", "2", "--out", "run", *options]) == 0
+    assert json.loads((here / "run/result.json").read_text())["realism"] == "custom"
+
+
+@pytest.mark.parametrize(
+    ("name", "given", "said"),
+    [
+        ("srt", "mod=thesis", "unknown setting 'mod'; did you mean 'mode'"),
+        ("own_without:Mine", "weights=a", "unknown setting 'weights' (known: none)"),
+        ("own_needing:Mine", None, "policy 'own_needing:Mine' needs the setting 'weights'"),
+    ],
+)
+def test_wrong_settings_of_policies_are_answered_in_one_line(here, name, given, said, capsys):
+    (here / "own_without.py").write_text(POLICY)
+    (here / "own_needing.py").write_text(POLICY + "\n    def __init__(self, weights):\n        pass\n")
+    chosen = [] if given is None else ["--policy-set", given]
+    assert main(["run", "--policy", name, "--robots", "1", "--out", "run", *chosen]) == 2
+    error = capsys.readouterr().err
+    assert said in error
+    assert "Traceback" not in error
