@@ -35,12 +35,14 @@ def test_an_unknown_name_is_refused_with_the_nearest_one(shapes):
     assert unknown("shape", "zzz", []) == "unknown shape 'zzz' (known: none)"
 
 
-def test_a_name_is_taken_once_and_free_again_when_it_is_unregistered(shapes):
-    with pytest.raises(ValueError, match="shape 'square' is registered already; choose another name"):
+def test_a_users_item_is_replaced_with_a_warning_and_its_name_is_free_again_when_it_is_unregistered(shapes):
+    with pytest.warns(UserWarning, match="shape 'square' was registered before and is replaced"):
         shapes.register("square", 5, "another")
-    shapes.unregister("square")
-    shapes.register("square", 5, "another")
     assert shapes["square"] == 5
+    assert shapes.summaries["square"] == "another"
+    shapes.unregister("square")
+    shapes.register("square", 6, "a third")
+    assert shapes["square"] == 6
     with pytest.raises(ValueError, match="unknown shape 'cube'"):
         shapes.unregister("cube")
 

@@ -6,7 +6,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.envs.observing.rows import Rows
+from lidarium.envs.observing.rows import Rows, check_finite
 from lidarium.registry import Registry
 
 
@@ -237,5 +237,14 @@ class ExtraTerms:
             term.start(self._rows, episode)
 
     def earned(self) -> dict[str, NDArray[np.float64]]:
-        """Return the amount of each term for each robot since the last call, by name, (rows,) each."""
-        return {name: weight * term.amounts(self._rows) for name, (weight, term) in self._terms.items()}
+        """Return the amount of each term for each robot since the last call, by name, (rows,) each.
+
+        Raises
+        ------
+        ValueError
+            If an amount is not finite.
+        """
+        earned = {name: weight * term.amounts(self._rows) for name, (weight, term) in self._terms.items()}
+        for name, amounts in earned.items():
+            check_finite("reward term", name, amounts, self._rows)
+        return earned

@@ -93,7 +93,8 @@ def reachable_free_space(raster: Raster, radius: float, starts: NDArray[np.float
     -------
     (rows, columns) bool
         Free cells whose centre is within the radius of a cell centre of the configuration space, in its
-        4-connected components that hold a start. Read-only.
+        4-connected components that hold a start; within so many whole cells that a disc at a straight wall reaches
+        the last free cell before it, if that is more. Read-only.
     """
     found = components(raster, radius)
     kept = sorted(
@@ -107,6 +108,8 @@ def reachable_free_space(raster: Raster, radius: float, starts: NDArray[np.float
             chosen = np.zeros(found.areas.size, dtype=np.bool_)
             chosen[kept] = True
             reach = _cells_of(raster, radius)
+            # Centres next to a straight wall are rounded away from it: they are ceil(reach + 1/2) cells from it.
+            reach = max(reach, math.ceil(reach + 0.5 - 1e-9) - 1.0)
             steps = np.arange(math.floor(reach + 1e-9) + 2)
             disc = steps[:, None] ** 2 + steps[None, :] ** 2 <= reach**2 + 1e-9
             covered[box] = _dilated(chosen[found.labels[box]], disc) & (raster.solid[box] == 0)

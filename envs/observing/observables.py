@@ -8,7 +8,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from lidarium.envs.observing.rows import FARTHEST, Rows
+from lidarium.envs.observing.rows import FARTHEST, Rows, check_finite
 from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.settings.observables import SENSED, Observable
 
@@ -140,6 +140,8 @@ class ComputedObservations:
                     f"observable {name!r} has shape {values.shape}; want {(self._count, *box.shape)}: "
                     "a value for each row = episode * robots + robot"
                 )
+            if np.isnan(values).any():
+                check_finite("observable", name, np.where(np.isinf(values), 0.0, values), self._rows)
             clipped = np.clip(values, box.low, box.high)
             if seen is None:
                 out[name][:] = clipped

@@ -10,6 +10,7 @@ from lidarium.envs.onboard.known_poses import KnownPoses
 from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.simulation.kernels.arrays import ENDED
 from lidarium.envs.simulation.simulation import Simulation
+from lidarium.mapping.geometry.bounds import shown
 
 FARTHEST = 1000.0
 """Bound of positions in observations [m]."""
@@ -150,3 +151,20 @@ class Rows:
         if self._poses is None:
             raise ValueError("teammates are known to observables only, not to rewards")
         return self._poses.table()
+
+
+def check_finite(kind: str, name: str, values: NDArray[Any], rows: Rows) -> None:
+    """Check that values of all rows, computed by a user's function, are finite numbers.
+
+    Raises
+    ------
+    ValueError
+        If one is not; it names the robot.
+    """
+    is_finite = np.isfinite(values).reshape(len(values), -1).all(axis=1)
+    if not is_finite.all():
+        row = int(np.flatnonzero(~is_finite)[0])
+        episode, robot = divmod(row, rows.robots)
+        raise ValueError(
+            f"{kind} {name!r} of robot_{robot}, episode {episode}, is {shown(values[row])}; want finite numbers"
+        )

@@ -31,7 +31,7 @@ from lidarium.mapping.geometry.bounds import (
 )
 from lidarium.mapping.grids.occupancy import OccupancySettings
 from lidarium.mapping.localization.registry import LOCALIZERS
-from lidarium.registry import REGISTRIES, registry
+from lidarium.registry import REGISTRIES, registry, unknown
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -345,13 +345,16 @@ def localizer_settings(localization: str, values: Mapping[str, Any]) -> Any:  # 
         raise ValueError(f"localization {localization!r} has no settings; choose one of {', '.join(LOCALIZERS)}")
     try:
         return with_parts(LOCALIZERS[localization].Settings, values)
-    except TypeError as error:
+    except (TypeError, ValueError) as error:
         raise ValueError(f"settings of localizer {localization!r} cannot be used: {error}") from error
 
 
 def with_parts(kind: type, values: Mapping[str, Any]) -> Any:  # noqa: ANN401
     """Make a dataclass from values; those of parts that are dataclasses may be mappings."""
     hints = get_type_hints(kind)
+    for name in values:
+        if name not in kind.__dataclass_fields__:
+            raise ValueError(f"{kind.__name__}: {unknown('setting', name, kind.__dataclass_fields__)}")
     made = {
         name: with_parts(hints[name], value) if isinstance(value, Mapping) and is_dataclass(hints.get(name)) else value
         for name, value in values.items()

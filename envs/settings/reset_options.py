@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.envs.floors.floor_choice import Floors
-from lidarium.envs.settings.exploration import STARTS
+from lidarium.envs.settings.exploration import STARTS, ExplorationSettings
 from lidarium.mapping.geometry.bounds import shown
 
 
@@ -33,13 +33,18 @@ SIMILARITY = 0.8
 
 
 def check_options(options: Any, known: Iterable[str] = OPTIONS) -> None:  # noqa: ANN401
-    """Check that options are a mapping, and that no name is a known one misspelt.
+    """Check that options are a mapping, and that no name is a setting, or a known one misspelt.
 
     Other unknown names are no error: wrappers and trainers pass options of their own.
     """
     if options is not None and not isinstance(options, Mapping):
         raise ValueError(f"options of reset are {shown(options)}; want a dict of any of {', '.join(known)}, or None")
     for name in options or ():
+        if name in ExplorationSettings.__dataclass_fields__ and name not in known:
+            raise ValueError(
+                f"{name} is no option of reset, but a setting of the environment; want {name}={shown(options[name])} "
+                "where it is made, or randomize"
+            )
         near = difflib.get_close_matches(str(name)[:100], known, n=1, cutoff=SIMILARITY)
         if near and near[0] != name:
             raise ValueError(f"unknown reset option {shown(name)}; did you mean {near[0]!r}?")

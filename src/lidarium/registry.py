@@ -8,6 +8,7 @@ import difflib
 import os
 import reprlib
 import sys
+import warnings
 from collections.abc import Iterable, Iterator, Mapping
 from importlib import import_module
 from typing import Any, Generic, TypeVar, cast
@@ -51,6 +52,7 @@ class Registry(Mapping[str, T], Generic[T]):
         self.kind = kind
         self._items: dict[str, T | str] = {}
         self._summaries: dict[str, str] = {}
+        self._own: set[str] = set()
 
     def register(self, name: str, item: T | str, summary: str) -> None:
         """Add an item.
@@ -64,13 +66,23 @@ class Registry(Mapping[str, T], Generic[T]):
         summary : str
             One line that describes it.
 
+        Warns
+        -----
+        UserWarning
+            If a user's item of this name is replaced, as by a cell of a notebook that is run again.
+
         Raises
         ------
         ValueError
-            If the name is taken.
+            If the package has an item of this name.
         """
+        is_own = not _is_package_loading()
         if name in self._items:
-            raise ValueError(f"{self.kind} {name!r} is registered already; choose another name")
+            if not (is_own and name in self._own):
+                raise ValueError(f"{self.kind} {name!r} is registered already; choose another name")
+            warnings.warn(f"{self.kind} {name!r} was registered before and is replaced", UserWarning, stacklevel=3)
+        if is_own:
+            self._own.add(name)
         self._items[name] = item
         self._summaries[name] = summary
 
@@ -84,6 +96,7 @@ class Registry(Mapping[str, T], Generic[T]):
         """
         self._check(name)
         del self._items[name], self._summaries[name]
+        self._own.discard(name)
 
     def __getitem__(self, name: str) -> T:
         """Return an item.
@@ -118,6 +131,16 @@ class Registry(Mapping[str, T], Generic[T]):
     def _check(self, name: str) -> None:
         if not isinstance(name, str) or name not in self._items:
             raise UnknownNameError(unknown(self.kind, name, self._items))
+
+
+def _is_package_loading() -> bool:
+    """Whether a module of the package that is being imported calls, not a user through a function of the package."""
+    frame = sys._getframe(2)
+    while frame is not None and str(frame.f_globals.get("__name__", "")).partition(".")[0] == "lidarium":
+        if frame.f_code.co_name == "<module>":
+            return True
+        frame = frame.f_back  # type: ignore[assignment]
+    return False
 
 
 class UnknownNameError(KeyError, ValueError):

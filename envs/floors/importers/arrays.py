@@ -29,7 +29,9 @@ def load(path: Path, resolution: float | None) -> Floor:
     if isinstance(content, dict):
         return _load_named(path, content, resolution)
     if resolution is None:
-        raise ValueError(f"{path} is an array without a scale; pass --resolution with its metres per cell")
+        raise ValueError(
+            f"{path} is an array without a scale; want image_resolution (--resolution), its metres per cell"
+        )
     _check_grid(path, content)
     free = ~content if content.dtype == np.bool_ else content > _FREE_ABOVE
     return floor_of_cells(path, free[::-1], (0.0, 0.0), resolution)

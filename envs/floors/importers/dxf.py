@@ -219,7 +219,7 @@ def load(path: Path, resolution: float | None) -> Floor:
     if unit is not None and resolution is not None:
         raise ValueError(f"{path} has units of {unit:g} m, but a resolution of {resolution} m is given; want none")
     if unit is None and resolution is None:
-        raise ValueError(f"{path} has no unit; give --resolution, the metres of a unit")
+        raise ValueError(f"{path} has no unit; want image_resolution (--resolution), the metres of a unit")
     scale = resolution if unit is None else unit
     assert scale is not None
     with _damage(path):

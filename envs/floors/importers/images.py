@@ -54,7 +54,9 @@ def load_image(path: Path, resolution: float | None) -> Floor:
     The grey that mappers write for unknown is solid.
     """
     if resolution is None:
-        raise ValueError(f"{path} is an image without a scale; pass --resolution with its metres per pixel")
+        raise ValueError(
+            f"{path} is an image without a scale; want image_resolution (--resolution), its metres per pixel"
+        )
     grey = _grey(read_image(path))
     free = grey > _FREE_ABOVE
     unknown = unknown_grey(grey, (MAP_SERVER_GREYS, MIDDLE_GREYS))

@@ -32,7 +32,7 @@ def has_scale(path: Path) -> bool:
 def load(path: Path, resolution: float | None) -> Floor:
     """Read a grid map whose cells have a side of ``resolution`` [m]; the first line is at the top."""
     if resolution is None:
-        raise ValueError(f"{path} does not say how large a cell is; give --resolution, such as 0.5")
+        raise ValueError(f"{path} does not say how large a cell is; want image_resolution (--resolution), such as 0.5")
     lines = [line.rstrip("\r\n") for line in read_text(path).strip().split("\n")]
     try:
         begin = [line.strip().lower() for line in lines[:16]].index("map")

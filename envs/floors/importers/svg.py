@@ -235,7 +235,9 @@ def has_scale(path: Path) -> bool:
 def load(path: Path, resolution: float | None) -> Floor:
     """Read a drawing of which a unit is ``resolution`` long [m], in cells of 0.025 m."""
     if resolution is None:
-        raise ValueError(f"{path} does not say how large it is; give --resolution, the metres of a unit")
+        raise ValueError(
+            f"{path} does not say how large it is; want image_resolution (--resolution), the metres of a unit"
+        )
     try:
         root = ElementTree.fromstring(read_text(path))
     except ElementTree.ParseError as error:
@@ -256,7 +258,7 @@ def load(path: Path, resolution: float | None) -> Floor:
     if rows * columns > MAX_PIXELS:
         raise ValueError(
             f"{path} has {columns} x {rows} cells at {RESOLUTION} m, more than {MAX_PIXELS:,}; give "
-            "a smaller --resolution"
+            "a smaller image_resolution (--resolution)"
         )
     solid, origin = np.zeros((rows, columns), np.uint8), (float(low[0]), float(low[1]))
     # One over the other, in the order of painting; those of one colour at once.

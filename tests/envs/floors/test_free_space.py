@@ -60,6 +60,18 @@ def test_the_swept_space_is_what_discs_cover_from_the_start(seed, radius):
     np.testing.assert_array_equal(reachable_free_space(raster, radius, start), near & (raster.solid == 0))
 
 
+@pytest.mark.parametrize("radius", [0.01, 0.1, 0.18, 0.2, 0.267, 0.3, 0.34])
+def test_a_body_in_an_empty_room_sweeps_the_last_free_cell_before_each_straight_wall(radius):
+    solid = np.ones((80, 100), np.uint8)
+    solid[1:-1, 1:-1] = 0
+    swept = reachable_free_space(Raster(solid, (0.0, 0.0), 0.025), radius, np.array([[1.2, 1.0]]))
+    corner = math.ceil(radius / 0.025 + 0.5)
+    assert swept[1, corner:-corner].all()
+    assert swept[corner:-corner, 1].all()
+    assert swept.sum() >= 78 * 98 - 4 * corner**2
+    assert not swept[solid == 1].any()
+
+
 def test_a_sealed_room_is_never_swept():
     swept = reachable_free_space(two_rooms(), 0.18, np.array([[1.0, 1.0, 0.0]]))
     assert 0.97 < swept.sum() * 0.025**2 / 16.0 <= 1.0

@@ -50,6 +50,6 @@ def test_a_plain_image_is_a_floor_with_a_resolution(tmp_path, capsys):
     cv2.imwrite(str(path), room)
     arguments = ["bound", str(path), "--map-resolution", "0.05", "--rounds", "1", "--json"]
     assert main(arguments) == 2
-    assert "pass --resolution" in capsys.readouterr().err
+    assert "(--resolution)" in capsys.readouterr().err
     assert main([*arguments, "--resolution", "0.1"]) == 0
     assert json.loads(capsys.readouterr().out)["seen"] >= 0.99

@@ -174,7 +174,7 @@ def test_a_drawing_without_a_unit_needs_a_resolution(drawing, tmp_path):
     drawing.header["$INSUNITS"] = 0
     path = saved(drawing, tmp_path)
     assert takes_resolution(path)
-    with pytest.raises(ValueError, match=r"has no unit; give --resolution"):
+    with pytest.raises(ValueError, match=r"has no unit; want image_resolution \(--resolution"):
         load_file(path)
     assert load_file(path, 0.001).bounds == pytest.approx((-0.05, -0.05, 6.05, 4.05))
     drawing.header["$INSUNITS"] = 4

@@ -44,7 +44,7 @@ def test_windows_line_ends_and_packed_files_are_read(tmp_path):
 
 def test_a_grid_needs_a_resolution(tmp_path):
     assert takes_resolution(written(tmp_path, GRID))
-    with pytest.raises(ValueError, match=r"does not say how large a cell is; give --resolution"):
+    with pytest.raises(ValueError, match=r"does not say how large a cell is; want image_resolution \(--resolution"):
         load_file(tmp_path / "grid.map")
 
 

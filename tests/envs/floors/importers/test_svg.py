@@ -144,7 +144,7 @@ def test_what_is_dark_is_solid(tmp_path, shape, area):
 
 def test_a_drawing_needs_a_resolution(tmp_path):
     assert takes_resolution(written(tmp_path, ROOM))
-    with pytest.raises(ValueError, match=r"does not say how large it is; give --resolution"):
+    with pytest.raises(ValueError, match=r"does not say how large it is; want image_resolution \(--resolution"):
         load_file(tmp_path / "plan.svg")
 
 
