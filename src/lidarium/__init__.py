@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from lidarium.agents.catalogue import make_policy as policy
     from lidarium.agents.catalogue import register_policy
-    from lidarium.agents.policy import PerRobot, Policy, Stop
+    from lidarium.agents.policy import PerRobot, Policy
     from lidarium.agents.supervisor.policy import Supervised
     from lidarium.envs.engine.reward_terms import reward_term
     from lidarium.envs.faces.makers import env, parallel_env, sb3_vec_env, vector_env
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from lidarium.envs.levels.velocity import VelocityLevel
     from lidarium.envs.levels.waypoint import WaypointLevel
     from lidarium.envs.observing.observables import observable
-    from lidarium.envs.onboard.radio.messages import Order, OrderKind, Route, Target
+    from lidarium.envs.onboard.radio.messages import Order, Route, Stop, Target
     from lidarium.envs.settings.battery import Battery
     from lidarium.envs.settings.cameras import DepthCamera
     from lidarium.envs.settings.exploration import ExplorationSettings
@@ -92,7 +92,6 @@ _FACE: dict[str, str] = {
     "MergingSettings": "lidarium.envs.faces.team_exchange",
     "OdometrySettings": "lidarium.envs.settings.odometry",
     "Order": "lidarium.envs.onboard.radio.messages",
-    "OrderKind": "lidarium.envs.onboard.radio.messages",
     "PerRobot": "lidarium.agents.policy",
     "Policy": "lidarium.agents.policy",
     "RadioSettings": "lidarium.envs.settings.radio",
@@ -101,7 +100,7 @@ _FACE: dict[str, str] = {
     "Route": "lidarium.envs.onboard.radio.messages",
     "Solid": "lidarium.envs.floors.floor",
     "SparsePlanning": "lidarium.envs.faces.sparse_planning",
-    "Stop": "lidarium.agents.policy",
+    "Stop": "lidarium.envs.onboard.radio.messages",
     "Supervised": "lidarium.agents.supervisor.policy",
     "SweptBody": "lidarium.mapping.sparse.swept_body",
     "Target": "lidarium.envs.onboard.radio.messages",
