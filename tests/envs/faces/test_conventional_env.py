@@ -4,10 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from conventional_teams import AHEAD, CLOSET, OPTIONS, make, step
-from pettingzoo.test import parallel_api_test
-
-import lidarium
+from conventional_teams import AHEAD, CLOSET, make, step
 
 
 @pytest.mark.parametrize("level", ["velocity", "frontier"])
@@ -54,16 +51,6 @@ def test_the_mask_may_be_in_infos_of_any_form(form, infos):
         wanted = step(inside, 0)[0]
 
 
-def test_the_turn_based_form_has_masks_in_infos():
-    env = lidarium.env("scene_room", **OPTIONS, level="frontier", action_mask="infos", infos="none")
-    env.reset(seed=1)
-    for _ in range(6):
-        observation, _, terminated, truncated, info = env.last()
-        assert "action_mask" not in observation
-        assert info["action_mask"].any()
-        env.step(None if terminated or truncated else int(np.flatnonzero(info["action_mask"])[0]))
-
-
 @pytest.mark.parametrize("infos", ["full", "flat", "none"])
 def test_agents_that_have_ended_may_only_stay(infos):
     env = make(level="frontier", action_mask="infos", infos=infos, ended_agents="zeros")
@@ -95,12 +82,6 @@ def test_flat_infos_are_numbers_under_the_same_names(level):
             break
         action = 32 if level == "frontier" else AHEAD
         infos, wanted = step(env, action)[4], step(full, action)[4]
-
-
-def test_no_infos_are_empty_infos():
-    env = make(infos="none")
-    assert env.reset(seed=0)[1] == {"robot_0": {}, "robot_1": {}}
-    assert step(env)[4] == {"robot_0": {}, "robot_1": {}}
 
 
 @pytest.mark.parametrize("infos", ["full", "flat", "none"])
@@ -138,19 +119,6 @@ def test_agents_that_stay_end_as_terminated_where_the_horizon_cuts_the_others():
     assert outcome[3] == {"robot_0": True, "robot_1": False}
     env.reset(seed=1)
     assert env.agents == ["robot_0", "robot_1"]
-
-
-@pytest.mark.parametrize(
-    "conventions",
-    [
-        {"ended_agents": "zeros", "infos": "flat", "observation": "flat"},
-        {"team_reward": 0.5, "infos": "none"},
-        {"level": "frontier", "observation": "flat", "action_mask": "beside"},
-        {"level": "frontier", "infos": "none", "action_mask": "infos", "ended_agents": "zeros"},
-    ],
-)
-def test_the_tests_of_pettingzoo_pass(conventions):
-    parallel_api_test(make(CLOSET, stop_on_contact=True, **conventions), num_cycles=60)
 
 
 @pytest.mark.parametrize("share", [0.25, 1.0])
