@@ -204,7 +204,7 @@ PPO_FEW = {"n_steps": 250, "batch_size": 250, "n_epochs": 2}
 SAC_FEW = {"learning_starts": 100, "batch_size": 32, "train_freq": 20, "gradient_steps": 2}
 
 
-def assert_trains(algorithm, env, steps=2_000, **options):
+def assert_trains(algorithm, env, steps=500, **options):
     model = algorithm("MultiInputPolicy", env, seed=0, policy_kwargs={"net_arch": [32]}, **options)
     model.learn(steps)
     assert model.num_timesteps >= steps
