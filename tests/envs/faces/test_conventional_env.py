@@ -23,16 +23,6 @@ def test_the_flat_form_holds_the_numbers_of_the_dict_form(level):
 
 
 @pytest.mark.parametrize("form", ["dict", "flat"])
-def test_the_mask_may_be_beside_the_observation(form):
-    env = make(level="frontier", observation=form, action_mask="beside")
-    observations, _ = env.reset(seed=1)
-    for agent, observation in observations.items():
-        assert set(observation) == {"observation", "action_mask"}
-        assert env.observation_space(agent).contains(observation)
-        assert observation["action_mask"].shape == (33,)
-
-
-@pytest.mark.parametrize("form", ["dict", "flat"])
 @pytest.mark.parametrize("infos", ["full", "flat", "none"])
 def test_the_mask_may_be_in_infos_of_any_form(form, infos):
     env = make(level="frontier", observation=form, action_mask="infos", infos=infos)
@@ -82,31 +72,6 @@ def test_flat_infos_are_numbers_under_the_same_names(level):
             break
         action = 32 if level == "frontier" else AHEAD
         infos, wanted = step(env, action)[4], step(full, action)[4]
-
-
-@pytest.mark.parametrize("infos", ["full", "flat", "none"])
-@pytest.mark.parametrize("form", ["dict", "flat"])
-def test_agents_that_end_stay_with_zeros_until_the_last_one_ends(infos, form):
-    env = make(infos=infos, observation=form, ended_agents="zeros")
-    env.reset(seed=0)
-    env.unwrapped.stop("robot_0", "enough")
-    observations, _, terminations, truncations, _ = step(env)
-    assert env.agents == ["robot_0", "robot_1"]
-    assert not any((*terminations.values(), *truncations.values()))
-    observations, rewards, terminations, truncations, told = step(env)
-    space = env.observation_space("robot_0")
-    assert space.contains(observations["robot_0"])
-    parts = observations["robot_0"].values() if form == "dict" else [observations["robot_0"]]
-    assert not any(part.any() for part in parts)
-    assert rewards["robot_0"] == 0.0
-    assert list(told) == ["robot_0", "robot_1"]
-    if infos != "none":
-        assert [bool(info["active"]) for info in told.values()] == [False, True]
-    env.unwrapped.stop("robot_1", "enough")
-    _, _, terminations, truncations, _ = step(env)
-    assert terminations == {"robot_0": True, "robot_1": True}
-    assert truncations == {"robot_0": False, "robot_1": False}
-    assert env.agents == []
 
 
 def test_agents_that_stay_end_as_terminated_where_the_horizon_cuts_the_others():

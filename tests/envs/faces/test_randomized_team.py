@@ -103,6 +103,8 @@ def test_a_copy_goes_on_as_the_original():
         ({"reward.tim": (0.0, 1.0)}, "'reward.tim' is no setting"),
         ({"time_step": [-1.0]}, "time_step is -1.0"),
         ({"robots": (0, 3)}, r"the distribution of robots is \(0, 3\); want"),
+        ({"robots": (1.0, 4.0)}, "the distribution of robots is"),
+        ({"robots": [True]}, "the distribution of robots is"),
         ({"robots": [1, 2.5]}, "the distribution of robots is"),
         ({"robots": lambda generator: 2}, "so that the largest team is known"),
     ],
