@@ -6,15 +6,8 @@ import lidarium
 from lidarium.envs.floors.floor import Floor
 
 OPTIONS = {"robots": 2, "map_cells": 32, "lidar": "lidar_360_6m", "observe": ["scan", "pose", "map"]}
-
-
 CLOSET = Floor("closet", (0.0, 0.0, 2.0, 1.6))
-
-
 AHEAD = np.array([1.0, 0.2], np.float32)
-
-
-ENDING = {**OPTIONS, "stop_on_contact": True}
 
 
 def make(floor="scene_room", **options):

@@ -14,7 +14,7 @@ import math
 import sys
 import tempfile
 from collections.abc import Callable, Iterable, Iterator
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 
 import cv2
@@ -124,7 +124,8 @@ def _nested_blocks(deep: int, wide: int, last: str) -> str:
     return "".join(each.format(k, held) for k, held in enumerate([*inserts, last]))
 
 
-def _bag(scans: int, beams: int, name: str = "bag.mcap") -> bytes:
+@cache
+def _written(scans: int, beams: int) -> bytes:
     from lidarium.mapping.files.bags.writing import write_mcap_log
 
     stamps, poses = 0.1 * np.arange(scans), np.zeros((scans, 3))
@@ -139,6 +140,12 @@ def _bag(scans: int, beams: int, name: str = "bag.mcap") -> bytes:
     )
     with tempfile.TemporaryDirectory() as folder:
         write_mcap_log(Path(folder, "bag.mcap"), log)
+        return Path(folder, "bag.mcap").read_bytes()
+
+
+def _bag(scans: int, beams: int, name: str = "bag.mcap") -> bytes:
+    with tempfile.TemporaryDirectory() as folder:
+        Path(folder, "bag.mcap").write_bytes(_written(scans, beams))
         if name != "bag.mcap":
             write_form(Path(folder, name), Path(folder, "bag.mcap"))
         return Path(folder, name).read_bytes()
@@ -243,8 +250,8 @@ _NEEDS = {".dxf": "ezdxf", ".mcap": "rosbags", ".bag": "rosbags", ".db3": "rosba
 """Modules without which files are not read."""
 
 
-def measured(names: Iterable[str] = tuple(CASES)) -> Iterator[tuple[str, dict[str, object]]]:
-    """Yield of each file how it ended, its CPU time [s] and memory [MB]."""
+def measured(names: Iterable[str] = tuple(CASES), most_s: float = MOST_S) -> Iterator[tuple[str, dict[str, object]]]:
+    """Yield of each file how it ended, its CPU time [s] and memory [MB]; one that takes more is read again."""
     with tempfile.TemporaryDirectory() as folder:
         samples, place = Path(folder, "samples"), Path(folder, "files")
         make_samples(samples)
@@ -260,7 +267,7 @@ def measured(names: Iterable[str] = tuple(CASES)) -> Iterator[tuple[str, dict[st
             path.write_bytes(content)
             found = outcome_of(partial(use, path))
             for _ in range(TRIES):  # kernels may have been compiled for it, or the machine was busy
-                if is_costly(found):
+                if is_costly(found, most_s):
                     found = outcome_of(partial(use, path))
             yield name, found
 
@@ -276,9 +283,9 @@ def main(names: list[str]) -> int:
     return int(above > 0)
 
 
-def is_costly(found: dict[str, object]) -> bool:
+def is_costly(found: dict[str, object], most_s: float = MOST_S) -> bool:
     """Whether a file took more than one may."""
-    return float(str(found["cpu_s"])) > MOST_S or float(str(found["mb"])) > MOST_MB
+    return float(str(found["cpu_s"])) > most_s or float(str(found["mb"])) > MOST_MB
 
 
 if __name__ == "__main__":

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from compared_faces import compare_rows
 
 import lidarium
 from lidarium.envs.engine.reward_terms import REWARD_TERMS, reward_term
@@ -57,19 +58,6 @@ def test_a_registered_term_is_weighed_and_reported():
             assert -0.1 * 3.14 < terms["turning"] <= 0.0
             assert rewards[agent] == pytest.approx(before[agent] + terms["steps"] + terms["turning"])
     assert infos["robot_0"]["reward_terms"]["turning"] == pytest.approx(-0.05 * 3.14, rel=0.05)
-
-
-@pytest.mark.usefixtures("steps")
-def test_rows_of_a_batch_earn_what_single_episodes_do():
-    options = {"robots": 2, "reward": {"more": {"turning": -1.0}}}
-    rows = lidarium.vector_env(2, "scene_room", **options)
-    rows.reset(seed=[2, 3])
-    singles = run(lidarium.parallel_env("scene_room", **options))
-    for rewards, infos in singles:
-        _, of_rows, _, _, told = rows.step(np.tile(DRIVE, (4, 1)))
-        assert of_rows[:2].tolist() == [rewards["robot_0"], rewards["robot_1"]]
-        for name, values in told["reward_terms"].items():
-            assert values[:2].tolist() == [infos[agent]["reward_terms"][name] for agent in ("robot_0", "robot_1")]
 
 
 def test_an_unknown_term_is_refused():
@@ -148,6 +136,6 @@ def test_completion_is_paid_once_and_the_first_view_in_the_first_step():
 
 @pytest.mark.usefixtures("crowding")
 @pytest.mark.parametrize("level", ["velocity", "frontier"])
-def test_terms_of_a_batch_are_those_of_single_episodes(compare, level):
+def test_terms_of_a_batch_are_those_of_single_episodes(level):
     more = {"crowding": -0.1, "floor_share": 1.0, "completion": 2.0, "first_view": 0.1, "turning": -0.1}
-    compare(level, 2, 40, ["apartment", "clinic"], reward={"more": more}, stop_coverage=0.3, seed=7)
+    compare_rows(level, 2, 40, ["apartment", "clinic"], reward={"more": more}, stop_coverage=0.3, seed=7)

@@ -18,13 +18,6 @@ def drive(env, steps=40):
     return env
 
 
-@pytest.mark.parametrize("floor", ["scene_room", "apartment", "building:3"])
-def test_a_state_is_of_its_space_on_every_floor(floor):
-    env = drive(lidarium.parallel_env(floor, **OPTIONS))
-    assert env.state_space.shape == (HEAD + 2 * 24 * 24,)
-    assert env.state_space.contains(env.state())
-
-
 def test_numbers_of_the_state_are_the_truth():
     env = drive(lidarium.parallel_env("apartment", horizon_s=100.0, **OPTIONS))
     state, robots = env.state(), env.state()[: HEAD - 3].reshape(2, -1)
@@ -54,16 +47,6 @@ def test_a_robot_that_has_ended_is_not_live():
     env.stop("robot_0", "enough")
     env.step(dict.fromkeys(env.agents, np.zeros(2, np.float32)))
     assert env.state()[: HEAD - 3].reshape(2, -1)[:, 6].tolist() == [0.0, 1.0]
-
-
-def test_states_of_a_batch_are_those_of_single_episodes():
-    batch = lidarium.vector_env(2, ["apartment", "scene_room"], **OPTIONS)
-    batch.reset(seed=3)
-    for episode in range(2):
-        env = lidarium.parallel_env(["apartment", "scene_room"], **OPTIONS)
-        env.reset(seed=3 + episode)
-        assert np.array_equal(batch.state()[episode], env.state())
-    assert batch.state_space == env.state_space
 
 
 def test_wrappers_pass_the_state_on():

@@ -4,10 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from conventional_teams import AHEAD, CLOSET, OPTIONS, make, step
-from pettingzoo.test import parallel_api_test
-
-import lidarium
+from conventional_teams import AHEAD, CLOSET, make, step
 
 
 @pytest.mark.parametrize("level", ["velocity", "frontier"])
@@ -23,16 +20,6 @@ def test_the_flat_form_holds_the_numbers_of_the_dict_form(level):
             assert flat.columns(agent)[-1][2] == len(vector)
         action = 0 if level == "frontier" else AHEAD
         wanted, own = step(plain, action)[0], step(flat, action)[0]
-
-
-@pytest.mark.parametrize("form", ["dict", "flat"])
-def test_the_mask_may_be_beside_the_observation(form):
-    env = make(level="frontier", observation=form, action_mask="beside")
-    observations, _ = env.reset(seed=1)
-    for agent, observation in observations.items():
-        assert set(observation) == {"observation", "action_mask"}
-        assert env.observation_space(agent).contains(observation)
-        assert observation["action_mask"].shape == (33,)
 
 
 @pytest.mark.parametrize("form", ["dict", "flat"])
@@ -52,16 +39,6 @@ def test_the_mask_may_be_in_infos_of_any_form(form, infos):
             assert (infos == "none") == (not rest)
         observations, *_, told = step(env, 0)
         wanted = step(inside, 0)[0]
-
-
-def test_the_turn_based_form_has_masks_in_infos():
-    env = lidarium.env("scene_room", **OPTIONS, level="frontier", action_mask="infos", infos="none")
-    env.reset(seed=1)
-    for _ in range(6):
-        observation, _, terminated, truncated, info = env.last()
-        assert "action_mask" not in observation
-        assert info["action_mask"].any()
-        env.step(None if terminated or truncated else int(np.flatnonzero(info["action_mask"])[0]))
 
 
 @pytest.mark.parametrize("infos", ["full", "flat", "none"])
@@ -97,37 +74,6 @@ def test_flat_infos_are_numbers_under_the_same_names(level):
         infos, wanted = step(env, action)[4], step(full, action)[4]
 
 
-def test_no_infos_are_empty_infos():
-    env = make(infos="none")
-    assert env.reset(seed=0)[1] == {"robot_0": {}, "robot_1": {}}
-    assert step(env)[4] == {"robot_0": {}, "robot_1": {}}
-
-
-@pytest.mark.parametrize("infos", ["full", "flat", "none"])
-@pytest.mark.parametrize("form", ["dict", "flat"])
-def test_agents_that_end_stay_with_zeros_until_the_last_one_ends(infos, form):
-    env = make(infos=infos, observation=form, ended_agents="zeros")
-    env.reset(seed=0)
-    env.unwrapped.stop("robot_0", "enough")
-    observations, _, terminations, truncations, _ = step(env)
-    assert env.agents == ["robot_0", "robot_1"]
-    assert not any((*terminations.values(), *truncations.values()))
-    observations, rewards, terminations, truncations, told = step(env)
-    space = env.observation_space("robot_0")
-    assert space.contains(observations["robot_0"])
-    parts = observations["robot_0"].values() if form == "dict" else [observations["robot_0"]]
-    assert not any(part.any() for part in parts)
-    assert rewards["robot_0"] == 0.0
-    assert list(told) == ["robot_0", "robot_1"]
-    if infos != "none":
-        assert [bool(info["active"]) for info in told.values()] == [False, True]
-    env.unwrapped.stop("robot_1", "enough")
-    _, _, terminations, truncations, _ = step(env)
-    assert terminations == {"robot_0": True, "robot_1": True}
-    assert truncations == {"robot_0": False, "robot_1": False}
-    assert env.agents == []
-
-
 def test_agents_that_stay_end_as_terminated_where_the_horizon_cuts_the_others():
     env = make(ended_agents="zeros", horizon_s=0.5)
     env.reset(seed=0)
@@ -138,19 +84,6 @@ def test_agents_that_stay_end_as_terminated_where_the_horizon_cuts_the_others():
     assert outcome[3] == {"robot_0": True, "robot_1": False}
     env.reset(seed=1)
     assert env.agents == ["robot_0", "robot_1"]
-
-
-@pytest.mark.parametrize(
-    "conventions",
-    [
-        {"ended_agents": "zeros", "infos": "flat", "observation": "flat"},
-        {"team_reward": 0.5, "infos": "none"},
-        {"level": "frontier", "observation": "flat", "action_mask": "beside"},
-        {"level": "frontier", "infos": "none", "action_mask": "infos", "ended_agents": "zeros"},
-    ],
-)
-def test_the_tests_of_pettingzoo_pass(conventions):
-    parallel_api_test(make(CLOSET, stop_on_contact=True, **conventions), num_cycles=60)
 
 
 @pytest.mark.parametrize("share", [0.25, 1.0])

@@ -1,36 +1,69 @@
-"""Depth in batches is the depth of lone environments, on any number of threads."""
+"""Depth images are those of the bodies as they are, in both worlds."""
 
 import copy
 import pickle
+from importlib.util import find_spec
 
 import gymnasium
 import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
+from pettingzoo.test import parallel_seed_test
 
 import lidarium
+from lidarium.envs.simulation.depth.frames import image_of
 
 OPTIONS = {"robots": 2, "camera": "depth_64x48", "observe": ["pose", "depth"], "noise": "datasheet"}
+NEEDS_BULLET = pytest.mark.skipif(find_spec("pybullet") is None, reason="the extra bullet is missing")
+BACKENDS = ["kinematic", pytest.param("bullet", marks=NEEDS_BULLET)]
+SMALL = {**OPTIONS, "noise": "none", "map_cells": 64, "lidar": "lidar_360_6m", "resolution": 0.1}
 
 
-@pytest.mark.parametrize("threads", [1, 2])
-def test_a_batch_sees_what_lone_environments_see(threads):
-    batch = lidarium.vector_env(4, "apartment", threads=threads, **OPTIONS)
-    observations, infos = batch.reset(seed=[3, 4, 5, 6])
-    lone = [lidarium.parallel_env("apartment", **OPTIONS) for _ in range(4)]
-    seen = [env.reset(seed=3 + k)[0] for k, env in enumerate(lone)]
-    generator = np.random.default_rng(0)
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_equal_seeds_give_equal_noisy_images(backend):
+    options = {**SMALL, "camera": "xtion_noisy"}
+    parallel_seed_test(lambda: lidarium.parallel_env(backend=backend, **options), num_cycles=5)
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_gymnasiums_checker_finds_nothing_in_the_id(backend):
+    options = {name: value for name, value in SMALL.items() if name not in ("observe", "robots")}
+    env = gymnasium.make("lidarium/Exploration3D-v1", backend=backend, horizon_s=1.0, **options)
+    assert env.observation_space["depth"].shape == (1, 48, 64)
+    check_env(env.unwrapped, skip_render_check=True)
+    env.close()
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_an_image_is_that_of_the_body_as_it_leans(backend):
+    env = lidarium.parallel_env(backend=backend, **SMALL)
+    env.reset(seed=1)
+    for _ in range(12):
+        observations, *_ = env.step({agent: np.array([1.0, 0.4], np.float32) for agent in env.agents})
+    world, camera = env.world, env.settings.camera
+    for robot in range(2):
+        expected = image_of(world.floors[0].faces, world.poses, world.attitudes, world.bodies, robot, camera)
+        assert (observations[f"robot_{robot}"]["depth"][0] == expected).all()
+    if backend == "bullet":
+        assert np.abs(world.attitudes).max() > 0.0
+    env.close()
+
+
+def test_the_camera_follows_a_body_that_is_tilted():
+    pytest.importorskip("pybullet", reason="the extra bullet is missing")
+    env = lidarium.parallel_env(backend="bullet", **{**SMALL, "robots": 1, "robot": "service"})
+    observations, _ = env.reset(seed=1)
+    before = observations["robot_0"]["depth"].copy()
+    bodies, leans = env.world.bodies_of(0), []
     for _ in range(6):
-        assert infos["camera"]["intrinsics"]["cx"].tolist() == [31.5] * 8
-        for row in range(8):
-            own = seen[row // 2][f"robot_{row % 2}"]
-            assert (observations["depth"][row] == own["depth"]).all()
-        actions = generator.uniform(-1.0, 1.0, (8, 2)).astype(np.float32)
-        observations, _, _, _, infos = batch.step(actions)
-        seen = [
-            env.step({f"robot_{robot}": actions[2 * k + robot] for robot in range(2)})[0] for k, env in enumerate(lone)
-        ]
-    batch.close()
+        bodies.push(0, (0.0, 9000.0, 0.0), 1.0)
+        observations, *_ = env.step({agent: np.zeros(2, np.float32) for agent in env.agents})
+        leans.append(np.abs(env.world.attitudes[0, 1:]).max())
+        if not env.agents:
+            break
+    assert max(leans) > 0.02
+    assert (observations["robot_0"]["depth"] != before).any()
+    env.close()
 
 
 @pytest.mark.parametrize("duplicate", [copy.deepcopy, lambda env: pickle.loads(pickle.dumps(env))])
@@ -43,10 +76,3 @@ def test_a_copy_goes_on_seeing(duplicate):
     for agent in actions:
         assert (ours[agent]["depth"] == theirs[agent]["depth"]).all()
         assert ours[agent]["depth"].any()
-
-
-def test_the_id_observes_depth():
-    env = gymnasium.make("lidarium/Exploration3D-v1", camera="depth_64x48", floor="apartment", horizon_s=5.0)
-    assert env.observation_space["depth"].shape == (1, 48, 64)
-    check_env(env.unwrapped, skip_render_check=True)
-    env.close()

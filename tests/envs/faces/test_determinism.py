@@ -76,28 +76,6 @@ def test_five_hundred_steps_and_two_resets_give_the_same_arrays_for_the_same_see
         assert_equal(one, other)
 
 
-@pytest.mark.parametrize("level", ["waypoint", "frontier"])
-def test_decisions_give_the_same_arrays_for_the_same_seed(level):
-    first, second = (
-        run(
-            lidarium.parallel_env("building:5", level=level, robots=3, noise="datasheet", map_cells=64),
-            11,
-            25,
-            level,
-        )
-        for _ in range(2)
-    )
-    for one, other in zip(first, second, strict=True):
-        assert_equal(one, other)
-
-
-def test_one_environment_used_twice_gives_the_same_as_a_new_one():
-    used, new = (lidarium.parallel_env("set:test", robots=2, noise="datasheet", map_cells=64) for _ in range(2))
-    run(used, 5, 30)
-    for one, other in zip(run(used, 6, 60), run(new, 6, 60), strict=True):
-        assert_equal(one, other)
-
-
 def test_another_seed_gives_other_starts_noise_and_floors():
     records = [
         run(lidarium.parallel_env("building:5", robots=2, noise="datasheet", map_cells=64), seed, 5) for seed in (1, 2)

@@ -1,39 +1,30 @@
-"""Every row of a batch is the robot of a ``ParallelEnv`` with the same seed, to the bit, whatever the
-level and the threads."""
+"""Rows of a batch are single environments on many floors, on some threads, and however episodes end."""
 
 import pytest
+from compared_faces import compare_rows
 
+from lidarium.envs.faces.merged_maps import MergingSettings
 from lidarium.envs.floors.floor import Floor
 from lidarium.envs.settings.faults import FaultSettings
 from lidarium.envs.settings.radio import RadioSettings
 
 FLOORS = ("apartment", "building:3", "clinic", "building:17", "scene_room")
 CLOSET = Floor("closet", (0.0, 0.0, 2.0, 1.6))
-
-
-@pytest.mark.parametrize("threads", [1, 2])
-@pytest.mark.parametrize("level", ["velocity", "waypoint", "frontier"])
-def test_rows_of_a_batch_are_the_robots_of_parallel_environments(compare, level, threads):
-    compare(level, threads, 25, FLOORS)
-
-
-@pytest.mark.parametrize("level", ["velocity", "frontier"])
-def test_rows_are_the_same_with_noise_and_unknown_starts(compare, level):
-    compare(level, 2, 12, FLOORS[:4], noise="datasheet", known_starts=False, seed=3)
-
-
-def test_rows_are_the_same_where_robots_collide_and_end_one_by_one(compare):
-    assert compare("velocity", 2, 150, [CLOSET] * 5, stop_on_contact=True, seed=5) >= 10
+LOSSY = RadioSettings(kind="line_of_sight", reach=5.0, loss=0.2, latency_s=0.3)
 
 
 @pytest.mark.parametrize("level", ["velocity", "waypoint", "frontier"])
-def test_rows_are_the_same_at_the_horizon_and_in_the_episodes_after_it(compare, level):
-    assert compare(level, 2, 40, ["apartment"] * 4, horizon_s=3.0, decision_period_s=0.5, seed=9) >= 8
+def test_rows_are_the_same_on_floors_of_many_sizes(level):
+    compare_rows(level, 2, 15, FLOORS)
 
 
-def test_rows_are_the_same_when_all_is_covered_or_no_frontier_is_left(compare):
-    assert compare("frontier", 2, 60, ["apartment"] * 4, stop_coverage=0.6, seed=1) >= 16
-    assert compare("frontier", 1, 40, [CLOSET] * 2, stop_coverage=None, seed=1) >= 20
+def test_rows_are_the_same_if_robots_collide_and_end_one_by_one():
+    assert compare_rows("velocity", 2, 100, [CLOSET] * 3, stop_on_contact=True, seed=5) >= 6
+
+
+def test_rows_are_the_same_if_all_is_covered_or_no_frontier_is_left():
+    assert compare_rows("frontier", 2, 30, ["apartment"] * 2, stop_coverage=0.6, seed=1) >= 4
+    assert compare_rows("frontier", 1, 20, [CLOSET] * 2, stop_coverage=None, seed=1) >= 10
 
 
 @pytest.mark.parametrize("level", ["velocity", "waypoint", "frontier"])
@@ -41,10 +32,32 @@ def test_rows_are_the_same_when_all_is_covered_or_no_frontier_is_left(compare):
     "options",
     [
         {"localization": "odometry", "odometry": "poor", "noise": "datasheet"},
-        {"radio": RadioSettings(kind="line_of_sight", reach=5.0, loss=0.2, latency_s=0.3)},
+        {"radio": LOSSY, "comm": 2, "robots": 3},
         {"faults": FaultSettings(laser_dropout=400.0, stuck_wheel=400.0, kidnapping=400.0, dead_robot=200.0)},
     ],
     ids=["odometry", "radio", "faults"],
 )
-def test_rows_are_the_same_in_worlds_that_are_not_ideal(compare, level, options):
-    compare(level, 2, 12, FLOORS[:3], seed=6, **options)
+def test_rows_are_the_same_in_worlds_that_are_not_ideal(level, options):
+    compare_rows(level, 2, 12, FLOORS[:3:2], seed=6, **options)
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_rows_see_the_same_depth(threads):
+    options = {"camera": "depth_64x48", "observe": ["pose", "depth"], "noise": "datasheet"}
+    compare_rows("velocity", threads, 6, ["apartment"] * 2, seed=3, **options)
+
+
+def test_rows_merge_the_same_maps():
+    merging = MergingSettings(period_s=2.0)
+    options = {"known_starts": False, "radio": "line_of_sight", "observe": ["pose"], "horizon_s": 4.0}
+    compare_rows("velocity", 1, 45, ["scene_room", "apartment"], seed=5, merging=merging, **options)
+
+
+@pytest.mark.parametrize("infos", ["full", "flat", "none"])
+def test_rows_of_robots_that_have_ended_are_kept_the_same(infos):
+    def stop(episode, step, team):
+        if (episode, step) == (0, 0):
+            team.stop("robot_1", "enough")
+
+    options = {"ended_agents": "zeros", "infos": infos, "horizon_s": 1.0}
+    assert compare_rows("velocity", 1, 12, ["scene_room"] * 2, before=stop, **options) >= 4

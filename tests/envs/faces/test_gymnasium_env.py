@@ -1,33 +1,22 @@
-"""One robot alone, as Gymnasium has it."""
+"""One robot alone, as Gymnasium has it; ids, and what libraries ask of environments by name."""
 
+import importlib
+import math
+import sys
+
+import gymnasium
 import numpy as np
+import pettingzoo
 import pytest
 from linked_rooms import TWO_ROOMS
+from pettingzoo.test import max_cycles_test, performance_benchmark
 
 import lidarium
-from lidarium.envs.faces.gymnasium_env import AGENT, SoloExploration
+from lidarium.envs.faces.gymnasium_env import SoloExploration
 from lidarium.envs.onboard.radio.messages import Order, OrderKind
 
+IDS = [f"lidarium/{name}Exploration-v1" for name in ("", "Waypoint", "Frontier")]
 SMALL = {"map_cells": 32, "lidar": "lidar_360_6m", "stop_coverage": None}
-
-
-@pytest.mark.parametrize("level", ["velocity", "waypoint", "frontier"])
-def test_it_is_the_team_of_one_robot(level):
-    env = SoloExploration(TWO_ROOMS, level, **SMALL)
-    team = lidarium.parallel_env(TWO_ROOMS, level=level, robots=1, **SMALL)
-    assert env.observation_space == team.observation_space(AGENT)
-    assert env.action_space == team.action_space(AGENT)
-    observation, info = env.reset(seed=4)
-    observations, infos = team.reset(seed=4)
-    for _ in range(3):
-        assert env.observation_space.contains(observation)
-        for name, value in observations[AGENT].items():
-            assert np.array_equal(observation[name], value), name
-        assert info["truth"]["coverage"] == infos[AGENT]["truth"]["coverage"]
-        action = 0 if level == "frontier" else np.array([0.4, 0.1], np.float32)
-        observation, reward, *_, info = env.step(action)
-        observations, rewards, _, _, infos = team.step({AGENT: action})
-        assert reward == rewards[AGENT]
 
 
 def test_an_episode_ends_once_and_has_to_be_reset():
@@ -69,6 +58,71 @@ def test_the_robot_takes_orders_and_is_drawn():
     env.close()
 
 
-def test_a_team_is_refused():
-    with pytest.raises(ValueError, match="robots is 2; the Gymnasium form has one robot"):
-        SoloExploration(TWO_ROOMS, robots=2)
+def test_max_cycles_are_what_was_asked_for():
+    max_cycles_test(lidarium)
+
+
+def test_the_performance_benchmark_runs(monkeypatch, capsys):
+    module, now = sys.modules["pettingzoo.test.performance_benchmark"], [0.0]
+
+    class Clock:
+        @staticmethod
+        def time():
+            now[0] += 0.05
+            return now[0]
+
+    monkeypatch.setattr(module, "time", Clock)
+    performance_benchmark(lidarium.env(robots=2, horizon_s=3.0, map_cells=64))
+    assert "cycles per second" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("name", IDS)
+def test_ids_are_found_through_the_module_prefix(name):
+    env = gymnasium.make(f"lidarium:{name}", floor="scene_room")
+    assert env.spec is not None
+    assert env.spec.id == name
+    observation, info = env.reset(seed=1)
+    assert env.observation_space.contains(observation)
+    assert "truth" in info
+    env.close()
+
+
+@pytest.mark.skipif(not hasattr(pettingzoo, "make"), reason="PettingZoo before 1.27 has no register")
+@pytest.mark.parametrize("name", IDS)
+def test_pettingzoo_makes_both_forms_by_the_same_ids(name):
+    parallel = pettingzoo.make("parallel", name, robots=2)
+    assert parallel.reset(seed=0)[0].keys() == {"robot_0", "robot_1"}
+    turns = pettingzoo.make("aec", name, robots=2)
+    turns.reset(seed=0)
+    assert turns.agents == ["robot_0", "robot_1"]
+    assert parallel.metadata["name"] == turns.metadata["name"]
+
+
+def test_importing_twice_registers_once():
+    importlib.reload(lidarium)
+    assert set(IDS) <= gymnasium.registry.keys()
+
+
+@pytest.mark.parametrize("level", lidarium.registry("level"))
+def test_agents_have_action_spaces_of_their_own_and_metadata_is_complete(level):
+    env = lidarium.parallel_env(level=level, robots=2)
+    assert env.action_space("robot_0") is not env.action_space("robot_1")
+    assert set(env.metadata) >= {"name", "render_modes", "render_fps", "is_parallelizable"}
+    assert env.metadata["render_modes"] == ["human", "rgb_array"]
+    assert env.metadata["render_fps"] == pytest.approx(10 if level == "velocity" else 0.5)
+
+
+def test_the_solo_form_has_one_robot_and_says_what_to_use_for_more():
+    with pytest.raises(ValueError, match=r"lidarium\.parallel_env"):
+        gymnasium.make("lidarium/Exploration-v1", robots=2)
+
+
+def test_random_actions_never_break_the_bounds_of_velocity_and_heading():
+    env = lidarium.parallel_env("scene_corner", robots=2, map_cells=32, observe=["scan", "pose", "velocity"])
+    env.reset(seed=0)
+    generator = np.random.default_rng(1)
+    for _ in range(300):
+        observations = env.step({agent: generator.choice([-1.0, 1.0], 2).astype(np.float32) for agent in env.agents})[0]
+        for observation in observations.values():
+            assert abs(observation["velocity"][0]) <= np.float32(0.77)
+            assert abs(observation["pose"][2]) <= math.pi + 1e-6

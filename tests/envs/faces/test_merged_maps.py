@@ -2,7 +2,6 @@ import math
 
 import numpy as np
 import pytest
-from pettingzoo.test import parallel_api_test
 
 import lidarium
 from lidarium.envs.faces.merged_maps import MergedMaps, MergeEvent, MergingSettings
@@ -34,22 +33,6 @@ def driven(env, steps=20):
     for _ in range(steps):
         outcome = env.step({agent: np.array([0.3, 0.8], np.float32) for agent in env.agents})
     return outcome
-
-
-def test_the_wrapper_keeps_the_contract_of_pettingzoo():
-    parallel_api_test(MergedMaps(team()), num_cycles=40)
-
-
-def test_observations_lie_within_their_bounded_spaces():
-    env = MergedMaps(team(), MergingSettings(known_starts=True))
-    observations = driven(env)[0]
-    for agent, observation in observations.items():
-        space = env.observation_space(agent)
-        assert space.contains(observation)
-        assert space is env.observation_space(agent)
-        for name in ("team_map", "teammates"):
-            assert np.isfinite(space[name].low).all()
-            assert np.isfinite(space[name].high).all()
 
 
 def test_told_frames_give_the_teammates_true_poses_and_the_union_of_maps():
@@ -109,23 +92,6 @@ def test_known_starts_of_the_environment_are_understood_too():
     observations = driven(env)[0]
     belief = env.unwrapped.belief("robot_0").teammates["robot_1"].pose
     np.testing.assert_allclose(observations["robot_0"]["teammates"][0, :3], belief, atol=1e-5)
-
-
-@pytest.mark.parametrize("level", ["velocity", "frontier"])
-def test_every_level_of_decision_can_be_wrapped_and_repeats_itself(level):
-    told = []
-    for _ in range(2):
-        base = team()
-        base.use_level(level)
-        env = MergedMaps(base)
-        observations, _ = env.reset(seed=5)
-        for _ in range(2):
-            actions = {agent: 0 if level == "frontier" else np.array([0.5, 0.1], np.float32) for agent in env.agents}
-            observations = env.step(actions)[0]
-        told.append(observations)
-    for agent, observation in told[0].items():
-        for name, value in observation.items():
-            np.testing.assert_array_equal(value, told[1][agent][name])
 
 
 @pytest.mark.parametrize(("confirms", "horizon_s"), [(False, 8.0), (True, 30.0)])

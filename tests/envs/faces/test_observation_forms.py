@@ -6,14 +6,12 @@ from gymnasium import spaces
 
 from lidarium.envs.faces.conventions import (
     MASK,
-    REST,
     Conventions,
     ObservationForm,
     flat_box,
     flat_columns,
     shared_rewards,
 )
-from lidarium.envs.faces.randomized import zeros_of
 
 BOXES = {
     "scan": spaces.Box(0.0, 5.0, (4,), np.float32),
@@ -33,20 +31,6 @@ def form(observation, mask):
     return ObservationForm(spaces.Dict(BOXES), Conventions(observation=observation, action_mask=mask))
 
 
-@pytest.mark.parametrize("mask", ["inside", "beside", "infos"])
-@pytest.mark.parametrize("kind", ["dict", "flat"])
-def test_what_is_observed_is_in_its_space_alone_and_in_rows(kind, mask):
-    made, rows = form(kind, mask), observation(1, (5,))
-    found = made.of(rows, (5,))
-    for row in range(5):
-        alone = made.of({name: values[row] for name, values in rows.items()})
-        assert made.space.contains(alone)
-        if kind == "flat":
-            whole = found[REST] if mask == "beside" else found
-            assert np.array_equal(whole[row], alone[REST] if mask == "beside" else alone)
-    assert made.has_mask_apart == (mask == "infos")
-
-
 def test_columns_say_where_each_part_lies():
     parts = {name: BOXES[name] for name in ("map", "scan")}
     assert flat_columns(parts) == (("map", 0, 6), ("scan", 6, 10))
@@ -55,14 +39,6 @@ def test_columns_say_where_each_part_lies():
     for name, first, last in made.columns:
         assert np.array_equal(vector[first:last], seen[name].ravel().astype(np.float32))
     assert flat_box(parts).high.tolist() == [255.0] * 6 + [5.0] * 4
-
-
-def test_zeros_have_the_form_of_a_space():
-    zeros = zeros_of(form("dict", "beside").space)
-    assert set(zeros) == {REST, MASK}
-    assert zeros[REST]["map"].shape == (2, 3)
-    assert not zeros[REST]["map"].any()
-    assert zeros[MASK].dtype == np.int8
 
 
 def test_a_mask_that_is_not_there_cannot_be_beside():

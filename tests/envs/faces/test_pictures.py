@@ -1,7 +1,12 @@
-"""Batches are drawn: a picture of each episode, all of one size, and tiles."""
+"""Teams and batches are drawn: a picture of each episode, all of one size, and tiles."""
 
+import warnings
+
+import gymnasium
 import numpy as np
 import pytest
+from gymnasium.utils.env_checker import check_env
+from pettingzoo.test import render_test
 
 import lidarium
 from lidarium.envs.drawing.batch_frames import batch_frames
@@ -9,6 +14,61 @@ from lidarium.envs.floors.floor import Floor
 
 SMALL = {"robots": 2, "map_cells": 32, "lidar": "lidar_360_6m"}
 WIDE = Floor("wide", (0.0, 0.0, 6.0, 2.0))
+
+
+@pytest.fixture
+def no_display(monkeypatch):
+    """A machine without a screen: windows cannot open, and the environment says so once."""
+    monkeypatch.delenv("DISPLAY", raising=False)
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message=r"render_mode is 'human'")
+        yield
+
+
+@pytest.mark.parametrize("level", lidarium.registry("level"))
+@pytest.mark.usefixtures("no_display")
+def test_all_render_modes_render(level):
+    render_test(lambda **options: lidarium.env("scene_room", level=level, **SMALL, **options))
+
+
+@pytest.mark.usefixtures("no_display")
+def test_gymnasiums_checker_finds_nothing_in_pictures():
+    env = gymnasium.make("lidarium/Exploration-v1", floor=WIDE, render_mode="rgb_array", **{**SMALL, "robots": 1})
+    check_env(env.unwrapped)
+
+
+@pytest.mark.parametrize("level", lidarium.registry("level"))
+def test_pictures_follow_each_other_as_simulated_time_goes_alone_and_in_batches(level):
+    options = {"robots": 1, "time_step": 0.05, "decision_period_s": 0.5}
+    alone = lidarium.parallel_env(level=level, **options)
+    batch = lidarium.vector_env(1, level=level, **options)
+    for env in (alone, batch):
+        assert env.metadata["render_fps"] == pytest.approx(20 if level == "velocity" else 2)
+    assert type(batch).metadata["render_fps"] == 10
+
+
+@pytest.mark.usefixtures("no_display")
+def test_frames_are_images_that_change_as_robots_drive():
+    env = lidarium.parallel_env("scene_room", render_mode="rgb_array", **SMALL)
+    env.reset(seed=0)
+    first = env.render()
+    for _ in range(20):
+        env.step({agent: np.array([0.5, 0.5], np.float32) for agent in env.agents})
+    second = env.render()
+    assert first.shape == second.shape
+    assert first.dtype == np.uint8
+    assert not np.array_equal(first, second)
+    env.close()
+    env.close()
+
+
+def test_no_mode_renders_nothing_and_rendering_needs_a_reset():
+    env = lidarium.parallel_env("scene_room", robots=1)
+    env.reset(seed=0)
+    assert env.render() is None
+    with pytest.raises(RuntimeError, match="reset"):
+        lidarium.parallel_env("scene_room", robots=1, render_mode="rgb_array").render()
 
 
 def test_each_row_has_the_picture_of_its_episode():

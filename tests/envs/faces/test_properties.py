@@ -1,5 +1,6 @@
 """Whatever the floors, the team and the settings: rows are the robots of parallel environments."""
 
+from compared_faces import compare_rows
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -32,5 +33,5 @@ FLOORS = (
         unique=True,
     ),
 )
-def test_rows_are_the_robots_of_parallel_environments(compare, floors, robots, seed, threads, **options):
-    compare("velocity", threads, 8, floors, robots, seed, **options)
+def test_rows_are_the_robots_of_parallel_environments(floors, robots, seed, threads, **options):
+    compare_rows("velocity", threads, 8, floors, robots, seed, **options)

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from pettingzoo.test import parallel_api_test
 
 import lidarium
 from lidarium.envs.faces.merged_maps import MergedMaps
@@ -57,11 +56,6 @@ def test_robots_drive_round_what_only_the_camera_sees():
     assert info["drive"] is DriveState.ARRIVED
     assert info["route"] == ""
     assert sparse.unwrapped.belief("robot_0").pose[:2] == pytest.approx([4.0, 0.0], abs=0.1)
-
-
-def test_the_wrapper_keeps_the_contract_of_pettingzoo_at_both_levels():
-    for level in ("waypoint", "frontier"):
-        parallel_api_test(SparsePlanning(made(level=level, robots=2, horizon_s=6.0)), num_cycles=20)
 
 
 def test_spaces_are_those_of_the_environment_below():

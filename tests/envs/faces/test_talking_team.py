@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from pettingzoo.test import parallel_api_test
 from talking_teams import OPTIONS, actions, drawn
 
 import lidarium
@@ -37,7 +36,3 @@ def test_actions_without_a_message_are_refused_by_name(action):
     good = np.zeros(3, np.float32)
     with pytest.raises(ValueError, match="robot_1"):
         env.step({"robot_0": good, "robot_1": action})
-
-
-def test_the_tests_of_pettingzoo_pass():
-    parallel_api_test(lidarium.parallel_env("apartment", comm=2, infos="flat", **OPTIONS), num_cycles=20)

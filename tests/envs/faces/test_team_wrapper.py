@@ -10,23 +10,6 @@ from lidarium.envs.onboard.radio.messages import Order
 SMALL = {"robots": 2, "map_cells": 32, "lidar": "lidar_360_6m"}
 
 
-def test_a_wrapped_environment_does_what_the_one_below_does():
-    plain, below = (lidarium.parallel_env("apartment", **SMALL) for _ in range(2))
-    wrapped = TeamWrapper(below)
-    assert wrapped.unwrapped is below
-    assert wrapped.observation_space("robot_0") is below.observation_space("robot_0")
-    assert wrapped.action_space("robot_1") is below.action_space("robot_1")
-    assert wrapped.state_space == plain.state_space
-    seen, same = plain.reset(seed=3)[0], wrapped.reset(seed=3)[0]
-    for _ in range(5):
-        actions = {agent: np.array([0.5, 0.2], np.float32) for agent in plain.agents}
-        seen, rewards, *_ = plain.step(actions)
-        same, others, *_ = wrapped.step(actions)
-        assert rewards == others
-    assert all(np.array_equal(seen[agent][name], same[agent][name]) for agent in seen for name in seen[agent])
-    assert np.array_equal(plain.state(), wrapped.state())
-
-
 def test_agents_are_those_that_are_left():
     wrapped = TeamWrapper(lidarium.parallel_env("apartment", **SMALL))
     wrapped.reset(seed=0)

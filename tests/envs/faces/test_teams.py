@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from lidarium.envs.faces.parallel import ExplorationEnv
-from lidarium.envs.faces.randomized import RandomizedTeam
 from lidarium.envs.faces.teams import make_team
 from lidarium.envs.settings.making import make_settings
 
@@ -29,13 +28,6 @@ def test_unknown_levels_and_what_a_level_lacks_are_refused():
         make_team("scene_room", {"robots": 1}, level="thought")
     with pytest.raises(ValueError, match="needs level='frontier'"):
         make_team("scene_room", {"robots": 1, "observe": ("scan", "frontier_gains")})
-
-
-def test_conventions_and_draws_are_split_from_settings():
-    flat = make_team("scene_room", {"robots": 1, "observation": "flat"})
-    assert len(flat.observation_space("robot_0").shape) == 1
-    drawn = make_team("scene_room", {"robots": 2, "randomize": {"time_step": (0.05, 0.1)}})
-    assert isinstance(drawn, RandomizedTeam)
 
 
 def test_the_curriculum_of_an_episode_is_asked_for_that_one_alone():

@@ -45,13 +45,6 @@ def test_a_single_environment_and_a_batch_take_the_level():
         env.step(dict.fromkeys(env.agents, 9))
 
 
-def test_learners_take_the_level():
-    pytest.importorskip("stable_baselines3")
-    envs = lidarium.sb3_vec_env(2, TWO_ROOMS, level="compass", robots=1, observe=["scan"])
-    envs.reset()
-    assert envs.step(np.zeros(2, np.int64))[1].shape == (2,)
-
-
 def test_names_that_are_taken_or_unknown_are_refused():
     with pytest.raises(ValueError, match="level 'velocity' is registered already"):
         lidarium.level("velocity")(lidarium.WaypointLevel)

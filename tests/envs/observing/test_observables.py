@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from compared_faces import compare_rows
 
 import lidarium
 from lidarium.envs.observing.observables import observable
@@ -122,11 +123,11 @@ def test_a_function_of_ones_own_is_observed_and_clipped():
 
 @pytest.mark.usefixtures("nearest")
 @pytest.mark.parametrize("level", ["velocity", "frontier"])
-def test_rows_of_a_batch_observe_the_same_to_the_bit(compare, level):
+def test_rows_of_a_batch_observe_the_same_to_the_bit(level):
     observe = ["pose", "nearest", *NEW]
     radio = RadioSettings(kind="range", reach=6.0, loss=0.3, latency_s=0.2)
-    compare(level, 2, 12, ["apartment", "clinic"], observe=observe, seed=4)
-    compare(level, 1, 12, ["apartment", "clinic"], observe=observe, radio=radio, robots=3, seed=5)
+    compare_rows(level, 2, 12, ["apartment", "clinic"], observe=observe, seed=4)
+    compare_rows(level, 1, 12, ["apartment", "clinic"], observe=observe, radio=radio, robots=3, seed=5)
 
 
 def test_a_function_of_another_shape_is_refused_by_name():

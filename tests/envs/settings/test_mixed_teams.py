@@ -61,28 +61,6 @@ def test_each_robot_drives_within_limits_of_its_own():
     assert env.observation_space("robot_0")["velocity"].high[0] == np.float32(limits.max())
 
 
-@pytest.mark.parametrize("level", ["velocity", "waypoint", "frontier"])
-def test_a_mixed_team_is_in_a_batch_what_it_is_alone(level):
-    options = {**MIXED, "level": level}
-    alone, batch = (
-        lidarium.parallel_env("scene_room", **options),
-        lidarium.vector_env(2, "scene_room", **options),
-    )
-    alone.reset(seed=8)
-    batch.reset(seed=7)
-    generator = np.random.default_rng(0)
-    for _ in range(6):
-        actions = (
-            np.zeros(6, np.int64) if level == "frontier" else generator.uniform(-1.0, 1.0, (6, 2)).astype(np.float32)
-        )
-        rewards = alone.step({agent: actions[3 + k] for k, agent in enumerate(alone.possible_agents)})[1]
-        _, wanted, *_ = batch.step(actions)
-        assert list(rewards.values()) == wanted[3:].tolist()
-        assert np.array_equal(alone.unwrapped.world.poses, batch.engine.world.poses[3:])
-    assert np.isfinite(alone.state()).all()
-    assert alone.state_space.contains(alone.state())
-
-
 def test_bodies_that_touch_have_radii_of_their_own():
     env = lidarium.parallel_env("scene_room", **{**MIXED, "robots": 2})
     x, y = 15.0, 20.0

@@ -11,13 +11,11 @@ from lidarium.evaluation.episodes.runner import run_episode
 
 
 def explored(policy="nearest_frontier", **options):
-    env = ExplorationEnv("apartment", make_settings(**{"robots": 2, "resolution": 0.05, "horizon_s": 10.0, **options}))
+    env = ExplorationEnv("apartment", make_settings(**{"robots": 2, "resolution": 0.05, "horizon_s": 4.0, **options}))
     return run_episode(lidarium.policy(policy), env, 0)
 
 
-@pytest.mark.parametrize(
-    "options", [{}, {"known_starts": False}, {"robots": 18, "horizon_s": 1.0}, {"resolution": 0.1}]
-)
+@pytest.mark.parametrize("options", [{"known_starts": False, "resolution": 0.1}, {"robots": 18, "horizon_s": 1.0}])
 def test_a_run_has_a_picture(tmp_path, options):
     save_run_picture(tmp_path / "run.png", explored(**options), "nearest_frontier")
     picture = cv2.imread(str(tmp_path / "run.png"))

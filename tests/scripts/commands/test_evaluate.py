@@ -94,9 +94,9 @@ def test_an_interrupted_evaluation_keeps_what_is_finished_and_goes_on(tmp_path, 
         "--robots",
         "1",
         "--seeds",
-        "30",
+        "8",
         "--horizon-s",
-        "400",
+        "200",
         "--out",
         str(tmp_path),
         "--workers",
@@ -120,7 +120,7 @@ def test_an_interrupted_evaluation_keeps_what_is_finished_and_goes_on(tmp_path, 
     kept = read_episodes(tmp_path / "episodes.jsonl")
     assert kept
     assert evaluate(*arguments) == 0
-    assert "30 of 30 episodes finished" in capsys.readouterr().out
+    assert "8 of 8 episodes finished" in capsys.readouterr().out
     assert read_episodes(tmp_path / "episodes.jsonl")[: len(kept)] == kept
 
 

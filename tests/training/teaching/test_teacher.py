@@ -10,7 +10,7 @@ from lidarium.evaluation.episodes.runner import run_episode
 from lidarium.training.settings import TrainingSettings
 from lidarium.training.teaching.teacher import TaughtTours
 
-FLOORS = ("apartment:7", "apartment:12", "apartment:31", "apartment:44", "apartment:59")
+FLOORS = ("apartment:7", "apartment:12", "apartment:31", "apartment:44")
 
 
 def run(make, floor, robots=1):

@@ -27,7 +27,7 @@ def small_bank(monkeypatch):
         # What is patched here holds in this process alone.
         monkeypatch.setattr(module, "shared_out", lambda work, tasks, workers, is_apart: shared_out(work, tasks, 1))
     monkeypatch.setattr(bank, "RUNS", 1)
-    monkeypatch.setattr(drives, "HORIZON_S", 30.0)
+    monkeypatch.setattr(drives, "HORIZON_S", 15.0)
     monkeypatch.setattr(tuning, "bank_floors", lambda data, every: FLOORS)
     monkeypatch.setattr(making, "choose_pairs", partial(choose_pairs, wanted=few))
 

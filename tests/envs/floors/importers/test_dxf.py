@@ -247,6 +247,52 @@ def test_too_many_points_are_refused(drawing, tmp_path):
         load_file(saved(drawing, tmp_path))
 
 
+ROOM = "0\nLWPOLYLINE\n90\n4\n70\n1\n10\n0\n20\n0\n10\n6\n20\n0\n10\n6\n20\n4\n10\n0\n20\n4\n"
+
+
+def with_room(tmp_path, entities):
+    """A drawing in metres of a room with four walls and of other entities."""
+    sections = {"HEADER": "9\n$INSUNITS\n70\n6\n", "ENTITIES": ROOM + entities}
+    path = tmp_path / "plan.dxf"
+    path.write_text(
+        "".join(f"0\nSECTION\n2\n{name}\n{text}0\nENDSEC\n" for name, text in sections.items()) + "0\nEOF\n"
+    )
+    return path
+
+
+def zigzag(walls):
+    """A polyline to and fro; a file of its size may have 25,000 walls."""
+    return f"0\nLWPOLYLINE\n90\n{walls + 1}\n" + "".join(f"10\n{k % 2}\n20\n0\n" for k in range(walls + 1))
+
+
+def arcs(count):
+    """Arcs that are all the same; a file of their size may have 4,000 entities."""
+    return "0\nARC\n8\n0\n10\n1\n20\n1\n40\n1\n50\n0\n51\n9\n" * count
+
+
+@pytest.mark.parametrize(
+    ("entities", "maximum", "told"),
+    [(zigzag, 24_996, "more than 25,000 straight walls"), (arcs, 3_995, "more than 4,000 entities")],
+)
+def test_a_drawing_may_have_as_many_parts_as_are_allowed_and_not_one_more(tmp_path, entities, maximum, told):
+    assert load_file(with_room(tmp_path, entities(maximum))).solids
+    with pytest.raises(ValueError, match=told):
+        load_file(with_room(tmp_path, entities(maximum + 1)))
+
+
+def test_blocks_may_have_as_many_entities_as_are_allowed_and_not_one_more(drawing, tmp_path):
+    for name, lines in (("DESK", 1_000), ("PEN", 1)):
+        block = drawing.blocks.new(name)
+        for _ in range(lines):
+            block.add_line((0, 0), (1000, 0))
+    for _ in range(4):
+        drawing.modelspace().add_blockref("DESK", (1000, 1000))
+    assert load_file(saved(drawing, tmp_path)).solids
+    drawing.modelspace().add_blockref("PEN", (1000, 1000))
+    with pytest.raises(ValueError, match="blocks of more than 4,000 entities"):
+        load_file(saved(drawing, tmp_path))
+
+
 def test_a_drawing_with_small_faults_is_repaired(drawing, tmp_path, caplog, capsys):
     path = saved(drawing, tmp_path)
     path.write_text(path.read_text().replace("6000.0", "6000.0abc", 1))
