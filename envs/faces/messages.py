@@ -1,6 +1,7 @@
 """Numbers that robots send each other with their actions, over the radio of their team."""
 
 from collections import deque
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -127,13 +128,25 @@ class MessageBoard:
         return table[:, others].reshape(episodes * robots, robots - 1, -1).astype(np.float32)
 
 
+class _TalkingSpace(spaces.Dict):
+    """Actions with messages, which takes the mask of the actions as that of both, as trainers give it."""
+
+    def sample(self, mask: Any = None, probability: Any = None) -> dict[str, Any]:  # noqa: ANN401
+        """Draw an action and a message; a mask (actions,) is that of the action."""
+        whole = mask if mask is None or isinstance(mask, Mapping) else {ACTION: mask, MESSAGE: None}
+        odds = probability
+        if odds is not None and not isinstance(odds, Mapping):
+            odds = {ACTION: odds, MESSAGE: None}
+        return super().sample(whole) if odds is None else super().sample(whole, odds)
+
+
 def talking_space(space: spaces.Space[Any], floats: int) -> spaces.Space[Any]:
     """Return a space of actions with messages: a longer vector, or a ``Dict`` if actions are not vectors."""
     message = spaces.Box(-1.0, 1.0, (floats,), np.float32)
     if isinstance(space, spaces.Box):
         low, high = (np.concatenate(pair) for pair in ((space.low, message.low), (space.high, message.high)))
         return spaces.Box(low, high, dtype=np.float32)
-    return spaces.Dict({ACTION: space, MESSAGE: message})
+    return _TalkingSpace({ACTION: space, MESSAGE: message})
 
 
 def split_action(action: Any, floats: int, has_vectors: bool, whose: str) -> tuple[Any, NDArray[np.float64]]:  # noqa: ANN401

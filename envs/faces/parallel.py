@@ -126,6 +126,7 @@ class ExplorationEnv(ParallelEnv[str, Any, Any]):
         self._window: Any = None
         # A world with a window of its own draws itself.
         self._shows_itself = render_mode == "human" and self.world.show()
+        self._is_closed = False
         self._rows = TeamRows(self.engine, conventions)
         self._named: dict[str, tuple[Any, list[Any]]] = {"state": (None, []), "order": (None, [])}
         self._note_level()
@@ -193,6 +194,7 @@ class ExplorationEnv(ParallelEnv[str, Any, Any]):
             ``floor``, ``starts`` (robots, 3) in the floor's frame [m, rad], or ``fixed`` or ``drawn``, ``goal`` (2,)
             [m]. Unknown options are ignored; likely typos raise an error.
         """
+        self._check_open()
         chosen = read_options(options, self.settings.robots)
         self.engine.run(None, _FIRST, [checked_seed(seed)], {0: chosen})
         return self._begun()
@@ -231,6 +233,7 @@ class ExplorationEnv(ParallelEnv[str, Any, Any]):
             By agent. ``infos[agent]["truth"]`` is for scoring only; ``infos[agent]["ended_because"]`` says why an
             agent ended.
         """
+        self._check_open()
         if not self.agents:
             if self.floor is None:
                 raise RuntimeError("the environment was not reset; call reset() before step()")
@@ -454,10 +457,15 @@ class ExplorationEnv(ParallelEnv[str, Any, Any]):
 
     def close(self) -> None:
         """Close the window and the world, if they hold anything; closing again does nothing."""
+        self._is_closed = True
         self.simulation.close()
         if self._window is not None:
             self._window.close()
             self._window = None
+
+    def _check_open(self) -> None:
+        if self._is_closed:
+            raise RuntimeError("the environment is closed; make a new one")
 
     def __getstate__(self) -> dict[str, Any]:
         # A copy has no window.

@@ -117,7 +117,10 @@ class TeamRows:
     ) -> None:
         """Begin episodes; see `Engine.run`."""
         self.engine.run(None, chosen, seeds, options, is_same_step)
-        self.came_out(~self.engine.live, is_step=False)
+        # Robots of other episodes that ended in the step before still show their last observations.
+        masked = self._kept.copy()
+        masked.reshape(self.episodes, self.robots)[chosen] = False
+        self.came_out(masked, is_step=False)
 
     def step(self, actions: Any, beginning: NDArray[np.int64] = NO_EPISODES) -> None:  # noqa: ANN401
         """Run all live episodes for one step or decision by an array of actions, and begin others."""
@@ -230,9 +233,11 @@ class TeamRows:
         self.rewards = engine.score.rewards.copy()
         self._infos = engine.infos
         share = self.conventions.team_reward
-        if share and is_step:
+        if share:
             teams = (-1, self.robots)
-            mixed = shared_rewards(engine.rewards.reshape(teams), engine.acted.reshape(teams), share).ravel()
+            mixed = self.rewards
+            if is_step:
+                mixed = shared_rewards(engine.rewards.reshape(teams), engine.acted.reshape(teams), share).ravel()
             terms = {**engine.infos["reward_terms"], TEAM: mixed - engine.rewards}
             self.rewards = mixed
             self._infos = {**engine.infos, "reward_terms": terms}
@@ -275,7 +280,11 @@ class TeamRows:
 
     def observation(self, row: int) -> Any:  # noqa: ANN401
         """Return the observation of one row, its own arrays."""
-        return self._form.of({name: array[row].copy() for name, array in self._with_more().items()})
+        arrays = {name: array[row].copy() for name, array in self._with_more().items()}
+        if self._keeps and self._kept[row]:
+            for array in arrays.values():
+                array[...] = 0
+        return self._form.of(arrays)
 
     def _with_more(self) -> Mapping[str, NDArray[Any]]:
         """Return the observations including exchanged data."""
@@ -322,13 +331,13 @@ class TeamRows:
             of_live["_ended_because"] = kept | infos.get("_ended_because", np.False_)
             return of_live
         if form == "flat":
+            is_new = self.engine.acted | np.repeat(self.engine.world.steps <= 0, self.robots)
             for name, values in infos.items():
                 if name.startswith("_"):
                     continue
-                last = self._numbers.get(name)
-                if last is not None and kept.any():
-                    values[kept] = 0.0 if name.startswith("reward_terms.") else last[kept]
-            self._numbers = {name: values for name, values in infos.items() if not name.startswith("_")}
+                last = np.where(is_new, values, self._numbers.get(name, values))
+                self._numbers[name] = last
+                values[kept] = 0.0 if name.startswith("reward_terms.") else last[kept]
         return infos
 
     @property
