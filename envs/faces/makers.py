@@ -131,6 +131,7 @@ def sb3_vec_env(
 ) -> "ExplorationVecEnv":
     """Make the rows of `vector_env` for stable-baselines3; it needs ``lidarium[rl]``.
 
+    A row is a robot of an episode: ``num_envs`` is episodes x robots, 48 for 16 episodes of the default team of three.
     An episode begins again in the step that ends it.
 
     Raises

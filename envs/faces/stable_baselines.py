@@ -186,6 +186,10 @@ class ExplorationVecEnv(VecEnv):
             )
         return masks
 
+    def state(self) -> NDArray[np.float32]:
+        """Return the true state of each team, (episodes, numbers), for central critics; see `team_state`."""
+        return self.batch.states()
+
     @property
     def engine(self) -> Engine:
         """The engine of all episodes; if settings are drawn, each has its own, see ``batch.parts``."""

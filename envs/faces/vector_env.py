@@ -48,6 +48,9 @@ class ExplorationVectorEnv(VectorEnv[Any, NDArray[Any], NDArray[Any]]):
         ``rgb_array``, for ``render`` and Gymnasium's ``RecordVideo``. Nothing is drawn by default.
     curriculum : callable, optional
         As for ``lidarium.parallel_env``; episodes are counted over all as they begin.
+    autoreset_mode : AutoresetMode or str, optional
+        When episodes that are over begin again: ``NextStep``, the default, or ``SameStep``: in the step that ends them;
+        ``infos["final_obs"]`` and ``infos["final_info"]`` then have the last results of their rows.
     **options
         As for ``lidarium.parallel_env``; ``threads`` is that of the machine by default. ``merging``
         (``MergingSettings``) for merged maps, ``plans_sparsely=True`` for routes on sparse maps (`SparsePlanning`),
@@ -75,14 +78,20 @@ class ExplorationVectorEnv(VectorEnv[Any, NDArray[Any], NDArray[Any]]):
         copy: bool = True,
         render_mode: str | None = None,
         curriculum: Curriculum | None = None,
+        autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
         **options: Any,  # noqa: ANN401
     ) -> None:
         self.closed = True  # Gymnasium before 1.2 also closes environments that could not be made
+        self._resets_in_step = _mode(autoreset_mode) is AutoresetMode.SAME_STEP
         check_render_mode(render_mode)
         self.batch = make_rows(episodes, floor, options, level, image_resolution, copy, curriculum)
         self.settings = self.batch.settings
         self.render_mode = render_mode
-        self.metadata = {**type(self).metadata, "render_fps": 1.0 / self._period_s(level)}
+        self.metadata = {
+            **type(self).metadata,
+            "render_fps": 1.0 / self._period_s(level),
+            "autoreset_mode": _mode(autoreset_mode),
+        }
         self.num_envs = self.batch.rows
         self.single_observation_space = self.batch.space
         self.single_action_space = self.batch.action_space
@@ -134,10 +143,27 @@ class ExplorationVectorEnv(VectorEnv[Any, NDArray[Any], NDArray[Any]]):
             raise RuntimeError("the environment was not reset; call reset() before step()")
         if actions is None:
             raise ValueError("actions is None; want an action for each row, row = episode * robots + robot")
-        beginning = NO_EPISODES if batch.live.all() else np.flatnonzero(batch.is_over)
+        is_next = not (self._resets_in_step or batch.live.all())
+        beginning = np.flatnonzero(batch.is_over) if is_next else NO_EPISODES
         is_by_agent = isinstance(actions, list) and all(isinstance(each, Mapping) for each in actions)
         (batch.step_teams if is_by_agent else batch.step)(actions, beginning)
-        return batch.observations, batch.rewards, batch.terminated, batch.truncated, self._infos()
+        ended = batch.rewards, batch.terminated, batch.truncated
+        infos = self._begin_ended() if self._resets_in_step else self._infos()
+        return batch.observations, *ended, infos
+
+    def _begin_ended(self) -> dict[str, Any]:
+        """Let episodes that are over begin again; return the infos with the last results of their rows."""
+        batch, final = self.batch, self._infos()
+        over = np.flatnonzero(batch.is_over)
+        if not len(over):
+            return final
+        rows = np.repeat(batch.is_over, batch.robots)
+        last = np.full(batch.rows, None, object)
+        for row in np.flatnonzero(rows).tolist():
+            last[row] = batch.observation(row)
+        batch.begin(over, is_same_step=True)
+        masked = {name: values & rows if name.startswith("_") else values for name, values in final.items()}
+        return {**self._infos(), "final_obs": last, "_final_obs": rows, "final_info": masked, "_final_info": rows}
 
     def _infos(self) -> dict[str, Any]:
         return {**self.batch.infos, ACTIVE: self.batch.active, f"_{ACTIVE}": np.ones(self.num_envs, np.bool_)}
@@ -188,6 +214,16 @@ class ExplorationVectorEnv(VectorEnv[Any, NDArray[Any], NDArray[Any]]):
     def close_extras(self, **kwargs: Any) -> None:  # noqa: ANN401
         """Release everything that the worlds hold beyond arrays."""
         self.batch.close()
+
+
+def _mode(mode: AutoresetMode | str) -> AutoresetMode:
+    try:
+        found = AutoresetMode(mode)
+    except ValueError:
+        found = AutoresetMode.DISABLED
+    if found is AutoresetMode.DISABLED:
+        raise ValueError(f"autoreset_mode is {mode!r}; want NextStep or SameStep")
+    return found
 
 
 def check_render_mode(render_mode: str | None) -> None:

@@ -17,7 +17,9 @@ SET_PREFIX = "set:"
 FloorName = str | Path | Floor
 """A name of the catalogue, a set, a folder, a file, or a floor."""
 
-Floors = FloorName | Sequence[Any] | Mapping[Any, float] | Callable[[np.random.Generator], Any]
+Grid = np.ndarray[Any, np.dtype[Any]]
+
+Floors = FloorName | Grid | Sequence[Any] | Mapping[Any, float] | Callable[[np.random.Generator], Any]
 """Floors that an environment takes; see `FloorChoice`."""
 
 
@@ -26,12 +28,12 @@ class FloorChoice:
 
     Parameters
     ----------
-    floor : str, Path, Floor, sequence, mapping or callable
-        A name of the catalogue, a path, or a floor; or many: ``set:NAME``, a folder of files that the
-        importers know, a list, a mapping from floors to their weights, or a callable that takes the episode's
+    floor : str, Path, Floor, array, sequence, mapping or callable
+        A name of the catalogue, a path, a floor, or an array as `load_floor` takes it; or many: ``set:NAME``, a folder
+        of files that the importers know, a list, a mapping from floors to their weights, or a callable that takes the episode's
         generator and returns a floor. Those of a list or mapping may be sets and folders themselves.
     image_resolution : float or None
-        Side of a pixel [m] of floors that are plain images.
+        Side of a pixel [m] of floors that are plain images or arrays.
 
     Attributes
     ----------
@@ -42,6 +44,8 @@ class FloorChoice:
     """
 
     def __init__(self, floor: Floors, image_resolution: float | None = None) -> None:
+        if isinstance(floor, np.ndarray):
+            floor, image_resolution = load_floor(floor, image_resolution), None
         self._image_resolution = image_resolution
         self._source: Callable[[np.random.Generator], Any] | None = None
         self._weights: np.ndarray[Any, np.dtype[np.float64]] | None = None

@@ -22,6 +22,7 @@ from lidarium.envs.floors.floor import Floor, Solid
 from lidarium.envs.floors.free_space import measure_building
 from lidarium.envs.floors.generation.buildings import KINDS, BuildingSettings, generate_building
 from lidarium.envs.floors.importers import FORMATS, load_file
+from lidarium.mapping.files.map_files import RESOLUTION
 from lidarium.mapping.geometry.bounds import shown
 
 
@@ -96,16 +97,17 @@ def about_floor(name: str) -> str:
     return about_drawn(name)
 
 
-def load_floor(spec: str | Path | Floor, resolution: float | None = None) -> Floor:
+def load_floor(spec: str | Path | Floor | NDArray[Any], resolution: float | None = None) -> Floor:
     """Load a floor.
 
     Parameters
     ----------
     spec : str, Path or Floor
         A name of `floor_names`; ``building:SEED``, ``apartment:SEED``, ``office:SEED`` or ``corridors:SEED``;
-        a path to a file of a format that the importers know; or a floor, which is returned unchanged.
+        a path to a file of a format that the importers know; an array (rows, columns) of grey levels (above 127 is
+        free) or booleans (true is solid), row 0 at the top; or a floor, which is returned unchanged.
     resolution : float, optional
-        Side of a cell [m] of files that do not state it; files only.
+        Side of a cell [m] of arrays, and of files that do not state it.
 
     Returns
     -------
@@ -127,6 +129,12 @@ def load_floor(spec: str | Path | Floor, resolution: float | None = None) -> Flo
     """
     if isinstance(spec, Floor):
         return spec
+    if isinstance(spec, np.ndarray):
+        from lidarium.envs.floors.importers.arrays import floor_of_array
+
+        if resolution is not None and not RESOLUTION.hold(resolution):
+            raise ValueError(f"resolution is {resolution!r}; want {RESOLUTION.wanted}")
+        return floor_of_array(spec, resolution)
     if is_file_name(spec):
         return load_file(Path(spec), resolution)
     if resolution is not None:

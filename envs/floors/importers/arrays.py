@@ -28,13 +28,18 @@ def load(path: Path, resolution: float | None) -> Floor:
     content = read_arrays(path, "a numpy array that can be read")
     if isinstance(content, dict):
         return _load_named(path, content, resolution)
+    return floor_of_array(content, resolution, path)
+
+
+def floor_of_array(array: NDArray[np.generic], resolution: float | None, path: Path = Path("array")) -> Floor:
+    """Return the floor of an image, row 0 at the top: grey levels (above 127 is free) or booleans (true is solid)."""
     if resolution is None:
         raise ValueError(
             f"{path} is an array without a scale; want image_resolution (--resolution), its metres per cell"
         )
-    _check_grid(path, content)
-    free = ~content if content.dtype == np.bool_ else content > _FREE_ABOVE
-    return floor_of_cells(path, free[::-1], (0.0, 0.0), resolution)
+    _check_grid(path, array)
+    free = ~array if array.dtype == np.bool_ else array > _FREE_ABOVE
+    return floor_of_cells(path, np.ascontiguousarray(free[::-1]), (0.0, 0.0), resolution)
 
 
 def _load_named(path: Path, named: dict[str, NDArray[np.generic]], resolution: float | None) -> Floor:
