@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.agents.report import GivenUp, PolicyReport, TeamMaps
-from lidarium.envs.faces.parallel import Observation
+from lidarium.envs.faces.parallel import ExplorationEnv, Observation
+from lidarium.envs.faces.team import EpisodeTeam
 from lidarium.envs.levels import LEVELS
 from lidarium.envs.onboard.belief import Belief
 from lidarium.envs.onboard.radio.messages import DriveState, OperatingState, Order, Route, Stop, Target
@@ -146,6 +147,7 @@ class Policy(ABC):
         Subclasses need no ``agents``: they get the observations of the chosen ones.
         """
 
+    _driven: Any = None
     _pace: "_Pace | None" = None
 
     def __init_subclass__(cls, **options: Any) -> None:  # noqa: ANN401
@@ -179,8 +181,9 @@ def _checked(reset: Callable[..., None]) -> Callable[..., None]:
 
     @wraps(reset)
     def checked(policy: Policy, team: Any, seed: int = 0) -> None:  # noqa: ANN401
-        if not hasattr(team, "belief"):
-            team = getattr(team, "unwrapped", team)
+        team = getattr(team, "unwrapped", team)
+        if isinstance(team, ExplorationEnv):
+            team = EpisodeTeam(team.engine)
         level = getattr(team, "level", policy.level)
         if level != policy.level and policy.level not in LEVELS[level].carries:
             raise ValueError(
@@ -189,6 +192,7 @@ def _checked(reset: Callable[..., None]) -> Callable[..., None]:
             )
         if (settings := getattr(team, "settings", None)) is not None:
             check_observed(policy, type(policy).__name__, settings.observe)
+        policy._driven = team
         policy._pace = _Pace(policy, team) if (policy.level, level) == ("waypoint", "velocity") else None
         reset(policy, team, seed)
 
@@ -207,6 +211,9 @@ def _for_agents(act: Callable[..., dict[str, Action]]) -> Callable[..., dict[str
             if missing:
                 raise ValueError(f"there is no observation of {missing[0]!r}; want agents among {list(observations)}")
             observations = {agent: observations[agent] for agent in agents}
+        if policy._driven is not None:  # a step also returns observations of agents that ended in it
+            live = policy._driven.agents
+            observations = {agent: seen for agent, seen in observations.items() if agent in live}
         if not observations:
             return {}
         pace = policy._pace

@@ -30,8 +30,8 @@ class FloorChoice:
     ----------
     floor : str, Path, Floor, array, sequence, mapping or callable
         A name of the catalogue, a path, a floor, or an array as `load_floor` takes it; or many: ``set:NAME``, a folder
-        of files that the importers know, a list, a mapping from floors to their weights, or a callable that takes the episode's
-        generator and returns a floor. Those of a list or mapping may be sets and folders themselves.
+        of files that the importers know, a list, a mapping from floors to their weights, or a callable that takes the
+        episode's generator and returns a floor. Those of a list or mapping may be sets and folders themselves.
     image_resolution : float or None
         Side of a pixel [m] of floors that are plain images or arrays.
 

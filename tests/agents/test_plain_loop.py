@@ -29,7 +29,6 @@ def run(env, policy, seed=3):
     poses = []
     while env.agents:
         observations, *_ = env.step(policy.act(observations))
-        observations = {agent: observations[agent] for agent in env.agents}
         poses.append(env.unwrapped.world.poses.copy())
     return poses
 
