@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from lidarium.agents.policy import Policy
+from lidarium.mapping.geometry.bounds import shown
 from lidarium.registry import Registry, unknown
 
 POLICIES: Registry[Callable[..., Policy]] = Registry("policy")
@@ -220,5 +221,9 @@ def maker_at(name: str) -> Callable[..., Any]:
     if not attribute or not callable(getattr(module, attribute, None)):
         own = sorted(key for key, value in vars(module).items() if isinstance(value, type))
         raise ValueError(f"policy {name!r}: {unknown(f'class of {module_name}', attribute, own)}")
-    made: Callable[..., Any] = getattr(module, attribute)
-    return made
+    made = getattr(module, attribute)
+    # Checked before it is called: the name may come from a file.
+    if not (isinstance(made, type) and issubclass(made, Policy)):
+        raise ValueError(f"policy {name!r} is {shown(made)}; want a subclass of lidarium.Policy")
+    found: Callable[..., Any] = made
+    return found

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from lidarium.agents import Policy, make_policy
+from lidarium.agents.catalogue import POLICIES
 from lidarium.agents.policy import settings_for
 from lidarium.envs.floors.catalogue.names import is_generated, load_floor, set_floors
 from lidarium.envs.settings.exploration import ExplorationSettings
@@ -254,16 +255,40 @@ class Suite:
         return content
 
 
-def read_suite(path: Path) -> Suite:
-    """Read a suite from a TOML file (docs/reference/files.md)."""
+def read_suite(path: Path, own_policies: bool = False) -> Suite:
+    """Read a suite from a TOML file (docs/reference/files.md).
+
+    It may name policies of modules, which are imported, only with ``own_policies``: suites are shared.
+    """
     path = Path(path)
     if not path.exists():
         raise FileNotFoundError(f"no suite {path}; want a TOML file, as docs/reference/files.md shows one")
     text = read_text(path, MOST_SUITE_BYTES)
     with reading(path, "TOML"):
         content = tomllib.loads(text)
+    if not own_policies:
+        _refuse_modules(path, content)
     with reading(path, "a suite that can be used"):
         return suite_of(content)
+
+
+def _refuse_modules(path: Path, content: Mapping[str, Any]) -> None:
+    """Check that a file names registered policies alone."""
+    settings = content.get("policy_settings")
+    tables = settings.values() if isinstance(settings, Mapping) else ()
+    policies = content.get("policies")
+    named = [
+        *(policies if isinstance(policies, list) else [policies]),
+        *(table.get("policy") for table in tables if isinstance(table, Mapping)),
+    ]
+    aliases = set(settings) if isinstance(settings, Mapping) else set()
+    for name in named:
+        is_alias = name in aliases and "policy" in settings[name] if isinstance(name, str) and aliases else False
+        if isinstance(name, str) and ":" in name and name not in POLICIES and not is_alias:
+            raise ValueError(
+                f"{path} names the policy {shown(name)} of a module, which would be imported and run; want "
+                "--own-policies if you trust the file"
+            )
 
 
 def suite_of(content: Mapping[str, Any]) -> Suite:

@@ -1,11 +1,14 @@
-"""The web server of a view: on this machine alone, on a port that is free, quiet."""
+"""The web server of a view: on this machine alone, for those who know its address, on a free port, quiet."""
 
+import inspect
 import os
+import secrets
 import socket
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
+from http import HTTPStatus
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from viser import ViserServer
@@ -38,7 +41,10 @@ def view_server(port: int) -> Iterator["ViserServer"]:
             """Share nothing."""
             return None
 
-    server = LocalServer(HOST, port, label="lidarium", verbose=False)
+    token = secrets.token_urlsafe(16)
+    with _guarding(token):
+        server = LocalServer(HOST, port, label="lidarium", verbose=False)
+    server.lidarium_token = token
 
     def stop() -> None:
         server.stop()
@@ -57,8 +63,50 @@ def view_server(port: int) -> Iterator["ViserServer"]:
 
 
 def address_of(server: "ViserServer") -> str:
-    """Return the address for a browser."""
-    return f"http://{server.get_host()}:{server.get_port()}"
+    """Return the address for a browser; its path is a secret that other pages and users of the machine do not know."""
+    return f"http://{server.get_host()}:{server.get_port()}/{server.lidarium_token}/"  # type: ignore[attr-defined]
+
+
+@contextmanager
+def _guarding(token: str) -> Iterator[None]:
+    """Let a server that is made meanwhile refuse requests without the token in their path, or of another page.
+
+    viser has no hook for this: its call of ``serve`` of the package websockets is given another check of requests.
+    """
+    from websockets.asyncio import server as websockets
+
+    serve = websockets.serve
+
+    def guarded(*arguments: Any, process_request: Callable[..., Any], **options: Any) -> Any:  # noqa: ANN401
+        async def check(connection: Any, request: Any) -> Any:  # noqa: ANN401
+            refused = _why_refused(request, token, connection.local_address[1])
+            if refused:
+                return connection.respond(HTTPStatus.FORBIDDEN, f"{refused}; want the address that was printed\n")
+            request.path = request.path.removeprefix(f"/{token}") or "/"
+            answer = process_request(connection, request)
+            return await answer if inspect.isawaitable(answer) else answer
+
+        return serve(*arguments, process_request=check, **options)
+
+    websockets.serve = guarded  # type: ignore[assignment, misc]
+    try:
+        yield
+    finally:
+        websockets.serve = serve  # type: ignore[misc]
+
+
+def _why_refused(request: Any, token: str, port: int) -> str:  # noqa: ANN401
+    """Return why a request is refused, nothing if it is not: by its host, the page that it comes from, or its path."""
+    hosts = (f"{HOST}:{port}", f"localhost:{port}")
+    if request.headers.get("Host", "") not in hosts:  # a name of somebody else's that leads to this machine
+        return "the host is not this machine"
+    origin = request.headers.get("Origin")
+    if origin is not None and origin not in [f"http://{host}" for host in hosts]:
+        return "the request comes from another page"
+    first = request.path.partition("?")[0].split("/")[1:2]
+    if not first or not secrets.compare_digest(first[0].encode(), token.encode()):
+        return "the address has no token"
+    return ""
 
 
 def _check_free(port: int) -> None:

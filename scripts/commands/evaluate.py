@@ -32,6 +32,8 @@ class _Evaluate(TeamCommand):
 
     suite: Positional[Path | None] = None
     """TOML file with the suite, in place of the options below"""
+    own_policies: bool = False
+    """let the suite name policies as module:Class; their modules are imported and run"""
     preset: str | None = None
     """evaluate as another project does.
 
@@ -128,7 +130,7 @@ def _suite(command: _Evaluate) -> "Suite":
                     f"settings of {what} are given beside a suite or a preset; want them in its policy_settings"
                 )
     if command.suite is not None:
-        return read_suite(command.suite)
+        return read_suite(command.suite, command.own_policies)
     if command.seeds < 1:
         raise ValueError(f"--seeds is {command.seeds}; want at least 1")
     seeds = tuple(range(command.seed, command.seed + command.seeds))

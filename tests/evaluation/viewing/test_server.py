@@ -1,8 +1,10 @@
 """The page is served on this machine alone, at the port that was asked for, without a word on stdout."""
 
+import importlib.metadata
 import socket
 import sys
 import time
+import urllib.error
 import urllib.request
 
 import pytest
@@ -52,6 +54,43 @@ def test_it_is_bound_to_this_machine_alone():
     with view_server(0) as server, socket.socket() as probe:
         assert server.get_host() == "127.0.0.1"
         probe.bind(("127.0.0.2", server.get_port()))  # all of the machine's addresses would be taken
+
+
+def asked(address, **headers):
+    """Return the status of a request."""
+    request = urllib.request.Request(address, headers=headers)
+    try:
+        with urllib.request.urlopen(request, timeout=PATIENCE_S) as answer:
+            return answer.status
+    except urllib.error.HTTPError as error:
+        return error.code
+
+
+def test_requests_of_other_pages_hosts_and_without_the_token_are_refused():
+    with view_server(0) as server:
+        address, port = address_of(server), server.get_port()
+        assert asked(address) == 200
+        assert asked(address, Origin=f"http://{HOST}:{port}") == 200
+        assert asked(f"http://{HOST}:{port}/") == 403
+        assert asked(f"http://{HOST}:{port}/wrong/index.html") == 403
+        assert asked(address, Origin="https://elsewhere.example") == 403
+        assert asked(address, Host="elsewhere.example") == 403
+
+
+@pytest.mark.parametrize("origin", ["https://elsewhere.example", "null", None])
+def test_a_socket_is_opened_for_the_page_alone(origin):
+    from websockets.exceptions import InvalidStatus
+    from websockets.sync.client import connect
+
+    with view_server(0) as server:
+        address = address_of(server).replace("http://", "ws://").rstrip("/")
+        options = {"subprotocols": [f"viser-v{importlib.metadata.version('viser')}"], "open_timeout": PATIENCE_S}
+        own = f"http://{HOST}:{server.get_port()}"
+        with connect(address, origin=own, **options) as connection:
+            assert connection.recv(timeout=PATIENCE_S)
+        wrong = address if origin is not None else address.rpartition("/")[0]
+        with pytest.raises(InvalidStatus, match="403"):
+            connect(wrong, origin=origin, **options)
 
 
 def test_the_port_is_the_one_that_was_asked_for():
