@@ -7,6 +7,7 @@ from linked_rooms import TWO_ROOMS
 
 import lidarium
 from lidarium.envs.engine.engine import Engine
+from lidarium.envs.onboard.radio.messages import OrderKind
 from lidarium.envs.settings.making import make_settings
 
 SMALL = {"robots": 2, "map_cells": 32, "lidar": "lidar_360_6m", "stop_coverage": None, "observe": ["scan", "pose"]}
@@ -34,7 +35,7 @@ def test_a_batch_pauses_robots_as_single_environments_do(level):
 
 @pytest.mark.parametrize("radio", ["all", "line_of_sight"])
 def test_a_batch_takes_orders_as_single_environments_do(radio):
-    kinds = lidarium.OrderKind
+    kinds = OrderKind
     orders = {
         1: lidarium.Order(kinds.GO_TO, lidarium.Target(0.5, 0.2), "test"),
         3: lidarium.Order(kinds.PAUSE, None, "test"),
