@@ -49,7 +49,7 @@ class _LocalMatcher:
         points: NDArray[np.float64],
         predicted: NDArray[np.float64],
         moved: NDArray[np.float64],
-        uncertainty: NDArray[np.float64],
+        uncertainty: NDArray[np.float64] | None,
         failed: int,
     ) -> Match | None:
         """Return the pose of a scan on a local map; None if it does not match.
@@ -70,13 +70,14 @@ class _LocalMatcher:
         moved : (3,) float64
             The motion since the last match that led there.
         uncertainty : (3, 3) float64
-            Covariance of that motion, in the robot's frame at its end [m^2, m rad, rad^2].
+            Covariance of that motion, in the robot's frame at its end [m^2, m rad, rad^2]; None if odometry does not
+            measure it.
         failed : int
             How many scans in a row did not match before.
         """
         settings = self._matching
-        is_blind = not self._uses_odometry or failed >= settings.wide_after
-        near = self._match_near(submap, points, predicted, uncertainty) if self._uses_odometry else None
+        is_blind = uncertainty is None or failed >= settings.wide_after
+        near = None if uncertainty is None else self._match_near(submap, points, predicted, uncertainty)
         self.contradiction = 1.0 if near is None else near.contradiction
         is_sparse = near is not None and len(points) < settings.wide_share * self._geometry.beams
         if near is not None and self._is_new_ground(near, len(points)):
@@ -89,7 +90,7 @@ class _LocalMatcher:
             return self._noted(near)
         reach = (settings.blind_m, settings.blind_angle) if is_blind else self._reach(moved)
         far = None if is_sparse else self._match_far(submap, points, predicted, reach)
-        if self._uses_odometry and is_blind and far is not None:
+        if uncertainty is not None and is_blind and far is not None:
             # So far from odometry something a little similar, or in part, is soon found.
             is_alike = (
                 far.score >= settings.convincing_share * self.usual_score and far.overlap >= settings.blind_overlap
@@ -341,7 +342,7 @@ class LocalMapper:
         points: NDArray[np.float64],
         predicted: NDArray[np.float64],
         moved: NDArray[np.float64],
-        uncertainty: NDArray[np.float64],
+        uncertainty: NDArray[np.float64] | None,
         failed: int,
     ) -> Match | None:
         """Return the pose of a scan on the older local map, see ``_LocalMatcher.match``."""
