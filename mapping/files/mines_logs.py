@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from lidarium.mapping.files.beams import marked, symmetric_scans
 from lidarium.mapping.files.guarded_reading import read_lines, reading
 from lidarium.mapping.files.laser_logs import LaserLog, made_usable
+from lidarium.mapping.files.trajectories import interpolated
 from lidarium.mapping.geometry.rigid import composed
 
 _MAX_LINE_BYTES = 1 << 16
@@ -29,6 +30,10 @@ _WHEEL_M, _HALF_AXLE_M, _COUNTS = 0.077, 0.165, 2000
 """Radius of the wheels, half the distance between them [m], and counts of a turn of a wheel."""
 
 _LASER_AHEAD_M = 0.145
+
+_DELAY_S = 0.15
+"""A line has the counts of now and a scan of so long ago: turns of the scans of exp1.dat agree best with odometry then
+(correlation 0.95, without the delay 0.69)."""
 
 
 def read_mines_log(path: Path) -> LaserLog:
@@ -53,11 +58,12 @@ def _log(table: NDArray[np.float64], damaged: int) -> LaserLog:
     ranges = marked((1e-3 * table[:, _BEFORE_RANGES : _BEFORE_RANGES + _BEAMS]).astype(np.float32), _LEAST_M, _MOST_M)
     increment = _FIELD_OF_VIEW / (_BEAMS - 1)
     wide, geometry, axis = symmetric_scans(ranges, -0.5 * _FIELD_OF_VIEW, increment, (_LEAST_M, _MOST_M))
+    stamps = 1e-6 * table[:, 0]
     return LaserLog(
-        1e-6 * table[:, 0],
+        stamps,
         wide,
         geometry,
-        _driven(table[:, 2:4]),
+        interpolated(stamps, _driven(table[:, 2:4]), stamps - _DELAY_S),
         np.array([_LASER_AHEAD_M, 0.0, axis]),
         skipped={"damaged lines": damaged} if damaged else {},
     )
