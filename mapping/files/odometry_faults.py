@@ -13,6 +13,9 @@ from lidarium.mapping.grids.scan_geometry import ScanGeometry
 _FASTEST_M_S, _FASTEST_TURN = 3.0, 4.0
 """Speeds that an indoor robot reaches [m/s, rad/s]; higher speeds may still be usual in a log."""
 
+_MAX_SPEED = 25.0
+"""Usual speed beyond which odometry is not in metres [m/s]."""
+
 _USUAL = 3.0
 """Factor by which the speed may exceed that which 95 % of a log's motions keep below is still believed."""
 
@@ -79,6 +82,7 @@ def mended(
 
     Odometry is nan where it stands still although scans move.
     """
+    _check_metres(odometry, stamps)
     remarks = []
     odometry, remark = _in_robot_axes(odometry)
     remarks += remark
@@ -104,6 +108,18 @@ def mended(
             "wrong"
         )
     return odometry, ranges, remarks
+
+
+def _check_metres(odometry: NDArray[np.float64], stamps: NDArray[np.float64]) -> None:
+    """Raise ValueError if the robot usually moves as fast as odometry in centimetres or millimetres would be."""
+    motions = relative(odometry[:-1], odometry[1:])
+    lengths, steps = np.hypot(motions[:, 0], motions[:, 1]), np.diff(stamps)
+    moving = (lengths > 0.0) & (steps > 0.0)
+    speed = float(np.median(lengths[moving] / steps[moving])) if moving.sum() >= _MIN_PAIRS else 0.0
+    if speed > _MAX_SPEED:
+        raise ValueError(
+            f"the robot moves at {speed:,.0f} a second, as odometry in centimetres or millimetres; want metres"
+        )
 
 
 def _in_robot_axes(odometry: NDArray[np.float64]) -> tuple[NDArray[np.float64], list[str]]:

@@ -83,7 +83,10 @@ class _LocalMatcher:
         if near is not None and self._is_new_ground(near, len(points)):
             nothing = np.zeros((3, 3))
             unmatched = Match(predicted, near.score, near.overlap, near.contradiction, nothing, near.prior)
-            known = None if is_sparse else self._beyond_odometry(submap, points, predicted)
+            known = None
+            if not is_sparse:
+                known = self._beside_odometry(submap, points, predicted, moved)
+                known = known or self._beyond_odometry(submap, points, predicted)
             return unmatched if known is None else self._noted(known)
         if near is not None and self._is_good(near) and near.score >= settings.convincing_share * self.usual_score:
             self.explains = self._explains(near)
@@ -109,6 +112,22 @@ class _LocalMatcher:
         """Whether a match explains enough of a scan: points near known cells, and their agreement."""
         least = self._matching.explained_share * self.usual_score
         return match is not None and match.score * match.overlap >= least
+
+    def _beside_odometry(
+        self, submap: Submap, points: NDArray[np.float64], predicted: NDArray[np.float64], moved: NDArray[np.float64]
+    ) -> Match | None:
+        """Return the match of a scan that seems to see new ground, as far as odometry may be wrong, or None.
+
+        Few points of a scan at a wrong heading lie near what the map holds, although most of them show it.
+        """
+        settings = self._matching
+        match = self._match_far(submap, points, predicted, self._reach(moved))
+        if match is None or not self._is_good(match) or match.overlap < settings.known_overlap:
+            return None
+        if match.score < settings.convincing_share * self.usual_score:
+            return None
+        self.recoveries += 1
+        return match
 
     def _beyond_odometry(
         self, submap: Submap, points: NDArray[np.float64], predicted: NDArray[np.float64]

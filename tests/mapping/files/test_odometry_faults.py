@@ -108,3 +108,8 @@ def test_a_field_of_view_that_is_not_the_lasers_is_told(log):
     narrow = replace(log, geometry=replace(GEOMETRY, field_of_view=math.radians(160.0)))
     (remark,) = made_usable(narrow, "log").remarks
     assert remark.startswith("turns contradict each other: scans turn 0.6")
+
+
+def test_odometry_in_centimetres_is_refused(log):
+    with pytest.raises(ValueError, match=r"moves at \d+ a second, as odometry in centimetres"):
+        made_usable(replace(log, odometry=log.odometry * [100.0, 100.0, 1.0]), "log")
