@@ -52,6 +52,9 @@ _OPPOSED, _RATIO = 0.85, 0.2
 _STEADY = 0.7
 """A ratio of turns is believed if this share of the turns is within a fifth of it."""
 
+_COMPARED_BEAMS = 360
+"""Of scans with more than twice as many beams some are compared."""
+
 _FIT = 0.45
 """Disagreement of two turned scans below which their turn is believed; 1 is none of their ranges alike."""
 
@@ -113,9 +116,10 @@ def mended(
 def _check_metres(odometry: NDArray[np.float64], stamps: NDArray[np.float64]) -> None:
     """Raise ValueError if the robot usually moves as fast as odometry in centimetres or millimetres would be."""
     motions = relative(odometry[:-1], odometry[1:])
-    lengths, steps = np.hypot(motions[:, 0], motions[:, 1]), np.diff(stamps)
-    moving = (lengths > 0.0) & (steps > 0.0)
-    speed = float(np.median(lengths[moving] / steps[moving])) if moving.sum() >= _MIN_PAIRS else 0.0
+    lengths, duration = np.hypot(motions[:, 0], motions[:, 1]), float(stamps[-1] - stamps[0])
+    moving = lengths[lengths > 0.0]
+    # Stamps of scans that came in a bundle say nothing of single speeds, and jumps nothing of usual lengths.
+    speed = float(np.median(moving)) * len(lengths) / duration if len(moving) >= _MIN_PAIRS and duration > 0.0 else 0.0
     if speed > _MAX_SPEED:
         raise ValueError(
             f"the robot moves at {speed:,.0f} a second, as odometry in centimetres or millimetres; want metres"
@@ -243,9 +247,11 @@ class _Turns:
 
 def _turn(before: NDArray[np.float32], after: NDArray[np.float32], geometry: ScanGeometry) -> float:
     """Return the turn from one scan to the next at which their ranges are most alike [rad]; nan if none are."""
-    most = max(int(_MAX_SHIFT / geometry.angle_increment), 1)
-    shifts = np.arange(-most, most + 1)
-    index = np.arange(geometry.beams) + shifts[:, None]
+    stride = max(geometry.beams // _COMPARED_BEAMS, 1)
+    most = max(int(_MAX_SHIFT / (stride * geometry.angle_increment)), 1)
+    shifts = stride * np.arange(-most, most + 1)
+    after = after[::stride]
+    index = stride * np.arange(len(after)) + shifts[:, None]
     is_inside = np.ones(index.shape, np.bool_) if geometry.is_full_circle else (index >= 0) & (index < geometry.beams)
     moved = before[index % geometry.beams]
     known = is_inside & np.isfinite(moved) & np.isfinite(after)
@@ -253,7 +259,7 @@ def _turn(before: NDArray[np.float32], after: NDArray[np.float32], geometry: Sca
         apart = np.minimum(np.abs(moved - after) / (_CHANGED_M + 0.1 * after), 1.0)
     count = known.sum(axis=1)
     cost = np.where(known, apart, 0.0).sum(axis=1) / np.maximum(count, 1)
-    cost[count < 0.4 * geometry.beams] = 1.0
+    cost[count < 0.4 * len(after)] = 1.0
     best = int(cost.argmin())
     is_clear = cost[best] < _FIT and cost[best] < 0.8 * float(np.median(cost))
     return float(shifts[best] * geometry.angle_increment) if is_clear else math.nan
