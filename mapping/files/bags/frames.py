@@ -118,14 +118,14 @@ def _matrix(transform: Any) -> NDArray[np.float64]:  # noqa: ANN401
     pose = np.eye(4)
     pose[:3, 3] = place.x, place.y, place.z
     if square > 0.0:
-        scale = 2.0 / square
-        pose[:3, :3] += scale * np.array(
-            [
-                [-y * y - z * z, x * y - z * w, x * z + y * w],
-                [x * y + z * w, -x * x - z * z, y * z - x * w],
-                [x * z - y * w, y * z + x * w, -x * x - y * y],
-            ]
-        )
+        with np.errstate(over="ignore", invalid="ignore"):
+            pose[:3, :3] += (2.0 / square) * np.array(
+                [
+                    [-y * y - z * z, x * y - z * w, x * z + y * w],
+                    [x * y + z * w, -x * x - z * z, y * z - x * w],
+                    [x * z - y * w, y * z + x * w, -x * x - y * y],
+                ]
+            )
     if not np.isfinite(pose).all():
         raise ValueError("a transform between frames is not finite; want metres and a quaternion")
     return pose

@@ -70,7 +70,10 @@ def read_bag_log(path: Path, topic: str | None = None) -> LaserLog:
     with reading(path, "a whole bag", WANTED):
         try:
             messages = _messages(path, topic)
-        except STORAGE_ERRORS as error:
+        except (*STORAGE_ERRORS, OSError) as error:
+            # A bare one without a file's name is of a library: bz2 on damaged data, or a seek to before the beginning.
+            if isinstance(error, OSError) and (type(error) is not OSError or error.filename is not None):
+                raise
             raise ValueError(
                 f"{path} is not a whole bag, it is cut off or damaged ({reason(error)}); {WANTED}"
             ) from error
