@@ -39,8 +39,8 @@ commands; `lidarium COMMAND --help` shows the options of one:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command and return its exit code.
 
-    0 is done, 2 bad input, 3 no solution found, 130 interrupted by Ctrl-C, 143 by SIGTERM (finished parts are
-    kept), 1 a defect of lidarium. The arguments are those of the process by default.
+    0 is done, 2 bad input, 3 no solution found, 4 done but probably wrong, 130 interrupted by Ctrl-C, 143 by SIGTERM
+    (finished parts are kept), 1 a defect of lidarium. The arguments are those of the process by default.
     """
     from lidarium.evaluation.processes import end_workers, heard_termination, leave_at_the_next
 

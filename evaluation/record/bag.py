@@ -49,6 +49,7 @@ class _BagRecorder(Watcher):
 
     def begin(self, env: ExplorationEnv) -> None:
         """Write the mounts of the lasers, and the first scans."""
+        self._starts = env.world.poses.copy()
         self._times: list[float] = []
         self._poses: list[NDArray[np.float64]] = []
         for robot in env.possible_agents:
@@ -73,7 +74,9 @@ class _BagRecorder(Watcher):
 
     def _write(self, env: ExplorationEnv) -> None:
         time_s, poses, steps = _time_of(env), env.world.poses, int(env.world.steps[0])
-        reckoned = env.simulation.odometry
+        # Wheels that do not err are not simulated unless a localizer reads them: they measure the true motion.
+        is_true = env.settings.odometry.is_ideal and env.settings.localization == "truth"
+        reckoned = relative(self._starts, poses) if is_true else env.simulation.odometry
         odom_on_map = composed(poses, relative(reckoned, np.zeros_like(poses)))
         for row, robot in enumerate(env.possible_agents):
             odom, base = f"{robot}/odom", f"{robot}/base_link"

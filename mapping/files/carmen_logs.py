@@ -1,9 +1,9 @@
 """Logs of the CARMEN robot navigation toolkit: text, one message per line, plain or gzipped.
 
-FLASER and ROBOTLASER1 (scans), ODOM (odometry) and PARAM (the pose of the laser) are read. The line of a scan
-has its odometry, too. GridFastSLAM, which is recognised by its NEFF lines, replaces it in scans and in the
-first ODOM after each; in its logs odometry is the sum of the motions from ODOM to ODOM without those first
-ones, and a scan has the stamp of the ODOM before it.
+FLASER and ROBOTLASER1 (scans), ODOM (odometry) and PARAM (the pose of the laser) are read, and LASER_READING (scans)
+of GMapping. The line of a scan has its odometry, too. GridFastSLAM, which is recognised by its NEFF lines, replaces it
+in scans and in the first ODOM after each; in its logs odometry is the sum of the motions from ODOM to ODOM without
+those first ones, and a scan has the stamp of the ODOM before it.
 
 A header states the field of view, the step from beam to beam and the number of beams, two of which suffice.
 If they contradict each other, the number of beams is certain, and the field of view is believed.
@@ -17,13 +17,21 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from lidarium.mapping.files.beams import (
+    WHOLE_TURN,
+    Beams,
+    check_metres,
+    from_right_to_left,
+    marked,
+    on_one_grid,
+    symmetric_scans,
+)
 from lidarium.mapping.files.guarded_reading import read_lines, reading
-from lidarium.mapping.files.laser_logs import LaserLog, made_usable, symmetric_scans
+from lidarium.mapping.files.laser_logs import LaserLog, made_usable
 from lidarium.mapping.files.trajectories import interpolated
 from lidarium.mapping.geometry.rigid import composed, relative
 
@@ -38,27 +46,6 @@ SICK_BEAMS = {
     401: (100.0, 0.25),
 }
 """Field of view and step [degrees] of a SICK LMS by its number of beams."""
-
-WHOLE_TURN = 2.0 * math.pi
-
-_JUMP_SHARE = 0.2
-"""Neighbouring returns that differ by more than this share are of two surfaces."""
-
-
-class _Beams(NamedTuple):
-    """Directions of the beams of a scan.
-
-    Attributes
-    ----------
-    angle_min, increment : float
-        Of the first beam against the heading, and from beam to beam [rad].
-    remark : str
-        Parts of the header that were ignored; empty if there are none.
-    """
-
-    angle_min: float
-    increment: float
-    remark: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,15 +64,15 @@ class _FieldOfView:
     stated: float | None = None
     step: float | None = None
 
-    def beams(self, count: int) -> _Beams:
+    def beams(self, count: int) -> Beams:
         """Return the directions of a number of beams: the user's, the log's, a SICK's, or half a turn."""
         if self.wanted is not None:
             return _spread(self.wanted, count)
         if self.stated is not None and self.step is not None and _agrees(self.stated, self.step, count):
-            return _Beams(-0.5 * self.stated, self.step)
+            return Beams(-0.5 * self.stated, self.step)
         if count in SICK_BEAMS:
             view, step = (math.radians(angle) for angle in SICK_BEAMS[count])
-            return _Beams(-0.5 * view, step)
+            return Beams(-0.5 * view, step)
         if self.stated is not None:
             return _spread(self.stated, count)
         return _spread(
@@ -96,7 +83,7 @@ class _FieldOfView:
         )
 
 
-def _stated_beams(start: float, view: float, step: float, count: int) -> _Beams:
+def _stated_beams(start: float, view: float, step: float, count: int) -> Beams:
     """Return the directions that a header states.
 
     Parameters
@@ -106,10 +93,10 @@ def _stated_beams(start: float, view: float, step: float, count: int) -> _Beams:
         those of a laser that is mounted upside down.
     """
     if view == 0.0 or abs(view) > 1.01 * WHOLE_TURN or _agrees(abs(view), abs(step), count):
-        return _Beams(start, step)
+        return Beams(start, step)
     is_circle = abs(abs(view) - WHOLE_TURN) < 1e-3
     size = abs(view) / (count if is_circle else max(count - 1, 1))
-    return _Beams(
+    return Beams(
         start,
         math.copysign(size, view),
         f"steps of {step:g} rad contradict {count} beams over {view:g} rad: {size:.6g} rad are assumed",
@@ -121,47 +108,14 @@ def _agrees(view: float, step: float, count: int) -> bool:
     return step > 0.0 and abs((count - 0.5) * step - view) < step
 
 
-def _from_right_to_left(ranges: list[float], beams: _Beams) -> tuple[list[float], _Beams]:
-    """Return a scan whose beams run counter-clockwise: that of an upside-down laser is reversed."""
-    if beams.increment >= 0.0:
-        return ranges, beams
-    last = beams.angle_min + (len(ranges) - 1) * beams.increment
-    return ranges[::-1], _Beams(last, -beams.increment, "scans run clockwise, as of a laser upside down")
+def _spread(view: float, count: int, remark: str = "") -> Beams:
+    return Beams(-0.5 * view, view / max(count - 1, 1), remark)
 
 
-def _resampled(ranges: NDArray[np.float32], beams: _Beams, wanted: _Beams, count: int) -> NDArray[np.float32]:
-    """Return a scan at other directions.
-
-    Between two returns of one surface the range is interpolated; else the nearest beam counts. Directions beyond
-    the scan are invalid.
-
-    Parameters
-    ----------
-    ranges : (n,) float32
-        The scan [m]; inf for no return, nan for an invalid beam.
-    """
-    own = len(ranges)
-    is_circle = own * beams.increment > WHOLE_TURN - 0.5 * beams.increment
-    place = (wanted.angle_min + np.arange(count) * wanted.increment - beams.angle_min) / beams.increment
-    if is_circle:
-        place %= WHOLE_TURN / beams.increment
-    before = np.floor(place + 1e-9).astype(np.int64)
-    share = np.maximum(place - before, 0.0)
-    is_seen = is_circle | ((place > -0.5) & (place < own - 0.5))
-    index = np.array([before, before + 1])
-    left, right = ranges[index % own if is_circle else np.clip(index, 0, own - 1)].astype(np.float64)
-    with np.errstate(invalid="ignore"):
-        is_one = np.abs(left - right) <= _JUMP_SHARE * np.minimum(left, right)
-        between = (1.0 - share) * left + share * right
-    found = np.where(is_one & np.isfinite(between), between, np.where(share < 0.5, left, right))
-    return np.where(is_seen, found, np.nan).astype(np.float32)
-
-
-def _spread(view: float, count: int, remark: str = "") -> _Beams:
-    return _Beams(-0.5 * view, view / max(count - 1, 1), remark)
-
-
-_QUIET = ("#", "NEFF", "PARAM", "SYNC", "MARKER", "RLASER", "REMISSION", "TRUEPOS")
+_QUIET = (
+    *("#", "NEFF", "PARAM", "SYNC", "MARKER", "RLASER", "REMISSION", "TRUEPOS"),
+    *("ODO_UPDATE", "SM_UPDATE", "FRAME", "RESAMPLE"),
+)
 """Messages that hold nothing that is needed here."""
 
 
@@ -169,13 +123,15 @@ _QUIET = ("#", "NEFF", "PARAM", "SYNC", "MARKER", "RLASER", "REMISSION", "TRUEPO
 class _Scan:
     """A line with a scan; without beams if the line has no angles."""
 
-    ranges: list[float]
+    ranges: list[float] | NDArray[np.float32]
     stamp: float
     robot_pose: list[float]
     laser_pose: list[float]
-    beams: _Beams | None
+    beams: Beams | None
     max_range: float
     has_angles: bool = True
+    is_raw: bool = False
+    """Whether its odometry is as measured also in a log of GridFastSLAM."""
 
 
 @dataclass(slots=True, eq=False)
@@ -204,6 +160,8 @@ def _read_line(line: str, content: _Content) -> None:
                 content.scans.append((_flaser(words), len(content.odometry)))
             case "ROBOTLASER1":
                 content.scans.append((_robotlaser(words), len(content.odometry)))
+            case "LASER_READING":
+                content.scans.append((_laser_reading(words), len(content.odometry)))
             case "ODOM":
                 content.odometry.append((_numbers(words[1:4], 3), float(words[9] if len(words) > 9 else words[-1])))
             case "PARAM" if len(words) > 2:
@@ -226,14 +184,39 @@ def _numbers(words: list[str], count: int) -> list[float]:
 def _flaser(words: list[str]) -> _Scan:
     """Read a ``FLASER`` line, of which old logs lack the last two values.
 
-    It is ``FLASER n ranges laser_pose robot_pose stamp host logger_stamp``.
+    It is ``FLASER n ranges laser_pose robot_pose stamp host logger_stamp``. Some programs write the number of
+    remissions behind the ranges, and the remissions, as in ``ROBOTLASER1``: poses and stamp end at the host.
     """
-    beams = int(words[1])
-    ranges, tail = list(map(float, words[2 : 2 + beams])), words[2 + beams :]
-    if beams < 1 or len(ranges) != beams:
-        raise ValueError("too few ranges")
+    ranges, tail = _ranges(words)
+    host = next((k for k, word in enumerate(tail) if not _is_number(word)), len(tail))
+    if host > 7 and tail[0].isdigit() and host == 8 + int(tail[0]):
+        tail = tail[1 + int(tail[0]) :]
     laser_pose, robot_pose = _numbers(tail[:3], 3), _numbers(tail[3:6], 3)
     return _Scan(ranges, float(tail[6]), robot_pose, laser_pose, None, math.nan, has_angles=False)
+
+
+def _laser_reading(words: list[str]) -> _Scan:
+    """Read a line of GMapping: ``LASER_READING n ranges x y theta stamp``, the pose by odometry."""
+    ranges, tail = _ranges(words)
+    pose = _numbers(tail[:3], 3)
+    return _Scan(ranges, float(tail[3]), pose, pose, None, math.nan, has_angles=False, is_raw=True)
+
+
+def _ranges(words: list[str]) -> tuple[list[float], list[str]]:
+    """Return the ranges, whose number is the second word, and the words behind them."""
+    beams = int(words[1])
+    ranges = list(map(float, words[2 : 2 + beams]))
+    if beams < 1 or len(ranges) != beams:
+        raise ValueError("too few ranges")
+    return ranges, words[2 + beams :]
+
+
+def _is_number(word: str) -> bool:
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True
 
 
 def _robotlaser(words: list[str]) -> _Scan:
@@ -269,6 +252,19 @@ SICK_MAX_M = 80.0
 """From this range on, a SICK LMS reports the absence of a return [m]."""
 
 
+def _drop_repeated(content: _Content) -> None:
+    """Leave out lines without directions that repeat a ROBOTLASER1 line: a logger wrote each scan both ways."""
+    told = {round(scan.stamp / SAME_STAMP_S) for scan, _ in content.scans if scan.has_angles}
+    kept = [
+        (scan, before)
+        for scan, before in content.scans
+        if scan.has_angles or round(scan.stamp / SAME_STAMP_S) not in told
+    ]
+    if len(kept) < len(content.scans):
+        content.skipped["FLASER lines that repeat ROBOTLASER1 lines"] = len(content.scans) - len(kept)
+        content.scans = kept
+
+
 def _give_directions(content: _Content, field_of_view: float | None) -> None:
     """Give each scan the directions of its beams, from right to left."""
     fov, step = (_parameter(content, f"laser_front_laser_{name}") for name in ("fov", "resolution"))
@@ -280,45 +276,28 @@ def _give_directions(content: _Content, field_of_view: float | None) -> None:
     assumed = cache(view.beams)
     for scan, _ in content.scans:
         stated = scan.beams or assumed(len(scan.ranges))
-        scan.ranges, beams = _from_right_to_left(scan.ranges, stated)
-        scan.beams = beams._replace(remark="") if beams.remark else beams
-        for remark in {stated.remark, beams.remark} - {""} if stated.remark or beams.remark else ():
+        ranges, beams = from_right_to_left(np.array(scan.ranges, np.float32), stated)
+        scan.ranges, scan.beams = ranges, beams._replace(remark="")
+        for remark in {stated.remark, beams.remark} - {""}:
             content.remarks[remark] += 1
 
 
-def _on_one_grid(content: _Content) -> tuple[list[tuple[_Scan, int]], _Beams, NDArray[np.float32], float]:
-    """Return the scans that are kept, the directions of most, the ranges in these, and the longest one.
+def _on_one_grid(content: _Content) -> tuple[list[tuple[_Scan, int]], Beams, NDArray[np.float32], float]:
+    """Return the scans that are kept, the directions of their beams, their ranges, and the longest one.
 
     Scans whose own line has other directions are resampled; a scan without any that has fewer beams than most is
     damaged.
     """
-    groups = Counter((len(scan.ranges), scan.beams) for scan, _ in content.scans)
-    (count, beams), _ = groups.most_common(1)[0]
-    assert beams is not None
+    count = Counter(len(scan.ranges) for scan, _ in content.scans).most_common(1)[0][0]
     kept = [each for each in content.scans if len(each[0].ranges) == count or each[0].has_angles]
     if len(kept) < len(content.scans):
         content.skipped[f"scans that have not {count} beams as most"] = len(content.scans) - len(kept)
     highest = _max_range(kept)
-    ranges = np.empty((len(kept), count), np.float32)
-    is_other = np.array([(len(scan.ranges), scan.beams) != (count, beams) for scan, _ in kept])
-    same = [scan.ranges for (scan, _), other in zip(kept, is_other, strict=True) if not other]
-    ranges[~is_other] = _marked(np.array(same, np.float32), highest)
-    for place in np.flatnonzero(is_other):
-        scan = kept[place][0]
-        assert scan.beams is not None
-        own = _marked(np.array(scan.ranges, np.float32), highest)
-        ranges[place] = _resampled(own, scan.beams, beams, count)
-    if is_other.any():
-        content.remarks[f"scans whose beams are not {count} as of most are resampled"] = int(is_other.sum())
+    scans = [marked(np.array(scan.ranges, np.float32), 0.0, highest) for scan, _ in kept]
+    ranges, beams, others = on_one_grid(scans, [scan.beams for scan, _ in kept if scan.beams is not None])
+    if others:
+        content.remarks[f"scans whose beams are not {ranges.shape[1]} as of most are resampled"] = others
     return kept, beams, ranges, highest
-
-
-def _marked(ranges: NDArray[np.float32], highest: float) -> NDArray[np.float32]:
-    """Mark invalid ranges: nan if the beam is invalid, inf if nothing returned."""
-    ranges[~(ranges > 0.0)] = np.nan
-    with np.errstate(invalid="ignore"):
-        ranges[ranges >= highest * (1.0 - 1e-6)] = np.inf
-    return ranges
 
 
 def _max_range(scans: list[tuple[_Scan, int]]) -> float:
@@ -326,7 +305,7 @@ def _max_range(scans: list[tuple[_Scan, int]]) -> float:
     first = scans[0][0]
     if math.isfinite(first.max_range) and first.max_range > 0.0:
         return first.max_range
-    known = np.array([value for scan, _ in scans for value in scan.ranges], np.float32)
+    known = np.concatenate([scan.ranges for scan, _ in scans]).astype(np.float32)
     known = known[np.isfinite(known)]
     highest = float(known.max()) if known.size and known.max() > 0.0 else 1.0
     return min(highest, SICK_MAX_M)
@@ -357,6 +336,8 @@ def read_carmen_log(path: Path, field_of_view: float | None = None) -> LaserLog:
             _read_line(line, content)
         if not content.scans:
             raise ValueError(f"{path} holds no scans; want a CARMEN log with FLASER or ROBOTLASER1 lines")
+        _drop_repeated(content)
+        check_metres(np.concatenate([scan.ranges for scan, _ in content.scans]).astype(np.float32), str(path))
         _give_directions(content, field_of_view)
         return made_usable(_log(path, content), str(path))
 
@@ -382,7 +363,7 @@ def _log(path: Path, content: _Content) -> LaserLog:
     readings = np.array([pose for pose, _ in content.odometry], np.float64).reshape(-1, 3)
     before = np.array([before for _, before in kept], np.int64)
     remarks = tuple(f"{number} x {what}" for what, number in content.remarks.items())
-    if not content.is_corrected:
+    if not content.is_corrected or kept[0][0].is_raw:
         return LaserLog(
             stamps,
             wide,

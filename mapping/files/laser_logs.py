@@ -1,14 +1,14 @@
-"""Recorded laser scans with odometry: the log, and the repair of clocks and odometry that jump."""
+"""Recorded laser scans with odometry: the log, and the repair of its clock."""
 
-import math
+from bisect import bisect_right
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.mapping.geometry.rigid import composed, relative
-from lidarium.mapping.grids.scan_geometry import MAX_BEAMS, ScanGeometry
+from lidarium.mapping.files.odometry_faults import mended
+from lidarium.mapping.grids.scan_geometry import ScanGeometry
 
 FEW = 5
 """Number of scans in a row that may have wild stamps; if more run backwards the clock has restarted."""
@@ -73,58 +73,43 @@ def _go_on_after(stamps: NDArray[np.float64], k: int, last: int) -> bool:
     return len(ahead) == 0 or bool(np.median(ahead) >= stamps[last])
 
 
-FASTEST_M_S, FASTEST_TURN = 3.0, 4.0
-"""Speeds that an indoor robot reaches [m/s, rad/s]; higher speeds may still be usual in a log."""
+def _order(stamps: NDArray[np.float64]) -> NDArray[np.int64] | None:
+    """Return the order of time of scans that are not in it although their stamps are fine; None if they are, or not.
 
-USUAL = 3.0
-"""Factor by which the speed may exceed that which 95 % of a log's motions keep below is still believed."""
-
-
-def _without_jumps(odometry: NDArray[np.float64], stamps: NDArray[np.float64]) -> tuple[NDArray[np.float64], int]:
-    """Return odometry without its jumps, and their number.
-
-    Over a jump the robot is assumed to have moved as before it.
-
-    Parameters
-    ----------
-    odometry : (n, 3) float64
-        x, y, theta by dead reckoning [m, rad]; not finite if unknown.
-    stamps : (n,) float64
-        When, never decreasing [s].
+    In the order of time such stamps are as steady as those of a log. Those of a clock that has restarted lie between
+    each other or far apart, and a wild stamp is far from all others or too near to one.
     """
-    if len(odometry) < 4 or not np.isfinite(odometry).all():
-        return odometry, 0
-    motions = relative(odometry[:-1], odometry[1:])
     steps = np.diff(stamps)
-    # Stamps of scans that came in a bundle say nothing of the speed between them.
-    steps = np.maximum(steps, np.median(steps))
-    if not steps.all():
-        return odometry, 0
-    jumps = _beyond(np.hypot(motions[:, 0], motions[:, 1]) / steps, FASTEST_M_S) | _beyond(
-        np.abs(motions[:, 2]) / steps, FASTEST_TURN
-    )
-    if not jumps.any():
-        return odometry, 0
-    mended = odometry.copy()
-    for k, motion in enumerate(motions):
-        if jumps[k]:
-            motion = motions[k] = motions[k - 1] * (steps[k] / steps[k - 1]) if k else np.zeros(3)
-        mended[k + 1] = composed(mended[k], motion)
-    return mended, int(jumps.sum())
+    if not np.isfinite(stamps).all() or not (steps < 0.0).any():
+        return None
+    order = np.argsort(stamps, kind="stable")
+    period, forward = np.diff(stamps[order]), steps[steps > 0.0]
+    usual = float(np.median(period))
+    # A pause is a step forward between others.
+    pauses = steps[1:-1][(steps[:-2] >= 0.0) & (steps[2:] >= 0.0)]
+    if not usual > 0.0 or period.max() > max(3.0 * usual, float(pauses.max(initial=0.0))):
+        return None
+    near = int((period < 0.6 * usual).sum())
+    if len(stamps) > FEW * (1 + int((steps < 0.0).sum())):
+        # Long runs: their own steps show how steady stamps are, and those of two clocks would lie between each other.
+        is_fine = usual > 0.75 * float(np.median(forward))
+        is_fine &= near - int((forward < 0.6 * usual).sum()) <= 0.3 * _displaced(stamps)
+    else:
+        is_fine = near <= 0.5 * len(stamps)
+    return order if is_fine else None
 
 
-def _beyond(speeds: NDArray[np.float64], fastest: float) -> NDArray[np.bool_]:
-    return np.asarray(speeds > max(fastest, USUAL * float(np.percentile(speeds, 95.0))))
+def _displaced(stamps: NDArray[np.float64]) -> int:
+    """Return the smallest number of stamps without which the others are in order."""
+    ends: list[float] = []  # the last stamp of the longest ascending choices of each length, as low as possible
+    for stamp in stamps.tolist():
+        position = bisect_right(ends, stamp)
+        ends[position : position + 1] = [stamp]
+    return len(stamps) - len(ends)
 
-
-MAX_REACH_M = 10_000.0
-"""Longest range of a laser that a log may have [m]."""
 
 MAX_POSE_M = 1e8
 """Farthest that a log may lead [m]."""
-
-CIRCLE_BEAMS = 0.4
-"""Beams that miss a whole turn by less than so many steps cover it: headers round the step."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -188,13 +173,18 @@ def made_usable(log: LaserLog, where: str) -> LaserLog:
     """Return a log without unusable scans and odometry.
 
     Scans are dropped without any finite stamp or if stamps go back in time; a clock that restarts is continued.
-    Odometry is dropped if it contains no information, and its jumps are taken out.
+    Scans out of the order of time are sorted. Odometry is dropped if it contains no information, and mended by
+    ``odometry_faults``.
 
     If most stamps stand still or run backwards, the clock is useless, and scans are numbered by the second instead.
     """
     for poses in (log.odometry, log.corrected, log.readings, log.laser_pose):
         if poses is not None and poses.size and not np.nanmax(np.abs(poses), initial=0.0) <= MAX_POSE_M:
             raise ValueError(f"{where} has poses beyond {MAX_POSE_M:,.0f} m; want metres and radians")
+    order = _order(log.stamps)
+    if order is not None:
+        moved = int((order != np.arange(len(order))).sum())
+        log = replace(_at(log, order), remarks=(*log.remarks, f"{moved} scans are not in the order of time: sorted"))
     stamps, skipped, remarks = log.stamps, dict(log.skipped), list(log.remarks)
     if len(stamps) > 2 and not (np.diff(stamps) > 0.0).mean() > 0.5:
         stamps = np.arange(len(stamps), dtype=np.float64)
@@ -211,81 +201,36 @@ def made_usable(log: LaserLog, where: str) -> LaserLog:
     if clock.restarts:
         remarks.append(f"the clock restarts {clock.restarts} times; stamps are continued")
         log = _without_readings(log)
-    odometry = None if log.odometry is None else log.odometry[clock.kept]
-    if odometry is not None and (not np.isfinite(odometry).any() or not np.nanmax(np.ptp(odometry, axis=0)) > 0.0):
+    log = _at(log, clock.kept)
+    odometry, ranges = log.odometry, log.ranges
+    if odometry is not None and not _moves(odometry):
         odometry = None
     if odometry is not None:
-        odometry, jumps = _without_jumps(odometry, clock.stamps)
-        if jumps:
-            remarks.append(f"odometry jumps {jumps} times as no robot moves; the jumps are taken out")
-    return replace(
+        odometry, ranges, found = mended(odometry, ranges, log.geometry, clock.stamps)
+        remarks += found
+    return replace(log, stamps=clock.stamps, ranges=ranges, odometry=odometry, skipped=skipped, remarks=tuple(remarks))
+
+
+def _at(log: LaserLog, numbers: NDArray[np.int64]) -> LaserLog:
+    """Return a log of some of its scans, or in another order."""
+    numbered = log.reading_of_scan[numbers] if len(log.reading_of_scan) else log.reading_of_scan
+    changed = replace(
         log,
-        stamps=clock.stamps,
-        ranges=log.ranges[clock.kept],
-        odometry=odometry,
-        corrected=None if log.corrected is None else log.corrected[clock.kept],
-        reading_of_scan=log.reading_of_scan[clock.kept] if len(log.reading_of_scan) else log.reading_of_scan,
-        skipped=skipped,
-        remarks=tuple(remarks),
+        stamps=log.stamps[numbers],
+        ranges=log.ranges[numbers],
+        odometry=None if log.odometry is None else log.odometry[numbers],
+        corrected=None if log.corrected is None else log.corrected[numbers],
+        reading_of_scan=numbered,
     )
+    return _without_readings(changed) if (np.diff(numbered) < 0).any() else changed
+
+
+def _moves(odometry: NDArray[np.float64]) -> bool:
+    """Whether odometry contains information."""
+    known = odometry[np.isfinite(odometry).all(axis=1)]
+    return len(known) > 0 and bool(np.ptp(known, axis=0).max() > 0.0)
 
 
 def _without_readings(log: LaserLog) -> LaserLog:
     """Return a log without the readings between its scans, whose stamps are of no use."""
     return replace(log, readings_stamps=np.zeros(0), readings=np.zeros((0, 3)), reading_of_scan=np.zeros(0, np.int64))
-
-
-def symmetric_scans(
-    ranges: NDArray[np.float32], angle_min: float, increment: float, reach: tuple[float, float]
-) -> tuple[NDArray[np.float32], ScanGeometry, float]:
-    """Return scans symmetric about the laser's axis, their geometry, and that axis.
-
-    Invalid beams are added on one side. The axis is within half a beam of the heading, by which beams that are not
-    symmetric about the heading are turned: it belongs to the laser's pose on the robot.
-
-    Parameters
-    ----------
-    ranges : (scans, beams) float32
-        The scans [m].
-    angle_min, increment : float
-        Direction of the first beam against the heading, and from beam to beam [rad].
-    reach : (float, float)
-        Shortest and longest measured range [m].
-    """
-    beams = ranges.shape[1]
-    if not (increment > 0.0 and beams * increment < 2.0 * math.pi + 1.5 * increment and math.isfinite(angle_min)):
-        raise ValueError(
-            f"{beams} beams from {angle_min} rad in steps of {increment} rad; want steps of more than 0 within a circle"
-        )
-    if not abs(2.0 * angle_min / increment) + 2 * beams <= 2 * MAX_BEAMS or not reach[1] <= MAX_REACH_M:
-        raise ValueError(
-            f"{beams} beams from {angle_min} rad in steps of {increment} rad reach {reach[1]:g} m; want at "
-            f"most {MAX_BEAMS:,} about the heading, and {MAX_REACH_M:,.0f} m"
-        )
-    whole = 2.0 * math.pi
-    if abs((beams - 1) * increment - whole) < CIRCLE_BEAMS * increment:
-        # The last beam repeats the first.
-        ranges, beams = ranges[:, :-1], beams - 1
-    if abs(beams * increment - whole) < CIRCLE_BEAMS * increment:
-        increment = whole / beams
-        turned = round((angle_min + math.pi) / increment)
-        geometry = ScanGeometry(beams=beams, field_of_view=whole, range_min=reach[0], range_max=reach[1])
-        return (
-            np.roll(ranges, turned, axis=1),
-            geometry,
-            _axis(angle_min + math.pi - turned * increment, increment),
-        )
-    missing = round((2.0 * angle_min + (beams - 1) * increment) / increment)
-    added = np.full((len(ranges), abs(missing)), np.nan, np.float32)
-    wide = np.concatenate([added, ranges] if missing > 0 else [ranges, added], axis=1)
-    view = (wide.shape[1] - 1) * increment
-    if view > whole:
-        raise ValueError(f"beams begin at {angle_min} rad; want beams about the heading")
-    geometry = ScanGeometry(beams=wide.shape[1], field_of_view=view or whole, range_min=reach[0], range_max=reach[1])
-    first = angle_min - max(missing, 0) * increment
-    return wide, geometry, _axis(first + 0.5 * view, increment)
-
-
-def _axis(angle: float, increment: float) -> float:
-    """Return the angle of the laser's axis [rad]; 0 if it is a rounded zero."""
-    return angle if abs(angle) > 1e-2 * increment else 0.0

@@ -5,11 +5,12 @@ from pathlib import Path
 from lidarium.mapping.files.bags.reading import is_bag, read_bag_log
 from lidarium.mapping.files.carmen_logs import read_carmen_log
 from lidarium.mapping.files.laser_logs import LaserLog
+from lidarium.mapping.files.mines_logs import read_mines_log
 from lidarium.mapping.files.npz_logs import read_npz_log
 
 
 def read_log(path: Path | str, topic: str | None = None, field_of_view: float | None = None) -> LaserLog:
-    """Read a log of laser scans: a CARMEN log, an npz file or a bag of ROS 1 or 2.
+    """Read a log of laser scans: a CARMEN log, an npz file, a bag of ROS 1 or 2, or a log of Mines ParisTech.
 
     Use it with `run_slam`. Scans without a usable stamp and odometry without information are left out;
     ``skipped`` of the log counts what was left out, by reason.
@@ -18,7 +19,8 @@ def read_log(path: Path | str, topic: str | None = None, field_of_view: float | 
     ----------
     path : Path or str
         A CARMEN log (``.log``, ``.clf``, also ``.gz``), an ``.npz`` file, or a bag (``.bag``, ``.mcap``,
-        ``.db3``, or a folder of these). Bags need the extra ``bags``.
+        ``.db3``, or a folder of these), or a log of Mines ParisTech (``.dat``, also ``.gz``). Bags need the extra
+        ``bags``.
     topic : str, optional
         Topic of the scans if a bag has several.
     field_of_view : float, optional
@@ -52,4 +54,6 @@ def read_log(path: Path | str, topic: str | None = None, field_of_view: float | 
         return read_bag_log(path, topic)
     if path.suffix == ".npz":
         return read_npz_log(path)
+    if path.name.endswith((".dat", ".dat.gz")):
+        return read_mines_log(path)
     return read_carmen_log(path, field_of_view)

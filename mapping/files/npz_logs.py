@@ -25,8 +25,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from lidarium.mapping.files.beams import check_metres, marked, symmetric_scans
 from lidarium.mapping.files.guarded_reading import read_arrays, reading
-from lidarium.mapping.files.laser_logs import LaserLog, made_usable, symmetric_scans
+from lidarium.mapping.files.laser_logs import LaserLog, made_usable
 from lidarium.mapping.files.output import write_whole
 from lidarium.mapping.geometry.bounds import shown
 
@@ -51,18 +52,14 @@ def _from_arrays(path: Path, arrays: Mapping[str, NDArray[Any]]) -> LaserLog:
     if ranges.ndim != 2 or ranges.shape[1] == 0:
         raise ValueError(f"{path}: ranges have shape {ranges.shape}; want (scans, beams)")
     scans = len(ranges)
-    highest = _number(path, arrays, "max_range", _highest(ranges))
-    ranges[ranges < 0.0] = np.nan
-    with np.errstate(invalid="ignore"):
-        ranges[ranges >= highest * (1.0 - 1e-6)] = np.inf
+    check_metres(ranges, str(path))
+    least, highest = _number(path, arrays, "min_range", 0.0), _number(path, arrays, "max_range", _highest(ranges))
     first, increment = (
         _number(path, arrays, "angle_min", math.nan),
         _number(path, arrays, "angle_increment", math.nan),
     )
     try:
-        wide, geometry, axis = symmetric_scans(
-            ranges, first, increment, (_number(path, arrays, "min_range", 0.0), highest)
-        )
+        wide, geometry, axis = symmetric_scans(marked(ranges, least, highest), first, increment, (least, highest))
     except ValueError as error:
         raise ValueError(f"{path}: {error}") from error
     stamps = _table(path, arrays, "stamp", (scans,))

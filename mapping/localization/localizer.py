@@ -20,7 +20,7 @@ class Sensing:
     time_s : float
         When the odometry was read and the last beam of the scan was taken [s].
     odometry : (3,) float64
-        x, y, theta by dead reckoning since its own arbitrary beginning [m, rad].
+        x, y, theta by dead reckoning since its own arbitrary beginning [m, rad]; nan if unknown.
     ranges : (beams,) float32
         The scan [m]; inf for no return, nan for an invalid beam.
     """

@@ -113,6 +113,8 @@ class MatchingSettings:
     blind_overlap : float
         Share of the returns near observed cells of the local map below which a match does not count if
         odometry led nowhere.
+    known_overlap : float
+        The same if a scan seems to see new ground where odometry led.
     evaluations : int
         Maximum number of placements, and blocks of them, examined in such a search.
     explained_share : float
@@ -169,6 +171,7 @@ class MatchingSettings:
     blind_angle: Angle = math.radians(50.0)
     wide_share: Positive = 0.08
     blind_overlap: Positive = 0.7
+    known_overlap: Positive = 0.5
     evaluations: Count = 100_000
     explained_share: Positive = 0.35
     lost_evaluations: Count = 400_000

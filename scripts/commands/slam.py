@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from tyro.conf import Positional
 
-from lidarium.scripts.common import Answer, Command, counted, notify, table
+from lidarium.scripts.common import DONE, DOUBTFUL, Answer, Command, counted, notify, table
 
 if TYPE_CHECKING:
     import numpy as np
@@ -32,10 +32,11 @@ class _Slam(Command):
     compiles: ClassVar[bool] = True
 
     log: Positional[Path]
-    """CARMEN log, .npz file or bag of ROS 1 or 2.
+    """CARMEN log, .npz file, bag of ROS 1 or 2, or log of Mines ParisTech.
 
     CARMEN logs (.log, .clf, also .gz) have FLASER or ROBOTLASER1 lines; .npz holds ranges, stamp and
-    pose_odom; bags are .mcap, .db3 or .bag files with LaserScan messages, or folders of these (extra bags).
+    pose_odom; bags are .mcap, .db3 or .bag files with LaserScan messages, or folders of these (extra bags);
+    logs of Mines are .dat.
     """
     topic: str | None = None
     """topic of the scans, if a bag has several"""
@@ -113,13 +114,17 @@ def execute(command: _Slam) -> Answer:
         raise ValueError(
             f"{command.log} holds no scan with a return within {command.range} m; want a larger --range or another log"
         )
-    result = _result(command, log, followed)
+    verdict = None
+    if followed.reasons_to_doubt:
+        verdict = f"this map is probably wrong: {'; '.join(followed.reasons_to_doubt)}"
+        notify(f"{command.log}: {verdict}")
+    result = _result(command, log, followed, verdict)
     if reference is not None:
         result |= _against_reference(command, log, followed.poses, reference)
     if relations is not None:
         result["relations"] = _against_relations(command, log, followed.poses, relations)
     _write(command, out, log, followed, result)
-    return Answer(result, _summary(result, out))
+    return Answer(result, _summary(result, out), DONE if verdict is None else DOUBTFUL)
 
 
 def _settings_of(command: _Slam) -> "SlamSettings":
@@ -155,7 +160,7 @@ def _log(command: _Slam) -> "LaserLog":
     return log.limited(command.range, command.clear_without_return)
 
 
-def _result(command: _Slam, log: "LaserLog", followed: "Followed") -> dict[str, Any]:
+def _result(command: _Slam, log: "LaserLog", followed: "Followed", verdict: str | None) -> dict[str, Any]:
     import numpy as np
 
     from lidarium import __version__
@@ -171,7 +176,8 @@ def _result(command: _Slam, log: "LaserLog", followed: "Followed") -> dict[str, 
         "log": command.log.name,
         "scans": len(log.stamps),
         "skipped": log.skipped,
-        "remarks": list(log.remarks),
+        "remarks": [*log.remarks, *([] if verdict is None else [verdict])],
+        "probably_wrong": verdict is not None,
         "odometry": not command.ignore_odometry and log.odometry is not None,
         "data_s": round(data_s, 3),
         "cpu_s": round(cpu_s, 3),
@@ -272,6 +278,8 @@ def _summary(result: dict[str, Any], out: Path) -> str:
     if result["doubtful"]:
         scans = sum(doubt["scans"] for doubt in result["doubtful"])
         rows.append(("doubtful", f"{scans} scans in {len(result['doubtful'])} stretches, see slam.json"))
+        worst = max(result["doubtful"], key=lambda doubt: doubt["scans"])
+        rows.append(("longest", f"{worst['start_s']:.3f} to {worst['end_s']:.3f} s: {worst['reason']}"))
     if "ate_m" in result:
         rows.append(("ATE", f"{result['ate_m']:.3f} m"))
     if "relations" in result:

@@ -229,6 +229,11 @@ def _logs(folder: Path) -> None:
             f"ODOM {pose} 0.1 0.0 0.0 {stamp:.3f} host {stamp:.3f}",
             f"FLASER {len(scan)} {told} {pose} {pose} {stamp:.3f} host {stamp:.3f}",
         ]
+    lines.append(f"LASER_READING {len(scan)} {told} {pose} {stamp + 0.2:.3f}")
+    rows = [
+        f"{200_000 * k} 0 {100 * k} {110 * k} {'0 ' * 20}{' '.join(['1500'] * 682)} 5" for k in range(len(log.stamps))
+    ]
+    (folder / "mines.dat").write_text("\n".join(rows) + "\n")
     (folder / "carmen.log").write_text("\n".join(lines) + "\n")
     (folder / "carmen.log.gz").write_bytes(gzip.compress((folder / "carmen.log").read_bytes()))
     write_tum(folder / "trajectory.tum", log.stamps, poses)

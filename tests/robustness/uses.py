@@ -24,6 +24,7 @@ from lidarium.mapping.files.bags.reading import read_bag_log
 from lidarium.mapping.files.carmen_logs import read_carmen_log
 from lidarium.mapping.files.laser_logs import LaserLog
 from lidarium.mapping.files.map_files import cropped, read_grey_map, read_ros_map
+from lidarium.mapping.files.mines_logs import read_mines_log
 from lidarium.mapping.files.npz_logs import read_npz_log
 from lidarium.mapping.files.spline_files import compact_arrays, read_spline_map
 from lidarium.mapping.files.trajectories import interpolated, read_tum
@@ -151,6 +152,7 @@ USES: dict[str, Callable[[Path], None]] = {
     "array": _array,
     "log": lambda path: _log(read_npz_log, path),
     "carmen": lambda path: _log(read_carmen_log, path),
+    "mines": lambda path: _log(read_mines_log, path),
     "trajectory": _trajectory,
     "relations": read_relations,
     "splines": _splines,

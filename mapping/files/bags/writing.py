@@ -99,8 +99,12 @@ class BagWriter:
         *,
         height: float = 0.0,
         is_static: bool = False,
+        topic: str | None = None,
     ) -> None:
-        """Write the pose of a frame in another one: x, y, theta [m, rad], and its height [m]."""
+        """Write the pose of a frame in another one: x, y, theta [m, rad], and its height [m].
+
+        By default to ``/tf``, or to ``/tf_static``.
+        """
         position, orientation = _in_space(pose, height)
         transform = self._made(
             "geometry_msgs/msg/Transform",
@@ -113,7 +117,7 @@ class BagWriter:
             child_frame_id=child,
             transform=transform,
         )
-        self._write(_LATCHED if is_static else "/tf", TRANSFORMS, time_s, transforms=[stamped])
+        self._write(topic or (_LATCHED if is_static else "/tf"), TRANSFORMS, time_s, transforms=[stamped])
 
     def grid(
         self,

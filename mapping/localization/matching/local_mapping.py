@@ -49,7 +49,7 @@ class _LocalMatcher:
         points: NDArray[np.float64],
         predicted: NDArray[np.float64],
         moved: NDArray[np.float64],
-        uncertainty: NDArray[np.float64],
+        uncertainty: NDArray[np.float64] | None,
         failed: int,
     ) -> Match | None:
         """Return the pose of a scan on a local map; None if it does not match.
@@ -70,26 +70,30 @@ class _LocalMatcher:
         moved : (3,) float64
             The motion since the last match that led there.
         uncertainty : (3, 3) float64
-            Covariance of that motion, in the robot's frame at its end [m^2, m rad, rad^2].
+            Covariance of that motion, in the robot's frame at its end [m^2, m rad, rad^2]; None if odometry does not
+            measure it.
         failed : int
             How many scans in a row did not match before.
         """
         settings = self._matching
-        is_blind = not self._uses_odometry or failed >= settings.wide_after
-        near = self._match_near(submap, points, predicted, uncertainty) if self._uses_odometry else None
+        is_blind = uncertainty is None or failed >= settings.wide_after
+        near = None if uncertainty is None else self._match_near(submap, points, predicted, uncertainty)
         self.contradiction = 1.0 if near is None else near.contradiction
         is_sparse = near is not None and len(points) < settings.wide_share * self._geometry.beams
         if near is not None and self._is_new_ground(near, len(points)):
             nothing = np.zeros((3, 3))
             unmatched = Match(predicted, near.score, near.overlap, near.contradiction, nothing, near.prior)
-            known = None if is_sparse else self._beyond_odometry(submap, points, predicted)
+            known = None
+            if not is_sparse:
+                known = self._beside_odometry(submap, points, predicted, moved)
+                known = known or self._beyond_odometry(submap, points, predicted)
             return unmatched if known is None else self._noted(known)
         if near is not None and self._is_good(near) and near.score >= settings.convincing_share * self.usual_score:
             self.explains = self._explains(near)
             return self._noted(near)
         reach = (settings.blind_m, settings.blind_angle) if is_blind else self._reach(moved)
         far = None if is_sparse else self._match_far(submap, points, predicted, reach)
-        if self._uses_odometry and is_blind and far is not None:
+        if uncertainty is not None and is_blind and far is not None:
             # So far from odometry something a little similar, or in part, is soon found.
             is_alike = (
                 far.score >= settings.convincing_share * self.usual_score and far.overlap >= settings.blind_overlap
@@ -108,6 +112,22 @@ class _LocalMatcher:
         """Whether a match explains enough of a scan: points near known cells, and their agreement."""
         least = self._matching.explained_share * self.usual_score
         return match is not None and match.score * match.overlap >= least
+
+    def _beside_odometry(
+        self, submap: Submap, points: NDArray[np.float64], predicted: NDArray[np.float64], moved: NDArray[np.float64]
+    ) -> Match | None:
+        """Return the match of a scan that seems to see new ground, as far as odometry may be wrong, or None.
+
+        Few points of a scan at a wrong heading lie near what the map holds, although most of them show it.
+        """
+        settings = self._matching
+        match = self._match_far(submap, points, predicted, self._reach(moved))
+        if match is None or not self._is_good(match) or match.overlap < settings.known_overlap:
+            return None
+        if match.score < settings.convincing_share * self.usual_score:
+            return None
+        self.recoveries += 1
+        return match
 
     def _beyond_odometry(
         self, submap: Submap, points: NDArray[np.float64], predicted: NDArray[np.float64]
@@ -341,7 +361,7 @@ class LocalMapper:
         points: NDArray[np.float64],
         predicted: NDArray[np.float64],
         moved: NDArray[np.float64],
-        uncertainty: NDArray[np.float64],
+        uncertainty: NDArray[np.float64] | None,
         failed: int,
     ) -> Match | None:
         """Return the pose of a scan on the older local map, see ``_LocalMatcher.match``."""

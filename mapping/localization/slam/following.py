@@ -20,6 +20,7 @@ from lidarium.mapping.localization.settings import (
     SubmapSettings,
 )
 from lidarium.mapping.localization.slam.localizer import Slam
+from lidarium.mapping.localization.slam.verdict import reasons_to_doubt
 
 LOG_SETTINGS = SlamSettings(
     matching=MatchingSettings(
@@ -64,6 +65,8 @@ class Followed:
         CPU time of each scan [s].
     finish_s : float
         CPU time after the last one [s].
+    reasons_to_doubt : tuple of str
+        Why the map is probably wrong; empty if nothing says so.
     """
 
     slam: Slam
@@ -71,6 +74,7 @@ class Followed:
     online: NDArray[np.float64]
     scan_s: NDArray[np.float64]
     finish_s: float
+    reasons_to_doubt: tuple[str, ...] = ()
 
 
 def follow(
@@ -111,7 +115,15 @@ def follow(
     slam.finish()
     finish_s = clock() - began
     laser = composed(slam.nodes[numbers], positions)
-    return Followed(slam, _of_robot(laser, log.laser_pose), _of_robot(online, log.laser_pose), scan_s, finish_s)
+    poses, counts = _of_robot(laser, log.laser_pose), slam.counts
+    reasons = reasons_to_doubt(
+        poses,
+        log.odometry if settings.uses_odometry else None,
+        sum(doubt.scans for doubt in slam.doubts.stretches),
+        counts.matches + counts.failures,
+        counts.restarts,
+    )
+    return Followed(slam, poses, _of_robot(online, log.laser_pose), scan_s, finish_s, tuple(reasons))
 
 
 def run_slam(log: LaserLog, settings: SlamSettings | None = None, range_m: float = 30.0) -> Followed:
@@ -129,7 +141,8 @@ def run_slam(log: LaserLog, settings: SlamSettings | None = None, range_m: float
     Returns
     -------
     Followed
-        ``poses`` (scans, 3) of the robot in the frame of the first scan [m, rad], and ``slam``, with its map.
+        ``poses`` (scans, 3) of the robot in the frame of the first scan [m, rad], ``slam``, with its map, and
+        ``reasons_to_doubt``: why the map is probably wrong, empty if nothing says so.
 
     Raises
     ------

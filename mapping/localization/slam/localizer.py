@@ -135,7 +135,7 @@ class Slam:
         matching = self._settings.matching
         moved = relative(path.matched, path.local)
         is_far = np.hypot(moved[0], moved[1]) >= matching.distance_m or abs(moved[2]) >= matching.angle
-        if is_far or not self._has_begun or not self._settings.uses_odometry:
+        if is_far or not self._has_begun or not self._motion.is_measured:
             ranges = at_last_beam(
                 np.asarray(sensing.ranges, np.float32),
                 self._geometry,
@@ -211,7 +211,8 @@ class Slam:
         if not self._has_begun:
             self._begin(ranges)
             return
-        match = path.mapper.match(points, path.local, moved, self._motion.growth(), self._failed)
+        growth = self._motion.growth() if self._motion.is_measured else None
+        match = path.mapper.match(points, path.local, moved, growth, self._failed)
         self.doubts.note(time_s, self._doubt(match, len(points)))
         self.counts.recoveries = path.mapper.recoveries
         if match is None:
@@ -221,10 +222,11 @@ class Slam:
             heading = float(path.local[2])
             measured, prior = turned(match.information, -heading), turned(match.prior, -heading)
             self._motion.learn(relative(path.local, match.pose), measured, prior)
+        if growth is None:
+            self._motion.velocity = relative(path.matched, match.pose)
         self._motion.begin_interval()
         self.counts.matches += 1
         self._failed = 0
-        self._motion.velocity = relative(path.matched, match.pose)
         path.take(match.pose, match.covariance, ranges, points, time_s)
         self.counts.corrections = path.corrections
 

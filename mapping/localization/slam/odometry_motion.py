@@ -120,7 +120,9 @@ class OdometryMotion:
     Attributes
     ----------
     velocity : (3,) float64
-        The last motion between matches, taken if odometry is not used [m, m, rad].
+        The last motion between sensings, taken if odometry does not measure one [m, m, rad].
+    is_measured : bool
+        Whether odometry has measured all motion since the last match.
     """
 
     def __init__(self, settings: SlamSettings) -> None:
@@ -128,6 +130,7 @@ class OdometryMotion:
         self._calibration = OdometryCalibration(settings.odometry)
         self._last: Sensing | None = None
         self.velocity = np.zeros(3)
+        self.is_measured = settings.uses_odometry
         # What odometry has measured since the last match: distance, negative backwards, and turn [m, rad].
         self._measured = np.zeros(2)
 
@@ -141,14 +144,14 @@ class OdometryMotion:
     def _motion(self, sensing: Sensing) -> NDArray[np.float64]:
         if self._last is None:
             return np.zeros(3)
-        if not self._uses_odometry:
-            return self.velocity
         ends = np.stack([self._last.odometry, sensing.odometry])
-        if not np.isfinite(ends).all():
-            return np.zeros(3)
+        if not self._uses_odometry or not np.isfinite(ends).all():
+            self.is_measured = False
+            return self.velocity
         motion = relative(ends[0], ends[1])
         self._measured += motion[[0, 2]]
-        return self._calibration.corrected(motion)
+        self.velocity = self._calibration.corrected(motion)
+        return self.velocity
 
     @property
     def has_moved(self) -> bool:
@@ -177,3 +180,4 @@ class OdometryMotion:
     def begin_interval(self) -> None:
         """Measure from here on: the pose is known otherwise."""
         self._measured[:] = 0.0
+        self.is_measured = self._uses_odometry

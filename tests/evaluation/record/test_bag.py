@@ -70,6 +70,25 @@ def test_transforms_lead_from_the_map_to_the_true_pose(episode):
         assert np.cos(found[2] - env.world.poses[row, 2]) == pytest.approx(1.0)
 
 
+def test_ideal_odometry_moves_as_the_robot_does(recorded, tmp_path):
+    record, env = recorded("nearest_frontier", resolution=0.05, horizon_s=12.0)
+    write_bag(tmp_path / "ideal.mcap", record)
+    starts = {}
+    for _, content in messages(tmp_path / "ideal.mcap", "/tf"):
+        for each in content.transforms:
+            if each.header.frame_id == "map":
+                starts.setdefault(each.child_frame_id, []).append(
+                    planar(each.transform.translation, each.transform.rotation)
+                )
+    for row, robot in enumerate(env.possible_agents):
+        found = np.array(starts[f"{robot}/odom"])
+        assert np.abs(found[:, :2] - found[0, :2]).max() < 1e-9
+        log = read_bag_log(tmp_path / "ideal.mcap", f"/{robot}/scan")
+        assert log.odometry is not None
+        assert np.allclose(composed(found[0], log.odometry[-1])[:2], env.world.poses[row, :2], atol=1e-9)
+        assert np.hypot(*np.diff(log.odometry[:, :2], axis=0).T).sum() > 1.0
+
+
 def test_maps_and_paths_at_the_end_are_those_of_the_episode(episode):
     _, env, path = episode
     maps = maps_on_floor(env)

@@ -6,18 +6,16 @@ import math
 import numpy as np
 import pytest
 
+from lidarium.mapping.files.beams import Beams, resampled, symmetric_scans
 from lidarium.mapping.files.carmen_logs import (
-    _Beams,
     _Content,
     _give_directions,
     _on_one_grid,
     _parameter,
     _read_line,
-    _resampled,
     _Scan,
     read_carmen_log,
 )
-from lidarium.mapping.files.laser_logs import symmetric_scans
 from lidarium.mapping.grids.scan_geometry import ScanGeometry
 
 TURN = 2.0 * math.pi
@@ -86,7 +84,7 @@ def test_scans_of_varying_beam_counts_are_resampled_on_one_grid(tmp_path):
 
 def test_a_resampled_scan_invents_nothing_between_two_surfaces():
     ranges = np.array([1.0, 1.02, 9.0, np.inf, np.nan], np.float32)
-    found = _resampled(ranges, _Beams(0.0, 0.1), _Beams(-0.08, 0.05), 12)
+    found = resampled(ranges, Beams(0.0, 0.1), Beams(-0.08, 0.05), 12)
     np.testing.assert_allclose(
         found, [np.nan, 1.0, 1.004, 1.014, 1.02, 9.0, 9.0, np.inf, np.inf, np.nan, np.nan, np.nan], atol=1e-6
     )
@@ -365,14 +363,13 @@ def test_what_cannot_be_used_is_left_out_and_counted(tmp_path):
         flaser_of_carmen_logs(5.0, SCAN, (3, 0, 0)),
     ]
     log = read_of_carmen_logs(tmp_path, *lines)
-    assert log.stamps.tolist() == [1.0, 2.0, 4.0, 5.0]
+    assert log.stamps.tolist() == [1.0, 1.5, 2.0, 4.0, 5.0]
     assert log.skipped == {
-        "LASER_READING lines": 1,
+        "damaged LASER_READING lines": 1,
         "damaged FLASER lines": 3,
         "damaged ODOM lines": 1,
         "\x00\x01 lines": 1,
         "scans that have not 5 beams as most": 1,
-        "scans back in time": 1,
     }
 
 
@@ -420,3 +417,44 @@ def test_odometry_of_a_scan_without_a_line_of_its_stamp_is_interpolated(tmp_path
 def test_a_pose_of_the_program_that_is_missing_costs_nothing(tmp_path):
     whole, without = (read_of_carmen_logs(tmp_path, *corrected_lines(without_own=own)) for own in (None, 5))
     assert without.odometry == pytest.approx(whole.odometry, abs=1e-9)
+
+
+def test_a_number_of_remissions_behind_the_ranges_is_passed_over():
+    plain = said(FLASER).scans[0][0]
+    for numbers in ("0", "2 7 8"):
+        ((scan, _),) = said(FLASER.replace("3.0 0.5", f"3.0 {numbers} 0.5")).scans
+        assert (scan.ranges, scan.laser_pose, scan.robot_pose) == (plain.ranges, plain.laser_pose, plain.robot_pose)
+        assert scan.stamp == plain.stamp
+
+
+def test_readings_of_gmapping_have_odometry_as_measured(tmp_path):
+    lines = []
+    for k in range(6):
+        lines += [
+            odom(float(k), 5.0 + 0.1 * k),
+            f"LASER_READING 5 {' '.join(map(str, SCAN))} {5.0 + 0.1 * k} 0 0 {k}\n",
+        ]
+        lines += ["SM_UPDATE 30 1 2 3\n", "NEFF 30\n"]
+    log = read_of_carmen_logs(tmp_path, *lines)
+    assert log.odometry[:, 0] == pytest.approx(5.0 + 0.1 * np.arange(6))
+    assert log.corrected is None
+    assert not log.skipped
+
+
+def test_lines_that_repeat_a_scan_without_its_directions_are_left_out(tmp_path):
+    ranges = [1.0, 8.0, 2.0]
+    lines = [
+        each
+        for k in range(5)
+        for each in (flaser_of_carmen_logs(float(k), ranges, (0.1 * k, 0, 0)), robotlaser(float(k), ranges))
+    ]
+    log = read_of_carmen_logs(tmp_path, *lines)
+    assert log.stamps.tolist() == [0.0, 1.0, 2.0, 3.0, 4.0]
+    assert log.skipped == {"FLASER lines that repeat ROBOTLASER1 lines": 5}
+    assert log.geometry.range_max == 8.0
+
+
+def test_ranges_in_centimetres_are_refused(tmp_path):
+    ranges = np.random.default_rng(0).uniform(50.0, 700.0, 90).round(1).tolist()
+    with pytest.raises(ValueError, match="as of ranges in centimetres; want metres"):
+        read_of_carmen_logs(tmp_path, *(flaser_of_carmen_logs(k, ranges, (k, 0, 0)) for k in range(3)))

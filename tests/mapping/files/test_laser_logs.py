@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 from recorded_logs import recording
 
+from lidarium.mapping.files.beams import symmetric_scans
 from lidarium.mapping.files.carmen_logs import read_carmen_log
-from lidarium.mapping.files.laser_logs import _continued, _without_jumps, symmetric_scans
+from lidarium.mapping.files.laser_logs import _continued, _order
 from lidarium.mapping.files.npz_logs import read_npz_log
+from lidarium.mapping.files.odometry_faults import _without_jumps
 
 
 @pytest.mark.parametrize("wild", [2e9, -5.0, math.nan])
@@ -32,6 +34,51 @@ def test_a_clock_that_restarts_is_continued():
     clock = _continued(stamps)
     assert clock.restarts == 2
     np.testing.assert_allclose(clock.stamps - clock.stamps[0], true)
+
+
+def _disordered():
+    draws, stamps = np.random.default_rng(0), 100.0 + 0.5 * np.arange(60.0)
+    swapped = np.arange(60)
+    swapped[[20, 21, 40, 41]] = [21, 20, 41, 40]
+    return {
+        "drawn": stamps[draws.permutation(60)],
+        "reversed": stamps[::-1],
+        "late": stamps[swapped],
+        "parts": np.concatenate([stamps[30:], stamps[:30]]),
+    }
+
+
+@pytest.mark.parametrize("how", _disordered())
+def test_fine_stamps_out_of_order_are_sorted(how):
+    stamps = _disordered()[how]
+    order = _order(stamps)
+    assert order is not None
+    assert (np.diff(stamps[order]) > 0.0).all()
+
+
+@pytest.mark.parametrize("second", [0.0, 0.1, 0.25, -7000.0, 40.0])
+def test_scans_of_two_clocks_are_not_mixed(second):
+    stamps = 100.0 + 0.5 * np.arange(60.0)
+    assert _order(np.concatenate([stamps, stamps[:40] + second - (0.0 if second < 40.0 else 37.1)])) is None
+
+
+def test_scans_of_a_file_without_order_are_those_of_one_in_order(tmp_path):
+    count, draws = 40, np.random.default_rng(1)
+    arrays = {
+        "ranges": draws.uniform(1.0, 4.0, (count, 30)).astype(np.float32),
+        "stamp": 50.0 + 0.2 * np.arange(count),
+        "pose_odom": np.stack([0.1 * np.arange(count), np.zeros(count), np.zeros(count)], axis=1),
+    }
+    beams = {"angle_min": -1.0, "angle_increment": 2.0 / 29.0, "max_range": 5.0}
+    mixed = draws.permutation(count)
+    np.savez(tmp_path / "a.npz", **arrays, **beams)
+    np.savez(tmp_path / "b.npz", **{name: table[mixed] for name, table in arrays.items()}, **beams)
+    ordered, sorted_again = read_npz_log(tmp_path / "a.npz"), read_npz_log(tmp_path / "b.npz")
+    np.testing.assert_array_equal(sorted_again.stamps, ordered.stamps)
+    np.testing.assert_array_equal(sorted_again.ranges, ordered.ranges)
+    np.testing.assert_array_equal(sorted_again.odometry, ordered.odometry)
+    assert any("not in the order of time" in remark for remark in sorted_again.remarks)
+    assert not ordered.remarks
 
 
 def test_order_is_all_that_a_clock_without_faults_is_asked_for():

@@ -1,14 +1,31 @@
-"""Logs whose headers, stamps or odometry are wrong in ways that other programs write them."""
+"""Logs and bags whose headers, stamps, mounting or odometry are wrong in ways that other programs write them."""
 
+import math
+
+import numpy as np
 import pytest
 
-from lidarium.mapping.files.carmen_logs import read_carmen_log
+from lidarium.mapping.files.log_files import read_log
 
 LOGS = {
+    "bag-beams-vary/first.mcap": (244, 0.01),
+    "bag-beams-vary/length.mcap": (244, 0.01),
+    "bag-beams-vary/step.mcap": (244, 0.01),
+    "bag-forms/packed": (100, 0.01),
+    "bag-forms/split": (100, 0.01),
+    "bag-forms/sqlite": (100, 0.01),
+    "bag-laser-mounting/chain.mcap": (244, 0.02),
+    "bag-laser-mounting/plain.mcap": (244, 0.02),
+    "bag-laser-mounting/upside_down.mcap": (244, 0.02),
+    "bag-no-return-is-range-max/inf.mcap": (244, 0.02),
+    "bag-no-return-is-range-max/range_max.mcap": (244, 0.02),
     "beam-counts-vary/spinning.log.gz": (401, 0.02),
     "flaser-geometry/fov270_param.log.gz": (401, 0.02),
     "lidar-360-rounded/circle.log.gz": (401, 0.02),
     "odometry-jump/reset.log.gz": (401, 0.05),
+    "odometry-stops/silent_8s.log.gz": (366, 0.05),
+    "odometry-stops/stops_at_half.log.gz": (366, 0.05),
+    "odometry-stops/whole.log.gz": (366, 0.02),
     "robotlaser-header/resolution_is_count.log.gz": (401, 0.02),
     "robotlaser-header/upside_down.log.gz": (401, 0.02),
     "wild-stamp/future.log.gz": (400, 0.02),
@@ -23,8 +40,12 @@ def test_logs_of_other_programs_are_followed_over_all_their_scans(shared_cases, 
     from lidarium.mapping.localization.slam.following import LOG_SETTINGS, follow
 
     scans, error = LOGS[name]
-    log = read_carmen_log(shared_cases / name).limited(8.0, clears_without_return=False)
+    log = read_log(shared_cases / name).limited(8.0, clears_without_return=False)
     assert len(log.stamps) == scans
     stamps, true = read_tum(shared_cases / name.split("/")[0] / "truth.tum")
-    poses = follow(log, LOG_SETTINGS).poses
-    assert absolute_error(poses, interpolated(stamps, true, log.stamps)) < error
+    followed = follow(log, LOG_SETTINGS)
+    known = interpolated(stamps, true, log.stamps)
+    assert absolute_error(followed.poses, known) < error
+    turns = (followed.poses - followed.poses[0] - known + known[0])[:, 2]
+    assert np.abs(np.remainder(turns + math.pi, 2.0 * math.pi) - math.pi).max() < math.radians(1.0)
+    assert not followed.slam.doubts.stretches

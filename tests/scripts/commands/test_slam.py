@@ -6,10 +6,12 @@ import pytest
 from driven_rooms import GEOMETRY, driven, odd_room
 
 from lidarium.mapping.files.laser_logs import LaserLog
+from lidarium.mapping.files.log_files import read_log
 from lidarium.mapping.files.map_files import read_ros_map
 from lidarium.mapping.files.npz_logs import write_npz_log
 from lidarium.mapping.files.trajectories import read_tum, write_tum
 from lidarium.mapping.geometry.rigid import composed, relative
+from lidarium.mapping.localization.slam.following import run_slam
 from lidarium.scripts.main import main
 
 FILES = ["map.pgm", "map.yaml", "slam.json", "trajectory.tum"]
@@ -49,6 +51,7 @@ def test_a_recording_becomes_map_trajectory_and_figures(run, log, tmp_path, caps
     assert result["relations"]["translation_m"] < 0.04
     assert result["settings"]["submaps"]["resolution"] == 0.05
     assert result["odometry"] is True
+    assert (result["remarks"], result["probably_wrong"]) == ([], False)
     stamps, poses = read_tum(tmp_path / "out" / "trajectory.tum")
     assert stamps[0] == START_S
     assert np.hypot(*(poses - run.truth)[:, :2].T).max() < 0.1
@@ -105,6 +108,58 @@ def test_a_log_without_odometry_is_matched_all_the_same(run, log, tmp_path, caps
     result = json.loads((tmp_path / "out" / "slam.json").read_text())
     assert result["odometry"] is False
     assert result["ate_m"] < 0.1
+
+
+def test_a_map_that_is_probably_wrong_is_written_with_a_sentence_a_remark_and_exit_code_4(log, tmp_path, capsys):
+    with np.load(log) as archive:
+        arrays = dict(archive)
+    np.savez(tmp_path / "stretched.npz", **{**arrays, "ranges": arrays["ranges"] * 1.5, "max_range": 9.0})
+    assert main(["slam", str(tmp_path / "stretched.npz"), "--out", str(tmp_path / "out")]) == 4
+    (sentence,) = [line for line in capsys.readouterr().err.splitlines() if "probably wrong" in line]
+    assert "this map is probably wrong: lengths by scans are 1." in sentence
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == FILES
+    result = json.loads((tmp_path / "out" / "slam.json").read_text())
+    assert result["probably_wrong"] is True
+    assert result["remarks"][-1] in sentence
+
+
+def test_a_field_of_view_that_is_only_assumed_ends_in_doubt(shared_cases, tmp_path, capsys):
+    log = str(shared_cases / "flaser-geometry" / "fov270_silent.log.gz")
+    assert main(["slam", log, "--range", "8", "--out", str(tmp_path / "out")]) == 4
+    told = capsys.readouterr().err
+    assert "136 beams, as no SICK has" in told
+    assert "--field-of-view 27" in told
+    assert "this map is probably wrong: turns by scans" in told
+    assert main(["slam", log, "--range", "8", "--field-of-view", "270", "--out", str(tmp_path / "out")]) == 0
+
+
+def test_odometry_that_stops_is_told_from_when_to_when(shared_cases, tmp_path, capsys):
+    log = str(shared_cases / "odometry-stops" / "silent_8s.log.gz")
+    assert main(["slam", log, "--range", "8", "--out", str(tmp_path / "out")]) == 0
+    sentence = "odometry stands still while the scans move, from 1036.600 to 1044.600 s: 40 scans"
+    assert sentence in capsys.readouterr().err
+    assert sentence in json.loads((tmp_path / "out" / "slam.json").read_text())["remarks"][0]
+
+
+@pytest.mark.parametrize("name", ["aces", "belgioioso", "edmonton", "intel"])
+def test_maps_of_good_logs_are_not_doubted(shared_data, name):
+    log = read_log(shared_data / "laser_logs" / "carmen" / f"{name}-corrected.log.gz")
+    assert not log.remarks
+    assert run_slam(log).reasons_to_doubt == ()
+
+
+def test_a_log_with_too_little_in_common_from_scan_to_scan_ends_in_doubt(shared_data, tmp_path, capsys):
+    log = str(shared_data / "laser_logs" / "carmen" / "orebro-corrected.log.gz")
+    assert main(["slam", log, "--out", str(tmp_path / "out")]) == 4
+    assert "scans are doubtful" in capsys.readouterr().err
+
+
+def test_the_log_of_mines_is_read(shared_data):
+    log = read_log(shared_data / "laser_logs" / "mines" / "exp1.dat.gz")
+    assert (len(log.stamps), log.skipped, log.remarks) == (756, {}, ())
+    found = run_slam(log)
+    assert found.slam.counts.failures == 0
+    assert found.reasons_to_doubt == ()
 
 
 def test_the_same_log_gives_the_same_trajectory_to_the_bit(log, tmp_path, capsys):

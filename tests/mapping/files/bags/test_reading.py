@@ -135,8 +135,60 @@ def test_a_laser_that_turns_clockwise_and_scans_of_other_lengths_are_read(log, t
             beams = 9 if k != 2 else 4
             writer.scan("/scan", "laser", float(k), log.ranges[k][:beams], Clockwise())
     found = read_bag_log(tmp_path / "odd.mcap")
-    assert found.skipped == {"scans of another length than most": 1}
-    assert np.array_equal(found.ranges, log.ranges[[0, 1, 3, 4], ::-1], equal_nan=True)
+    assert not found.skipped
+    assert any("1 x scans whose beams are not as those of most" in remark for remark in found.remarks)
+    assert np.array_equal(found.ranges[[0, 1, 3, 4]], log.ranges[[0, 1, 3, 4], ::-1], equal_nan=True)
+    # Four beams from the left: the others of that scan are invalid.
+    assert np.array_equal(found.ranges[2, 5:], log.ranges[2, 3::-1])
+    assert np.isnan(found.ranges[2, :5]).all()
+
+
+def test_a_chain_of_transforms_says_where_the_laser_is(log, tmp_path):
+    with bag(tmp_path / "chain.mcap") as writer:
+        writer.transform("base_footprint", "base_link", 0.0, (0.1, 0.0, 0.0), height=0.1, is_static=True)
+        for k, ranges in enumerate(log.ranges):
+            writer.transform("base_link", "laser", 0.25 * k, (0.2, 0.0, math.pi / 2))
+            writer.odometry("/odom", "odom", "base_footprint", 0.25 * k, log.odometry[k])
+            writer.scan("/scan", "laser", 0.25 * k, ranges, GEOMETRY)
+    found = read_bag_log(tmp_path / "chain.mcap")
+    assert np.allclose(found.laser_pose, [0.3, 0.0, math.pi / 2], atol=1e-6)
+    assert not found.remarks
+
+
+def test_a_laser_without_a_place_is_told(log, tmp_path):
+    with bag(tmp_path / "bare.mcap") as writer:
+        for k, ranges in enumerate(log.ranges):
+            writer.odometry("/odom", "odom", "base", 0.25 * k, log.odometry[k])
+            writer.scan("/scan", "laser", 0.25 * k, ranges, GEOMETRY)
+    (remark,) = read_bag_log(tmp_path / "bare.mcap").remarks
+    assert "no transforms say where the laser (laser) is on the robot (base)" in remark
+
+
+def test_transforms_of_another_robot_are_not_mixed_in(log, tmp_path):
+    with bag(tmp_path / "two.mcap") as writer:
+        for k, ranges in enumerate(log.ranges):
+            writer.odometry("/a/odom", "odom", "base", 0.25 * k, log.odometry[k])
+            writer.scan("/a/scan", "laser", 0.25 * k, ranges, GEOMETRY)
+        for robot, ahead in (("b", 0.5), ("a", 0.2)):
+            writer.transform("base", "laser", 0.0, (ahead, 0.0, 0.0), is_static=True, topic=f"/{robot}/tf_static")
+    assert np.allclose(read_bag_log(tmp_path / "two.mcap").laser_pose, [0.2, 0.0, 0.0], atol=1e-6)
+
+
+def test_odometry_that_is_missing_while_the_robot_moves_is_unknown(log, tmp_path):
+    with bag(tmp_path / "gap.mcap") as writer:
+        for k, ranges in enumerate(log.ranges):
+            if not 6 <= k < 14:
+                writer.odometry("/odom", "odom", "base", 0.25 * k, log.odometry[k])
+            writer.scan("/scan", "base", 0.25 * k, ranges, GEOMETRY)
+    found = read_bag_log(tmp_path / "gap.mcap")
+    assert np.flatnonzero(np.isnan(found.odometry[:, 0])).tolist() == list(range(6, 14))
+
+
+def test_no_return_is_the_longest_range_in_bags_as_in_logs(log, tmp_path):
+    ranges = log.ranges.copy()
+    ranges[:, 4] = 5.0
+    write_mcap_log(tmp_path / "log.mcap", replace(log, ranges=ranges))
+    assert np.isinf(read_bag_log(tmp_path / "log.mcap").ranges[:, 4]).all()
 
 
 def test_what_is_cut_off_or_damaged_is_refused_by_name(log, tmp_path):

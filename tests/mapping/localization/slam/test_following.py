@@ -62,3 +62,12 @@ def test_scans_pass_by_the_watch_in_order_and_time_is_that_of_the_clock(run):
 def test_a_log_without_odometry_is_followed_by_its_scans(run):
     found = follow(replace(log_of(run), odometry=None), SlamSettings())
     assert np.abs(found.poses - run.truth)[:, :2].max() < 0.1
+
+
+def test_a_log_whose_odometry_is_unknown_for_a_while_is_followed_by_its_scans(run):
+    log = log_of(run)
+    odometry = log.odometry.copy()
+    odometry[8:22] = np.nan
+    found = follow(replace(log, odometry=odometry), SlamSettings())
+    assert np.abs(found.poses - run.truth)[:, :2].max() < 0.1
+    assert found.slam.counts.failures == 0

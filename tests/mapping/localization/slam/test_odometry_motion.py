@@ -52,6 +52,20 @@ def test_odometry_that_is_no_number_is_no_motion(broken):
     assert not motion.has_moved
 
 
+def test_where_odometry_is_unknown_the_last_motion_goes_on():
+    motion, pose = OdometryMotion(SlamSettings()), np.zeros(3)
+    motion.take(sensing(0.0, pose))
+    known, _ = motion.take(sensing(0.1, STEP))
+    assert motion.is_measured
+    for time_s, odometry in ((0.2, np.full(3, np.nan)), (0.3, composed(STEP, STEP))):
+        step, _ = motion.take(sensing(time_s, odometry))
+        np.testing.assert_array_equal(step, known)
+        assert not motion.is_measured
+    motion.begin_interval()
+    motion.take(sensing(0.4, composed(STEP, STEP)))
+    assert motion.is_measured
+
+
 def test_uncertainty_grows_since_the_last_match_and_begins_again():
     motion = OdometryMotion(SlamSettings())
     at_rest, pose = np.trace(motion.growth()), np.zeros(3)
