@@ -8,9 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
+from lidarium.benchmarks.results_page import about, publish
 from lidarium.benchmarks.speed.harness.batches import OBSERVED
-from lidarium.benchmarks.speed.harness.report import about, heading, with_effort
+from lidarium.benchmarks.speed.harness.report import with_effort
 from lidarium.benchmarks.speed.harness.timing import EFFORTS, Effort, interleaved, on_cores, repeated
+from lidarium.benchmarks.speed.peers.catalogue import outside_versions
 from lidarium.benchmarks.speed.scenes.floors import BenchFloor, straight_floor, turned_floor
 from lidarium.benchmarks.speed.scenes.teams import DrivenTeam
 from lidarium.envs.observing.writer import ObservationWriter
@@ -22,7 +24,7 @@ from lidarium.envs.simulation.kernels.contact import TeamBodies
 from lidarium.envs.simulation.kernels.masks import window_corner
 from lidarium.envs.simulation.kernels.motion import body_grids, move_robots
 from lidarium.envs.simulation.kernels.ray_casting import cast_scan
-from lidarium.mapping.files.output import check_writable, write_text
+from lidarium.mapping.files.output import check_writable
 from lidarium.mapping.grids.pooled_maps import touched_words
 from lidarium.mapping.grids.scan_geometry import Beams, beam_directions
 from lidarium.mapping.grids.scan_integration import SeenScan, integrate_scan
@@ -276,14 +278,14 @@ def main() -> None:
     if chosen.out is not None:
         command = f"python benchmarks/speed/profile_step.py --effort {chosen.effort} --out {chosen.out}"
         chosen.out.mkdir(parents=True, exist_ok=True)
-        write_text(chosen.out / "profile.md", profile_page(profiles, effort, command))
+        publish(chosen.out / "profile.md", profile_page(profiles, effort), about(command, outside_versions()))
 
 
-def profile_page(profiles: Mapping[str, tuple[Mapping[str, float], float, float]], effort: Effort, command: str) -> str:
+def profile_page(profiles: Mapping[str, tuple[Mapping[str, float], float, float]], effort: Effort) -> str:
     """Write the page of the profile."""
     return "\n".join(
         [
-            *heading("Profile of a step", about(command)),
+            "# Profile of a step",
             f"One thread; medians of {effort.rounds} rounds in which all parts run in turn for "
             f"{effort.block_s:g} s each.",
             "",

@@ -48,11 +48,6 @@ STUDIES.register(
     "map merging on a bank of maps that robots made, beside the thesis and ROS map_merge",
 )
 STUDIES.register(
-    "merging_tuning",
-    f"{_PACKAGE}.merging.tuning:STUDY",
-    "map merging on the half of the bank on which its limits are tuned",
-)
-STUDIES.register(
     "parity",
     f"{_PACKAGE}.parity:STUDY",
     "random driving in the world of PyBullet beside the kinematic one, on 20 floors",

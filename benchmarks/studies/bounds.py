@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import lidarium
 from lidarium.agents import make_policy
 from lidarium.benchmarks.studies.shared.study import Progress, Study, do_missing, kept_lines
 from lidarium.envs.faces.parallel import ExplorationEnv
@@ -44,8 +43,6 @@ PAGE = """# Bounds
 How soon a team that knows the floor sees 99 % of it. Views that see all are chosen from a lattice of places,
 ordered by OR-Tools and improved by taking stops out and covering again; the tours are driven with the robots'
 limits. The plan is feasible, so its time is an upper bound on the optimum.
-
-Made with `{command}`, lidarium {version}.
 
 ## How tight
 
@@ -176,7 +173,7 @@ def _tight_row(line: Mapping[str, Any]) -> str:
     return "| " + " | ".join(str(each) for each in cells) + " |"
 
 
-def page(folder: Path, command: str) -> str:
+def page(folder: Path) -> str:
     """Return the results as markdown."""
     tight, teams = kept_lines(folder / TIGHT_FILE), kept_lines(folder / FLOORS_FILE)
     ratios = [line["plan_m"] / line["lower_m"] for line in tight if line["lower_m"] > 0.0]
@@ -192,8 +189,6 @@ def page(folder: Path, command: str) -> str:
     missed = sum(line["known_s"] is None for line in teams)
     rows = "\n".join(_tight_row(line) for line in tight)
     text = PAGE.format(
-        command=command,
-        version=lidarium.__version__,
         tight_count=len(tight),
         side=SPACING[0],
         mean=statistics.mean(ratios),

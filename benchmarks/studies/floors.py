@@ -1,16 +1,15 @@
 """Every real floor, dungeons and 200 generated floors, explored by 1 to 3 robots."""
 
-import platform
 import time
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from datetime import date
 from pathlib import Path
 from statistics import median
 from typing import Any
 
 import lidarium
+from lidarium.benchmarks.results_page import in_file
 from lidarium.benchmarks.studies.shared.study import Progress, Study, do_missing, kept_lines, real_floors
 from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.settings.making import make_settings
@@ -94,7 +93,7 @@ def work(folder: Path, data: Path | None, every: int, workers: int) -> Progress:
     yield from do_missing(folder / RUNS_FILE, "runs", runs, explore, workers)
 
 
-def page(folder: Path, command: str) -> str:
+def page(folder: Path) -> str:
     """Return the results as markdown."""
     rows = kept_lines(folder / RUNS_FILE)
     runs = [row for row in rows if "error" not in row]
@@ -103,8 +102,7 @@ def page(folder: Path, command: str) -> str:
     lines = [
         "# Every floor, explored",
         "",
-        f"`{command}` on {date.today().isoformat()}, lidarium {lidarium.__version__}, "
-        f"Python {platform.python_version()}: policy `{POLICY}`, Kobuki (radius 0.18 m), URG-04LX (727 "
+        f"Policy `{POLICY}`, Kobuki (radius 0.18 m), URG-04LX (727 "
         "beams, 240 degrees, "
         "5.6 m), true poses, no noise, world and maps at 0.025 m, no horizon, seed 0. A run "
         "ends as `covered` when 0.99 of `C_free` is sensed.",
@@ -121,7 +119,8 @@ def page(folder: Path, command: str) -> str:
     ]
     lines += ["", "## Floors that the robots do not fit in", ""]
     lines += [f"- {row['floor']}, {row['robots']} robots: {row['error']}" for row in refused] or ["None."]
-    lines += ["", "## All runs", "", "Coverage / time in s / path of the team in m.", "", *_all_runs(runs)]
+    lines += ["", "## All runs", "", "Coverage / time in s / path of the team in m.", ""]
+    lines += [in_file("\n".join(_all_runs(runs)))]
     return "\n".join(lines) + "\n"
 
 

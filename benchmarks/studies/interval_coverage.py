@@ -1,21 +1,17 @@
 """The study ``interval_coverage``: how often the intervals of reports hold a known truth."""
 
-import platform
 import time
 import zlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from datetime import date
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 from scipy import integrate, optimize, stats
 
-import lidarium
 from lidarium.benchmarks.studies.shared.study import Progress, Study, do_missing, kept_lines
 from lidarium.evaluation.statistics import (
     FEWEST_FOR_NOMINAL,
@@ -271,7 +267,7 @@ def is_reached(shares: Sequence[tuple[float, int]]) -> bool:
     )
 
 
-def page(folder: Path, command: str) -> str:
+def page(folder: Path) -> str:
     """Return the results as markdown."""
     lines = kept_lines(folder / CASES_FILE)
     trials, resamples, seconds = TRIALS, RESAMPLES, sum(line["seconds"] for line in lines)
@@ -280,12 +276,8 @@ def page(folder: Path, command: str) -> str:
     text = [
         "# How often intervals hold the truth",
         "",
-        f"`{command}` on {date.today().isoformat()}, lidarium {lidarium.__version__}, Python "
-        f"{platform.python_version()}, numpy {np.__version__}, scipy {scipy.__version__}; {seconds:.0f} s on "
-        "one core.",
-        "",
         f"Share of {trials:,} trials in which the 95 % interval holds the known truth, in %, by the number "
-        "of runs or pairs. Its standard "
+        "of runs or pairs; {seconds:.0f} s on one core. Its standard "
         f"error is {100.0 * np.sqrt(0.95 * 0.05 / trials):.1f} at 95 %. Intervals are made of {resamples:,} "
         "resamples here, of 10,000 in "
         f"reports. Asked for are {100 * WANTED[0]:.0f} to {100 * WANTED[1]:.0f} at {FEWEST_FOR_NOMINAL} and "

@@ -16,7 +16,6 @@ from typing import Any
 
 import numpy as np
 
-from lidarium.benchmarks.speed.harness.report import about, heading
 from lidarium.benchmarks.studies.shared.study import Progress, Study, do_missing, kept_lines
 from lidarium.evaluation.statistics.samples import MOST_VALUES
 from lidarium.evaluation.suites.campaign import EPISODES_FILE, Campaign
@@ -194,7 +193,7 @@ LONG, PIECES_FILE, AGAIN_FILE, NODES_FILE, KILLS_FILE = (
     "kills.jsonl",
 )
 
-PAGE = """{heading}
+PAGE = """# Many episodes, many machines
 
 ## 10^5 episodes
 
@@ -306,7 +305,7 @@ def _gain_row(episodes: int, compared: Sequence[Mapping[str, Any]]) -> str:
     return f"| {episodes} | {len(gains)} | {median:.2f} x ({min(gains):.2f} to {max(gains):.2f}) |"
 
 
-def page(folder: Path, command: str) -> str:
+def page(folder: Path) -> str:
     """Return the results as markdown."""
     pieces, compared = kept_lines(folder / PIECES_FILE), kept_lines(folder / NODES_FILE)
     [again], [killed] = kept_lines(folder / AGAIN_FILE), kept_lines(folder / KILLS_FILE)
@@ -316,7 +315,6 @@ def page(folder: Path, command: str) -> str:
         rows.append(_row(total, line))
     line_bytes = pieces[-1]["file_bytes"] / total
     return PAGE.format(
-        heading="\n".join(heading("Many episodes, many machines", about(command))),
         workers=pieces[-1]["workers"],
         piece=pieces[0]["episodes"],
         pieces="\n".join(rows),

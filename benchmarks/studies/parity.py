@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-import lidarium
 from lidarium.benchmarks.studies.shared.study import Progress, Study, do_missing, kept_lines
 from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.settings.making import make_settings
@@ -50,8 +49,6 @@ To reach: 95 % of the free drives end within {distance_m} m and {turn_deg:.0f} d
   that measure exactly; free drives, and those with contact.
 - *Scans*: at the poses of PyBullet's bodies, both worlds' scans, compared to the bit in every step in which
   the body leans by less than 2 deg.
-
-Made with `{command}`, lidarium {version}.
 """
 
 
@@ -178,11 +175,9 @@ def _shown(apart: tuple[float, float]) -> str:
     return f"{apart[0]:.3f} m, {apart[1]:.2f} deg"
 
 
-def page(folder: Path, command: str) -> str:
+def page(folder: Path) -> str:
     """Return the results as markdown."""
     return PAGE.format(
-        command=command,
-        version=lidarium.__version__,
         floors=len(FLOORS),
         seeds=len(SEEDS),
         drive_s=DRIVE_S,

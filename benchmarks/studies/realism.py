@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 import lidarium
-from lidarium.benchmarks.speed.harness.report import about, heading
 from lidarium.benchmarks.studies.shared.study import Progress, Study, do_missing, kept_lines
 from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.settings.making import make_settings
@@ -352,7 +351,7 @@ def times_of(episodes: list[dict[str, Any]], longest: Sequence[float]) -> Iterat
     )
 
 
-def page(folder: Path, command: str) -> str:
+def page(folder: Path) -> str:
     """Return the results as markdown."""
     episodes = kept_lines(folder / EPISODES_FILE)
     rates = kept_lines(folder / RATES_FILE)[0]["rates"]
@@ -365,7 +364,7 @@ def page(folder: Path, command: str) -> str:
     )
     table = [f"| {' | '.join(HEADER)} |", "|" + "---|" * len(HEADER), *rows_of(episodes)]
     lines = [
-        *heading("Robots in worlds that are not ideal", about(command)),
+        "# Robots in worlds that are not ideal",
         "",
         ABOUT,
         "",

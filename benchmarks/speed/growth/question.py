@@ -9,12 +9,13 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from lidarium.benchmarks.results_page import about, publish
 from lidarium.benchmarks.speed.cases.histories import Drives, Histories, drawn_drives
 from lidarium.benchmarks.speed.growth.idle_memory import IdleMemory
-from lidarium.benchmarks.speed.harness.report import about, heading
 from lidarium.benchmarks.speed.harness.timing import Interval, median_interval, on_cores
+from lidarium.benchmarks.speed.peers.catalogue import outside_versions
 from lidarium.benchmarks.speed.scenes.floors import straight_floor
-from lidarium.mapping.files.output import check_writable, write_json, write_text
+from lidarium.mapping.files.output import check_writable, write_json
 
 ALLOWED_MEMORY = 1.2
 MIB = 2**20
@@ -142,7 +143,7 @@ def growth_page(result: Mapping[str, Any], growths: Sequence[Growth], memory: Id
     """Write the page of growth; ``result`` is that of ``growth_result``."""
     return "\n".join(
         [
-            *heading("Growth", result),
+            "# Growth",
             f"One thread. {result['repeats']} repeats in which all sizes run in turn; medians, with the "
             "interval of ranks that holds the "
             f"true median in at least 95 of 100 cases. Caches of a core: {result['caches']}.",
@@ -270,9 +271,9 @@ def main() -> None:
     print(growth_table(growths), memory_table(memory), sep="\n\n")
     if chosen.out is not None:
         command = f"python benchmarks/speed/growth/question.py --repeats {chosen.repeats} --out {chosen.out}"
-        result = growth_result(growths, memory, chosen.repeats, about(command))
+        result = growth_result(growths, memory, chosen.repeats, about(command, outside_versions()))
         chosen.out.mkdir(parents=True, exist_ok=True)
-        write_text(chosen.out / "growth.md", growth_page(result, growths, memory))
+        publish(chosen.out / "growth.md", growth_page(result, growths, memory), result)
         write_json(chosen.out / "growth.json", result)
 
 

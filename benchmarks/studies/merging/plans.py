@@ -12,6 +12,7 @@ from typing import Any
 import cv2
 import numpy as np
 
+from lidarium.benchmarks.results_page import in_file
 from lidarium.benchmarks.studies.merging.figures import Share
 from lidarium.benchmarks.studies.merging.real_maps import (
     HALMSTAD_M,
@@ -180,7 +181,7 @@ def plan_tables(rows: Rows) -> str:
         + "\n\nThe same by the confidence from which maps are joined:\n\n"
         + _curve(rows)
         + "\n\nEach pair of one building:\n\n"
-        + _each(rows)
+        + in_file(_each(rows))
     )
 
 

@@ -14,6 +14,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from lidarium.benchmarks.results_page import in_file
 from lidarium.benchmarks.studies.merging.figures import Share
 from lidarium.mapping.files.map_files import read_grey_map, read_ros_map
 from lidarium.mapping.geometry.rigid import Transform
@@ -258,10 +259,10 @@ def real_maps(rows: Rows) -> str:
         "correspondence and 8 degrees, as these maps are bent by up to 0.5 m; of the others within 0.5 m and "
         "3 degrees. Strangers are all pairs of maps of different buildings. The model was fitted to E5, the "
         "easy halves of logs, every other pair of strangers, and the bank's half for tuning.\n\n"
-        + "\n".join(lines)
+        + in_file("\n".join(lines))
         + "\n\nThe same by the confidence from which maps are joined that agree only once they are bent "
         f"(`normal` is {TOLERANCES['normal']}, `drift` {TOLERANCES['drift']}):\n\n"
-        + _curve(rows)
+        + in_file(_curve(rows))
         + "\n\nEach pair of one building that is not joined, or wrong:\n\n"
         + _missed(rows)
     )

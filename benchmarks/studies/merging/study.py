@@ -1,11 +1,9 @@
 """The study ``merging``: merging of robots' maps, besides the thesis and ROS map_merge."""
 
 import json
-import platform
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import replace
-from datetime import date
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -16,7 +14,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-import lidarium
+from lidarium.benchmarks.results_page import in_file
 from lidarium.benchmarks.studies.merging import tables
 from lidarium.benchmarks.studies.merging.bank.bank import BankMap, Pair, read_maps, read_pairs
 from lidarium.benchmarks.studies.merging.bank.drives import RESOLUTION
@@ -177,7 +175,7 @@ def _measured(folder: Path, data: Path | None, name: str) -> list[dict[str, Any]
     return merge_plans(data) if name == "plans" else merge_real_maps(data)
 
 
-def page(folder: Path, command: str) -> str:
+def page(folder: Path) -> str:
     """Return the results as markdown."""
     pairs = [pair for pair in read_pairs(folder) or [] if pair.half == "test"]
     tried: dict[str, Tried] = {
@@ -186,9 +184,7 @@ def page(folder: Path, command: str) -> str:
     extra = json.loads((folder / EXTRA_FILE).read_text(encoding="utf-8"))
     parts = [
         "# Merging maps",
-        f"Made by `{command}` on {date.today().isoformat()}: lidarium {lidarium.__version__}, Python "
-        f"{platform.python_version()}. How maps "
-        "are merged is told in [merging maps](../reference/merging.md). Times are of the processor, medians "
+        "How maps are merged is told in [merging maps](../reference/merging.md). Times are of the processor, medians "
         "on a machine that others "
         "share; ratios are of runs in turn.",
         _about_bank(folder, len(pairs)),
@@ -226,7 +222,8 @@ def _about_thesis(extra: dict[str, Any]) -> str:
         "agree too little: unknown cells count as a state, and so do ragged walls. Its own pairs lay within "
         "1.1 % of its bound too: four that were accepted at 90.2 to 91.1 %.\n\n"
         "Its table of twelve pairs, of the first apartment of this bank (first and last map of a drive from "
-        "each start), with the errors of the transforms:\n\n" + twelve_text(extra["twelve"])
+        "each start), with the errors of the transforms, beside what it prints of its own apartment:\n\n"
+        + in_file(twelve_text(extra["twelve"]))
     )
 
 

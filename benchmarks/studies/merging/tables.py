@@ -4,6 +4,7 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from lidarium.benchmarks.results_page import in_file
 from lidarium.benchmarks.studies.merging import figures, thesis
 from lidarium.benchmarks.studies.merging.bank.bank import Pair
 from lidarium.benchmarks.studies.merging.features import BURST, REPEATS
@@ -65,7 +66,7 @@ def peers(tried: dict[str, figures.Tried]) -> str:
         "RANSAC, from OpenCV's "
         "stitching) says how sure it is, and its users set from where on they believe it. OpenCV 5 has no "
         "AKAZE any more; SIFT stands in "
-        "its place.\n\n" + "\n".join(lines) + "\n\n"
+        "its place.\n\n" + in_file("\n".join(lines)) + "\n\n"
         "A floor and its copy are nearly the same image, so no threshold tells look-alikes from positives: "
         "nothing in it asks what "
         "contradicts."
@@ -249,7 +250,7 @@ def teams(rows: list[dict[str, Any]]) -> str:
     whole = sum(row["joined"] == row["robots"] for row in rows)
     return (
         f"The last maps of five drives of a floor, merged at once: all joined on {whole} of {len(rows)} "
-        "floors.\n\n" + "\n".join(lines)
+        "floors.\n\n" + in_file("\n".join(lines))
     )
 
 

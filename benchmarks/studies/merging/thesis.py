@@ -191,14 +191,22 @@ def stages_text(rows: Sequence[dict[str, Any]]) -> str:
 def twelve_text(rows: Sequence[dict[str, Any]]) -> str:
     """Return the table of twelve pairs, as markdown."""
     lines = [
-        "| pair | known in both | initial matches | inliers | overlap [%] | time [us] | accepted | error [m] |",
-        "|---|---:|---:|---:|---:|---:|---|---:|",
+        "| pair | known in both | initial matches | inliers | overlap [%] | time [us] | accepted | error [m] | "
+        "printed: initial matches | inliers | overlap [%] | time [us] | accepted |",
+        "|---|---:|---:|---:|---:|---:|---|---:|---:|---:|---:|---:|---|",
     ]
+    printed = {"-".join(sorted((pair.a, pair.b))): pair for pair in PAIRS}
     for row in rows:
         overlap = f"{100 * row['overlap']:.0f} %"
         error = "-" if row["error_m"] is None else f"{row['error_m']:.2f}"
+        theirs = printed[row["pair"]]
         lines.append(
             f"| {row['pair']} | {overlap} | {row['matches']} | {row['inliers']} | {row['agreement']:.3f} | "
-            f"{row['time_us']:.0f} | {'yes' if row['is_accepted'] else 'no'} | {error} |"
+            f"{row['time_us']:.0f} | {_yes(row['is_accepted'])} | {error} | {theirs.matches} | {theirs.inliers} | "
+            f"{theirs.agreement:.3f} | {theirs.time_us} | {_yes(theirs.is_accepted)} |"
         )
     return "\n".join(lines)
+
+
+def _yes(is_so: bool) -> str:
+    return "yes" if is_so else "no"

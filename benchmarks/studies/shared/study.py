@@ -29,8 +29,8 @@ class Study:
     Attributes
     ----------
     page : callable
-        Takes the folder that the suites have run into, a folder for each by its name, and returns the page
-        for ``docs/results``.
+        Takes the folder that the suites have run into, a folder for each by its name, and returns title and
+        sections of the page for ``docs/results``; see `results_page`.
     suites : callable
         Takes the folder of real data (or None) and the share of the floors that is run, every how many-th;
         returns suites by name.
@@ -40,12 +40,15 @@ class Study:
         folder has is not done again.
     pictures : callable or None
         Takes the folder and that of the page, and draws the page's pictures.
+    quick : int
+        Every how many-th part ``--quick`` runs: at most five minutes on two slow cores.
     """
 
-    page: Callable[[Path, str], str]
+    page: Callable[[Path], str]
     suites: Callable[[Path | None, int], dict[str, Suite]] = no_suites
     work: Callable[[Path, Path | None, int, int], Iterator[tuple[str, int, int]]] | None = None
     pictures: Callable[[Path, Path], None] | None = None
+    quick: int = 100
 
 
 VERSION = "version"

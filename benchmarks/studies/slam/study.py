@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from lidarium.benchmarks.speed.harness.report import about, heading
+from lidarium.benchmarks.results_page import in_file
 from lidarium.benchmarks.studies.shared.study import Progress, Study, do_missing, kept_lines
 from lidarium.benchmarks.studies.slam import lies
 from lidarium.benchmarks.studies.slam.logs import OTHERS, RELATIONS, log_row, read, relation_cells
@@ -50,7 +50,7 @@ LOGS_HEADER = (
     "from scan to scan, m",
 )
 
-PAGE = """{heading}
+PAGE = """# SLAM
 
 One core. All logs are followed with the settings of `lidarium slam` (ranges to 30 m, cells of 5 cm, every
 scan that moved by 2 cm or 1 degree is matched). No pose is derived from the corrected poses that the logs
@@ -83,7 +83,6 @@ and the agreement with the others, so the figures are not those of logs never se
 
 ## Logs
 
-{logs_header}
 {logs}
 
 *Agreement* is the root mean square distance from the corrected poses after the best rigid motion, *most*
@@ -160,7 +159,7 @@ def header_rows(titles: Sequence[str]) -> str:
     return f"| {' | '.join(titles)} |\n|{'---|' * len(titles)}"
 
 
-def page(folder: Path, command: str) -> str:
+def page(folder: Path) -> str:
     """Return the results as markdown."""
     logs = kept_lines(folder / LOGS_FILE)
     [line] = kept_lines(folder / ROBOT_FILE)
@@ -171,15 +170,13 @@ def page(folder: Path, command: str) -> str:
     robot = Robot(match, closure, correction, line["error_m"], line["odometry_m"], line["path_m"])
     relations = [f"| {log['key']} | {' | '.join(log['relations'])} |" for log in logs if log["relations"]]
     return PAGE.format(
-        heading="\n".join(heading("SLAM", about(command))),
         relations_header=header_rows(RELATIONS_HEADER),
         relations="\n".join(relations),
-        logs_header=header_rows(LOGS_HEADER),
-        logs="\n".join(log["row"] for log in logs),
+        logs=in_file("\n".join([header_rows(LOGS_HEADER), *(log["row"] for log in logs)])),
         turns=lies.TURNS,
         count=len(lying),
         honest=sum(map(lies.is_honest, lying)),
-        lies=lies.table(lying),
+        lies=in_file(lies.table(lying)),
         robot="\n".join(robot_lines(robot, FLOOR)),
     )
 

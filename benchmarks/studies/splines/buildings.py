@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from lidarium.agents import make_policy
+from lidarium.benchmarks.results_page import in_file
 from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.settings.making import make_settings
 from lidarium.evaluation.episodes.result import EpisodeData, figures_of
@@ -146,4 +147,4 @@ def section(lines: Sequence[dict[str, Any]]) -> str:
             f"| all steps, least to median IoU | `{name}` | {100 * within:.1f} % | "
             f"{ious.min():.2f} to {np.median(ious):.2f} | | |"
         )
-    return "\n\n".join([ABOUT, "\n".join([HEADER, *rows]), TO_REACH])
+    return "\n\n".join([ABOUT, in_file("\n".join([HEADER, *rows])), TO_REACH])

@@ -7,21 +7,17 @@ alone. Times are CPU times of one process, map updates included.
 
 import itertools
 import math
-import platform
 import statistics
 import time
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
-from datetime import date
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 
-import lidarium
 from lidarium.agents import make_policy
 from lidarium.benchmarks.studies.shared.map_figures import MapFigures, map_figures
 from lidarium.benchmarks.studies.shared.study import Progress, Study, do_missing, kept_lines
@@ -235,7 +231,7 @@ floor's bounds. Steps are CPU times of single calls with 400 particles and 727 r
 takes in a scan, which makes the 95 %. On a machine that does other things at the same time they scatter."""
 
 
-def page(folder: Path, command: str) -> str:
+def page(folder: Path) -> str:
     """Return the results as markdown."""
     rows = [
         row(line["floor"], name, [_run_of(entry) for entry in runs])
@@ -250,12 +246,9 @@ def page(folder: Path, command: str) -> str:
         "figures. The filters' settings were chosen on the six worlds with a goal with seeds 0 to 2; "
         "`apartment` had no part in it."
     )
-    made = f"""Made with `{command}`
-on {date.today()}, lidarium {lidarium.__version__}, Python {platform.python_version()},
-numpy {np.__version__}, scipy {scipy.__version__}, {platform.machine()}."""
     table = "\n".join([HEADER, *rows])
     in_buildings = buildings.section(kept_lines(folder / BUILDINGS_FILE))
-    parts = ["# Spline maps and localization on them", how, table, TO_REACH, MEANING, in_buildings, made]
+    parts = ["# Spline maps and localization on them", how, table, TO_REACH, MEANING, in_buildings]
     return "\n\n".join(parts) + "\n"
 
 

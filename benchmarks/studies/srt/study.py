@@ -3,11 +3,9 @@
 It has the worlds in the thesis's mode and the default one, full exploration, and what its parts are worth.
 """
 
-import platform
-from datetime import date
 from pathlib import Path
 
-import lidarium
+from lidarium.benchmarks.results_page import in_file
 from lidarium.benchmarks.studies.shared.study import Progress, Study, do_missing
 from lidarium.benchmarks.studies.srt import tables
 from lidarium.benchmarks.studies.srt.ablations import FollowedWay, measure_variants
@@ -69,14 +67,12 @@ def work(folder: Path, _data: Path | None, every: int, workers: int) -> Progress
     yield from do_missing(folder / ABLATIONS_FILE, "ablations", ways, measure_variants, workers)
 
 
-def page(folder: Path, command: str) -> str:
+def page(folder: Path) -> str:
     """Return the results as markdown."""
     runs, followed = read_episodes(folder / GOALS_FILE), read_episodes(folder / ABLATIONS_FILE)
     episodes = read_episodes(folder / EXPLORATION / "episodes.jsonl")
     parts = [
         "# Sensor-based random tree",
-        f"Made by `{command}` on {date.today().isoformat()}: lidarium {lidarium.__version__}, Python "
-        f"{platform.python_version()}. "
         "What the tree does is told in [the reference](../reference/srt.md).",
         "## Towards goals",
         "A Pioneer P3-DX with the URG-04LX (noise of its data sheet) looks for the goal of each world; "
@@ -102,7 +98,7 @@ def page(folder: Path, command: str) -> str:
         "curves' length within 5 cm of a wall. Bytes are those of the compact form; end points are those of "
         "the scans that went into the "
         "map, as two float32 each; a grid has one byte a cell of 5 cm over the floor's bounds.",
-        tables.maps(runs),
+        in_file(tables.maps(runs)),
         "\n".join(
             f"![{world}: tree, safe regions, curves and truth](srt_world_{world.removeprefix('srt_')}.png)"
             for world in WORLDS
@@ -117,15 +113,13 @@ def page(folder: Path, command: str) -> str:
         "between two targets for ever (`office:2000009`). Means over the starts; the last columns are our "
         "mean over that of the better of "
         "the others.",
-        tables.exploration(episodes, POLICIES),
+        in_file(tables.exploration(episodes, POLICIES)),
         "## What parts are worth",
         f"The ways of the default mode, {len(FOLLOWED)} a world at most, followed by the particle filter "
         "with one part changed. Means over "
         "all worlds, in brackets the worst.",
-        tables.ablations(followed),
+        in_file(tables.ablations(followed)),
     ]
-    if "--every" in command:
-        parts.insert(2, "A part of the seeds, floors and starts; without `--every` the command runs all.")
     return "\n\n".join(parts) + "\n"
 
 

@@ -1,13 +1,11 @@
 """The page of the study of the supervisor, and what the logs of its runs say."""
 
 import json
-import platform
 from collections.abc import Mapping, Sequence
-from datetime import date
 from pathlib import Path
 from typing import Any
 
-import lidarium
+from lidarium.benchmarks.results_page import in_file
 from lidarium.benchmarks.studies.supervisor import tables
 from lidarium.benchmarks.studies.supervisor.figures import Row, chosen, floor_of, has_wrong_merge
 from lidarium.benchmarks.studies.supervisor.goals import BUMPER, SUPERVISED, goals_of, is_covered
@@ -78,7 +76,7 @@ EXTENSION_SUITES = ("extensions", "radio", "energy", "together")
 SECONDS_PER_HOUR = 3600.0
 
 
-def page(folder: Path, command: str) -> str:
+def page(folder: Path) -> str:
     """Return the results as markdown."""
     rows = {name: asked_runs(folder, name) for name in suites(None)}
     failing = asked_runs(folder, FAILING)
@@ -88,11 +86,8 @@ def page(folder: Path, command: str) -> str:
     alone = rows["one"]
     parts = [
         "# Supervised teams",
-        f"Made by `{command}` on {date.today().isoformat()}: lidarium {lidarium.__version__}, Python "
-        f"{platform.python_version()}; "
-        f"{len(every)} runs, {hours:.2f} hours of one core, {hours / 2.0:.2f} of two.",
-        _about(alone),
-        "## What was to be reached\n\n" + tables.goals_table(goals),
+        f"{len(every)} runs, {hours:.2f} hours of one core. " + _about(alone),
+        "## What was to be reached\n\n" + in_file(tables.goals_table(goals)),
         _notes(),
         *_wrong_section(every),
         *logs_section(read_json(folder / LOGS_FILE)),
@@ -103,7 +98,7 @@ def page(folder: Path, command: str) -> str:
             for floor in dict.fromkeys(floor_of(row) for row in rows["pairs"])
         ),
         "## Test 3: three robots, apartment\n\n" + tables.team_table(rows["three"], rows["alone"]),
-        "## One robot on each floor\n\n" + tables.one_table(alone),
+        "## One robot on each floor\n\n" + in_file(tables.one_table(alone)),
     ]
     generated = [row for row in rows["teams"] if _is_generated(row)]
     real = [row for row in rows["teams"] if not _is_generated(row)]
@@ -113,14 +108,14 @@ def page(folder: Path, command: str) -> str:
         ("Real floors, or what stands in for them", real),
     ):
         if some:
-            parts.append(f"## {title}\n\n" + tables.team_table(some, alone))
+            parts.append(f"## {title}\n\n" + in_file(tables.team_table(some, alone)))
     parts += [
         "## Five robots\n\n" + tables.five_table(rows["five"], alone),
         "## A robot fails\n\n" + _about_failing() + "\n\n" + failing_table(failing),
         *_left_section(failing),
         *_bumper_section(rows[BUMPER]),
         "## Extensions\n\n" + _about_extensions(),
-        *(extension_table(rows[name]) for name in EXTENSION_SUITES if rows[name]),
+        *(in_file(extension_table(rows[name])) for name in EXTENSION_SUITES if rows[name]),
     ]
     return "\n\n".join(parts) + "\n"
 
@@ -146,7 +141,7 @@ def _bumper_section(rows: Sequence[Row]) -> list[str]:
         "no order, since what it met would be drawn into its map and trap it (`supervised`). `resumes` "
         "orders it to go on where the cause is known, after it has backed out. Counts are of all runs."
     )
-    return ["## Bumpers\n\n" + words + "\n\n" + bumper_table(rows)] if rows else []
+    return ["## Bumpers\n\n" + words + "\n\n" + in_file(bumper_table(rows))] if rows else []
 
 
 def _left_section(failing: Sequence[Row]) -> list[str]:

@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from lidarium.benchmarks.results_page import about
 from lidarium.benchmarks.speed.cases.histories import Histories, drawn_drives
 from lidarium.benchmarks.speed.growth.idle_memory import IdleMemory, array_bytes, measure, own_bytes
 from lidarium.benchmarks.speed.growth.question import (
@@ -12,7 +13,6 @@ from lidarium.benchmarks.speed.growth.question import (
     growth_with_robots,
     memory_table,
 )
-from lidarium.benchmarks.speed.harness.report import about
 from lidarium.benchmarks.speed.scenes.floors import straight_floor, team_poses
 from lidarium.envs.settings.lidar import Lidar
 from lidarium.envs.settings.robots import ROBOTS

@@ -1,9 +1,10 @@
 from functools import partial
 
 import pytest
+from published_pages import assert_published
 
 from lidarium.benchmarks.studies import STUDIES
-from lidarium.benchmarks.studies.merging import features, trials, tuning
+from lidarium.benchmarks.studies.merging import features, trials
 from lidarium.benchmarks.studies.merging import study as merging
 from lidarium.benchmarks.studies.merging.bank import bank, drives, making
 from lidarium.benchmarks.studies.merging.bank.floors import BankFloor
@@ -28,7 +29,6 @@ def small_bank(monkeypatch):
         monkeypatch.setattr(module, "shared_out", lambda work, tasks, workers, is_apart: shared_out(work, tasks, 1))
     monkeypatch.setattr(bank, "RUNS", 1)
     monkeypatch.setattr(drives, "HORIZON_S", 30.0)
-    monkeypatch.setattr(tuning, "bank_floors", lambda data, every: FLOORS)
     monkeypatch.setattr(making, "choose_pairs", partial(choose_pairs, wanted=few))
 
 
@@ -40,7 +40,8 @@ def test_the_page_has_all_experiments_and_what_is_done_is_not_done_again(small_b
     assert done[-1] == ("other experiments", 9, 9)
     again = list(study.work(tmp_path, None, 1, 1))
     assert all(what.startswith("pairs") for what, *_ in again)
-    page = study.page(tmp_path, "lidarium reproduce merging")
+    page = study.page(tmp_path)
+    assert_published("merging", page, tmp_path, ("Maps of real robots", "Drawn plans"))
     for heading in (
         "The bank",
         "Beside the thesis's bank",
@@ -57,16 +58,3 @@ def test_the_page_has_all_experiments_and_what_is_done_is_not_done_again(small_b
     monkeypatch.setattr(merging, "bank_floors", lambda data, every: FLOORS[:2])
     with pytest.raises(ValueError, match="a bank of other floors"):
         next(study.work(tmp_path, None, 1, 1))
-
-
-def test_the_half_for_tuning_is_a_study_of_its_own(small_bank, tmp_path):
-    study = STUDIES["merging_tuning"]
-    done = list(study.work(tmp_path, None, 1, 1))
-    assert ("drives", 3, 3) in done
-    again = list(study.work(tmp_path, None, 1, 1))
-    assert all(what.startswith("pairs") and done == total for what, done, total in again)
-    page = study.page(tmp_path, "lidarium reproduce merging_tuning")
-    assert "Made by `lidarium reproduce merging_tuning` on " in page
-    assert "| | `default` | `thesis` |" in page
-    assert "| recall, overlap 30 % and more | " in page
-    assert "| false accepts | " in page
