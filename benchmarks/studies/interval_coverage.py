@@ -277,7 +277,7 @@ def page(folder: Path) -> str:
         "# How often intervals hold the truth",
         "",
         f"Share of {trials:,} trials in which the 95 % interval holds the known truth, in %, by the number "
-        "of runs or pairs; {seconds:.0f} s on one core. Its standard "
+        f"of runs or pairs; {seconds:.0f} s on one core. Its standard "
         f"error is {100.0 * np.sqrt(0.95 * 0.05 / trials):.1f} at 95 %. Intervals are made of {resamples:,} "
         "resamples here, of 10,000 in "
         f"reports. Asked for are {100 * WANTED[0]:.0f} to {100 * WANTED[1]:.0f} at {FEWEST_FOR_NOMINAL} and "

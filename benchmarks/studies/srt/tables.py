@@ -46,11 +46,10 @@ def goals(lines: Sequence[Line]) -> str:
 
 
 def _goal_row(world: str, mode: str, runs: Sequence[Line]) -> str:
-    endings = ", ".join(f"{name} {count}" for name, count in sorted(Counter(run["ending"] for run in runs).items()))
     ratios = [run["path_m"] / run["shortest_m"] for run in runs if run["shortest_m"] and run["ending"] == "reached"]
     shortest = f"{statistics.median(ratios):.2f} (to {max(ratios):.2f})" if ratios else "-"
     return (
-        f"| {world} | {mode} | {len(runs)} | {endings} | {_spread(runs, 'nodes', 0)} | "
+        f"| {world} | {mode} | {len(runs)} | {_endings(runs)} | {_spread(runs, 'nodes', 0)} | "
         f"{_spread(runs, 'curves', 0)} | "
         f"{_spread(runs, 'time_s', 0)} | {_spread(runs, 'path_m', 1)} | {shortest} | "
         f"{100 * min(run['coverage'] for run in runs):.1f} % | "
@@ -117,6 +116,26 @@ def _map_cells(runs: Sequence[Line]) -> str:
             _worst(runs, "of_grid", 100.0, 1, max, " %"),
         ]
     )
+
+
+def trees(lines: Sequence[Line]) -> str:
+    """Return what variants of the thesis's rules come to, on each floor."""
+    rows = [
+        "| floor | tree | runs | ended | nodes | time [s] | path [m] | area covered | contacts |",
+        "|---|---|---:|---|---:|---:|---:|---:|---:|",
+    ]
+    for floor, tree in dict.fromkeys((line["world"], line["mode"]) for line in lines):
+        runs = _of(lines, floor, tree)
+        rows.append(
+            f"| {floor} | {tree} | {len(runs)} | {_endings(runs)} | {_spread(runs, 'nodes', 0)} | "
+            f"{_spread(runs, 'time_s', 0)} | {_spread(runs, 'path_m', 1)} | "
+            f"{100 * min(run['coverage'] for run in runs):.1f} % | {sum(run['collisions'] for run in runs)} |"
+        )
+    return "\n".join(rows)
+
+
+def _endings(runs: Sequence[Line]) -> str:
+    return ", ".join(f"{name} {count}" for name, count in sorted(Counter(run["ending"] for run in runs).items()))
 
 
 def ablations(lines: Sequence[Line]) -> str:
