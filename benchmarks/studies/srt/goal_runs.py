@@ -161,7 +161,7 @@ def measure_goal_run(run: GoalRun) -> dict[str, Any]:
     """Run and measure; returns the run's line."""
     episode, policy, way = drive_to_goal(run)
     env = episode.env
-    world, floor, goal, tables = env.world, env.floor, env.goal, env.world.floors[0]
+    floor, goal, tables = env.floor, env.goal, env.world.floors[0]
     assert floor is not None
     assert goal is not None
     assert tables is not None

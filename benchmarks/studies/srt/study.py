@@ -106,8 +106,8 @@ def page(folder: Path) -> str:
         'The rows called thesis drive by MOVE_TO with the list of controls (`drive="controls"`), have stars as safe '
         'regions and the spline map by the thesis\'s rules (`spline_settings("thesis")`). Here one rule at a time is '
         "another that the thesis names: the controller of turn and advance, balls, one radius for each ray, the base "
-        "algorithm, and the farthest point of an opening. In `apartment` there is no goal: the robot knows where it is, "
-        "and explores until 99 % are covered or 1,200 s are over. What slopes and lines about the robot do to the map "
+        "algorithm, and the farthest point of an opening. In `apartment` there is no goal: the robot knows where it "
+        "is, and explores until 99 % are covered or 1,200 s are over. What slopes and lines about the robot do to the map "
         "is in [parts](#what-parts-are-worth).",
         tables.trees(trees),
         "## Poses and maps",
