@@ -74,9 +74,8 @@ They are modules with ``CORES``, ``NOTES`` and ``measure(effort)``.
 """
 
 ABOUT_QUOTES = (
-    "*quoted* marks a rate that was not measured in this run but on an AMD Zen 5 core of about 4.1 GHz; on "
-    "another machine read "
-    "those ratios with that in mind.",
+    "*quoted* marks a rate that was not measured in this run but on an AMD Zen 5 core of about 4.1 GHz; on another "
+    "machine read those ratios with that in mind.",
 )
 
 

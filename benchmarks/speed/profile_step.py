@@ -250,11 +250,9 @@ def profile_table(profiles: Mapping[str, tuple[Mapping[str, float], float, float
 def rates(profiles: Mapping[str, tuple[Mapping[str, float], float, float]]) -> Sequence[str]:
     """Say how many rays and cells that is in a second."""
     return [
-        f"- {floor}: {rays:.0f} rays and {cells:,.0f} cells in an agent step; "
-        f"{rays / spent['ray casting']:.0f} M rays/s cast, "
-        f"{cells / 1e3 / (spent['area seen through noise'] + spent['map update']):.2f} G cells/s found and "
-        "put into the map, "
-        f"{cells / 1e3 / spent['map update']:.1f} G cells/s put into the map once found."
+        f"- {floor}: {rays:.0f} rays and {cells:,.0f} cells in an agent step; {rays / spent['ray casting']:.0f} M "
+        f"rays/s cast, {cells / 1e3 / (spent['area seen through noise'] + spent['map update']):.2f} G cells/s found "
+        f"and put into the map, {cells / 1e3 / spent['map update']:.1f} G cells/s put into the map once found."
         for floor, (spent, rays, cells) in profiles.items()
     ]
 
@@ -291,13 +289,10 @@ def profile_page(profiles: Mapping[str, tuple[Mapping[str, float], float, float]
             "",
             profile_table(profiles),
             "",
-            f"A team of {ROBOTS} on the floor of 512 x 512 cells of 2.5 cm, straight and turned by 17 deg; "
-            "720 noisy beams over 240 deg to "
-            "5.6 m, maps at 2.5 cm. Every part runs by itself on the same poses and scans, so what it needs "
-            "lies in nearer caches than in "
-            "the whole step, and the rest holds that difference, too. The observation (scan, pose, velocity, "
-            "bumper, egocentric maps) is "
-            "no part of the kernel's step.",
+            f"A team of {ROBOTS} on the floor of 512 x 512 cells of 2.5 cm, straight and turned by 17 deg; 720 noisy "
+            "beams over 240 deg to 5.6 m, maps at 2.5 cm. Every part runs by itself on the same poses and scans, so "
+            "what it needs lies in nearer caches than in the whole step, and the rest holds that difference, too. The "
+            "observation (scan, pose, velocity, bumper, egocentric maps) is no part of the kernel's step.",
             "",
             *rates(profiles),
             "",

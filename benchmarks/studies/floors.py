@@ -102,10 +102,8 @@ def page(folder: Path) -> str:
     lines = [
         "# Every floor, explored",
         "",
-        f"Policy `{POLICY}`, Kobuki (radius 0.18 m), URG-04LX (727 "
-        "beams, 240 degrees, "
-        "5.6 m), true poses, no noise, world and maps at 0.025 m, no horizon, seed 0. A run "
-        "ends as `covered` when 0.99 of `C_free` is sensed.",
+        f"Policy `{POLICY}`, Kobuki (radius 0.18 m), URG-04LX (727 beams, 240 degrees, 5.6 m), true poses, no noise, "
+        "world and maps at 0.025 m, no horizon, seed 0. A run ends as `covered` when 0.99 of `C_free` is sensed.",
         "",
         *_summary(runs),
         "",
@@ -127,9 +125,8 @@ def page(folder: Path) -> str:
 def _summary(runs: Sequence[Row]) -> list[str]:
     """Return a table with a line for each kind of floor and number of robots."""
     lines = [
-        "| floors | robots | runs | reached 0.99 | least coverage | collisions | area, median m2 | time, "
-        "median s | path, median m "
-        "| wall, median s |",
+        "| floors | robots | runs | reached 0.99 | least coverage | collisions | area, median m2 | time, median s | "
+        "path, median m | wall, median s |",
         "|---|---|---|---|---|---|---|---|---|---|",
     ]
     for kind, title in KINDS.items():
@@ -137,14 +134,10 @@ def _summary(runs: Sequence[Row]) -> list[str]:
             chosen = [row for row in runs if row["kind"] == kind and row["robots"] == robots]
             if chosen:
                 lines.append(
-                    f"| {title} | {robots} | {len(chosen)} | "
-                    f"{sum(row['coverage'] >= 0.99 for row in chosen)} "
-                    f"| {min(row['coverage'] for row in chosen):.4f} | "
-                    f"{sum(row['collisions'] for row in chosen)} "
-                    f"| {median(row['area_m2'] for row in chosen):.0f} | "
-                    f"{median(row['time_s'] for row in chosen):.0f} "
-                    f"| {median(row['path_m'] for row in chosen):.0f} | "
-                    f"{median(row['wall_s'] for row in chosen):.1f} |"
+                    f"| {title} | {robots} | {len(chosen)} | {sum(row['coverage'] >= 0.99 for row in chosen)} | "
+                    f"{min(row['coverage'] for row in chosen):.4f} | {sum(row['collisions'] for row in chosen)} | "
+                    f"{median(row['area_m2'] for row in chosen):.0f} | {median(row['time_s'] for row in chosen):.0f} | "
+                    f"{median(row['path_m'] for row in chosen):.0f} | {median(row['wall_s'] for row in chosen):.1f} |"
                 )
     return lines
 

@@ -276,30 +276,24 @@ def page(folder: Path) -> str:
     text = [
         "# How often intervals hold the truth",
         "",
-        f"Share of {trials:,} trials in which the 95 % interval holds the known truth, in %, by the number "
-        f"of runs or pairs; {seconds:.0f} s on one core. Its standard "
-        f"error is {100.0 * np.sqrt(0.95 * 0.05 / trials):.1f} at 95 %. Intervals are made of {resamples:,} "
-        "resamples here, of 10,000 in "
-        f"reports. Asked for are {100 * WANTED[0]:.0f} to {100 * WANTED[1]:.0f} at {FEWEST_FOR_NOMINAL} and "
-        "more on normal, skewed and "
-        "20 % censored data; the figures at 10 and 20 are published, not asked for, and reports warn there. "
-        "Rows marked as beyond are "
-        "harder than what is asked for, or discrete. What each interval is made of: "
+        f"Share of {trials:,} trials in which the 95 % interval holds the known truth, in %, by the number of runs or "
+        f"pairs; {seconds:.0f} s on one core. Its standard error is {100.0 * np.sqrt(0.95 * 0.05 / trials):.1f} at 95 "
+        f"%. Intervals are made of {resamples:,} resamples here, of 10,000 in reports. Asked for are "
+        f"{100 * WANTED[0]:.0f} to {100 * WANTED[1]:.0f} at {FEWEST_FOR_NOMINAL} and more on normal, skewed and 20 % "
+        "censored data; the figures at 10 and 20 are published, not asked for, and reports warn there. Rows marked as "
+        "beyond are harder than what is asked for, or discrete. What each interval is made of: "
         "[statistics](../reference/statistics.md).",
         "",
-        "Times of two policies are drawn in pairs whose normal scores have a correlation of 0.5; the second "
-        "policy takes 1.2 times "
-        "as long. Cut by the horizon: runs end where the first policy has missed a fifth. Cut at random: "
-        "exponential cuts come "
-        "before a fifth of its times, and the horizon is its upper quartile.",
+        "Times of two policies are drawn in pairs whose normal scores have a correlation of 0.5; the second policy "
+        "takes 1.2 times as long. Cut by the horizon: runs end where the first policy has missed a fifth. Cut at "
+        "random: exponential cuts come before a fifth of its times, and the horizon is its upper quartile.",
         "",
         f"**Reached in {asked - len(missed)} of {asked} rows that are asked for.**"
         + ("" if not missed else " Missed: " + "; ".join(f"{line['figure']}, {line['data']}" for line in missed) + "."),
         *_tables(lines),
         "",
-        "*refused*: trials in which the longest time was cut before the horizon, so that the mean up to "
-        "there is unknown; the "
-        "function says so, and the share is of the others.",
+        "*refused*: trials in which the longest time was cut before the horizon, so that the mean up to there is "
+        "unknown; the function says so, and the share is of the others.",
     ]
     return "\n".join(text) + "\n"
 

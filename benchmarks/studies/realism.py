@@ -321,11 +321,10 @@ def rows_of(episodes: list[dict[str, Any]]) -> Iterator[str]:
         ate, aligned, last, wheels, way = (np.concatenate([one[name] for one in own]) for name in names)
         coverage, iou, fitted = (np.array([one[name] for one in own]) for name in ("coverage", "iou", "aligned_iou"))
         yield (
-            f"| {key[0]} | {key[1]} | {np.median(way):.0f} | {np.median(coverage):.3f} | "
-            f"{np.median(aligned):.3f} ({aligned.max():.3f}) "
-            f"| {np.median(ate):.3f} ({ate.max():.3f}) | {np.median(last):.3f} ({last.max():.3f}) "
-            f"| {np.median(wheels):.2f} | {np.median(iou):.3f} ({iou.min():.3f}) "
-            f"| {np.median(fitted):.3f} ({fitted.min():.3f}) | {own[0]['true_iou']:.3f} |"
+            f"| {key[0]} | {key[1]} | {np.median(way):.0f} | {np.median(coverage):.3f} | {np.median(aligned):.3f} "
+            f"({aligned.max():.3f}) | {np.median(ate):.3f} ({ate.max():.3f}) | {np.median(last):.3f} "
+            f"({last.max():.3f}) | {np.median(wheels):.2f} | {np.median(iou):.3f} ({iou.min():.3f}) | "
+            f"{np.median(fitted):.3f} ({fitted.min():.3f}) | {own[0]['true_iou']:.3f} |"
         )
 
 
@@ -358,9 +357,8 @@ def page(folder: Path) -> str:
     repeated = (line["longest_s"] for line in kept_lines(folder / LONGEST_FILE))
     longest = [seconds for seconds in repeated if seconds is not None]
     speed = (
-        f"Five robots on building:17 make {np.median(rates):.0f} agent steps a second on one core "
-        f"({min(rates):.0f} to {max(rates):.0f}), "
-        "policy, maps and localizers included."
+        f"Five robots on building:17 make {np.median(rates):.0f} agent steps a second on one core ({min(rates):.0f} to "
+        f"{max(rates):.0f}), policy, maps and localizers included."
     )
     table = [f"| {' | '.join(HEADER)} |", "|" + "---|" * len(HEADER), *rows_of(episodes)]
     lines = [

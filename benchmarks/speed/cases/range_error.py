@@ -27,11 +27,9 @@ ALLOWED_MM = 0.1
 CORES = 1
 
 NOTES = (
-    "*Range error*: the greatest difference between our ranges (as the sensor returns them, float32) and the "
-    "nearest entry point into any "
-    "solid cell, computed by intersecting each beam with every such cell in reach; 12 poses of 720 beams on "
-    "each of the four floors. The "
-    "other column has the mean error of sphere tracing on the same beams.",
+    "*Range error*: the greatest difference between our ranges (as the sensor returns them, float32) and the nearest "
+    "entry point into any solid cell, computed by intersecting each beam with every such cell in reach; 12 poses of "
+    "720 beams on each of the four floors. The other column has the mean error of sphere tracing on the same beams.",
 )
 
 

@@ -29,15 +29,12 @@ Measured on an AMD Zen 5 core on floors like these (9 to 12 M).
 CORES = 1
 
 NOTES = (
-    "*Rays alone*: `cast_scans` of the package on 32 poses, 720 beams over 240 deg to 5.6 m, no noise, no "
-    "map. The larger floor has "
-    "2000 x 2000 cells of 2.5 cm.",
-    "*f1tenth's scan simulator* is the original's code (f1tenth/f1tenth_gym 02ca878, `laser_models.py`, "
-    "comments and tests "
-    "left out, an outside file that LIDARIUM_F1TENTH "
-    "names), its noise of 6 to 8 us a scan included; the same poses, one call a scan. Where no file is named "
-    "its rate is quoted, about "
-    "10 M rays/s, measured on a Zen 5 core on floors like these.",
+    "*Rays alone*: `cast_scans` of the package on 32 poses, 720 beams over 240 deg to 5.6 m, no noise, no map. The "
+    "larger floor has 2000 x 2000 cells of 2.5 cm.",
+    "*f1tenth's scan simulator* is the original's code (f1tenth/f1tenth_gym 02ca878, `laser_models.py`, comments and "
+    "tests left out, an outside file that LIDARIUM_F1TENTH names), its noise of 6 to 8 us a scan included; the same "
+    "poses, one call a scan. Where no file is named its rate is quoted, about 10 M rays/s, measured on a Zen 5 core "
+    "on floors like these.",
     "*Sphere tracing* is code of our own after the same method, without noise: faster than the original, "
     "and no line to reach.",
     "*PyBullet* casts the same scans with `rayTestBatch` on the floor's boxes, one thread.",

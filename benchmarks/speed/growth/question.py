@@ -144,34 +144,28 @@ def growth_page(result: Mapping[str, Any], growths: Sequence[Growth], memory: Id
     return "\n".join(
         [
             "# Growth",
-            f"One thread. {result['repeats']} repeats in which all sizes run in turn; medians, with the "
-            "interval of ranks that holds the "
-            f"true median in at least 95 of 100 cases. Caches of a core: {result['caches']}.",
+            f"One thread. {result['repeats']} repeats in which all sizes run in turn; medians, with the interval of "
+            f"ranks that holds the true median in at least 95 of 100 cases. Caches of a core: {result['caches']}.",
             "",
             growth_table(growths),
             "",
-            "- *Robots in a batch*: the same 1,024 drives of 1 s (teams of two, 720 noisy beams over 240 deg "
-            "to 5.6 m, the straight floor "
-            "of 512 x 512 cells of 2.5 cm) are run in batches of 4, of 16 and so on: batch after batch is "
-            "put where its drives begin, on "
-            "the maps that it has. A step is `KinematicWorld.step` with motion, contact, scans, scorer and "
-            "maps.",
-            "- *On the maps of 4*: the same batch of 1,024 robots, whose maps and masks are those of the "
-            "first four. The arithmetic "
-            "is the same, cell for cell; only the memory in use is smaller. What the time falls by is what "
-            "memory costs.",
+            "- *Robots in a batch*: the same 1,024 drives of 1 s (teams of two, 720 noisy beams over 240 deg to 5.6 "
+            "m, the straight floor of 512 x 512 cells of 2.5 cm) are run in batches of 4, of 16 and so on: batch "
+            "after batch is put where its drives begin, on the maps that it has. A step is `KinematicWorld.step` with "
+            "motion, contact, scans, scorer and maps.",
+            "- *On the maps of 4*: the same batch of 1,024 robots, whose maps and masks are those of the first four. "
+            "The arithmetic is the same, cell for cell; only the memory in use is smaller. What the time falls by is "
+            "what memory costs.",
             "- *Side of the floor*: 256 drives of 5 s on floors of the same kind of rooms, four robots at a "
             "time, each alone on its floor.",
             "",
             memory_table(memory),
             "",
-            f"- *Idle robot*: {memory.robots:,} robots in teams of two that have stood still for a second at "
-            "the level of velocities, on "
-            f"the straight floor; the map of one has {memory.map_bytes / MIB:.2f} MiB. *Arrays that belong "
-            "to the robot* are its map, its "
-            "mask (an eighth of the map) and its rows of all tables; *all arrays* adds the team's masks and "
-            "two sets of observations. "
-            "*Resident* is what the process has grown by, with what the C library keeps between arrays.",
+            f"- *Idle robot*: {memory.robots:,} robots in teams of two that have stood still for a second at the level "
+            f"of velocities, on the straight floor; the map of one has {memory.map_bytes / MIB:.2f} MiB. *Arrays that "
+            "belong to the robot* are its map, its mask (an eighth of the map) and its rows of all tables; *all "
+            "arrays* adds the team's masks and two sets of observations. *Resident* is what the process has grown by, "
+            "with what the C library keeps between arrays.",
             "",
         ]
     )

@@ -62,14 +62,11 @@ def peers(tried: dict[str, figures.Tried]) -> str:
             ]
             lines.append(f"| {method.upper()} | {' | '.join(str(cell) for cell in cells)} |")
     return (
-        "The pipeline of ROS map_merge (features, the best of two nearest, an affine motion without shear by "
-        "RANSAC, from OpenCV's "
-        "stitching) says how sure it is, and its users set from where on they believe it. OpenCV 5 has no "
-        "AKAZE any more; SIFT stands in "
-        "its place.\n\n" + in_file("\n".join(lines)) + "\n\n"
-        "A floor and its copy are nearly the same image, so no threshold tells look-alikes from positives: "
-        "nothing in it asks what "
-        "contradicts."
+        "The pipeline of ROS map_merge (features, the best of two nearest, an affine motion without shear by RANSAC, "
+        "from OpenCV's stitching) says how sure it is, and its users set from where on they believe it. OpenCV 5 has "
+        "no AKAZE any more; SIFT stands in its place.\n\n" + in_file("\n".join(lines)) + "\n\n"
+        "A floor and its copy are nearly the same image, so no threshold tells look-alikes from positives: nothing in "
+        "it asks what contradicts."
     )
 
 
@@ -93,26 +90,17 @@ def reading(tried: dict[str, figures.Tried]) -> str:
     inexact = sum(one.is_accepted for one in plenty)
     return (
         f"- Without the fallback a pair of 512 x 512 cells takes {without.median:.0f} ms (median, both maps "
-        "described). The fallback ran "
-        f"on {100 * (1 - without.count / max(every.count, 1)):.0f} % of these pairs, most of which are "
-        "negatives: who is refused has been "
-        f"searched for everywhere. Of all pairs 95 % are done in {every.p95:.0f} ms; of those that are "
-        "joined, half in "
-        f"{joined.median:.0f} ms.\n"
-        f"- {negatives.hits} of {negatives.total} negatives are accepted, so the rate is below "
-        f"{100 * negatives.high:.2f} % (95 %).\n"
-        f"- Of the {len(plenty)} pairs with 30 % and more that are missed, {refused} were found in the right "
-        "place and refused, because "
-        "too little wall speaks for it or more for a place that looks like it, and "
-        f"{inexact} joined less exactly than is counted as right.\n"
-        f"- Of the {len(missed)} pairs with 15 to 30 % of overlap that are missed, {poor} have less than "
-        f"{POOR_M:g} m of wall in "
-        "common under the best transform: what both know is open floor, on which any two rooms agree. "
-        "Whoever accepts on less accepts "
-        "strangers too.\n"
-        "- Indistinct negatives are like rooms that differ by less than 1 m of wall: whoever joins maps of "
-        "one room joins them. Symmetric positives "
-        "that are accepted are like rooms whose wrong overlay shows more walls than the true one."
+        f"described). The fallback ran on {100 * (1 - without.count / max(every.count, 1)):.0f} % of these pairs, most "
+        "of which are negatives: who is refused has been searched for everywhere. Of all pairs 95 % are done in "
+        f"{every.p95:.0f} ms; of those that are joined, half in {joined.median:.0f} ms.\n- {negatives.hits} of "
+        f"{negatives.total} negatives are accepted, so the rate is below {100 * negatives.high:.2f} % (95 %).\n- Of "
+        f"the {len(plenty)} pairs with 30 % and more that are missed, {refused} were found in the right place and "
+        f"refused, because too little wall speaks for it or more for a place that looks like it, and {inexact} joined "
+        f"less exactly than is counted as right.\n- Of the {len(missed)} pairs with 15 to 30 % of overlap that are "
+        f"missed, {poor} have less than {POOR_M:g} m of wall in common under the best transform: what both know is "
+        "open floor, on which any two rooms agree. Whoever accepts on less accepts strangers too.\n- Indistinct "
+        "negatives are like rooms that differ by less than 1 m of wall: whoever joins maps of one room joins them. "
+        "Symmetric positives that are accepted are like rooms whose wrong overlay shows more walls than the true one."
     )
 
 
@@ -145,10 +133,9 @@ def beside_thesis(tried: dict[str, figures.Tried]) -> str:
     lines = [
         "| | pairs that overlap | joined | negatives accepted | time a pair |",
         "|---|---:|---|---|---|",
-        f"| thesis, an apartment of 65 m2 (errors never measured) | {known.total} | {100 * known.value:.0f} "
-        f"% ({known.hits} of "
-        f"{known.total}) | 0 of {strangers.total} (the rate may be up to {100 * strangers.high:.0f} %) | "
-        f"{sum(spent) / len(spent):.0f} ms mean, {max(spent):.0f} ms worst |",
+        f"| thesis, an apartment of 65 m2 (errors never measured) | {known.total} | {100 * known.value:.0f} % "
+        f"({known.hits} of {known.total}) | 0 of {strangers.total} (the rate may be up to {100 * strangers.high:.0f} "
+        f"%) | {sum(spent) / len(spent):.0f} ms mean, {max(spent):.0f} ms worst |",
     ]
     for method, name in (("thesis", "thesis mode"), ("default", "default mode")):
         positives = figures.recall(tried[method], lambda pair: pair.category in figures.SAME_PLACE)
@@ -160,8 +147,7 @@ def beside_thesis(tried: dict[str, figures.Tried]) -> str:
         )
     return (
         "\n".join(lines) + f"\n\nThe 280 ms that it claims are the longest times of its stages, added up once: "
-        f"{thesis.claimed_ms():.0f} ms. "
-        f"With both maps described its worst pair takes {max(spent):.0f} ms."
+        f"{thesis.claimed_ms():.0f} ms. With both maps described its worst pair takes {max(spent):.0f} ms."
     )
 
 
@@ -182,9 +168,8 @@ def detectors(rows: list[dict[str, Any]]) -> str:
         + "\n\n"
         + _stabilities(rows)
         + "The thesis, C++ on 2.2 GHz, on maps of 146 x 144, 113 x 113 and 398 x 402 cells [us]: "
-        f"{_printed(thesis.DETECTORS_US)}; 2.8 to 3.9 times faster than Shi-Tomasi. Its rows of Harris and "
-        "Shi-Tomasi are the same in six "
-        "of eight columns; one was copied."
+        f"{_printed(thesis.DETECTORS_US)}; 2.8 to 3.9 times faster than Shi-Tomasi. Its rows of Harris and Shi-Tomasi "
+        "are the same in six of eight columns; one was copied."
     )
 
 
@@ -225,15 +210,13 @@ def methods(rows: list[dict[str, Any]]) -> str:
     ]
     lines += [
         f"| {row['method']} | {row['matches']:.0f} | {row['right']:.0f} | {100 * row['two_right']:.0f} % | "
-        f"{100 * row['voted']:.0f} % | "
-        f"{row['time_ms']:.1f} |"
+        f"{100 * row['voted']:.0f} % | {row['time_ms']:.1f} |"
         for row in rows
     ]
     return (
         f"Medians over {rows[0]['pairs']} positives with 30 % of overlap and more.\n\n" + "\n".join(lines) + "\n\n"
-        "The thesis [ms]: distances 3.0, triplets 1.5, descriptors 208 and 85; with descriptors two right "
-        "matches in more than 85 % of its "
-        "pairs."
+        "The thesis [ms]: distances 3.0, triplets 1.5, descriptors 208 and 85; with descriptors two right matches in "
+        "more than 85 % of its pairs."
     )
 
 

@@ -201,16 +201,12 @@ def row(floor: str, name: str, runs: list[Run]) -> str:
     ratio = min(each.odometry_ate_m / each.ate_m for each in figures)
     return (
         f"| {floor} | `{name}` | {1000 * max(each.ate_m for each in figures):.0f} | "
-        f"{1000 * max(each.end_m for each in figures):.0f} | "
-        f"{max(each.end_deg for each in figures):.2f} | {ratio:.1f} | "
-        f"{1000 * max(each.wall_mean_m for each in figures):.1f} | "
-        f"{1000 * max(each.wall_p95_m for each in figures):.0f} | "
-        f"{100 * min(each.recall for each in figures):.1f} % | "
-        f"{100 * min(each.precision for each in figures):.1f} % | "
-        f"{max(each.size_bytes for each in figures)} | "
+        f"{1000 * max(each.end_m for each in figures):.0f} | {max(each.end_deg for each in figures):.2f} | {ratio:.1f} "
+        f"| {1000 * max(each.wall_mean_m for each in figures):.1f} | "
+        f"{1000 * max(each.wall_p95_m for each in figures):.0f} | {100 * min(each.recall for each in figures):.1f} % | "
+        f"{100 * min(each.precision for each in figures):.1f} % | {max(each.size_bytes for each in figures)} | "
         f"{100 * max(each.of_end_points for each in figures):.1f} % | "
-        f"{100 * max(each.of_grid for each in figures):.1f} % | "
-        f"{statistics.median(run.step_ms for run in runs):.1f}, "
+        f"{100 * max(each.of_grid for each in figures):.1f} % | {statistics.median(run.step_ms for run in runs):.1f}, "
         f"{statistics.median(run.step_p95_ms for run in runs):.1f} |"
     )
 

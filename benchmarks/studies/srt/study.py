@@ -44,13 +44,10 @@ GOALS_FILE, TREES_FILE, ABLATIONS_FILE = "goals.jsonl", "trees.jsonl", "ablation
 PICTURE_SEED = SEEDS[0]
 
 TUNED_ON = (
-    f"Seeds are {SEEDS[0]} and on; choices were made on others of the same worlds: what the thesis never "
-    "printed (free rays of 0.9 m, "
-    "step, least distance) among about twenty settings with seeds 0 to 19, for goals that are reached, "
-    "slower and with more nodes than "
-    "others that were tried, which flatters the ratios to it; the default mode with seeds 0 to 5, and its "
-    "localization with seeds 0 to 3, "
-    "with a look at 100 to 102."
+    f"Seeds are {SEEDS[0]} and on; choices were made on others of the same worlds: what the thesis never printed (free "
+    "rays of 0.9 m, step, least distance) among about twenty settings with seeds 0 to 19, for goals that are reached, "
+    "slower and with more nodes than others that were tried, which flatters the ratios to it; the default mode with "
+    "seeds 0 to 5, and its localization with seeds 0 to 3, with a look at 100 to 102."
 )
 """What the runs towards goals owe to choices that were made on the same worlds."""
 
@@ -107,30 +104,25 @@ def page(folder: Path) -> str:
         'regions and the spline map by the thesis\'s rules (`spline_settings("thesis")`). Here one rule at a time is '
         "another that the thesis names: the controller of turn and advance, balls, one radius for each ray, the base "
         "algorithm, and the farthest point of an opening. In `apartment` there is no goal: the robot knows where it "
-        "is, and explores until 99 % are covered or 1,200 s are over. What slopes and lines about the robot do to the map "
-        "is in [parts](#what-parts-are-worth).",
+        "is, and explores until 99 % are covered or 1,200 s are over. What slopes and lines about the robot do to the "
+        "map is in [parts](#what-parts-are-worth).",
         tables.trees(trees),
         "## Poses and maps",
-        "Means, in brackets the worst of the runs. *Walls found* counts walls within 5 cm of which true "
-        "beams end, *curves right* the "
-        "curves' length within 5 cm of a wall. Bytes are those of the compact form; end points are those of "
-        "the scans that went into the "
-        "map, as two float32 each; a grid has one byte a cell of 5 cm over the floor's bounds.",
+        "Means, in brackets the worst of the runs. *Walls found* counts walls within 5 cm of which true beams end, "
+        "*curves right* the curves' length within 5 cm of a wall. Bytes are those of the compact form; end points are "
+        "those of the scans that went into the map, as two float32 each; a grid has one byte a cell of 5 cm over the "
+        "floor's bounds.",
         in_file(tables.maps(runs)),
         "\n".join(
             f"![{world}: tree, safe regions, curves and truth](srt_world_{world.removeprefix('srt_')}.png)"
             for world in WORLDS
         ),
         "## Full exploration",
-        "One robot with perfect poses explores until 99 % is covered, maps of 2.5 cm, starts drawn by the "
-        "seed, the same for every policy. "
-        "The six scenes had a part in the choices, with other starts; the generated floors, ten of the "
-        "validation set, had none, but "
-        "that two faults showed on them and were mended: robots that stood still beside a wall "
-        "(`office:2000006`), and one that turned "
-        "between two targets for ever (`office:2000009`). Means over the starts; the last columns are our "
-        "mean over that of the better of "
-        "the others.",
+        "One robot with perfect poses explores until 99 % is covered, maps of 2.5 cm, starts drawn by the seed, the "
+        "same for every policy. The six scenes had a part in the choices, with other starts; the generated floors, "
+        "ten of the validation set, had none, but that two faults showed on them and were mended: robots that stood "
+        "still beside a wall (`office:2000006`), and one that turned between two targets for ever (`office:2000009`). "
+        "Means over the starts; the last columns are our mean over that of the better of the others.",
         in_file(tables.exploration(episodes, POLICIES)),
         "## What parts are worth",
         f"{len(followed)} ways of the default mode, followed by the particle filter with one part changed. Means, in "

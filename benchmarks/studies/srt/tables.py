@@ -29,9 +29,8 @@ UNHINDERED = WORLDS[:3]
 def goals(lines: Sequence[Line]) -> str:
     """Return the endings, times, nodes and ways of both modes besides the thesis's."""
     rows = [
-        "| world | mode | runs | ended | nodes | curves | time [s] | path [m] | of the shortest | area "
-        "covered | from the start [m] | "
-        "contacts |",
+        "| world | mode | runs | ended | nodes | curves | time [s] | path [m] | of the shortest | area covered | from "
+        "the start [m] | contacts |",
         "|---|---|---:|---|---:|---:|---:|---:|---:|---:|---:|---:|",
     ]
     for world in WORLDS:
@@ -50,10 +49,8 @@ def _goal_row(world: str, mode: str, runs: Sequence[Line]) -> str:
     shortest = f"{statistics.median(ratios):.2f} (to {max(ratios):.2f})" if ratios else "-"
     return (
         f"| {world} | {mode} | {len(runs)} | {_endings(runs)} | {_spread(runs, 'nodes', 0)} | "
-        f"{_spread(runs, 'curves', 0)} | "
-        f"{_spread(runs, 'time_s', 0)} | {_spread(runs, 'path_m', 1)} | {shortest} | "
-        f"{100 * min(run['coverage'] for run in runs):.1f} % | "
-        f"{max(run['from_start_m'] for run in runs):.2f} | "
+        f"{_spread(runs, 'curves', 0)} | {_spread(runs, 'time_s', 0)} | {_spread(runs, 'path_m', 1)} | {shortest} | "
+        f"{100 * min(run['coverage'] for run in runs):.1f} % | {max(run['from_start_m'] for run in runs):.2f} | "
         f"{sum(run['collisions'] for run in runs)} |"
     )
 
@@ -86,9 +83,8 @@ def _ratio(pairs: Sequence[tuple[Line, Line]], key: str) -> str:
 def maps(lines: Sequence[Line]) -> str:
     """Return the errors of poses and maps, and the maps' sizes."""
     rows = [
-        "| world | mode | ATE [mm] | end [mm] | end [deg] | odometry's ATE over ours | wall error [mm] | its "
-        "95 % [mm] | walls found | "
-        "curves right | bytes | of end points | of a grid |",
+        "| world | mode | ATE [mm] | end [mm] | end [deg] | odometry's ATE over ours | wall error [mm] | its 95 % "
+        "[mm] | walls found | curves right | bytes | of end points | of a grid |",
         "|---|---|" + "---:|" * 11,
     ]
     for world in WORLDS:

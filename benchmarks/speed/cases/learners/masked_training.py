@@ -120,11 +120,10 @@ TO_REACH = 3000.0
 LEARNER = FrontierLearner("MultiInputPolicy", episodes=64, rollout=32, batch=512, epochs=4)
 
 NOTES = (
-    f"*MaskablePPO*: of sb3-contrib, its `MultiInputPolicy`, {LEARNER.episodes} episodes of one robot on "
-    f"`{FLOORS}` from the store of floors, {LEARNER.rollout} decisions of each between updates of "
-    f"{LEARNER.epochs} epochs, PyTorch on one thread and the kernels on two. Steps are decisions, by the "
-    f"clock, floors in the store. *All floors in memory*: `{SIZE_VARIABLE}={ALL_MIB}`; usual are "
-    f"{DEFAULT_MIB:g} MiB.",
+    f"*MaskablePPO*: of sb3-contrib, its `MultiInputPolicy`, {LEARNER.episodes} episodes of one robot on `{FLOORS}` "
+    f"from the store of floors, {LEARNER.rollout} decisions of each between updates of {LEARNER.epochs} epochs, "
+    "PyTorch on one thread and the kernels on two. Steps are decisions, by the clock, floors in the store. *All "
+    f"floors in memory*: `{SIZE_VARIABLE}={ALL_MIB}`; usual are {DEFAULT_MIB:g} MiB.",
 )
 
 

@@ -83,32 +83,32 @@ class _Known:
     @cached_property
     def truth(self) -> DescribedMap:
         """The floor's cells that the map knows."""
-        raster = _raster(self.map.floor)
-        known = self.map.levels != UNKNOWN
-        pose = Transform(-raster.origin[0], -raster.origin[1], 0.0) @ self.map.floor_from_map
-        cosine, sine = math.cos(pose.theta), math.sin(pose.theta)
-        # The centre of pixel (0, 0) is half a cell from the corner.
-        x, y = (
-            pose.x / RESOLUTION + 0.5 * (cosine - sine) - 0.5,
-            pose.y / RESOLUTION + 0.5 * (sine + cosine) - 0.5,
-        )
-        size = raster.solid.shape[::-1]
-        mask = cv2.warpAffine(
-            known.astype(np.uint8),
-            np.array([[cosine, -sine, x], [sine, cosine, y]]),
-            size,
-            flags=cv2.INTER_NEAREST,
-        )
-        beside = cv2.dilate(mask, np.ones((7, 7), np.uint8))
-        levels = np.full(raster.solid.shape, UNKNOWN, np.uint8)
-        levels[(mask > 0) & (raster.solid == 0)] = FREE
-        levels[(beside > 0) & (raster.solid != 0)] = OCCUPIED
-        return describe_map(levels, RESOLUTION, CornerSettings(limit=1))
+        return describe_map(true_levels(self.map), RESOLUTION, CornerSettings(limit=1))
 
     def truth_from_map(self) -> Transform:
         """Return the transform from the map into the frame of the truth."""
         origin = _raster(self.map.floor).origin
         return Transform(-origin[0], -origin[1], 0.0) @ self.map.floor_from_map
+
+
+def true_levels(one: BankMap) -> NDArray[np.uint8]:
+    """Return the floor's own cells that a map knows, on the floor's grid: no noise, no error of poses."""
+    raster = _raster(one.floor)
+    pose = Transform(-raster.origin[0], -raster.origin[1], 0.0) @ one.floor_from_map
+    cosine, sine = math.cos(pose.theta), math.sin(pose.theta)
+    # The centre of pixel (0, 0) is half a cell from the corner.
+    x, y = (pose.x / RESOLUTION + 0.5 * (cosine - sine) - 0.5, pose.y / RESOLUTION + 0.5 * (sine + cosine) - 0.5)
+    mask = cv2.warpAffine(
+        (one.levels != UNKNOWN).astype(np.uint8),
+        np.array([[cosine, -sine, x], [sine, cosine, y]]),
+        raster.solid.shape[::-1],
+        flags=cv2.INTER_NEAREST,
+    )
+    beside = cv2.dilate(mask, np.ones((7, 7), np.uint8))
+    levels = np.full(raster.solid.shape, UNKNOWN, np.uint8)
+    levels[(mask > 0) & (raster.solid == 0)] = FREE
+    levels[(beside > 0) & (raster.solid != 0)] = OCCUPIED
+    return levels
 
 
 def choose_pairs(maps: dict[str, BankMap], seed: int = 0, wanted: Wanted | None = None) -> Iterator[Pair]:
