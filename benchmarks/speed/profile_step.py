@@ -48,13 +48,7 @@ def _directions(poses: Array, unit_vectors: Array, directions: Array) -> None:
 
 @kernel
 def _rays(
-    floor: Array,
-    places: Array,
-    directions: Array,
-    angle_first: float,
-    increment: float,
-    reach: float,
-    lengths: Array,
+    floor: Array, places: Array, directions: Array, angle_first: float, increment: float, reach: float, lengths: Array
 ) -> None:
     for row in range(places.shape[0]):
         x, y, heading = places[row]
@@ -115,16 +109,9 @@ class StepParts:
 
     Each is a function that does it for all robots.
 
-    Attributes
-    ----------
-    parts : dict
-        Functions by the name of the part; none changes what another one reads.
-    whole : callable
-        A whole step of the world from the same poses.
-    observation : callable
-        The observations of all robots.
-    rays, cells : float
-        Rays, and cells seen through noise, of an agent step.
+    `parts`: functions by the name of the part; none changes what another one reads; `whole`: a whole step of the world
+    from the same poses; `observation`: the observations of all robots; `rays`, `cells`: rays, and cells seen through
+    noise, of an agent step.
     """
 
     def __init__(self, floor: BenchFloor) -> None:
@@ -133,11 +120,7 @@ class StepParts:
             team.step()
         simulation, lidar = team.simulation, team.simulation.lidar
         beams, reach = lidar.beams, lidar.range_max / floor.resolution
-        poses, velocities, commands = (
-            simulation.world.poses.copy(),
-            simulation.world.velocities.copy(),
-            team.commands,
-        )
+        poses, velocities, commands = (simulation.world.poses.copy(), simulation.world.velocities.copy(), team.commands)
         places = poses / [floor.resolution, floor.resolution, 1.0]
         corners = np.array([window_corner(x, y, reach) for x, y in places[:, :2]])
         inside = places[:, :2] - corners[:, ::-1]

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from lidarium.agents import make_policy
-from lidarium.benchmarks.studies.shared.study import Progress, Study, do_missing, kept_lines
+from lidarium.benchmarks.studies.shared.study import Progress, Study, Task, do_missing, kept_lines
 from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.floors.catalogue.names import load_floor, set_floors
 from lidarium.envs.settings.exploration import ExplorationSettings
@@ -73,28 +73,18 @@ that did not get there within {horizon:.0f} s count as that.
 
 
 @dataclass(frozen=True, slots=True)
-class Small:
+class Small(Task):
     """A small floor."""
 
     floor: str
 
-    @property
-    def key(self) -> str:
-        """Name that no other one of its file has."""
-        return self.floor
-
 
 @dataclass(frozen=True, slots=True)
-class Team:
+class Team(Task):
     """A floor and a number of robots."""
 
     floor: str
     robots: int
-
-    @property
-    def key(self) -> str:
-        """Name that no other one of its file has."""
-        return f"{self.floor} | {self.robots}"
 
 
 def settings_of(robots: int) -> ExplorationSettings:
@@ -129,13 +119,7 @@ def measure_team(team: Team) -> dict[str, Any]:
         run_episode(make_policy(name), env, 0, {"starts": starts})
         times[name] = env.scorer.times.get(GOAL)
     known = bound.time_s if math.isfinite(bound.time_s) else None
-    return {
-        "floor": team.floor,
-        "robots": team.robots,
-        "known_s": known,
-        "seen": bound.share,
-        "times_s": times,
-    }
+    return {"floor": team.floor, "robots": team.robots, "known_s": known, "seen": bound.share, "times_s": times}
 
 
 def work(folder: Path, _data: Path | None, every: int, workers: int) -> Progress:

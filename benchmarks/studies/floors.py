@@ -10,7 +10,7 @@ from typing import Any
 
 import lidarium
 from lidarium.benchmarks.results_page import in_file
-from lidarium.benchmarks.studies.shared.study import Progress, Study, do_missing, kept_lines, real_floors
+from lidarium.benchmarks.studies.shared.study import Progress, Study, Task, do_missing, kept_lines, real_floors
 from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.settings.making import make_settings
 from lidarium.evaluation.episodes.runner import run_episode
@@ -32,7 +32,7 @@ Row = Mapping[str, Any]
 
 
 @dataclass(frozen=True, slots=True)
-class Run:
+class Run(Task):
     """A floor of some kind that a number of robots explore."""
 
     kind: str
@@ -46,10 +46,7 @@ class Run:
 
 
 def floors(data: Path | None) -> list[tuple[str, str]]:
-    """Return (kind, floor) of all that is explored.
-
-    Without data these are generated floors alone.
-    """
+    """Return (kind, floor) of all that is explored. Without data these are generated floors alone."""
     found = {} if data is None else real_floors(data)
     return [(kind, str(path)) for kind, paths in found.items() for path in paths] + [
         ("generated", f"building:{seed}") for seed in GENERATED
@@ -62,10 +59,7 @@ def name_of(floor: str) -> str:
 
 
 def explore(run: Run) -> dict[str, Any]:
-    """Run an episode without a horizon.
-
-    Returns its figures, or why it could not start.
-    """
+    """Run an episode without a horizon. Returns its figures, or why it could not start."""
     row = {"kind": run.kind, "floor": name_of(run.floor), "robots": run.robots, "policy": POLICY}
     began = time.perf_counter()
     try:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import integrate, optimize, stats
 
-from lidarium.benchmarks.studies.shared.study import Progress, Study, do_missing, kept_lines
+from lidarium.benchmarks.studies.shared.study import Progress, Study, Task, do_missing, kept_lines
 from lidarium.evaluation.statistics import (
     FEWEST_FOR_NOMINAL,
     CensoredTimes,
@@ -41,10 +41,7 @@ Values = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class Family:
-    """A distribution of times [s] as scipy has it.
-
-    It belongs to what is asked for, or goes beyond it.
-    """
+    """A distribution of times [s] as scipy has it. It belongs to what is asked for, or goes beyond it."""
 
     name: str
     times: Any
@@ -87,20 +84,12 @@ ASKED_FOR = tuple(family for family in FAMILIES if family.is_asked_for)
 
 
 @dataclass(frozen=True, slots=True)
-class Case:
+class Case(Task):
     """A figure of data of known truth.
 
-    Attributes
-    ----------
-    figure, data : str
-        What is estimated, and from what.
-    truth : float
-        What the interval should hold.
-    interval : callable
-        From a generator, the size and a seed of resampling: the interval of one trial. A ``ValueError`` is a
-        refusal.
-    is_asked_for : bool
-        Whether the interval must hold the truth about as often as it says; others go beyond that.
+    `figure`, `data`: what is estimated, and from what; `truth`: what the interval should hold; `interval`: from a
+    generator, the size and a seed of resampling: the interval of one trial. A ``ValueError`` is a refusal;
+    `is_asked_for`: whether the interval must hold the truth about as often as it says; others go beyond that.
     """
 
     figure: str

@@ -252,11 +252,7 @@ def suites(data: Path | None, every: int = 1) -> dict[str, Suite]:
 
 def _suite(policies: Sequence[str], floors: Sequence[str]) -> Suite:
     return Suite(
-        policies=tuple(policies),
-        floors=tuple(floors),
-        robots=TEAMS,
-        seeds=(0,),
-        variants={DEFAULT_VARIANT: SETTINGS},
+        policies=tuple(policies), floors=tuple(floors), robots=TEAMS, seeds=(0,), variants={DEFAULT_VARIANT: SETTINGS}
     )
 
 

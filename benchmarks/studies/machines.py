@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from lidarium.benchmarks.studies.shared.study import Progress, Study, do_missing, kept_lines
+from lidarium.benchmarks.studies.shared.study import Progress, Study, Task, do_missing, kept_lines
 from lidarium.evaluation.statistics.samples import MOST_VALUES
 from lidarium.evaluation.suites.campaign import EPISODES_FILE, Campaign
 from lidarium.evaluation.suites.episodes_file import TIMINGS, EpisodesFile, read_episodes
@@ -237,30 +237,20 @@ none was lost, doubled or changed: all lines are those of one machine.
 
 
 @dataclass(frozen=True, slots=True)
-class Piece:
+class Piece(Task):
     """Some seeds of the short episodes."""
 
     first: int
     last: int
 
-    @property
-    def key(self) -> str:
-        """Name that no other one of its file has."""
-        return f"seeds {self.first} to {self.last}"
-
 
 @dataclass(frozen=True, slots=True)
-class Part:
+class Part(Task):
     """A part that is measured, and how large it is."""
 
     name: str
     size: int
     turn: int = 0
-
-    @property
-    def key(self) -> str:
-        """Name that no other one of its file has."""
-        return f"{self.name} | {self.size} | round {self.turn}"
 
 
 def work(folder: Path, _data: Path | None, every: int, workers: int) -> Progress:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.benchmarks.studies.shared.study import Progress, Study, do_missing, kept_lines
+from lidarium.benchmarks.studies.shared.study import Progress, Study, Task, do_missing, kept_lines
 from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.settings.making import make_settings
 from lidarium.envs.simulation.bullet.bullet_world import LEAN, BulletWorld
@@ -53,17 +53,12 @@ To reach: 95 % of the free drives end within {distance_m} m and {turn_deg:.0f} d
 
 
 @dataclass(frozen=True, slots=True)
-class Drive:
+class Drive(Task):
     """A robot on a floor, and where its commands come from."""
 
     floor: str
     robot: str
     seed: int
-
-    @property
-    def key(self) -> str:
-        """Name that no other one of its file has."""
-        return f"{self.floor} | {self.robot} | {self.seed}"
 
 
 def _commands(settings: Any, seed: int) -> NDArray[np.float64]:  # noqa: ANN401
@@ -76,12 +71,7 @@ def _commands(settings: Any, seed: int) -> NDArray[np.float64]:  # noqa: ANN401
 
 def measure(drive: Drive) -> dict[str, Any]:
     """Drive in both worlds; return how far apart they are."""
-    options: dict[str, Any] = {
-        "robots": 1,
-        "robot": drive.robot,
-        "resolution": 0.1,
-        "localization": "odometry",
-    }
+    options: dict[str, Any] = {"robots": 1, "robot": drive.robot, "resolution": 0.1, "localization": "odometry"}
     envs = [
         ExplorationEnv(drive.floor, make_settings(backend=backend, **options)) for backend in ("bullet", "kinematic")
     ]

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import lidarium
-from lidarium.benchmarks.studies.shared.study import Progress, Study, do_missing, kept_lines
+from lidarium.benchmarks.studies.shared.study import Progress, Study, Task, do_missing, kept_lines
 from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.settings.making import make_settings
 from lidarium.envs.simulation.coverage import unpack_bits
@@ -37,7 +37,7 @@ REPEATS = 5
 
 
 @dataclass(frozen=True, slots=True)
-class Run:
+class Run(Task):
     """A floor that a number of robots explore from a seed."""
 
     floor: str
@@ -84,14 +84,8 @@ class TimedLocalizer:
 class Watch(Watcher):
     """Watches how long scans take localizers, and where wheels would place robots.
 
-    Attributes
-    ----------
-    seconds : list of (float, bool)
-        Wall time of each scan [s], and whether it corrected the past.
-    wheels : list of (robots,) float64
-        How far dead reckoning is off after each step [m].
-    believed, true : list of (robots, 3) float64
-        Poses after each step [m, m, rad].
+    `seconds`: wall time of each scan [s], and whether it corrected the past; `wheels`: how far dead reckoning is off
+    after each step [m]; `believed`, `true`: poses after each step [m, m, rad].
     """
 
     def begin(self, env: ExplorationEnv) -> None:
@@ -270,22 +264,14 @@ HEADER = (
 
 
 @dataclass(frozen=True, slots=True)
-class Rates:
+class Rates(Task):
     """Speed of a team, in an episode of each seed."""
 
     seeds: int
 
-    @property
-    def key(self) -> str:
-        """Name that no other one of its file has."""
-        return f"{self.seeds} seeds"
-
 
 def work(folder: Path, data: Path | None, every: int, _workers: int) -> Progress:
-    """Measure every N-th pair of floor and team with all seeds.
-
-    All is done in this process, as scans are timed.
-    """
+    """Measure every N-th pair of floor and team with all seeds. All is done in this process, as scans are timed."""
     floors = FLOORS if data is None else (*FLOORS, str(_large_office(data)))
     teams = [(floor, robots) for floor in floors for robots in TEAMS][::every]
     runs = [Run(floor, robots, seed) for floor, robots in teams for seed in SEEDS]
@@ -329,10 +315,7 @@ def rows_of(episodes: list[dict[str, Any]]) -> Iterator[str]:
 
 
 def times_of(episodes: list[dict[str, Any]], longest: Sequence[float]) -> Iterator[str]:
-    """Return lines on how long scans take.
-
-    The longest corrections were measured by themselves [s].
-    """
+    """Return lines on how long scans take. The longest corrections were measured by themselves [s]."""
     seconds = [entry for one in episodes for entry in one["seconds"]]
     plain = 1e3 * np.array([time for time, is_corrected in seconds if not is_corrected])
     # A scan that is not matched takes microseconds.

@@ -43,10 +43,7 @@ class Twins:
         self._whole, self._kernel = (ExplorationEnv(floor.floor(), settings) for _ in range(2))
         limits = np.array([settings.robot.max_speed, settings.robot.max_turn_rate])
         generator = np.random.default_rng(0)
-        speeds, turns = (
-            generator.uniform(0.2, 0.9, (_DRAWS, ROBOTS)),
-            generator.uniform(-0.3, 0.3, (_DRAWS, ROBOTS)),
-        )
+        speeds, turns = (generator.uniform(0.2, 0.9, (_DRAWS, ROBOTS)), generator.uniform(-0.3, 0.3, (_DRAWS, ROBOTS)))
         actions = np.stack([speeds, turns], axis=2).astype(np.float32)
         self._actions = [dict(zip(self._whole.possible_agents, team, strict=True)) for team in actions]
         self._commands = [team.astype(np.float64) * limits for team in actions]

@@ -43,10 +43,7 @@ NOTES = (
 
 
 class Deciders:
-    """A batch that drives between waypoints, and its shadow of bare steps.
-
-    The shadow takes the same steps.
-    """
+    """A batch that drives between waypoints, and its shadow of bare steps. The shadow takes the same steps."""
 
     def __init__(self, threads: int) -> None:
         floor = straight_floor()
@@ -82,18 +79,12 @@ class Deciders:
         )
 
     def run(self, seconds: float) -> tuple[float, float]:
-        """Decide and take bare steps for about so long each.
-
-        Seconds per robot and step of both.
-        """
+        """Decide and take bare steps for about so long each. Seconds per robot and step of both."""
         simulation, bare = self._deciding.engine.simulation, self._bare.engine.simulation
         deciding, stepping, agent_steps = 0.0, 0.0, 0
         while agent_steps == 0 or deciding + stepping < 2.0 * seconds:
             actions = self._actions()
-            bare.world.poses[:], bare.world.velocities[:] = (
-                simulation.world.poses,
-                simulation.world.velocities,
-            )
+            bare.world.poses[:], bare.world.velocities[:] = (simulation.world.poses, simulation.world.velocities)
             bare.beliefs.believed[:] = simulation.beliefs.believed
             poses, steps, travelled = (
                 simulation.world.poses.copy(),
@@ -130,10 +121,7 @@ class Deciders:
         return np.clip(shares, -1.0, 1.0).astype(np.float32)
 
     def _drawn(self, row: int) -> NDArray[np.float64]:
-        """Draw a place [m] that the robot knows to be free.
-
-        Where it stands, if none of many draws is.
-        """
+        """Draw a place [m] that the robot knows to be free. Where it stands, if none of many draws is."""
         simulation = self._deciding.engine.simulation
         angles, distances = (
             self._generator.uniform(-math.pi, math.pi, _TRIALS),

@@ -25,18 +25,9 @@ MIB = 2**20
 class Growth:
     """The times of one size besides those of the first of its group.
 
-    Attributes
-    ----------
-    group : str
-        What grows.
-    name : str
-        This size.
-    working_set : int
-        Bytes of the maps and masks that the robots write to.
-    seconds, first : list of float
-        Seconds per agent step in each repeat, of this size and of the first one.
-    allowed : float or None
-        How many times the first's time it may take; None if that is only told.
+    `group`: what grows; `name`: this size; `working_set`: bytes of the maps and masks that the robots write to;
+    `seconds`, `first`: seconds per agent step in each repeat, of this size and of the first one; `allowed`: how many
+    times the first's time it may take; None if that is only told.
     """
 
     group: str
@@ -87,10 +78,7 @@ def memory_ratios(memory: IdleMemory) -> dict[str, tuple[float, float | None]]:
         "all arrays of the environment, a robot's share": (memory.all_bytes / memory.map_bytes, None),
     }
     if memory.resident_bytes is not None:
-        ratios["growth of the process (resident)"] = (
-            memory.resident_bytes / memory.map_bytes,
-            ALLOWED_MEMORY,
-        )
+        ratios["growth of the process (resident)"] = (memory.resident_bytes / memory.map_bytes, ALLOWED_MEMORY)
     return ratios
 
 
@@ -119,10 +107,7 @@ def caches() -> str:
 def growth_result(
     growths: Sequence[Growth], memory: IdleMemory, repeats: int, told: Mapping[str, Any]
 ) -> dict[str, Any]:
-    """Return what is written to ``growth.json``.
-
-    ``told`` is what ``report.about`` tells.
-    """
+    """Return what is written to ``growth.json``. ``told`` is what ``report.about`` tells."""
     rows = [
         {
             "group": growth.group,
@@ -175,19 +160,13 @@ REPEATS = 15
 SIZES = (4, 16, 64, 256, 1024)
 TEAM, ROBOT_STEPS = 2, 10
 SIDES, ALONE, FLOOR_DRIVES, FLOOR_STEPS = (512, 1000, 2000, 4000), 4, 256, 50
-"""Sides of the floors [cells of 2.5 cm], and how many robots drive there.
-
-Each robot is alone on the floor.
-"""
+"""Sides of the floors [cells of 2.5 cm], and how many robots drive there. Each robot is alone on the floor."""
 
 ALLOWED_TO_64, ALLOWED_TO_1024, ALLOWED_FLOORS = 1.25, {0.025: 1.8, 0.05: 1.4}, 1.25
 
 
 def repeated_in_turn(histories: dict[str, Histories], repeats: int) -> dict[str, list[float]]:
-    """Run all in turn that many times, after once to warm up.
-
-    Seconds per agent step of each.
-    """
+    """Run all in turn that many times, after once to warm up. Seconds per agent step of each."""
     for history in histories.values():
         history.run()
     seconds: dict[str, list[float]] = {name: [] for name in histories}

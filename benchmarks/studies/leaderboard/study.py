@@ -19,14 +19,7 @@ from lidarium.benchmarks.studies.leaderboard.worlds import (
     parts,
     suites,
 )
-from lidarium.benchmarks.studies.shared.study import (
-    Bounded,
-    Progress,
-    Study,
-    do_missing,
-    kept_lines,
-    measure_bound,
-)
+from lidarium.benchmarks.studies.shared.study import Bounded, Progress, Study, do_missing, kept_lines, measure_bound
 from lidarium.evaluation.analysis.figures import over_bound
 from lidarium.evaluation.report import write_report
 from lidarium.evaluation.suites.campaign import EPISODES_FILE

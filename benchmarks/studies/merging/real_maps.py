@@ -59,20 +59,11 @@ class Grid(NamedTuple):
 class Row:
     """What the merger says of a pair.
 
-    Attributes
-    ----------
-    pair, collection : str
-        Names of the maps, and where they come from: ``halmstad``, ``real``, ``log_split`` or ``strangers``.
-    is_tuned : bool
-        Whether the model of strangers was fitted to the pair.
-    is_accepted, is_right : bool
-        Whether it is joined, and whether the best transform is right; strangers have no right one.
-    distance_m, angle : float or None
-        Error of the best transform [m, rad].
-    found_by, reason : str
-        How it was found, and why it is refused.
-    confidence, bend_m, time_ms : float
-        Of the best hypothesis, and processor time, description included [ms].
+    `pair`, `collection`: names of the maps, and where they come from: ``halmstad``, ``real``, ``log_split`` or
+    ``strangers``; `is_tuned`: whether the model of strangers was fitted to the pair; `is_accepted`, `is_right`: whether
+    it is joined, and whether the best transform is right; strangers have no right one; `distance_m`, `angle`: error of
+    the best transform [m, rad]; `found_by`, `reason`: how it was found, and why it is refused; `confidence`, `bend_m`,
+    `time_ms`: of the best hypothesis, and processor time, description included [ms].
     """
 
     pair: str
@@ -291,10 +282,7 @@ def _figures(rows: Rows, name: str) -> str:
 
 def _curve(rows: Rows) -> str:
     """Return the curve: with each threshold what would be joined."""
-    lines = [
-        "| confidence | right of one building | wrong of one building | strangers |",
-        "|---|---|---|---|",
-    ]
+    lines = ["| confidence | right of one building | wrong of one building | strangers |", "|---|---|---|---|"]
     known = [row for row in rows if row["collection"] != "strangers"]
     strangers = [row for row in rows if row["collection"] == "strangers"]
     for threshold in THRESHOLDS:

@@ -21,11 +21,7 @@ from lidarium.benchmarks.studies.merging.bank.drives import RESOLUTION
 from lidarium.benchmarks.studies.merging.bank.floors import bank_floors
 from lidarium.benchmarks.studies.merging.bank.groups import merge_teams
 from lidarium.benchmarks.studies.merging.bank.making import kept_floors, make_bank
-from lidarium.benchmarks.studies.merging.features import (
-    compare_descriptors,
-    compare_detectors,
-    compare_methods,
-)
+from lidarium.benchmarks.studies.merging.features import compare_descriptors, compare_detectors, compare_methods
 from lidarium.benchmarks.studies.merging.figures import Tried
 from lidarium.benchmarks.studies.merging.plans import merge_plans, plan_tables
 from lidarium.benchmarks.studies.merging.real_maps import merge_real_maps, real_maps
@@ -78,10 +74,7 @@ def _chosen(pairs: list[Pair], outcomes: list[Outcome]) -> list[tuple[str, Pair]
             "missed: little overlap",
             lambda pair, one: pair.category == "positive" and not one.is_accepted and pair.overlap < 0.3,
         ),
-        (
-            "look-alike, refused",
-            lambda pair, one: pair.category == "look_alike" and not one.is_accepted,
-        ),
+        ("look-alike, refused", lambda pair, one: pair.category == "look_alike" and not one.is_accepted),
         (
             "furniture taken away, joined",
             lambda pair, one: pair.category == "refurnished" and pair.differing_m > 2.0 and one.is_accepted,
@@ -102,10 +95,7 @@ def _draw(axes: Axes, title: str, a: BankMap, b: BankMap) -> None:
 
 
 def _coloured(fused: FusedMap) -> NDArray[np.uint8]:
-    """Return walls and free space coloured by which map knows them.
-
-    The shape is (rows, columns, 3).
-    """
+    """Return walls and free space coloured by which map knows them. The shape is (rows, columns, 3)."""
     sources = fused.sources.astype(np.int64)
     picture = np.full((*sources.shape, 3), 240.0)
     for bits, colour in ((1, FIRST), (2, SECOND), (3, BOTH)):

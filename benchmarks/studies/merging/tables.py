@@ -28,20 +28,14 @@ def bank_table(tried: dict[str, figures.Tried]) -> str:
         ("indistinct negatives refused", lambda one: figures.refused(one, ("indistinct",))),
         ("error, median / 95 % [m]", _error),
         ("time a pair of 512 x 512 cells, median / 95 % [ms]", figures.times),
-        (
-            "the same without the fallback",
-            lambda one: figures.times(one, lambda outcome: not outcome.needed_fallback),
-        ),
+        ("the same without the fallback", lambda one: figures.times(one, lambda outcome: not outcome.needed_fallback)),
     ]
     lines += [f"| {what} | {entry(tried['default'])} | {entry(tried['thesis'])} |" for what, entry in rows]
     return "\n".join(lines)
 
 
 def peers(tried: dict[str, figures.Tried]) -> str:
-    """Return the results of the ROS map_merge pipeline on the bank.
-
-    They are for a range of its thresholds.
-    """
+    """Return the results of the ROS map_merge pipeline on the bank. They are for a range of its thresholds."""
     thresholds = ("any", "its own, 1.0", "no stranger accepted", "no negative accepted")
     lines = [
         "| features | threshold of confidence | recall, overlap 30 % and more | strangers accepted | "
@@ -54,12 +48,7 @@ def peers(tried: dict[str, figures.Tried]) -> str:
         for name, value in zip(thresholds, values, strict=True):
             shares = [figures.accepted(one, (category,), value) for category in figures.NEGATIVE]
             wrong = [f"{share.hits} of {share.total}" for share in shares]
-            cells = [
-                f"{name} ({value:.2f})",
-                figures.recall(one, figures.is_plenty, value),
-                *wrong,
-                figures.times(one),
-            ]
+            cells = [f"{name} ({value:.2f})", figures.recall(one, figures.is_plenty, value), *wrong, figures.times(one)]
             lines.append(f"| {method.upper()} | {' | '.join(str(cell) for cell in cells)} |")
     return (
         "The pipeline of ROS map_merge (features, the best of two nearest, an affine motion without shear by RANSAC, "
@@ -163,7 +152,8 @@ def detectors(rows: list[dict[str, Any]]) -> str:
         ratio = row["time_us"]["goodFeaturesToTrack"] / row["time_us"]["ours"]
         lines.append(f"| {row['image']} {row['shape'][1]} x {row['shape'][0]} | {' | '.join(cells)} | {ratio:.1f} x |")
     return (
-        f"Least time of {REPEATS} turns of {BURST} runs each [us], one thread, and points found.\n\n"
+        f"Least time of {REPEATS} turns of {BURST} runs each [us], one thread, and points found; Trajkovic"
+        " and Hedley in numpy, all others compiled.\n\n"
         + "\n".join(lines)
         + "\n\n"
         + _stabilities(rows)
@@ -224,11 +214,7 @@ def teams(rows: list[dict[str, Any]]) -> str:
     """Return how five maps of a floor are joined."""
     lines = ["| floor | joined | largest error [m] | [deg] | time [s] |", "|---|---:|---:|---:|---:|"]
     for row in rows:
-        figures_of_row = (
-            f"{row['distance_m']:.3f}",
-            f"{math.degrees(row['angle']):.2f}",
-            f"{row['time_s']:.2f}",
-        )
+        figures_of_row = (f"{row['distance_m']:.3f}", f"{math.degrees(row['angle']):.2f}", f"{row['time_s']:.2f}")
         lines.append(f"| {row['floor']} | {row['joined']} of {row['robots']} | {' | '.join(figures_of_row)} |")
     whole = sum(row["joined"] == row["robots"] for row in rows)
     return (

@@ -43,21 +43,12 @@ Poses = NDArray[np.float64]
 class MapFigures:
     """Figures of a run: lengths in metres, angles in degrees, shares, bytes.
 
-    Attributes
-    ----------
-    ate_m, end_m, end_deg : float
-        Error of the poses: root of the mean square over the path, and at its end.
-    odometry_ate_m : float
-        The same of odometry alone.
-    wall_mean_m, wall_p95_m : float
-        How far curves lie from walls.
-    recall, precision : float
-        Share of the walls within 5 cm of a curve, of those where true beams end; share of the curves within 5
-        cm of a wall.
-    curves, control_points, size_bytes : int
-        Size of the map, the last in its compact form.
-    of_end_points, of_grid : float
-        Its bytes as a share of those of the end points of the scans that went into it, and of a 5 cm grid.
+    `ate_m`, `end_m`, `end_deg`: error of the poses: root of the mean square over the path, and at its end;
+    `odometry_ate_m`: the same of odometry alone; `wall_mean_m`, `wall_p95_m`: how far curves lie from walls; `recall`,
+    `precision`: share of the walls within 5 cm of a curve, of those where true beams end; share of the curves within 5
+    cm of a wall; `curves`, `control_points`, `size_bytes`: size of the map, the last in its compact form;
+    `of_end_points`, `of_grid`: its bytes as a share of those of the end points of the scans that went into it, and of a
+    5 cm grid.
     """
 
     ate_m: float
@@ -108,10 +99,7 @@ def map_figures(
 ) -> MapFigures:
     """Compare what a localizer believed with the truth.
 
-    Parameters
-    ----------
-    true, believed, odometry : (times, 3) float64
-        Poses x, y, theta [m, rad]; odometry in a frame of its own.
+    `true`, `believed`, `odometry` (times, 3) float64: poses x, y, theta [m, rad]; odometry in a frame of its own.
     """
     curves = spline_map.sample(SPACING)
     edges = np.concatenate([solid.edges for solid in floor.solids])

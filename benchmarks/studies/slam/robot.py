@@ -22,16 +22,10 @@ from lidarium.mapping.localization.slam.localizer import Slam
 class Robot:
     """What SLAM costs a simulated robot, and how far off it is.
 
-    Attributes
-    ----------
-    match_ms, closure_ms, correction_ms : (calls,) float64
-        CPU time of a scan that is matched and drawn into the map, of one that recognised a place, and of one
-        that corrected the past.
-    error_m, odometry_m : float
-        Root mean square of the positions given at each time against the true ones, unaligned, and of odometry
-        [m].
-    path_m : float
-        Length of the path [m].
+    `match_ms`, `closure_ms`, `correction_ms` (calls,) float64: CPU time of a scan that is matched and drawn into the
+    map, of one that recognised a place, and of one that corrected the past; `error_m`, `odometry_m`: root mean square
+    of the positions given at each time against the true ones, unaligned, and of odometry [m]; `path_m`: length of the
+    path [m].
     """
 
     match_ms: NDArray[np.float64]

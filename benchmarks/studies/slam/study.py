@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from lidarium.benchmarks.results_page import in_file
-from lidarium.benchmarks.studies.shared.study import Progress, Study, do_missing, kept_lines
+from lidarium.benchmarks.studies.shared.study import Progress, Study, Task, do_missing, kept_lines
 from lidarium.benchmarks.studies.slam import lies
 from lidarium.benchmarks.studies.slam.logs import OTHERS, RELATIONS, log_row, read, relation_cells
 from lidarium.benchmarks.studies.slam.robot import Robot, measured_robot, robot_lines
@@ -107,10 +107,10 @@ another direction than odometry said; *doubtful* are these, and those that no ma
 
 
 @dataclass(frozen=True, slots=True)
-class Task:
+class Followed(Task):
     """A log that is followed, or a floor that a robot explores."""
 
-    key: str
+    name: str
 
 
 def work(folder: Path, data: Path | None, every: int, _workers: int) -> Progress:
@@ -119,14 +119,14 @@ def work(folder: Path, data: Path | None, every: int, _workers: int) -> Progress
     All is done in this process, as scans are timed.
     """
     logs = None if data is None else Path(data) / LOGS_FOLDER
-    tasks = [] if logs is None else [Task(name) for name in (*RELATIONS, *OTHERS)][::every]
+    tasks = [] if logs is None else [Followed(name) for name in (*RELATIONS, *OTHERS)][::every]
     yield from do_missing(folder / LOGS_FILE, "logs", tasks, partial(_follow_log, logs), 1)
     lying = [] if logs is None else lies.lies()[::every]
     yield from do_missing(folder / LIES_FILE, "logs that lie", lying, partial(lies.measure, logs), 1)
-    yield from do_missing(folder / ROBOT_FILE, "robot", [Task(FLOOR)], partial(_follow_robot, logs), 1)
+    yield from do_missing(folder / ROBOT_FILE, "robot", [Followed(FLOOR)], partial(_follow_robot, logs), 1)
 
 
-def _follow_log(logs: Path | None, task: Task) -> dict[str, Any]:
+def _follow_log(logs: Path | None, task: Followed) -> dict[str, Any]:
     """Return the lines of a log; relations only if there are some."""
     assert logs is not None
     _warm_up(logs)
@@ -138,7 +138,7 @@ def _follow_log(logs: Path | None, task: Task) -> dict[str, Any]:
     return {"row": log_row(task.key, log, followed), "relations": cells}
 
 
-def _follow_robot(logs: Path | None, task: Task) -> dict[str, Any]:
+def _follow_robot(logs: Path | None, task: Followed) -> dict[str, Any]:
     """Return the figures of a robot."""
     _warm_up(logs)
     robot = measured_robot(task.key, HORIZON_S)

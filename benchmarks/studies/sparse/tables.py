@@ -100,15 +100,7 @@ def thesis_failure_table(lines: Sequence[Line]) -> str:
 
 def node_table(lines: Sequence[Line]) -> str:
     """Return free and occupied codes, tables 5.5 and 5.6."""
-    header = (
-        "place",
-        "usage",
-        "free",
-        "boxes",
-        "graph: nodes, edges",
-        "by the thesis: free, occupied",
-        "printed",
-    )
+    header = ("place", "usage", "free", "boxes", "graph: nodes, edges", "by the thesis: free, occupied", "printed")
     rows = []
     for line in lines:
         for usage in thesis.USAGES:
@@ -164,17 +156,7 @@ def memory_table(lines: Sequence[Line]) -> str:
     return markdown_table(header, rows)
 
 
-ERROR_HEADER = (
-    "clouds",
-    "codes",
-    "K-means",
-    "LBG",
-    "K-means++",
-    "K-means++ / K-means",
-    "K-means",
-    "LBG",
-    "K-means++",
-)
+ERROR_HEADER = ("clouds", "codes", "K-means", "LBG", "K-means++", "K-means++ / K-means", "K-means", "LBG", "K-means++")
 
 
 def error_table(lines: Sequence[Line], codes: Sequence[int] = (16, 32, 64, 128, 256, 512)) -> str:

@@ -14,6 +14,7 @@ from scipy import stats
 
 from lidarium.agents import make_policy
 from lidarium.benchmarks.results_page import in_file
+from lidarium.benchmarks.studies.shared.study import Task
 from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.settings.making import make_settings
 from lidarium.evaluation.episodes.result import EpisodeData, figures_of
@@ -35,16 +36,11 @@ LEAST_VARIANCE = 1e-12
 
 
 @dataclass(frozen=True, slots=True)
-class Stay:
+class Stay(Task):
     """A building that a robot explores with a localizer."""
 
     floor: str
     localizer: str
-
-    @property
-    def key(self) -> str:
-        """Name that no other one of its file has."""
-        return f"{self.floor} | {self.localizer}"
 
 
 @dataclass(slots=True)
@@ -86,11 +82,7 @@ def squared_distances(
 def measure_stay(stay: Stay) -> dict[str, Any]:
     """Let a robot explore a building, and compare what it believed with the truth."""
     settings = make_settings(
-        robots=1,
-        realism="lab",
-        localization=stay.localizer,
-        horizon_s=HORIZON_S,
-        resolution=RESOLUTION,
+        robots=1, realism="lab", localization=stay.localizer, horizon_s=HORIZON_S, resolution=RESOLUTION
     )
     beliefs = Beliefs()
     env = WatchedExploration(stay.floor, settings, watchers=[beliefs])

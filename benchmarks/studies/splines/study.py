@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from lidarium.agents import make_policy
 from lidarium.benchmarks.studies.shared.map_figures import THESIS, MapFigures, follow, map_figures
-from lidarium.benchmarks.studies.shared.study import Progress, Study, do_missing, kept_lines
+from lidarium.benchmarks.studies.shared.study import Progress, Study, Task, do_missing, kept_lines
 from lidarium.benchmarks.studies.splines import buildings
 from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.floors.catalogue.names import load_floor
@@ -33,19 +33,9 @@ from lidarium.mapping.localization.on_splines.spline_ekf import SplineEkf
 from lidarium.mapping.localization.on_splines.spline_filter import SplineFilter
 from lidarium.mapping.localization.on_splines.spline_tracking import SplineTracker
 
-TUNED_ON = (
-    "srt_corridor",
-    "srt_l_room",
-    "srt_lab",
-    "srt_t_junction",
-    "srt_cluttered",
-    "srt_cluttered_reachable",
-)
+TUNED_ON = ("srt_corridor", "srt_l_room", "srt_lab", "srt_t_junction", "srt_cluttered", "srt_cluttered_reachable")
 FLOORS = (*TUNED_ON, "apartment")
-"""Floors that come with a start.
-
-Settings were chosen on the first six, with other seeds.
-"""
+"""Floors that come with a start. Settings were chosen on the first six, with other seeds."""
 
 LOCALIZERS: dict[str, Callable[[], SplineTracker]] = {
     "splines": SplineFilter,
@@ -96,15 +86,10 @@ class Run:
 
 
 @dataclass(frozen=True, slots=True)
-class Task:
+class FloorTask(Task):
     """A floor on which all localizers are tried with all seeds."""
 
     floor: str
-
-    @property
-    def key(self) -> str:
-        """Name that no other one of its file has."""
-        return self.floor
 
 
 def drive(floor: Floor, seed: int) -> Drive:
@@ -117,10 +102,7 @@ def drive(floor: Floor, seed: int) -> Drive:
 
 
 def odometry(poses: NDArray[np.float64], seed: int) -> NDArray[np.float64]:
-    """Return odometry (n, 3) along true poses (n, 3).
-
-    Motions are too long by a share, and slip as wheels do.
-    """
+    """Return odometry (n, 3) along true poses (n, 3). Motions are too long by a share, and slip as wheels do."""
     generator = np.random.default_rng(seed)
     reckoned, place = [np.zeros(3)], Transform()
     for before, after in itertools.pairwise(poses):
@@ -150,7 +132,7 @@ def measure(name: str, floor: Floor, walk: Drive, seed: int, picture: Path | Non
     return Run(figures, 1000.0 * statistics.median(seconds[1:]), 1000.0 * float(np.quantile(seconds[1:], 0.95)))
 
 
-def measure_floor(pictures: Path, task: Task) -> dict[str, Any]:
+def measure_floor(pictures: Path, task: FloorTask) -> dict[str, Any]:
     """Try all localizers on a floor with all seeds, and draw the first run of each."""
     floor = load_floor(task.floor)
     walks = [drive(floor, seed) for seed in SEEDS]
@@ -165,10 +147,7 @@ def measure_floor(pictures: Path, task: Task) -> dict[str, Any]:
 
 
 def _as_entry(run: Run) -> dict[str, Any]:
-    """Return a run as JSON has it.
-
-    A figure that is no number, as of a map without curves, is None.
-    """
+    """Return a run as JSON has it. A figure that is no number, as of a map without curves, is None."""
     entry = asdict(run)
     entry["figures"] = {name: value if math.isfinite(value) else None for name, value in entry["figures"].items()}
     return entry
@@ -181,7 +160,7 @@ def _run_of(entry: Mapping[str, Any]) -> Run:
 
 def work(folder: Path, _data: Path | None, every: int, workers: int) -> Progress:
     """Measure on every N-th floor, in this process alone, as steps are timed; then in buildings."""
-    tasks = [Task(floor) for floor in FLOORS[::every]]
+    tasks = [FloorTask(floor) for floor in FLOORS[::every]]
     measured = partial(measure_floor, folder / PICTURES_FOLDER)
     yield from do_missing(folder / FLOORS_FILE, "floors", tasks, measured, 1)
     stays = [buildings.Stay(floor, name) for floor in buildings.FLOORS for name in buildings.LOCALIZERS]

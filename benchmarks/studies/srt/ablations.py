@@ -1,7 +1,4 @@
-"""The value of the parts of localization on curves.
-
-The same paths are followed with one part changed.
-"""
+"""The value of the parts of localization on curves. The same paths are followed with one part changed."""
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
@@ -11,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from lidarium.benchmarks.studies.shared.map_figures import THESIS, follow, map_figures
+from lidarium.benchmarks.studies.shared.study import Task
 from lidarium.benchmarks.studies.srt.goal_runs import GoalRun, drive_to_goal
 from lidarium.evaluation.suites.episodes_file import KEY
 from lidarium.mapping.localization.on_splines.spline_filter import SplineFilter, SplineFilterSettings
@@ -65,23 +63,15 @@ VARIANTS: Mapping[str, tuple[str, SplineFilterSettings]] = MappingProxyType(
 
 
 @dataclass(frozen=True, slots=True)
-class FollowedWay:
+class FollowedWay(Task):
     """A way of the default mode in a world, to be followed by all variants."""
 
     world: str
     seed: int
 
-    @property
-    def key(self) -> str:
-        """The way in one line."""
-        return f"followed | {self.world} | {self.seed}"
-
 
 def measure_variants(task: FollowedWay) -> dict[str, Any]:
-    """Drive once, and let each variant follow what was sensed.
-
-    Returns a line with the figures of all.
-    """
+    """Drive once, and let each variant follow what was sensed. Returns a line with the figures of all."""
     episode, _, way = drive_to_goal(GoalRun("default", task.world, task.seed))
     floor, settings = episode.env.floor, episode.env.settings
     assert floor is not None

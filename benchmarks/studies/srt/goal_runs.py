@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from lidarium.agents.srt.policy import SensorBasedRandomTree
 from lidarium.benchmarks.studies.shared.map_figures import THESIS, MapFigures, map_figures
+from lidarium.benchmarks.studies.shared.study import Task
 from lidarium.benchmarks.studies.srt.shortest_path import shortest_path
 from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.floors.catalogue.names import load_floor
@@ -18,14 +19,7 @@ from lidarium.evaluation.episodes.watching import WatchedExploration, Watcher
 from lidarium.evaluation.suites.episodes_file import KEY
 from lidarium.mapping.localization.on_splines.spline_tracking import SplineTracker
 
-WORLDS = (
-    "srt_corridor",
-    "srt_l_room",
-    "srt_lab",
-    "srt_t_junction",
-    "srt_cluttered",
-    "srt_cluttered_reachable",
-)
+WORLDS = ("srt_corridor", "srt_l_room", "srt_lab", "srt_t_junction", "srt_cluttered", "srt_cluttered_reachable")
 MODES = ("thesis", "default")
 CONTROLS = {"drive": "controls"}
 TREES: dict[str, tuple[str, dict[str, Any]]] = {
@@ -67,17 +61,12 @@ CURVE_PERIOD = 10
 
 
 @dataclass(frozen=True, slots=True)
-class GoalRun:
+class GoalRun(Task):
     """A run: the mode of the tree, the world and the seed."""
 
     mode: str
     world: str
     seed: int
-
-    @property
-    def key(self) -> str:
-        """The run in one line; no other run has the same."""
-        return f"{self.mode} | {self.world} | {self.seed}"
 
 
 class Way(Watcher):

@@ -31,14 +31,7 @@ seeds had a part in any choice.
 """
 
 POLICIES = ("srt", "nearest_frontier", "explore_lite")
-SCENES = (
-    "scene_corner",
-    "scene_corridor",
-    "scene_loop",
-    "scene_loop_corridor",
-    "scene_room",
-    "scene_room_corner",
-)
+SCENES = ("scene_corner", "scene_corridor", "scene_loop", "scene_loop_corridor", "scene_room", "scene_room_corner")
 EXPLORATION, SETTINGS = "exploration", {"resolution": 0.025, "stop_coverage": 0.99, "horizon_s": 3600.0}
 GOALS_FILE, TREES_FILE, ABLATIONS_FILE = "goals.jsonl", "trees.jsonl", "ablations.jsonl"
 PICTURE_SEED = SEEDS[0]

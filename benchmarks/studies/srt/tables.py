@@ -56,10 +56,7 @@ def _goal_row(world: str, mode: str, runs: Sequence[Line]) -> str:
 
 
 def against_thesis_mode(lines: Sequence[Line]) -> str:
-    """Return the default mode's time, nodes and path over the thesis mode's.
-
-    The ratios are taken seed by seed.
-    """
+    """Return the default mode's time, nodes and path over the thesis mode's. The ratios are taken seed by seed."""
     rows = ["| world | time | nodes | path |", "|---|---:|---:|---:|"]
     for world in WORLDS:
         pairs = _pairs(_of(lines, world, "thesis"), _of(lines, world, "default"))
@@ -183,10 +180,7 @@ def exploration(episodes: Sequence[Line], policies: Sequence[str]) -> str:
 
 
 def _means(episodes: Sequence[Line], floor: str, policy: str) -> tuple[float, float]:
-    """Return mean time [s] and path [m] to 99 %.
-
-    Infinite if a run did not get there.
-    """
+    """Return mean time [s] and path [m] to 99 %. Infinite if a run did not get there."""
     runs = [episode for episode in episodes if episode["floor"] == floor and episode["policy"] == policy]
     if not runs or any(run["t99_s"] is None for run in runs):
         return math.inf, math.inf

@@ -8,14 +8,7 @@ from typing import Any
 from lidarium.agents.supervisor.settings import SupervisorSettings
 from lidarium.benchmarks.results_page import in_file
 from lidarium.benchmarks.studies.supervisor import tables
-from lidarium.benchmarks.studies.supervisor.figures import (
-    Row,
-    chosen,
-    floor_of,
-    has_wrong_merge,
-    median,
-    time_shares,
-)
+from lidarium.benchmarks.studies.supervisor.figures import Row, chosen, floor_of, has_wrong_merge, median, time_shares
 from lidarium.benchmarks.studies.supervisor.goals import BUMPER, SUPERVISED, goals_of, is_covered
 from lidarium.benchmarks.studies.supervisor.runs import FAILING, LOGS_FILE, asked_runs, read_json
 from lidarium.benchmarks.studies.supervisor.suites import (
@@ -59,10 +52,7 @@ def logs_section(logs: Mapping[str, Any]) -> list[str]:
 
 
 def _line_of(entry: Mapping[str, Any]) -> str:
-    """Return what happened at the station, or an order, in a line.
-
-    Nothing of decisions to go on.
-    """
+    """Return what happened at the station, or an order, in a line. Nothing of decisions to go on."""
     if entry["event"] != "decision":
         return f"{entry['time_s']:6.1f} s  {entry['event']} {' + '.join(entry['agents'])}: {entry['words']}"
     if entry["order"] is None:

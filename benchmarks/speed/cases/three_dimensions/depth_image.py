@@ -29,12 +29,7 @@ RENDERERS = {"TinyRenderer": 150.0, "EGL": None}
 OBSERVED = {"all": ("scan", "pose", "velocity", "bumper", "map"), "pose and scan": ("scan", "pose")}
 """What batches observe beside depth: all that is observed by default, or little."""
 
-LIMITS_S = {
-    ("apartment", 320): 0.12e-3,
-    ("apartment", 640): 0.35e-3,
-    ("large", 320): 0.25e-3,
-    ("large", 640): 0.6e-3,
-}
+LIMITS_S = {("apartment", 320): 0.12e-3, ("apartment", 640): 0.35e-3, ("large", 320): 0.25e-3, ("large", 640): 0.6e-3}
 """Longest that an image may take [s], by floor and columns."""
 
 NOTES = (

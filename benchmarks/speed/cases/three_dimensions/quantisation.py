@@ -22,13 +22,7 @@ from lidarium.envs.settings.cameras import CAMERAS
 from lidarium.envs.settings.robots import ROBOTS
 from lidarium.envs.simulation.depth.frames import image_of
 from lidarium.mapping.geometry.rigid import Transform
-from lidarium.mapping.point_clouds.cameras import (
-    Intrinsics,
-    base_from_camera,
-    map_from_base,
-    moved,
-    points_of_depth,
-)
+from lidarium.mapping.point_clouds.cameras import Intrinsics, base_from_camera, map_from_base, moved, points_of_depth
 from lidarium.mapping.point_clouds.cloud_files import read_cloud
 from lidarium.mapping.point_clouds.point_cloud import PointCloud
 from lidarium.mapping.sparse.quantisation.lloyd import nearest_codes
@@ -134,10 +128,7 @@ def measure(effort: Effort) -> list[Line]:
     contenders = dict(zip(LIMITS_S, (quantised(*each) for each in asked), strict=True))
     start = frame[np.random.default_rng(0).choice(len(frame), CODES, replace=False)]
     contenders["ours"] = repeated(lambda: quantise(frame, CODES, plain, start=start), 1)
-    found = {
-        "scikit-learn": scikit_learn_steps(frame, start, STEPS),
-        "faiss": faiss_steps(frame, start, STEPS),
-    }
+    found = {"scikit-learn": scikit_learn_steps(frame, start, STEPS), "faiss": faiss_steps(frame, start, STEPS)}
     peers = {name: quietly(peer) for name, peer in found.items() if peer is not None}
     contenders |= {name: repeated(peer, 1) for name, peer in peers.items()}
     seconds = interleaved(contenders, effort)

@@ -49,10 +49,7 @@ This share of its walls agrees under the transform, and less than `DIFFERENT_M` 
 """
 
 _SLIDES = [Transform(0.3 * x, 0.3 * y, 0.0) for x, y in ((1, 0), (-1, 0), (0, 1), (0, -1))]
-"""Shifts tested along a corridor of which both maps know no end.
-
-Every such shift explains them as well.
-"""
+"""Shifts tested along a corridor of which both maps know no end. Every such shift explains them as well."""
 
 _QUARTERS = np.arange(4) * (math.pi / 2.0)
 _TRUTH = ValidationSettings(hit_distance_m=0.05, miss_distance_m=0.1)
@@ -73,10 +70,7 @@ class Wanted:
 
 @dataclass(frozen=True, eq=False)
 class _Known:
-    """A map with the truth of what it knows.
-
-    The truth is in the floor's frame less the raster's origin.
-    """
+    """A map with the truth of what it knows. The truth is in the floor's frame less the raster's origin."""
 
     map: BankMap
 
@@ -242,10 +236,7 @@ def _is_symmetric(a: _Known, b: _Known) -> bool:
 
 
 def _alignments(a: _Known, b: _Known) -> list[tuple[Transform, Agreement]]:
-    """Return the transforms under which the truth of two maps looks most alike.
-
-    How alike it looks is returned, too.
-    """
+    """Return the transforms under which the truth of two maps looks most alike. How alike it looks is returned, too."""
     transforms, values = best_translations(a.truth, b.truth, _QUARTERS, _SEARCH)
     order = np.argsort(-values, kind="stable")
     middle: NDArray[np.float64] = b.truth.walls.mean(axis=0) if len(b.truth.walls) else np.zeros(2)
