@@ -307,4 +307,4 @@ def _tables(lines: Sequence[Line]) -> list[str]:
     return rows
 
 
-STUDY = Study(page, work=work)
+STUDY = Study(page, work=work, quick=10)

@@ -240,7 +240,7 @@ def suites(data: Path | None, every: int = 1) -> dict[str, Suite]:
     """Return the suites: all floors for the two, a part of them for classic explorers."""
     floors = {"test": list(set_floors("test"))[::every]}
     if data is not None:
-        real = {kind: paths for kind, paths in real_floors(data).items() if kind in KINDS}
+        real = {kind: paths for kind, paths in real_floors(data).items() if kind in KINDS and len(paths) >= every}
         floors |= {kind: [str(path) for path in paths[REAL_FLOORS[kind]][::every]] for kind, paths in real.items()}
     found = {}
     for kind, names in floors.items():
@@ -290,4 +290,4 @@ def _times_in(folder: Path, kind: str) -> Times:
     return found
 
 
-STUDY = Study(page, suites, work)
+STUDY = Study(page, suites, work, quick=200)

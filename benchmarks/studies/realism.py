@@ -358,4 +358,4 @@ def page(folder: Path) -> str:
     return "\n".join(lines)
 
 
-STUDY = Study(page, work=work)
+STUDY = Study(page, work=work, quick=14)

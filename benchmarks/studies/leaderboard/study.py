@@ -185,4 +185,4 @@ def _browser_page(folder: Path) -> Path:
     return folder / ALL / "report" / "report.html"
 
 
-STUDY = Study(page, suites, work, beside)
+STUDY = Study(page, suites, work, beside, quick=200)

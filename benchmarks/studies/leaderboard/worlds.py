@@ -62,11 +62,15 @@ BOUNDED = {"test": 2, "lifull": 1}
 
 
 def floors_of(data: Path | None, every: int) -> dict[str, list[str]]:
-    """Return the floors by kind, every that many-th; generated ones alone if there are no data."""
+    """Return the floors by kind, every that many-th; kinds of fewer are left out, but for generated ones."""
     found = {"test": list(set_floors("test"))}
     if data is not None:
         found |= {kind: [str(path) for path in paths] for kind, paths in real_floors(data).items()}
-    return {kind: floors[:: every * EVERY.get(kind, 1)] for kind, floors in found.items() if floors}
+    return {
+        kind: floors[:: every * EVERY.get(kind, 1)]
+        for kind, floors in found.items()
+        if kind == "test" or len(floors) >= every
+    }
 
 
 def suites(data: Path | None, every: int = 1) -> dict[str, Suite]:

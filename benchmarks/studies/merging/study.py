@@ -25,6 +25,7 @@ from lidarium.benchmarks.studies.merging.features import compare_descriptors, co
 from lidarium.benchmarks.studies.merging.figures import Tried
 from lidarium.benchmarks.studies.merging.plans import merge_plans, plan_tables
 from lidarium.benchmarks.studies.merging.real_maps import merge_real_maps, real_maps
+from lidarium.benchmarks.studies.merging.structure import FLOORS as STRUCTURE_FLOORS
 from lidarium.benchmarks.studies.merging.structure import compare_structures, draw_regions, structure_text
 from lidarium.benchmarks.studies.merging.thesis import (
     stages_text,
@@ -105,6 +106,9 @@ def _coloured(fused: FusedMap) -> NDArray[np.uint8]:
     return picture.astype(np.uint8)
 
 
+FEW = 20
+"""If every so many-th floor is taken or fewer, maps and plans of real buildings are left out."""
+
 EXTRA_FILE = "extra.json"
 EXTRA = ("detectors", "descriptors", "methods", "stages", "thresholds", "twelve", "teams", "structure", "real", "plans")
 PROPOSED = tuple(structure for structure in STRUCTURES if structure != MergeSettings().structure)
@@ -117,7 +121,7 @@ def work(folder: Path, data: Path | None, every: int, workers: int) -> Progress:
     What is there is not done again. Yields what is being done, how much is, and of how much.
     """
     floors = bank_floors(data, every)
-    yield from make_bank(folder, floors, workers)
+    yield from make_bank(folder, floors, workers, every)
     maps, pairs = read_maps(folder, floors), read_pairs(folder) or []
     tested = [pair for pair in pairs if pair.half == "test"]
     for method in METHODS:
@@ -130,7 +134,7 @@ def work(folder: Path, data: Path | None, every: int, workers: int) -> Progress:
     kept = folder / EXTRA_FILE
     extra: dict[str, Any] = json.loads(kept.read_text(encoding="utf-8")) if kept.exists() else {}
     missing = [name for name in EXTRA if name not in extra]
-    for name, rows in shared_out(partial(_measured, folder, data), missing, 1, is_apart=True):
+    for name, rows in shared_out(partial(_measured, folder, data, every), missing, 1, is_apart=True):
         if isinstance(rows, Exception):
             raise rows
         extra[name] = rows
@@ -144,7 +148,7 @@ def _proposed(folder: Path, structure: str) -> Path:
     return folder / "structures" / structure
 
 
-def _measured(folder: Path, data: Path | None, name: str) -> list[dict[str, Any]]:
+def _measured(folder: Path, data: Path | None, every: int, name: str) -> list[dict[str, Any]]:
     """Do one of the other experiments, on the maps of the test half."""
     maps = read_maps(folder, [floor for floor in kept_floors(folder) if floor.half == "test"])
     if name == "detectors":
@@ -163,8 +167,8 @@ def _measured(folder: Path, data: Path | None, name: str) -> list[dict[str, Any]
     if name == "teams":
         return merge_teams(maps)
     if name == "structure":
-        return compare_structures(data)
-    if data is None:
+        return compare_structures(data if every < FEW else None, max(STRUCTURE_FLOORS // every, 1))
+    if data is None or every >= FEW:
         return []
     return merge_plans(data) if name == "plans" else merge_real_maps(data)
 

@@ -181,4 +181,4 @@ def page(folder: Path) -> str:
     )
 
 
-STUDY = Study(page, work=work)
+STUDY = Study(page, work=work, quick=11)

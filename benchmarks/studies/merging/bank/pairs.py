@@ -6,7 +6,7 @@ noise or error. Both floors have their walls along the axes, so that four rotati
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property, lru_cache
 from itertools import combinations
 
@@ -66,6 +66,10 @@ class Wanted:
     like_places: int = 60
     copies: int = 120
     indistinct: int = 30
+
+    def part(self, every: int) -> "Wanted":
+        """Return an N-th of what is wanted, three of each kind at least."""
+        return Wanted(*(max(round(getattr(self, each.name) / every), 3) for each in fields(self)))
 
 
 @dataclass(frozen=True, eq=False)
