@@ -15,9 +15,10 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
+import lidarium
 from lidarium.mapping.files.output import write_text
 
-_PACKAGES = ("lidarium", "numpy", "numba", "scipy", "opencv-python-headless", "ir-sim", "pybullet")
+_PACKAGES = ("numpy", "numba", "scipy", "opencv-python-headless", "ir-sim", "pybullet")
 _MADE, _NOTES = "\nMade by `", "\n## Notes\n"
 _IN_FILE = "<!-- in a file -->\n"
 _TABLE = re.compile(re.escape(_IN_FILE) + r"((?:\|[^\n]*\n?)+)")
@@ -43,7 +44,7 @@ def machine() -> str:
 
 def about(command: str, more_versions: Mapping[str, str] | None = None) -> dict[str, Any]:
     """Return how, when, where and with what something is made."""
-    found = {"Python": platform.python_version()}
+    found = {"Python": platform.python_version(), "lidarium": lidarium.__version__}
     for package in _PACKAGES:
         try:
             found[package] = version(package)
