@@ -6,7 +6,7 @@ noise or error. Both floors have their walls along the axes, so that four rotati
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, fields, replace
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property, lru_cache
 from itertools import combinations
 
@@ -69,7 +69,7 @@ class Wanted:
 
     def part(self, every: int) -> "Wanted":
         """Return an N-th of what is wanted, three of each kind at least."""
-        return Wanted(*(max(round(getattr(self, each.name) / every), 3) for each in fields(self)))
+        return Wanted(**{kind: max(round(count / every), min(count, 3)) for kind, count in asdict(self).items()})
 
 
 @dataclass(frozen=True, eq=False)

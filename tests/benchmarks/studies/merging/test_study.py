@@ -1,4 +1,3 @@
-from functools import partial
 
 import pytest
 from published_pages import assert_published
@@ -8,7 +7,7 @@ from lidarium.benchmarks.studies.merging import features, trials
 from lidarium.benchmarks.studies.merging import study as merging
 from lidarium.benchmarks.studies.merging.bank import bank, drives, making
 from lidarium.benchmarks.studies.merging.bank.floors import BankFloor
-from lidarium.benchmarks.studies.merging.bank.pairs import Wanted, choose_pairs
+from lidarium.benchmarks.studies.merging.bank.pairs import Wanted
 from lidarium.evaluation.processes import shared_out
 
 FLOORS = [
@@ -22,14 +21,14 @@ FLOORS = [
 def small_bank(monkeypatch):
     few = Wanted(plenty=3, little=1, negative=2, like_places=1, copies=1, indistinct=1)
     monkeypatch.setattr(merging, "bank_floors", lambda data, every: FLOORS)
-    monkeypatch.setattr(merging, "compare_structures", partial(merging.compare_structures, floors=1))
+    monkeypatch.setattr(merging, "STRUCTURE_FLOORS", 1)
     monkeypatch.setattr(features, "REPEATS", 1)
     for module in (merging, trials):
         # What is patched here holds in this process alone.
         monkeypatch.setattr(module, "shared_out", lambda work, tasks, workers, is_apart: shared_out(work, tasks, 1))
     monkeypatch.setattr(bank, "RUNS", 1)
     monkeypatch.setattr(drives, "HORIZON_S", 30.0)
-    monkeypatch.setattr(making, "choose_pairs", partial(choose_pairs, wanted=few))
+    monkeypatch.setattr(making, "Wanted", lambda: few)
 
 
 def test_the_page_has_all_experiments_and_what_is_done_is_not_done_again(small_bank, tmp_path, monkeypatch):
