@@ -1,3 +1,4 @@
+import json
 
 import pytest
 from published_pages import assert_published
@@ -39,6 +40,13 @@ def test_the_page_has_all_experiments_and_what_is_done_is_not_done_again(small_b
     assert done[-1] == ("other experiments", 10, 10)
     again = list(study.work(tmp_path, None, 1, 1))
     assert all(what.startswith("pairs") for what, *_ in again)
+    extra = json.loads((tmp_path / merging.EXTRA_FILE).read_text())
+    # The small bank has no apartment, and positives at best.
+    stage = {"corners": 9.0, "repeated": 0.5, "matches": 4, "right": 3, "discs_at_truth": 0.7, "is_joined": False}
+    pair = {"pair": "A1-B1", "overlap": 0.5, "matches": 4, "inliers": 3, "agreement": 80.0, "time_us": 9.0}
+    matched = {"method": "radius", "pairs": 1, "matches": 9, "right": 1, "two_right": 0, "voted": 0, "time_ms": 1.0}
+    extra |= {"stages": [stage], "twelve": [{**pair, "is_accepted": False, "error_m": None}], "methods": [matched]}
+    (tmp_path / merging.EXTRA_FILE).write_text(json.dumps(extra))
     page = study.page(tmp_path)
     assert_published("merging", page, tmp_path, ("Maps of real robots", "Drawn plans", "Regions and doors"))
     for heading in (
