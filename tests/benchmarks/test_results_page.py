@@ -1,8 +1,10 @@
 """Results pages: conclusion and notes stay, long tables go to files, and stale words are named."""
 
 import pytest
+from published_pages import PUBLISHED
 
 from lidarium.benchmarks.results_page import about, in_file, publish
+from lidarium.benchmarks.studies import STUDIES
 
 TABLE = "| floor | `time` [s] |\n|---|---:|\n| a \\| b | **{}** |"
 PAGE = "# Runs\n\nAll of them.\n\n## Times (3)\n\nIn seconds.\n\n" + in_file(TABLE) + "\n\nThat is all.\n"
@@ -67,3 +69,11 @@ def test_of_other_figures_the_page_says_for_which_it_was_concluded(page, text):
 def test_files_of_tables_that_are_no_more_are_deleted(page):
     publish(page, "# Runs\n\nNothing.", told())
     assert not page.with_name("runs_times.csv").exists()
+
+
+@pytest.mark.parametrize("name", [*STUDIES, "speed", "growth", "profile"])
+def test_published_pages_open_with_a_conclusion_of_five_lines_at_most(name):
+    title, conclusion, made, *_ = (PUBLISHED / f"{name}.md").read_text().split("\n\n")
+    assert title.startswith("# ")
+    assert 1 <= len(conclusion.splitlines()) <= 5
+    assert made.startswith("Made by `")
