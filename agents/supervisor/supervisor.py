@@ -89,7 +89,7 @@ class _Judge:
         taken: Mapping[str, int],
     ) -> _Judged:
         """Put a robot before the tree, and choose its goal if it is to get another."""
-        inputs = self._inputs(agent, survey.known_area_m2)
+        inputs = self._inputs(agent, survey.area_m2)
         if agent not in workers:
             is_explained = self._station.reports[agent].pause_cause in EXPLAINED_PAUSES
             return self._decide(Case(inputs, is_pause_explained=is_explained))
@@ -142,7 +142,7 @@ class _Judge:
         """
         is_waiting = agent in self._standing_by
         teammates = [
-            self._inputs(teammate, survey.known_area_m2)
+            self._inputs(teammate, survey.area_m2)
             for teammate in workers
             if teammate != agent
             and teammate not in self._standing_by
@@ -157,7 +157,7 @@ class _Judge:
     def _opponent(self, agent: str, others: list[str], survey: Survey) -> RobotInputs | None:
         """Return the nearest robot that an agent is about to meet."""
         teammates = [
-            self._inputs(teammate, survey.known_area_m2) for teammate in others if survey.are_meeting(agent, teammate)
+            self._inputs(teammate, survey.area_m2) for teammate in others if survey.are_meeting(agent, teammate)
         ]
         return min(teammates, key=lambda teammate: (teammate.remaining_m, teammate.agent), default=None)
 

@@ -6,6 +6,7 @@ It holds the goals on offer, the cost of each robot's path there, and the answer
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -200,19 +201,27 @@ class Survey:
         self.going = {agent: self._goal_at(position) for agent, position in self.places.items()}
         """The goal that this is, -1 for none."""
 
-    @property
-    def known_area_m2(self) -> float:
-        """Area of the box around the known cells of the map, widened on all sides [m2].
+    @cached_property
+    def area_m2(self) -> float:
+        """Area that the group's map knows, and what is unknown around its frontiers [m2].
 
-        The box is wider by the laser's range on each side.
+        The thesis says that a complete map is known by a share of 1, but not of which area.
         """
-        height, width = ((int(side) - 2 * _MARGIN) * self.resolution for side in self._map.log_odds.shape)
-        return float((height + 2.0 * self._settings.sensor_range_m) * (width + 2.0 * self._settings.sensor_range_m))
+        known = self._map.log_odds != 0
+        half = max(round(self._settings.sensor_range_m / 2.0 / self.resolution), 1)
+        beyond = np.zeros(np.add(known.shape, 2 * half), np.bool_)
+        for row, column in self.goals.seen_from[self._is_left()]:
+            beyond[row : row + 2 * half + 1, column : column + 2 * half + 1] = True
+        return float(np.count_nonzero(beyond | np.pad(known, half))) * self.resolution**2
 
     def has_frontier(self) -> bool:
         """Whether any of the robots can reach an unexplored frontier."""
-        is_left = self.goals.sizes >= self._settings.least_left_m
-        return bool(np.isfinite(self.goals.costs[:, is_left]).any())
+        return bool(self._is_left().any())
+
+    def _is_left(self) -> NDArray[np.bool_]:
+        """Return which goals are long enough to be work left, and in reach, (K,)."""
+        is_long = self.goals.sizes >= self._settings.least_left_m
+        return np.asarray(is_long & np.isfinite(self.goals.costs).any(axis=0))
 
     def is_goal(self) -> NDArray[np.bool_]:
         """Return which goals are long enough to be given, (K,)."""

@@ -39,7 +39,7 @@ class RobotInputs:
     state : OperatingState
         Its state, ``rob_sta``.
     map_known : float
-        Share of its group's floor that its own map knows, ``map_kno``.
+        Share of its group's floor that its own map knows, ``map_kno``: 1 if all is explored and it knows it all.
     travelled_m : float
         How far it has come, ``d_trav`` [m].
     """

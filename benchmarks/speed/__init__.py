@@ -1,4 +1,1 @@
-"""How fast the package is, besides other simulators.
-
-``all`` runs every question.
-"""
+"""How fast the package is, besides other simulators. ``all`` runs every question."""

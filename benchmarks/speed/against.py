@@ -68,10 +68,7 @@ def serve(threads: int) -> None:
 
 
 def times(pythons: list[str], threads: int, rounds: int, blocks: int) -> dict[str, np.ndarray]:
-    """Return the times per agent step of each kind [us].
-
-    The shape is (pythons, rounds * blocks).
-    """
+    """Return the times per agent step of each kind [us]. The shape is (pythons, rounds * blocks)."""
     command = [str(Path(__file__).resolve()), "--serve", "--threads", str(threads)]
     processes = [
         subprocess.Popen([python, *command], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)

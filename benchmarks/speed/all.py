@@ -33,12 +33,7 @@ from lidarium.benchmarks.speed.cases.learners import (
     learned_training,
     masked_training,
 )
-from lidarium.benchmarks.speed.cases.three_dimensions import (
-    bullet_world,
-    depth_image,
-    quantisation,
-    sparse_planning,
-)
+from lidarium.benchmarks.speed.cases.three_dimensions import bullet_world, depth_image, quantisation, sparse_planning
 from lidarium.benchmarks.speed.harness.lines import Line, table
 from lidarium.benchmarks.speed.harness.report import speed_result, with_effort, write_speed
 from lidarium.benchmarks.speed.harness.timing import EFFORTS, Effort, on_cores
@@ -68,15 +63,11 @@ _MODULES: tuple[ModuleType, ...] = (
 )
 
 QUESTIONS: dict[str, Any] = {module.__name__.split(".")[-1]: module for module in _MODULES}
-"""The questions by name.
-
-They are modules with ``CORES``, ``NOTES`` and ``measure(effort)``.
-"""
+"""The questions by name. They are modules with ``CORES``, ``NOTES`` and ``measure(effort)``."""
 
 ABOUT_QUOTES = (
-    "*quoted* marks a rate that was not measured in this run but on an AMD Zen 5 core of about 4.1 GHz; on "
-    "another machine read "
-    "those ratios with that in mind.",
+    "*quoted* marks a rate that was not measured in this run but on an AMD Zen 5 core of about 4.1 GHz; on another "
+    "machine read those ratios with that in mind.",
 )
 
 
@@ -89,10 +80,7 @@ def ask(name: str, effort: Effort) -> list[Line]:
 
 
 def result_of(names: Sequence[str], lines: Sequence[Line], command: str, effort: Effort) -> dict[str, Any]:
-    """Return the result of questions.
-
-    It holds their lines, what explains them, and which peers were left out.
-    """
+    """Return the result of questions. It holds their lines, what explains them, and which peers were left out."""
     notes = [note for name in names for note in QUESTIONS[name].NOTES]
     return speed_result(lines, command, effort, [*notes, *ABOUT_QUOTES, *missing_peers()])
 

@@ -8,9 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
+from lidarium.benchmarks.results_page import about, publish
 from lidarium.benchmarks.speed.harness.batches import OBSERVED
-from lidarium.benchmarks.speed.harness.report import about, heading, with_effort
+from lidarium.benchmarks.speed.harness.report import with_effort
 from lidarium.benchmarks.speed.harness.timing import EFFORTS, Effort, interleaved, on_cores, repeated
+from lidarium.benchmarks.speed.peers.catalogue import outside_versions
 from lidarium.benchmarks.speed.scenes.floors import BenchFloor, straight_floor, turned_floor
 from lidarium.benchmarks.speed.scenes.teams import DrivenTeam
 from lidarium.envs.observing.writer import ObservationWriter
@@ -22,7 +24,7 @@ from lidarium.envs.simulation.kernels.contact import TeamBodies
 from lidarium.envs.simulation.kernels.masks import window_corner
 from lidarium.envs.simulation.kernels.motion import body_grids, move_robots
 from lidarium.envs.simulation.kernels.ray_casting import cast_scan
-from lidarium.mapping.files.output import check_writable, write_text
+from lidarium.mapping.files.output import check_writable
 from lidarium.mapping.grids.pooled_maps import touched_words
 from lidarium.mapping.grids.scan_geometry import Beams, beam_directions
 from lidarium.mapping.grids.scan_integration import SeenScan, integrate_scan
@@ -46,13 +48,7 @@ def _directions(poses: Array, unit_vectors: Array, directions: Array) -> None:
 
 @kernel
 def _rays(
-    floor: Array,
-    places: Array,
-    directions: Array,
-    angle_first: float,
-    increment: float,
-    reach: float,
-    lengths: Array,
+    floor: Array, places: Array, directions: Array, angle_first: float, increment: float, reach: float, lengths: Array
 ) -> None:
     for row in range(places.shape[0]):
         x, y, heading = places[row]
@@ -113,16 +109,9 @@ class StepParts:
 
     Each is a function that does it for all robots.
 
-    Attributes
-    ----------
-    parts : dict
-        Functions by the name of the part; none changes what another one reads.
-    whole : callable
-        A whole step of the world from the same poses.
-    observation : callable
-        The observations of all robots.
-    rays, cells : float
-        Rays, and cells seen through noise, of an agent step.
+    `parts`: functions by the name of the part; none changes what another one reads; `whole`: a whole step of the world
+    from the same poses; `observation`: the observations of all robots; `rays`, `cells`: rays, and cells seen through
+    noise, of an agent step.
     """
 
     def __init__(self, floor: BenchFloor) -> None:
@@ -131,11 +120,7 @@ class StepParts:
             team.step()
         simulation, lidar = team.simulation, team.simulation.lidar
         beams, reach = lidar.beams, lidar.range_max / floor.resolution
-        poses, velocities, commands = (
-            simulation.world.poses.copy(),
-            simulation.world.velocities.copy(),
-            team.commands,
-        )
+        poses, velocities, commands = (simulation.world.poses.copy(), simulation.world.velocities.copy(), team.commands)
         places = poses / [floor.resolution, floor.resolution, 1.0]
         corners = np.array([window_corner(x, y, reach) for x, y in places[:, :2]])
         inside = places[:, :2] - corners[:, ::-1]
@@ -248,11 +233,9 @@ def profile_table(profiles: Mapping[str, tuple[Mapping[str, float], float, float
 def rates(profiles: Mapping[str, tuple[Mapping[str, float], float, float]]) -> Sequence[str]:
     """Say how many rays and cells that is in a second."""
     return [
-        f"- {floor}: {rays:.0f} rays and {cells:,.0f} cells in an agent step; "
-        f"{rays / spent['ray casting']:.0f} M rays/s cast, "
-        f"{cells / 1e3 / (spent['area seen through noise'] + spent['map update']):.2f} G cells/s found and "
-        "put into the map, "
-        f"{cells / 1e3 / spent['map update']:.1f} G cells/s put into the map once found."
+        f"- {floor}: {rays:.0f} rays and {cells:,.0f} cells in an agent step; {rays / spent['ray casting']:.0f} M "
+        f"rays/s cast, {cells / 1e3 / (spent['area seen through noise'] + spent['map update']):.2f} G cells/s found "
+        f"and put into the map, {cells / 1e3 / spent['map update']:.1f} G cells/s put into the map once found."
         for floor, (spent, rays, cells) in profiles.items()
     ]
 
@@ -276,26 +259,23 @@ def main() -> None:
     if chosen.out is not None:
         command = f"python benchmarks/speed/profile_step.py --effort {chosen.effort} --out {chosen.out}"
         chosen.out.mkdir(parents=True, exist_ok=True)
-        write_text(chosen.out / "profile.md", profile_page(profiles, effort, command))
+        publish(chosen.out / "profile.md", profile_page(profiles, effort), about(command, outside_versions()))
 
 
-def profile_page(profiles: Mapping[str, tuple[Mapping[str, float], float, float]], effort: Effort, command: str) -> str:
+def profile_page(profiles: Mapping[str, tuple[Mapping[str, float], float, float]], effort: Effort) -> str:
     """Write the page of the profile."""
     return "\n".join(
         [
-            *heading("Profile of a step", about(command)),
+            "# Profile of a step",
             f"One thread; medians of {effort.rounds} rounds in which all parts run in turn for "
             f"{effort.block_s:g} s each.",
             "",
             profile_table(profiles),
             "",
-            f"A team of {ROBOTS} on the floor of 512 x 512 cells of 2.5 cm, straight and turned by 17 deg; "
-            "720 noisy beams over 240 deg to "
-            "5.6 m, maps at 2.5 cm. Every part runs by itself on the same poses and scans, so what it needs "
-            "lies in nearer caches than in "
-            "the whole step, and the rest holds that difference, too. The observation (scan, pose, velocity, "
-            "bumper, egocentric maps) is "
-            "no part of the kernel's step.",
+            f"A team of {ROBOTS} on the floor of 512 x 512 cells of 2.5 cm, straight and turned by 17 deg; 720 noisy "
+            "beams over 240 deg to 5.6 m, maps at 2.5 cm. Every part runs by itself on the same poses and scans, so "
+            "what it needs lies in nearer caches than in the whole step, and the rest holds that difference, too. The "
+            "observation (scan, pose, velocity, bumper, egocentric maps) is no part of the kernel's step.",
             "",
             *rates(profiles),
             "",

@@ -8,15 +8,12 @@ ICRA 2023.
 """
 
 import csv
-import platform
 from collections.abc import Mapping, Sequence
-from datetime import date
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-import lidarium
 from lidarium.benchmarks.studies.shared.study import Study
 from lidarium.evaluation.episodes.stop_rules import STOP_REASON
 from lidarium.evaluation.statistics.estimates import paired_ratio
@@ -63,8 +60,6 @@ PAGE = """# Dungeons
 Ways of one robot on public dungeon maps, the test maps of
 [DARE](https://github.com/marmotlab/DARE) (MIT), beside those of four planners of that project on the first
 {printed} maps of its listing.
-
-Made with `{command}` on {date}: lidarium {version}, Python {python}.
 
 The sensor sees 20 m all around, cells have 0.4 m, starts are the maps' marks: as in the project. A robot of
 1 cm drives freely at 2 m/s and sees while it drives. The project's moves between the nodes of a graph, 4 m
@@ -138,7 +133,7 @@ def work(folder: Path, data: Path | None, _every: int, _workers: int) -> Any:  #
     yield "ways of planners", 1, 1
 
 
-def page(folder: Path, command: str) -> str:
+def page(folder: Path) -> str:
     """Return the results as markdown."""
     ours = ways_of(read_episodes(folder / "maps" / EPISODES_FILE))
     names = sorted({name for of_policy in ours.values() for name in of_policy})
@@ -146,10 +141,6 @@ def page(folder: Path, command: str) -> str:
     path = folder / ARIADNE / EPISODES_FILE
     small = ways_of(read_episodes(path)) if path.exists() else {}
     return PAGE.format(
-        command=command,
-        date=date.today().isoformat(),
-        version=lidarium.__version__,
-        python=platform.python_version(),
         printed=len(next(iter(theirs.values()), {})),
         same=_same_maps(ours, theirs),
         count=len(names),

@@ -1,17 +1,16 @@
 """Every real floor, dungeons and 200 generated floors, explored by 1 to 3 robots."""
 
-import platform
 import time
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from datetime import date
 from pathlib import Path
 from statistics import median
 from typing import Any
 
 import lidarium
-from lidarium.benchmarks.studies.shared.study import Progress, Study, do_missing, kept_lines, real_floors
+from lidarium.benchmarks.results_page import in_file
+from lidarium.benchmarks.studies.shared.study import Progress, Study, Task, do_missing, kept_lines, real_floors
 from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.settings.making import make_settings
 from lidarium.evaluation.episodes.runner import run_episode
@@ -33,7 +32,7 @@ Row = Mapping[str, Any]
 
 
 @dataclass(frozen=True, slots=True)
-class Run:
+class Run(Task):
     """A floor of some kind that a number of robots explore."""
 
     kind: str
@@ -47,10 +46,7 @@ class Run:
 
 
 def floors(data: Path | None) -> list[tuple[str, str]]:
-    """Return (kind, floor) of all that is explored.
-
-    Without data these are generated floors alone.
-    """
+    """Return (kind, floor) of all that is explored. Without data these are generated floors alone."""
     found = {} if data is None else real_floors(data)
     return [(kind, str(path)) for kind, paths in found.items() for path in paths] + [
         ("generated", f"building:{seed}") for seed in GENERATED
@@ -63,10 +59,7 @@ def name_of(floor: str) -> str:
 
 
 def explore(run: Run) -> dict[str, Any]:
-    """Run an episode without a horizon.
-
-    Returns its figures, or why it could not start.
-    """
+    """Run an episode without a horizon. Returns its figures, or why it could not start."""
     row = {"kind": run.kind, "floor": name_of(run.floor), "robots": run.robots, "policy": POLICY}
     began = time.perf_counter()
     try:
@@ -94,7 +87,7 @@ def work(folder: Path, data: Path | None, every: int, workers: int) -> Progress:
     yield from do_missing(folder / RUNS_FILE, "runs", runs, explore, workers)
 
 
-def page(folder: Path, command: str) -> str:
+def page(folder: Path) -> str:
     """Return the results as markdown."""
     rows = kept_lines(folder / RUNS_FILE)
     runs = [row for row in rows if "error" not in row]
@@ -103,11 +96,8 @@ def page(folder: Path, command: str) -> str:
     lines = [
         "# Every floor, explored",
         "",
-        f"`{command}` on {date.today().isoformat()}, lidarium {lidarium.__version__}, "
-        f"Python {platform.python_version()}: policy `{POLICY}`, Kobuki (radius 0.18 m), URG-04LX (727 "
-        "beams, 240 degrees, "
-        "5.6 m), true poses, no noise, world and maps at 0.025 m, no horizon, seed 0. A run "
-        "ends as `covered` when 0.99 of `C_free` is sensed.",
+        f"Policy `{POLICY}`, Kobuki (radius 0.18 m), URG-04LX (727 beams, 240 degrees, 5.6 m), true poses, no noise, "
+        "world and maps at 0.025 m, no horizon, seed 0. A run ends as `covered` when 0.99 of `C_free` is sensed.",
         "",
         *_summary(runs),
         "",
@@ -121,16 +111,16 @@ def page(folder: Path, command: str) -> str:
     ]
     lines += ["", "## Floors that the robots do not fit in", ""]
     lines += [f"- {row['floor']}, {row['robots']} robots: {row['error']}" for row in refused] or ["None."]
-    lines += ["", "## All runs", "", "Coverage / time in s / path of the team in m.", "", *_all_runs(runs)]
+    lines += ["", "## All runs", "", "Coverage / time in s / path of the team in m.", ""]
+    lines += [in_file("\n".join(_all_runs(runs)))]
     return "\n".join(lines) + "\n"
 
 
 def _summary(runs: Sequence[Row]) -> list[str]:
     """Return a table with a line for each kind of floor and number of robots."""
     lines = [
-        "| floors | robots | runs | reached 0.99 | least coverage | collisions | area, median m2 | time, "
-        "median s | path, median m "
-        "| wall, median s |",
+        "| floors | robots | runs | reached 0.99 | least coverage | collisions | area, median m2 | time, median s | "
+        "path, median m | wall, median s |",
         "|---|---|---|---|---|---|---|---|---|---|",
     ]
     for kind, title in KINDS.items():
@@ -138,14 +128,10 @@ def _summary(runs: Sequence[Row]) -> list[str]:
             chosen = [row for row in runs if row["kind"] == kind and row["robots"] == robots]
             if chosen:
                 lines.append(
-                    f"| {title} | {robots} | {len(chosen)} | "
-                    f"{sum(row['coverage'] >= 0.99 for row in chosen)} "
-                    f"| {min(row['coverage'] for row in chosen):.4f} | "
-                    f"{sum(row['collisions'] for row in chosen)} "
-                    f"| {median(row['area_m2'] for row in chosen):.0f} | "
-                    f"{median(row['time_s'] for row in chosen):.0f} "
-                    f"| {median(row['path_m'] for row in chosen):.0f} | "
-                    f"{median(row['wall_s'] for row in chosen):.1f} |"
+                    f"| {title} | {robots} | {len(chosen)} | {sum(row['coverage'] >= 0.99 for row in chosen)} | "
+                    f"{min(row['coverage'] for row in chosen):.4f} | {sum(row['collisions'] for row in chosen)} | "
+                    f"{median(row['area_m2'] for row in chosen):.0f} | {median(row['time_s'] for row in chosen):.0f} | "
+                    f"{median(row['path_m'] for row in chosen):.0f} | {median(row['wall_s'] for row in chosen):.1f} |"
                 )
     return lines
 

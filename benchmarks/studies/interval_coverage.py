@@ -1,22 +1,18 @@
 """The study ``interval_coverage``: how often the intervals of reports hold a known truth."""
 
-import platform
 import time
 import zlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from datetime import date
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 from scipy import integrate, optimize, stats
 
-import lidarium
-from lidarium.benchmarks.studies.shared.study import Progress, Study, do_missing, kept_lines
+from lidarium.benchmarks.studies.shared.study import Progress, Study, Task, do_missing, kept_lines
 from lidarium.evaluation.statistics import (
     FEWEST_FOR_NOMINAL,
     CensoredTimes,
@@ -45,10 +41,7 @@ Values = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class Family:
-    """A distribution of times [s] as scipy has it.
-
-    It belongs to what is asked for, or goes beyond it.
-    """
+    """A distribution of times [s] as scipy has it. It belongs to what is asked for, or goes beyond it."""
 
     name: str
     times: Any
@@ -91,20 +84,12 @@ ASKED_FOR = tuple(family for family in FAMILIES if family.is_asked_for)
 
 
 @dataclass(frozen=True, slots=True)
-class Case:
+class Case(Task):
     """A figure of data of known truth.
 
-    Attributes
-    ----------
-    figure, data : str
-        What is estimated, and from what.
-    truth : float
-        What the interval should hold.
-    interval : callable
-        From a generator, the size and a seed of resampling: the interval of one trial. A ``ValueError`` is a
-        refusal.
-    is_asked_for : bool
-        Whether the interval must hold the truth about as often as it says; others go beyond that.
+    `figure`, `data`: what is estimated, and from what; `truth`: what the interval should hold; `interval`: from a
+    generator, the size and a seed of resampling: the interval of one trial. A ``ValueError`` is a refusal;
+    `is_asked_for`: whether the interval must hold the truth about as often as it says; others go beyond that.
     """
 
     figure: str
@@ -271,7 +256,7 @@ def is_reached(shares: Sequence[tuple[float, int]]) -> bool:
     )
 
 
-def page(folder: Path, command: str) -> str:
+def page(folder: Path) -> str:
     """Return the results as markdown."""
     lines = kept_lines(folder / CASES_FILE)
     trials, resamples, seconds = TRIALS, RESAMPLES, sum(line["seconds"] for line in lines)
@@ -280,34 +265,24 @@ def page(folder: Path, command: str) -> str:
     text = [
         "# How often intervals hold the truth",
         "",
-        f"`{command}` on {date.today().isoformat()}, lidarium {lidarium.__version__}, Python "
-        f"{platform.python_version()}, numpy {np.__version__}, scipy {scipy.__version__}; {seconds:.0f} s on "
-        "one core.",
-        "",
-        f"Share of {trials:,} trials in which the 95 % interval holds the known truth, in %, by the number "
-        "of runs or pairs. Its standard "
-        f"error is {100.0 * np.sqrt(0.95 * 0.05 / trials):.1f} at 95 %. Intervals are made of {resamples:,} "
-        "resamples here, of 10,000 in "
-        f"reports. Asked for are {100 * WANTED[0]:.0f} to {100 * WANTED[1]:.0f} at {FEWEST_FOR_NOMINAL} and "
-        "more on normal, skewed and "
-        "20 % censored data; the figures at 10 and 20 are published, not asked for, and reports warn there. "
-        "Rows marked as beyond are "
-        "harder than what is asked for, or discrete. What each interval is made of: "
+        f"Share of {trials:,} trials in which the 95 % interval holds the known truth, in %, by the number of runs or "
+        f"pairs; {seconds:.0f} s on one core. Its standard error is {100.0 * np.sqrt(0.95 * 0.05 / trials):.1f} at 95 "
+        f"%. Intervals are made of {resamples:,} resamples here, of 10,000 in reports. Asked for are "
+        f"{100 * WANTED[0]:.0f} to {100 * WANTED[1]:.0f} at {FEWEST_FOR_NOMINAL} and more on normal, skewed and 20 % "
+        "censored data; the figures at 10 and 20 are published, not asked for, and reports warn there. Rows marked as "
+        "beyond are harder than what is asked for, or discrete. What each interval is made of: "
         "[statistics](../reference/statistics.md).",
         "",
-        "Times of two policies are drawn in pairs whose normal scores have a correlation of 0.5; the second "
-        "policy takes 1.2 times "
-        "as long. Cut by the horizon: runs end where the first policy has missed a fifth. Cut at random: "
-        "exponential cuts come "
-        "before a fifth of its times, and the horizon is its upper quartile.",
+        "Times of two policies are drawn in pairs whose normal scores have a correlation of 0.5; the second policy "
+        "takes 1.2 times as long. Cut by the horizon: runs end where the first policy has missed a fifth. Cut at "
+        "random: exponential cuts come before a fifth of its times, and the horizon is its upper quartile.",
         "",
         f"**Reached in {asked - len(missed)} of {asked} rows that are asked for.**"
         + ("" if not missed else " Missed: " + "; ".join(f"{line['figure']}, {line['data']}" for line in missed) + "."),
         *_tables(lines),
         "",
-        "*refused*: trials in which the longest time was cut before the horizon, so that the mean up to "
-        "there is unknown; the "
-        "function says so, and the share is of the others.",
+        "*refused*: trials in which the longest time was cut before the horizon, so that the mean up to there is "
+        "unknown; the function says so, and the share is of the others.",
     ]
     return "\n".join(text) + "\n"
 
@@ -332,4 +307,4 @@ def _tables(lines: Sequence[Line]) -> list[str]:
     return rows
 
 
-STUDY = Study(page, work=work)
+STUDY = Study(page, work=work, quick=10)

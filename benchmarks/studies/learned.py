@@ -1,20 +1,18 @@
 """The study ``learned``: learned explorers beside classic ones, on floors that no training has seen."""
 
 import json
-import platform
 from collections.abc import Mapping, Sequence
-from datetime import date
 from importlib import resources
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-import lidarium
 from lidarium.agents.learned.network import CARD
 from lidarium.agents.learned.policy import CORRECTED
 from lidarium.agents.tours.policy import NEAREST
 from lidarium.agents.tours.policy import TOURS as BY_TOURS
+from lidarium.benchmarks.results_page import in_file
 from lidarium.benchmarks.studies.shared.study import (
     Bounded,
     Progress,
@@ -125,7 +123,7 @@ def senders_table(episodes: Mapping[str, Times]) -> str:
             ending = np.mean([NEAREST in count for count in counts])
             often = f"{sum(sums) / len(counts):.1f}"
             rows.append(f"| {KINDS[kind]} | {robots} | {often} | {shares} | {100 * ending:.0f} % |")
-    return "\n".join(rows) if len(rows) > 2 else "No run says."
+    return in_file("\n".join(rows)) if len(rows) > 2 else "No run says."
 
 
 def _time(episode: Mapping[str, Any]) -> float:
@@ -202,8 +200,6 @@ poses, no noise, maps of 5 cm, cut at {horizon:.0f} s; runs that did not get the
 chosen by these floors. Beside `srt`, with SLAM and with unknown starts it is on the
 [leaderboard](leaderboard.md).
 
-Made with `{command}` on {date}: lidarium {version}, Python {python}.
-
 ## The weights
 
 {card}
@@ -244,7 +240,7 @@ def suites(data: Path | None, every: int = 1) -> dict[str, Suite]:
     """Return the suites: all floors for the two, a part of them for classic explorers."""
     floors = {"test": list(set_floors("test"))[::every]}
     if data is not None:
-        real = {kind: paths for kind, paths in real_floors(data).items() if kind in KINDS}
+        real = {kind: paths for kind, paths in real_floors(data).items() if kind in KINDS and len(paths) >= every}
         floors |= {kind: [str(path) for path in paths[REAL_FLOORS[kind]][::every]] for kind, paths in real.items()}
     found = {}
     for kind, names in floors.items():
@@ -256,11 +252,7 @@ def suites(data: Path | None, every: int = 1) -> dict[str, Suite]:
 
 def _suite(policies: Sequence[str], floors: Sequence[str]) -> Suite:
     return Suite(
-        policies=tuple(policies),
-        floors=tuple(floors),
-        robots=TEAMS,
-        seeds=(0,),
-        variants={DEFAULT_VARIANT: SETTINGS},
+        policies=tuple(policies), floors=tuple(floors), robots=TEAMS, seeds=(0,), variants={DEFAULT_VARIANT: SETTINGS}
     )
 
 
@@ -271,15 +263,11 @@ def work(folder: Path, _data: Path | None, every: int, workers: int) -> Progress
     yield from do_missing(folder / BOUNDS_FILE, "bounds", teams, measure_bound, workers)
 
 
-def page(folder: Path, command: str) -> str:
+def page(folder: Path) -> str:
     """Return the results as markdown."""
     episodes = {kind: _times_in(folder, kind) for kind in KINDS}
     bounds = kept_lines(folder / BOUNDS_FILE) if (folder / BOUNDS_FILE).exists() else []
     return PAGE.format(
-        command=command,
-        date=date.today().isoformat(),
-        version=lidarium.__version__,
-        python=platform.python_version(),
         horizon=HORIZON_S,
         card=card_text(json.loads((resources.files("lidarium.agents.learned") / "data" / CARD).read_text())),
         times="\n\n".join(times_table(kind, found) for kind, found in episodes.items() if found),
@@ -302,4 +290,4 @@ def _times_in(folder: Path, kind: str) -> Times:
     return found
 
 
-STUDY = Study(page, suites, work)
+STUDY = Study(page, suites, work, quick=200)

@@ -16,8 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from lidarium.benchmarks.speed.harness.report import about, heading
-from lidarium.benchmarks.studies.shared.study import Progress, Study, do_missing, kept_lines
+from lidarium.benchmarks.studies.shared.study import Progress, Study, Task, do_missing, kept_lines
 from lidarium.evaluation.statistics.samples import MOST_VALUES
 from lidarium.evaluation.suites.campaign import EPISODES_FILE, Campaign
 from lidarium.evaluation.suites.episodes_file import TIMINGS, EpisodesFile, read_episodes
@@ -194,7 +193,7 @@ LONG, PIECES_FILE, AGAIN_FILE, NODES_FILE, KILLS_FILE = (
     "kills.jsonl",
 )
 
-PAGE = """{heading}
+PAGE = """# Many episodes, many machines
 
 ## 10^5 episodes
 
@@ -238,30 +237,20 @@ none was lost, doubled or changed: all lines are those of one machine.
 
 
 @dataclass(frozen=True, slots=True)
-class Piece:
+class Piece(Task):
     """Some seeds of the short episodes."""
 
     first: int
     last: int
 
-    @property
-    def key(self) -> str:
-        """Name that no other one of its file has."""
-        return f"seeds {self.first} to {self.last}"
-
 
 @dataclass(frozen=True, slots=True)
-class Part:
+class Part(Task):
     """A part that is measured, and how large it is."""
 
     name: str
     size: int
     turn: int = 0
-
-    @property
-    def key(self) -> str:
-        """Name that no other one of its file has."""
-        return f"{self.name} | {self.size} | round {self.turn}"
 
 
 def work(folder: Path, _data: Path | None, every: int, workers: int) -> Progress:
@@ -306,7 +295,7 @@ def _gain_row(episodes: int, compared: Sequence[Mapping[str, Any]]) -> str:
     return f"| {episodes} | {len(gains)} | {median:.2f} x ({min(gains):.2f} to {max(gains):.2f}) |"
 
 
-def page(folder: Path, command: str) -> str:
+def page(folder: Path) -> str:
     """Return the results as markdown."""
     pieces, compared = kept_lines(folder / PIECES_FILE), kept_lines(folder / NODES_FILE)
     [again], [killed] = kept_lines(folder / AGAIN_FILE), kept_lines(folder / KILLS_FILE)
@@ -316,7 +305,6 @@ def page(folder: Path, command: str) -> str:
         rows.append(_row(total, line))
     line_bytes = pieces[-1]["file_bytes"] / total
     return PAGE.format(
-        heading="\n".join(heading("Many episodes, many machines", about(command))),
         workers=pieces[-1]["workers"],
         piece=pieces[0]["episodes"],
         pieces="\n".join(rows),
@@ -336,4 +324,4 @@ def page(folder: Path, command: str) -> str:
     )
 
 
-STUDY = Study(page, work=work)
+STUDY = Study(page, work=work, quick=20)

@@ -13,8 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-import lidarium
-from lidarium.benchmarks.studies.shared.study import Progress, Study, do_missing, kept_lines
+from lidarium.benchmarks.studies.shared.study import Progress, Study, Task, do_missing, kept_lines
 from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.settings.making import make_settings
 from lidarium.envs.simulation.bullet.bullet_world import LEAN, BulletWorld
@@ -50,23 +49,16 @@ To reach: 95 % of the free drives end within {distance_m} m and {turn_deg:.0f} d
   that measure exactly; free drives, and those with contact.
 - *Scans*: at the poses of PyBullet's bodies, both worlds' scans, compared to the bit in every step in which
   the body leans by less than 2 deg.
-
-Made with `{command}`, lidarium {version}.
 """
 
 
 @dataclass(frozen=True, slots=True)
-class Drive:
+class Drive(Task):
     """A robot on a floor, and where its commands come from."""
 
     floor: str
     robot: str
     seed: int
-
-    @property
-    def key(self) -> str:
-        """Name that no other one of its file has."""
-        return f"{self.floor} | {self.robot} | {self.seed}"
 
 
 def _commands(settings: Any, seed: int) -> NDArray[np.float64]:  # noqa: ANN401
@@ -79,12 +71,7 @@ def _commands(settings: Any, seed: int) -> NDArray[np.float64]:  # noqa: ANN401
 
 def measure(drive: Drive) -> dict[str, Any]:
     """Drive in both worlds; return how far apart they are."""
-    options: dict[str, Any] = {
-        "robots": 1,
-        "robot": drive.robot,
-        "resolution": 0.1,
-        "localization": "odometry",
-    }
+    options: dict[str, Any] = {"robots": 1, "robot": drive.robot, "resolution": 0.1, "localization": "odometry"}
     envs = [
         ExplorationEnv(drive.floor, make_settings(backend=backend, **options)) for backend in ("bullet", "kinematic")
     ]
@@ -178,11 +165,9 @@ def _shown(apart: tuple[float, float]) -> str:
     return f"{apart[0]:.3f} m, {apart[1]:.2f} deg"
 
 
-def page(folder: Path, command: str) -> str:
+def page(folder: Path) -> str:
     """Return the results as markdown."""
     return PAGE.format(
-        command=command,
-        version=lidarium.__version__,
         floors=len(FLOORS),
         seeds=len(SEEDS),
         drive_s=DRIVE_S,
@@ -193,4 +178,4 @@ def page(folder: Path, command: str) -> str:
     )
 
 
-STUDY = Study(page, work=work)
+STUDY = Study(page, work=work, quick=20)

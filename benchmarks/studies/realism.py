@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import lidarium
-from lidarium.benchmarks.speed.harness.report import about, heading
-from lidarium.benchmarks.studies.shared.study import Progress, Study, do_missing, kept_lines
+from lidarium.benchmarks.studies.shared.study import Progress, Study, Task, do_missing, kept_lines
 from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.settings.making import make_settings
 from lidarium.envs.simulation.coverage import unpack_bits
@@ -38,7 +37,7 @@ REPEATS = 5
 
 
 @dataclass(frozen=True, slots=True)
-class Run:
+class Run(Task):
     """A floor that a number of robots explore from a seed."""
 
     floor: str
@@ -85,14 +84,8 @@ class TimedLocalizer:
 class Watch(Watcher):
     """Watches how long scans take localizers, and where wheels would place robots.
 
-    Attributes
-    ----------
-    seconds : list of (float, bool)
-        Wall time of each scan [s], and whether it corrected the past.
-    wheels : list of (robots,) float64
-        How far dead reckoning is off after each step [m].
-    believed, true : list of (robots, 3) float64
-        Poses after each step [m, m, rad].
+    `seconds`: wall time of each scan [s], and whether it corrected the past; `wheels`: how far dead reckoning is off
+    after each step [m]; `believed`, `true`: poses after each step [m, m, rad].
     """
 
     def begin(self, env: ExplorationEnv) -> None:
@@ -271,22 +264,14 @@ HEADER = (
 
 
 @dataclass(frozen=True, slots=True)
-class Rates:
+class Rates(Task):
     """Speed of a team, in an episode of each seed."""
 
     seeds: int
 
-    @property
-    def key(self) -> str:
-        """Name that no other one of its file has."""
-        return f"{self.seeds} seeds"
-
 
 def work(folder: Path, data: Path | None, every: int, _workers: int) -> Progress:
-    """Measure every N-th pair of floor and team with all seeds.
-
-    All is done in this process, as scans are timed.
-    """
+    """Measure every N-th pair of floor and team with all seeds. All is done in this process, as scans are timed."""
     floors = FLOORS if data is None else (*FLOORS, str(_large_office(data)))
     teams = [(floor, robots) for floor in floors for robots in TEAMS][::every]
     runs = [Run(floor, robots, seed) for floor, robots in teams for seed in SEEDS]
@@ -322,19 +307,15 @@ def rows_of(episodes: list[dict[str, Any]]) -> Iterator[str]:
         ate, aligned, last, wheels, way = (np.concatenate([one[name] for one in own]) for name in names)
         coverage, iou, fitted = (np.array([one[name] for one in own]) for name in ("coverage", "iou", "aligned_iou"))
         yield (
-            f"| {key[0]} | {key[1]} | {np.median(way):.0f} | {np.median(coverage):.3f} | "
-            f"{np.median(aligned):.3f} ({aligned.max():.3f}) "
-            f"| {np.median(ate):.3f} ({ate.max():.3f}) | {np.median(last):.3f} ({last.max():.3f}) "
-            f"| {np.median(wheels):.2f} | {np.median(iou):.3f} ({iou.min():.3f}) "
-            f"| {np.median(fitted):.3f} ({fitted.min():.3f}) | {own[0]['true_iou']:.3f} |"
+            f"| {key[0]} | {key[1]} | {np.median(way):.0f} | {np.median(coverage):.3f} | {np.median(aligned):.3f} "
+            f"({aligned.max():.3f}) | {np.median(ate):.3f} ({ate.max():.3f}) | {np.median(last):.3f} "
+            f"({last.max():.3f}) | {np.median(wheels):.2f} | {np.median(iou):.3f} ({iou.min():.3f}) | "
+            f"{np.median(fitted):.3f} ({fitted.min():.3f}) | {own[0]['true_iou']:.3f} |"
         )
 
 
 def times_of(episodes: list[dict[str, Any]], longest: Sequence[float]) -> Iterator[str]:
-    """Return lines on how long scans take.
-
-    The longest corrections were measured by themselves [s].
-    """
+    """Return lines on how long scans take. The longest corrections were measured by themselves [s]."""
     seconds = [entry for one in episodes for entry in one["seconds"]]
     plain = 1e3 * np.array([time for time, is_corrected in seconds if not is_corrected])
     # A scan that is not matched takes microseconds.
@@ -352,20 +333,19 @@ def times_of(episodes: list[dict[str, Any]], longest: Sequence[float]) -> Iterat
     )
 
 
-def page(folder: Path, command: str) -> str:
+def page(folder: Path) -> str:
     """Return the results as markdown."""
     episodes = kept_lines(folder / EPISODES_FILE)
     rates = kept_lines(folder / RATES_FILE)[0]["rates"]
     repeated = (line["longest_s"] for line in kept_lines(folder / LONGEST_FILE))
     longest = [seconds for seconds in repeated if seconds is not None]
     speed = (
-        f"Five robots on building:17 make {np.median(rates):.0f} agent steps a second on one core "
-        f"({min(rates):.0f} to {max(rates):.0f}), "
-        "policy, maps and localizers included."
+        f"Five robots on building:17 make {np.median(rates):.0f} agent steps a second on one core ({min(rates):.0f} to "
+        f"{max(rates):.0f}), policy, maps and localizers included."
     )
     table = [f"| {' | '.join(HEADER)} |", "|" + "---|" * len(HEADER), *rows_of(episodes)]
     lines = [
-        *heading("Robots in worlds that are not ideal", about(command)),
+        "# Robots in worlds that are not ideal",
         "",
         ABOUT,
         "",
@@ -378,4 +358,4 @@ def page(folder: Path, command: str) -> str:
     return "\n".join(lines)
 
 
-STUDY = Study(page, work=work)
+STUDY = Study(page, work=work, quick=14)

@@ -16,13 +16,14 @@ if TYPE_CHECKING:
 
 DEFAULT_FOLDER = Path("docs/results")
 SECONDS_BETWEEN_LINES = 10.0
+PART = "A part of the floors, seeds and other parts of the study ran: intervals are wide."
 
 
 @dataclass(frozen=True, kw_only=True)
 class Reproduce(Command):
     """Run the study of a page of docs/results, and write the page to --out.
 
-    Finished parts are not run again.
+    Finished parts are not run again. Conclusion and notes of a page stay as they are.
     """
 
     compiles: ClassVar[bool] = True
@@ -35,6 +36,8 @@ class Reproduce(Command):
     """of each kind of floor, or of other parts of a study, every N-th, for a shorter run"""
     share: float | None = None
     """the same as a share: 0.1 is --every 10"""
+    quick: bool = False
+    """a small part, in at most five minutes on two cores"""
     runs: Path = Path("runs/reproduce")
     """folder for episodes and other work"""
     workers: int = 0
@@ -45,16 +48,17 @@ class Reproduce(Command):
 
 def execute(command: Reproduce) -> Answer:
     """Run the missing parts, then write the page."""
+    from lidarium.benchmarks.results_page import about, publish
     from lidarium.benchmarks.studies import STUDIES
     from lidarium.evaluation.suites.campaign import Campaign
-    from lidarium.mapping.files.output import check_writable, write_text
+    from lidarium.mapping.files.output import check_writable
 
     if command.every < 1 or command.workers < 0:
         raise ValueError(f"--every is {command.every} and --workers {command.workers}; want at least 1, and at least 0")
-    every = _every(command)
     out = command.out or DEFAULT_FOLDER
-    check_writable(out)
     study = STUDIES[command.name]
+    every = _every(command, study.quick)
+    check_writable(out)
     folder = command.runs / command.name
     workers = command.workers or len(os.sched_getaffinity(0))
     campaigns = {
@@ -69,19 +73,23 @@ def execute(command: Reproduce) -> Answer:
     if study.pictures is not None:
         study.pictures(folder, out)
     page = out / f"{command.name}.md"
-    write_text(page, study.page(folder, _command_line(command)))
+    words = publish(page, study.page(folder), about(_command_line(command)), PART if every > 1 else "")
     failures = [(trial, error) for campaign in campaigns.values() for trial, error in campaign.failures]
     for trial, error in failures:
         notify(f"{trial.key}: {type(error).__name__}: {error}")
-    return Answer({**_progress_of(campaigns), "page": str(page)}, f"{page} is written", DEFECT if failures else 0)
+    return Answer({**_progress_of(campaigns), "page": str(page)}, words, DEFECT if failures else 0)
 
 
-def _every(command: Reproduce) -> int:
+def _every(command: Reproduce, quick: int) -> int:
     """Return every how many-th part is run."""
+    if (command.share is not None) + (command.every != 1) + command.quick > 1:
+        raise ValueError(
+            f"--share is {command.share}, --every {command.every} and --quick {command.quick}; want one of them"
+        )
+    if command.quick:
+        return quick
     if command.share is None:
         return command.every
-    if command.every != 1:
-        raise ValueError(f"--share is {command.share} and --every {command.every}; want one of them")
     if not 0.0 < command.share <= 1.0:
         raise ValueError(f"--share is {command.share}; want a share above 0, up to 1")
     return max(round(1.0 / command.share), 1)
@@ -136,4 +144,6 @@ def _command_line(command: Reproduce) -> str:
     part = f" --every {command.every}" if command.every > 1 else ""
     if command.share is not None:
         part = f" --share {command.share:g}"
+    if command.quick:
+        part = " --quick"
     return f"lidarium reproduce {command.name}{data}{part}"

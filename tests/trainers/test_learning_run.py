@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from trainer_scripts import script
 
+import lidarium
+
 
 def test_a_learning_run_compares_networks_and_policies_on_unseen_floors(tmp_path):
     module = script("learning_run", "torch", "rl")
@@ -20,12 +22,55 @@ def test_a_learning_run_compares_networks_and_policies_on_unseen_floors(tmp_path
     )
     module.main(plan)
     numbers = json.loads((tmp_path / "training.json").read_text())
-    assert set(numbers["coverage"]) == {"random_walk", "nearest_frontier", "learned", "untrained network"}
+    assert set(numbers["coverage"]) == {*module.CLASSIC, "trained networks", "untrained networks"}
     assert all(len(reached) == 2 for reached in numbers["coverage"].values())
     assert all(0.0 < each <= 1.0 for reached in numbers["coverage"].values() for each in reached)
-    page = (tmp_path / "training.md").read_text()
-    assert page.count("\n| `") == 4
+    page = tmp_path / "training.md"
+    assert page.read_text().count("\n| `") == len(module.CLASSIC)
     assert (tmp_path / "training.png").stat().st_size > 1000
+    page.write_text(page.read_text() + "\n## Notes\n\nBeside other work.\n")
+    module.main(module.Plan(seeds=0, floors="set:validation:2", horizon_s=4.0, workers=1, out=tmp_path))
+    assert json.loads((tmp_path / "training.json").read_text()) == numbers
+    assert page.read_text().endswith("\n## Notes\n\nBeside other work.\n")
+
+
+def test_all_that_are_compared_begin_at_the_same_starts(monkeypatch):
+    module = script("learning_run", "torch", "rl")
+    begun, make, run = [], lidarium.vector_env, lidarium.run_episode
+
+    def batch(*args, **options):
+        env = make(*args, **options)
+        begun.append(env)
+        return env
+
+    def noted(policy, env, **options):
+        begun.append(env)
+        return run(policy, env, **options)
+
+    monkeypatch.setattr(lidarium, "vector_env", batch)
+    monkeypatch.setattr(lidarium, "run_episode", noted)
+    floors, options = lidarium.floor_set("set:validation:3"), {"robots": 1, "horizon_s": 1.0}
+    for starts in ({}, {"starts": "drawn"}):
+        begun.clear()
+        module.final_coverage(module.drawn_by(module.Scorer()), floors, {**module.ROBOT, **options, **starts})
+        module.classic_coverage("random_walk", floors, {**options, **starts})
+        networks, *classic = begun
+        poses = [np.array(start.starts) for start in networks.engine.starts]
+        for pose, env in zip(poses, classic, strict=True):
+            np.testing.assert_array_equal(pose, np.array(env.engine.starts[0].starts))
+        if not starts:
+            own = poses
+    assert not any(np.allclose(fixed, drawn) for fixed, drawn in zip(own, poses, strict=True))
+
+
+def test_the_conclusion_is_made_of_the_figures():
+    module = script("learning_run", "torch", "rl")
+    coverage = {name: [0.2 + 0.1 * k, 0.4 + 0.1 * k] for k, name in enumerate(module.CLASSIC)}
+    coverage |= {module.LEARNED: [0.8, 0.9], module.UNTRAINED: [0.1, 0.2]}
+    words = module.conclusion(60.0, coverage)
+    assert "Trained networks see 85.0 % of an unseen floor in 60 s" in words
+    assert "`learned`, the best classic policy, 80.0 %" in words
+    assert words.count("\n") < 5
 
 
 def test_networks_that_attend_are_compared_with_what_they_were(tmp_path):
@@ -41,10 +86,10 @@ def test_networks_that_attend_are_compared_with_what_they_were(tmp_path):
     )
     module.main(plan)
     numbers = json.loads((tmp_path / "attention.json").read_text())
-    assert set(numbers["coverage"]) == {"random_walk", "nearest_frontier", "learned", "untrained network"}
+    assert set(numbers["coverage"]) == {*numbers["drawn"], "trained networks", "untrained networks"}
     assert all(0.0 < each <= 1.0 for reached in numbers["coverage"].values() for each in reached)
     page = (tmp_path / "attention.md").read_text()
-    assert page.count("\n| `") == 4
+    assert page.count("\n| `") == len(numbers["drawn"])
     assert "2,048 decisions" in page
 
 

@@ -24,13 +24,10 @@ CORES = 1
 ALLOWED_S = 1.5
 
 NOTES = (
-    "*Cached start*: `import lidarium`, `lidarium.parallel_env()` and its first reset in a fresh process, "
-    "after one that has compiled the "
-    "kernels. *Kernels compiled* counts those of the reset and three steps that were not loaded from the "
-    "cache. *Read-only* is a start "
-    "from a copy of the package that cannot be written to, with a home that cannot be written to either: the "
-    "kernels are kept in the "
-    "temporary folder; a first start there compiles them.",
+    "*Cached start*: `import lidarium`, `lidarium.parallel_env()` and its first reset in a fresh process, after one "
+    "that has compiled the kernels. *Kernels compiled* counts those of the reset and three steps that were not loaded "
+    "from the cache. *Read-only* is a start from a copy of the package that cannot be written to, with a home that "
+    "cannot be written to either: the kernels are kept in the temporary folder; a first start there compiles them.",
 )
 
 
@@ -38,14 +35,8 @@ NOTES = (
 class Start:
     """What a start in a fresh process told.
 
-    Attributes
-    ----------
-    seconds : float
-        Import and first reset [s].
-    compiled, loaded : int
-        Kernels that were compiled, and that came from the cache.
-    folder : str
-        Where the compiled code is kept.
+    `seconds`: import and first reset [s]; `compiled`, `loaded`: kernels that were compiled, and that came from the
+    cache; `folder`: where the compiled code is kept.
     """
 
     seconds: float
@@ -78,9 +69,7 @@ def read_only_environment(folder: Path) -> dict[str, str]:
     package, home, temporary = folder / "package" / "lidarium", folder / "home", folder / "temporary"
     skipped = shutil.ignore_patterns("__pycache__")
     shutil.copytree(
-        Path(lidarium.__file__).parent,
-        package,
-        ignore=shutil.ignore_patterns("__pycache__", *("mapping", "envs")),
+        Path(lidarium.__file__).parent, package, ignore=shutil.ignore_patterns("__pycache__", *("mapping", "envs"))
     )
     for name in ("mapping", "envs"):
         shutil.copytree(importlib.import_module(f"lidarium.{name}").__path__[0], package / name, ignore=skipped)
@@ -101,10 +90,7 @@ def read_only_environment(folder: Path) -> dict[str, str]:
 
 
 def read_only_start() -> Start:
-    """Start twice with a writable temporary folder only.
-
-    Returned is what the second start reported.
-    """
+    """Start twice with a writable temporary folder only. Returned is what the second start reported."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         environment = read_only_environment(folder)
@@ -112,10 +98,7 @@ def read_only_start() -> Start:
             start(environment)
             second = start(environment)
         finally:
-            for each in (
-                folder / "home",
-                *(path for path in (folder / "package").rglob("*") if path.is_dir()),
-            ):
+            for each in (folder / "home", *(path for path in (folder / "package").rglob("*") if path.is_dir())):
                 each.chmod(0o755)
         if not Path(second.folder).is_relative_to(folder / "temporary"):
             raise RuntimeError(f"the compiled code is kept in {second.folder}; want the temporary folder")

@@ -23,12 +23,10 @@ _HOLD, _DRAWS = 20, 50
 CORES = 1
 
 NOTES = (
-    "*Whole step*: `ExplorationEnv.step` of 3 robots with observations (each with a 256 x 256 crop of the "
-    "map), rewards, endings "
-    "and infos, beside `KinematicWorld.step` of a second environment in the same state under the same "
-    "commands, 20 steps at a "
-    "time in turn; 720 noisy beams, maps at 2.5 cm. The ratio is the time of the whole step over that of "
-    "the kernel.",
+    "*Whole step*: `ExplorationEnv.step` of 3 robots with observations (each with a 256 x 256 crop of the map), "
+    "rewards, endings and infos, beside `KinematicWorld.step` of a second environment in the same state under the "
+    "same commands, 20 steps at a time in turn; 720 noisy beams, maps at 2.5 cm. The ratio is the time of the whole "
+    "step over that of the kernel.",
 )
 
 
@@ -45,10 +43,7 @@ class Twins:
         self._whole, self._kernel = (ExplorationEnv(floor.floor(), settings) for _ in range(2))
         limits = np.array([settings.robot.max_speed, settings.robot.max_turn_rate])
         generator = np.random.default_rng(0)
-        speeds, turns = (
-            generator.uniform(0.2, 0.9, (_DRAWS, ROBOTS)),
-            generator.uniform(-0.3, 0.3, (_DRAWS, ROBOTS)),
-        )
+        speeds, turns = (generator.uniform(0.2, 0.9, (_DRAWS, ROBOTS)), generator.uniform(-0.3, 0.3, (_DRAWS, ROBOTS)))
         actions = np.stack([speeds, turns], axis=2).astype(np.float32)
         self._actions = [dict(zip(self._whole.possible_agents, team, strict=True)) for team in actions]
         self._commands = [team.astype(np.float64) * limits for team in actions]

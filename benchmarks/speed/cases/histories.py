@@ -1,7 +1,4 @@
-"""The same short drives, run in batches of any size.
-
-Sizes differ in how much memory is in use, and in nothing else.
-"""
+"""The same short drives, run in batches of any size. Sizes differ in how much memory is in use, and in nothing else."""
 
 import time
 from dataclasses import dataclass
@@ -21,18 +18,9 @@ from lidarium.mapping.grids.occupancy import OccupancySettings
 class Drives:
     """Short drives of many robots on a floor.
 
-    Attributes
-    ----------
-    tables : FloorTables
-        The floor.
-    robots : int
-        Robots of a team; teams do not see each other.
-    starts : (drives, 3) float64
-        Where each drive begins [m, rad].
-    commands : (drives, 2) float64
-        Its speed and turn rate [m/s, rad/s].
-    steps : int
-        How long it takes.
+    `tables`: the floor; `robots`: robots of a team; teams do not see each other; `starts` (drives, 3) float64: where
+    each drive begins [m, rad]; `commands` (drives, 2) float64: its speed and turn rate [m/s, rad/s]; `steps`: how long
+    it takes.
     """
 
     tables: FloorTables

@@ -33,10 +33,7 @@ def fastest_irsim_step(
 
     Its time depends on what is in the robot's reach, several times over on a grid map.
 
-    Parameters
-    ----------
-    poses : (trials, 3) float64
-        Where the robot may start [m, rad].
+    `poses` (trials, 3) float64: where the robot may start [m, rad].
     """
     if importlib.util.find_spec("irsim") is None:
         return None
@@ -59,9 +56,7 @@ def _step(
 ) -> Callable[[], object]:
     with tempfile.TemporaryDirectory() as folder:
         env = irsim.make(
-            str(_write_world(Path(folder), floor, pose, shape, beams, reach)),
-            headless=True,
-            log_level="ERROR",
+            str(_write_world(Path(folder), floor, pose, shape, beams, reach)), headless=True, log_level="ERROR"
         )
     action = np.array([[0.2], [0.3]])
     count = 0
@@ -117,11 +112,7 @@ def _write_world(
     else:
         content["obstacle"] = [
             {
-                "shape": {
-                    "name": "rectangle",
-                    "length": float(x_high - x_low),
-                    "width": float(y_high - y_low),
-                },
+                "shape": {"name": "rectangle", "length": float(x_high - x_low), "width": float(y_high - y_low)},
                 "state": [float(x_low + x_high) / 2, float(y_low + y_high) / 2, 0.0],
             }
             for x_low, y_low, x_high, y_high in floor.boxes
@@ -138,19 +129,14 @@ TRIAL_POSES = 6
 CORES = 1
 
 NOTES = (
-    "*Kernel step*: one call of `KinematicWorld.step` for 16 robots: motion with contact, 720 noisy beams "
-    "over 240 deg to 5.6 m, teammates "
-    "as obstacles of bodies and beams, scorer, and the update of 16 maps at 2.5 cm. The floor has 512 x 512 "
-    "cells of 2.5 cm with rooms, "
-    "doors and boxes; every block starts with blank maps at other places.",
-    "*VMAS* runs its lidar with 720 rays on the same boxes, 3 agents an environment, at the batch size that "
-    "was best in a short trial; it "
-    "has no map. It is an outside program and runs in a process of its own. Boxes cost it the same whichever "
-    "way they lie, so "
-    "its straight floor is the peer of our turned floor too.",
-    "*IR-SIM* runs its lidar2d with 720 beams and noise for one robot, on the same floor as rectangles and "
-    "as a grid map, at that of six "
-    "poses where it is fastest; it keeps no map here.",
+    "*Kernel step*: one call of `KinematicWorld.step` for 16 robots: motion with contact, 720 noisy beams over 240 "
+    "deg to 5.6 m, teammates as obstacles of bodies and beams, scorer, and the update of 16 maps at 2.5 cm. The floor "
+    "has 512 x 512 cells of 2.5 cm with rooms, doors and boxes; every block starts with blank maps at other places.",
+    "*VMAS* runs its lidar with 720 rays on the same boxes, 3 agents an environment, at the batch size that was best "
+    "in a short trial; it has no map. It is an outside program and runs in a process of its own. Boxes cost it the "
+    "same whichever way they lie, so its straight floor is the peer of our turned floor too.",
+    "*IR-SIM* runs its lidar2d with 720 beams and noise for one robot, on the same floor as rectangles and as a grid "
+    "map, at that of six poses where it is fastest; it keeps no map here.",
 )
 
 
@@ -171,19 +157,9 @@ def measure(effort: Effort) -> list[Line]:
         seconds = interleaved(contenders, effort)
         vmas_name = vmas.name
     return [
+        faster("kernel step, 16 robots, straight floor", seconds["straight"], vmas_name, seconds.get("vmas"), 40.0),
         faster(
-            "kernel step, 16 robots, straight floor",
-            seconds["straight"],
-            vmas_name,
-            seconds.get("vmas"),
-            40.0,
-        ),
-        faster(
-            "kernel step, 16 robots, floor turned by 17 deg",
-            seconds["turned"],
-            vmas_name,
-            seconds.get("vmas"),
-            33.0,
+            "kernel step, 16 robots, floor turned by 17 deg", seconds["turned"], vmas_name, seconds.get("vmas"), 33.0
         ),
         faster(
             "kernel step, 16 robots, straight floor",

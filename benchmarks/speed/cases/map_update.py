@@ -22,12 +22,7 @@ class PolygonUpdate:
 
     It uses ``cv2.fillPoly`` and changes the map with numpy, in the scan's window.
 
-    Parameters
-    ----------
-    shape : (rows, columns)
-        Size of the map [cells].
-    increments : (4,) int64
-        Hit, miss, least and greatest value.
+    `shape` (rows, columns): size of the map [cells]; `increments` (4,) int64: hit, miss, least and greatest value.
     """
 
     def __init__(self, shape: tuple[int, int], increments: NDArray[np.int64]) -> None:
@@ -49,10 +44,7 @@ class PolygonUpdate:
         rows, columns = self.log_odds.shape
         ends = np.floor(np.stack([x, y]) + (directions * lengths).T).astype(np.int32)
         np.clip(ends, 0, (columns - 1, rows - 1), out=ends)
-        low, high = (
-            np.minimum(ends.min(axis=0), (int(x), int(y))),
-            np.maximum(ends.max(axis=0), (int(x), int(y))) + 1,
-        )
+        low, high = (np.minimum(ends.min(axis=0), (int(x), int(y))), np.maximum(ends.max(axis=0), (int(x), int(y))) + 1)
         outline = np.concatenate([[(int(x), int(y))], ends]).astype(np.int32) - low.astype(np.int32)
         seen = np.zeros((high[1] - low[1], high[0] - low[0]), np.uint8)
         cv2.fillPoly(seen, [outline], self._miss)
@@ -70,10 +62,7 @@ class PolygonUpdate:
 def update_by_rays(
     log_odds: Array, x: float, y: float, directions: Array, lengths: Array, is_hit: Array, increments: Array
 ) -> None:
-    """Put in a scan by walking along every beam.
-
-    Each cell on the beam is lowered, the last one is raised.
-    """
+    """Put in a scan by walking along every beam. Each cell on the beam is lowered, the last one is raised."""
     hit, miss, least, greatest = increments[0], increments[1], increments[2], increments[3]
     rows, columns = log_odds.shape
     for beam in range(lengths.shape[0]):
@@ -103,13 +92,10 @@ ROBOTS = 16
 CORES = 1
 
 NOTES = (
-    "*Map update*: the same 16 noisy scans of 720 beams into int8 log-odds of 2.5 cm cells on the straight "
-    "floor. Ours is "
-    "`KinematicWorld.perceive`, one call for 16 maps, hits on teammates taken out; the line *called scan by "
-    "scan* is "
-    "`OccupancyGrid.integrate`, which checks its arguments each time. *fillPoly and numpy* and *ray "
-    "traversal* (numba) update one map "
-    "scan by scan.",
+    "*Map update*: the same 16 noisy scans of 720 beams into int8 log-odds of 2.5 cm cells on the straight floor. "
+    "Ours is `KinematicWorld.perceive`, one call for 16 maps, hits on teammates taken out; the line *called scan by "
+    "scan* is `OccupancyGrid.integrate`, which checks its arguments each time. *fillPoly and numpy* and *ray "
+    "traversal* (numba) update one map scan by scan.",
 )
 
 
@@ -146,12 +132,7 @@ def measure(effort: Effort) -> list[Line]:
     )
     return [
         faster(
-            "map update of a noisy scan",
-            seconds["ours"],
-            "fillPoly and numpy",
-            seconds["polygons"],
-            5.0,
-            "scans/s",
+            "map update of a noisy scan", seconds["ours"], "fillPoly and numpy", seconds["polygons"], 5.0, "scans/s"
         ),
         faster("map update of a noisy scan", seconds["ours"], "ray traversal", seconds["rays"], 7.0, "scans/s"),
         faster(

@@ -15,7 +15,6 @@ from lidarium.benchmarks.speed.cases.ray_casting import all_floors
 from lidarium.benchmarks.speed.harness.lines import Line
 from lidarium.benchmarks.speed.harness.report import run_alone
 from lidarium.benchmarks.speed.harness.timing import Effort
-from lidarium.benchmarks.speed.peers.sphere_tracing import SphereTracer
 from lidarium.benchmarks.speed.scenes.floors import BenchFloor, free_poses
 from lidarium.benchmarks.speed.scenes.teams import BEAMS, LIDAR, RANGE_MAX
 from lidarium.envs.simulation.kernels.ray_casting import cast_scans
@@ -27,11 +26,9 @@ ALLOWED_MM = 0.1
 CORES = 1
 
 NOTES = (
-    "*Range error*: the greatest difference between our ranges (as the sensor returns them, float32) and the "
-    "nearest entry point into any "
-    "solid cell, computed by intersecting each beam with every such cell in reach; 12 poses of 720 beams on "
-    "each of the four floors. The "
-    "other column has the mean error of sphere tracing on the same beams.",
+    "*Range error*: the greatest difference between our ranges (as the sensor returns them, float32) and the nearest "
+    "entry point into any solid cell, computed by intersecting each beam with every such cell in reach; 12 poses of "
+    "720 beams on each of the four floors.",
 )
 
 
@@ -94,32 +91,23 @@ def our_ranges(floor: BenchFloor, poses: NDArray[np.float64]) -> NDArray[np.floa
     scaled = poses / [floor.resolution, floor.resolution, 1.0]
     reach = RANGE_MAX / floor.resolution
     cast_scans(
-        tables.rays.addresses,
-        scaled,
-        LIDAR.unit_vectors,
-        LIDAR.angle_first,
-        LIDAR.angle_increment,
-        reach,
-        ranges,
+        tables.rays.addresses, scaled, LIDAR.unit_vectors, LIDAR.angle_first, LIDAR.angle_increment, reach, ranges
     )
     return (ranges * floor.resolution).astype(np.float32).astype(np.float64)
 
 
 def measure(effort: Effort) -> list[Line]:
-    """Compare our ranges and those of sphere tracing with the reference."""
+    """Compare our ranges with the reference."""
     lines = []
     for name, floor in all_floors().items():
         poses = free_poses(floor, POSES, seed=2)
         exact = exact_ranges(floor, poses)
         error = 1000.0 * float(np.abs(our_ranges(floor, poses) - exact).max())
-        tracer = SphereTracer(floor, BEAMS, math.radians(240.0), RANGE_MAX)
-        traced = np.minimum([tracer.scan(pose) for pose in poses], RANGE_MAX)
-        traced_error = 1000.0 * float(np.abs(traced - exact).mean())
         lines.append(
             Line(
                 f"greatest error of a range, {name}",
                 f"{error:.2g} mm",
-                f"sphere tracing: {traced_error:.2g} mm on average",
+                "-",
                 None,
                 ALLOWED_MM,
                 error,

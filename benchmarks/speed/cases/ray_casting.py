@@ -1,10 +1,6 @@
-"""Exact ranges alone, beside three peers.
-
-They are f1tenth's scan simulator, sphere tracing of our own and PyBullet's rayTestBatch.
-"""
+"""Exact ranges alone, beside f1tenth's scan simulator and PyBullet's rayTestBatch."""
 
 import itertools
-import math
 
 import numpy as np
 
@@ -14,32 +10,23 @@ from lidarium.benchmarks.speed.harness.timing import Contender, Effort, interlea
 from lidarium.benchmarks.speed.peers import f1tenth_scans
 from lidarium.benchmarks.speed.peers.bullet import bullet_scan
 from lidarium.benchmarks.speed.peers.f1tenth_scans import F1tenthScanner
-from lidarium.benchmarks.speed.peers.sphere_tracing import SphereTracer
 from lidarium.benchmarks.speed.scenes.floors import BenchFloor, free_poses, straight_floor, turned_floor
 from lidarium.benchmarks.speed.scenes.teams import BEAMS, LIDAR, RANGE_MAX
 from lidarium.envs.simulation.kernels.ray_casting import cast_scans
 
 POSES = 32
 F1TENTH_RAYS = 10e6
-"""Rays per second of f1tenth's scan simulator.
-
-Measured on an AMD Zen 5 core on floors like these (9 to 12 M).
-"""
+"""Rays per second of f1tenth's scan simulator. Measured on an AMD Zen 5 core on floors like these (9 to 12 M)."""
 
 CORES = 1
 
 NOTES = (
-    "*Rays alone*: `cast_scans` of the package on 32 poses, 720 beams over 240 deg to 5.6 m, no noise, no "
-    "map. The larger floor has "
-    "2000 x 2000 cells of 2.5 cm.",
-    "*f1tenth's scan simulator* is the original's code (f1tenth/f1tenth_gym 02ca878, `laser_models.py`, "
-    "comments and tests "
-    "left out, an outside file that LIDARIUM_F1TENTH "
-    "names), its noise of 6 to 8 us a scan included; the same poses, one call a scan. Where no file is named "
-    "its rate is quoted, about "
-    "10 M rays/s, measured on a Zen 5 core on floors like these.",
-    "*Sphere tracing* is code of our own after the same method, without noise: faster than the original, "
-    "and no line to reach.",
+    "*Rays alone*: `cast_scans` of the package on 32 poses, 720 beams over 240 deg to 5.6 m, no noise, no map. The "
+    "larger floor has 2000 x 2000 cells of 2.5 cm.",
+    "*f1tenth's scan simulator* is the original's code (f1tenth/f1tenth_gym 02ca878, `laser_models.py`, comments and "
+    "tests left out, an outside file that LIDARIUM_F1TENTH names), its noise of 6 to 8 us a scan included; the same "
+    "poses, one call a scan. Where no file is named its rate is quoted, about 10 M rays/s, measured on a Zen 5 core "
+    "on floors like these.",
     "*PyBullet* casts the same scans with `rayTestBatch` on the floor's boxes, one thread.",
 )
 
@@ -60,32 +47,15 @@ def our_scans(floor: BenchFloor) -> Contender:
 
     def cast() -> None:
         cast_scans(
-            tables.rays.addresses,
-            poses,
-            LIDAR.unit_vectors,
-            LIDAR.angle_first,
-            LIDAR.angle_increment,
-            reach,
-            ranges,
+            tables.rays.addresses, poses, LIDAR.unit_vectors, LIDAR.angle_first, LIDAR.angle_increment, reach, ranges
         )
 
     cast()
     return repeated(cast, POSES * BEAMS)
 
 
-def traced_scans(floor: BenchFloor) -> Contender:
-    """Trace the scans of all poses in turn; a unit is a ray."""
-    tracer = SphereTracer(floor, BEAMS, math.radians(240.0), RANGE_MAX)
-    poses = itertools.cycle(free_poses(floor, POSES))
-    tracer.scan(next(poses))
-    return repeated(lambda: tracer.scan(next(poses)), BEAMS)
-
-
 def f1tenth_scans_of(floor: BenchFloor) -> Contender:
-    """Let f1tenth's scan simulator cast the scans of all poses in turn.
-
-    A unit is a ray.
-    """
+    """Let f1tenth's scan simulator cast the scans of all poses in turn. A unit is a ray."""
     scanner = F1tenthScanner(floor, BEAMS, RANGE_MAX)
     poses = itertools.cycle(free_poses(floor, POSES))
     scanner.scan(next(poses))
@@ -97,7 +67,7 @@ def measure(effort: Effort) -> list[Line]:
     floors = all_floors()
     contenders: dict[str, Contender] = {}
     for name, floor in floors.items():
-        contenders[name], contenders[f"traced {name}"] = our_scans(floor), traced_scans(floor)
+        contenders[name] = our_scans(floor)
         if f1tenth_scans.is_there():
             contenders[f"f1tenth {name}"] = f1tenth_scans_of(floor)
     small = next(iter(floors.values()))
@@ -111,20 +81,12 @@ def measure(effort: Effort) -> list[Line]:
         line = f"rays alone, exact, {name} cells" if len(floor.boxes) else f"rays alone, exact, {name}"
         if f1tenth_scans.is_there():
             lines.append(
-                faster(
-                    line,
-                    seconds[name],
-                    "f1tenth's scan simulator",
-                    seconds[f"f1tenth {name}"],
-                    wanted,
-                    "rays/s",
-                )
+                faster(line, seconds[name], "f1tenth's scan simulator", seconds[f"f1tenth {name}"], wanted, "rays/s")
             )
         else:
             lines.append(
                 faster_than_quoted(line, seconds[name], "f1tenth's scan simulator", F1TENTH_RAYS, wanted, "rays/s")
             )
-        lines.append(faster(line, seconds[name], "sphere tracing", seconds[f"traced {name}"], None, "rays/s"))
     lines.append(
         faster(
             f"rays alone, exact, {small.name} cells",
@@ -139,4 +101,4 @@ def measure(effort: Effort) -> list[Line]:
 
 
 if __name__ == "__main__":
-    run_alone(measure, "Exact ranges beside f1tenth, sphere tracing and PyBullet.")
+    run_alone(measure, "Exact ranges beside f1tenth and PyBullet.")

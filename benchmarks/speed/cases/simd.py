@@ -155,11 +155,7 @@ def _positive_cells(address: int) -> Any:  # noqa: ANN401
 
 @_inlined
 def _cells_that_differ(log_odds: int, numbers: int, number: int) -> Any:  # noqa: ANN401
-    cells, others, word = (
-        vector_at(log_odds, BLOCK, np.int8),
-        vector_at(numbers, BLOCK, np.uint16),
-        np.uint64(0),
-    )
+    cells, others, word = (vector_at(log_odds, BLOCK, np.int8), vector_at(numbers, BLOCK, np.uint16), np.uint64(0))
     for k in range(BLOCK):
         word |= np.uint64((cells[k] > 0) != (others[k] == number)) << np.uint64(k)
     return word

@@ -32,25 +32,18 @@ _TRIALS, _LONGEST, _FREE = 64, 10, 255
 _WITHOUT_WORK = (DriveState.IDLE, DriveState.ARRIVED, DriveState.NO_PATH)
 
 NOTES = (
-    f"*Waypoint decision*: `lidarium.vector_env` with level `waypoint`, {EPISODES} episodes of {ROBOTS} "
-    "robots, floor, laser, maps and "
-    "observations as in the *batch*, decisions of 2 s (20 steps; less where a robot arrives or finds no "
-    "way). Each robot gets a cell "
-    f"{NEAREST:g} to {FARTHEST:g} m off that is free in its own map and keeps it until it arrives, finds no "
-    "way, or has tried for 20 s; "
-    "as an action tells a place from where the robot is now, every robot plans anew in every decision. *Bare "
-    "steps* are calls of "
-    "`KinematicWorld.step` for robots at the same places, as many as each decision took, at the mean speed "
-    "and turn rate of the "
-    "decision, on as many threads. Times are per robot and step.",
+    f"*Waypoint decision*: `lidarium.vector_env` with level `waypoint`, {EPISODES} episodes of {ROBOTS} robots, floor, "
+    "laser, maps and observations as in the *batch*, decisions of 2 s (20 steps; less where a robot arrives or finds "
+    f"no way). Each robot gets a cell {NEAREST:g} to {FARTHEST:g} m off that is free in its own map and keeps it until "
+    "it arrives, finds no way, or has tried for 20 s; as an action tells a place from where the robot is now, every "
+    "robot plans anew in every decision. *Bare steps* are calls of `KinematicWorld.step` for robots at the same "
+    "places, as many as each decision took, at the mean speed and turn rate of the decision, on as many threads. "
+    "Times are per robot and step.",
 )
 
 
 class Deciders:
-    """A batch that drives between waypoints, and its shadow of bare steps.
-
-    The shadow takes the same steps.
-    """
+    """A batch that drives between waypoints, and its shadow of bare steps. The shadow takes the same steps."""
 
     def __init__(self, threads: int) -> None:
         floor = straight_floor()
@@ -86,18 +79,12 @@ class Deciders:
         )
 
     def run(self, seconds: float) -> tuple[float, float]:
-        """Decide and take bare steps for about so long each.
-
-        Seconds per robot and step of both.
-        """
+        """Decide and take bare steps for about so long each. Seconds per robot and step of both."""
         simulation, bare = self._deciding.engine.simulation, self._bare.engine.simulation
         deciding, stepping, agent_steps = 0.0, 0.0, 0
         while agent_steps == 0 or deciding + stepping < 2.0 * seconds:
             actions = self._actions()
-            bare.world.poses[:], bare.world.velocities[:] = (
-                simulation.world.poses,
-                simulation.world.velocities,
-            )
+            bare.world.poses[:], bare.world.velocities[:] = (simulation.world.poses, simulation.world.velocities)
             bare.beliefs.believed[:] = simulation.beliefs.believed
             poses, steps, travelled = (
                 simulation.world.poses.copy(),
@@ -134,10 +121,7 @@ class Deciders:
         return np.clip(shares, -1.0, 1.0).astype(np.float32)
 
     def _drawn(self, row: int) -> NDArray[np.float64]:
-        """Draw a place [m] that the robot knows to be free.
-
-        Where it stands, if none of many draws is.
-        """
+        """Draw a place [m] that the robot knows to be free. Where it stands, if none of many draws is."""
         simulation = self._deciding.engine.simulation
         angles, distances = (
             self._generator.uniform(-math.pi, math.pi, _TRIALS),

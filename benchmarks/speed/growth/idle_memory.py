@@ -22,19 +22,10 @@ from lidarium.envs.simulation.simulation import Simulation
 class IdleMemory:
     """Memory of a robot that stands still at the level of velocities.
 
-    Attributes
-    ----------
-    robots : int
-        How many stood there.
-    map_bytes : int
-        Of the robot's map.
-    own_bytes : float
-        Of all arrays that belong to the robot: map, mask, scan, poses and so on.
-    all_bytes : float
-        Of all arrays of the environment, by the number of robots: the team's masks and the observations'
-        buffers, too.
-    resident_bytes : float or None
-        By how much a robot makes the process grow, as the system tells; None if it does not.
+    `robots`: how many stood there; `map_bytes`: of the robot's map; `own_bytes`: of all arrays that belong to the
+    robot: map, mask, scan, poses and so on; `all_bytes`: of all arrays of the environment, by the number of robots: the
+    team's masks and the observations' buffers, too; `resident_bytes`: by how much a robot makes the process grow, as
+    the system tells; None if it does not.
     """
 
     robots: int
@@ -85,10 +76,7 @@ def array_bytes(thing: Any) -> int:  # noqa: ANN401
 
 
 def resident() -> int | None:
-    """Return how much memory of this process lies in the machine's [bytes].
-
-    None if the system does not tell.
-    """
+    """Return how much memory of this process lies in the machine's [bytes]. None if the system does not tell."""
     try:
         status = Path("/proc/self/status").read_text()
     except OSError:

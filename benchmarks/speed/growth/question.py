@@ -9,12 +9,13 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from lidarium.benchmarks.results_page import about, publish
 from lidarium.benchmarks.speed.cases.histories import Drives, Histories, drawn_drives
 from lidarium.benchmarks.speed.growth.idle_memory import IdleMemory
-from lidarium.benchmarks.speed.harness.report import about, heading
 from lidarium.benchmarks.speed.harness.timing import Interval, median_interval, on_cores
+from lidarium.benchmarks.speed.peers.catalogue import outside_versions
 from lidarium.benchmarks.speed.scenes.floors import straight_floor
-from lidarium.mapping.files.output import check_writable, write_json, write_text
+from lidarium.mapping.files.output import check_writable, write_json
 
 ALLOWED_MEMORY = 1.2
 MIB = 2**20
@@ -24,18 +25,9 @@ MIB = 2**20
 class Growth:
     """The times of one size besides those of the first of its group.
 
-    Attributes
-    ----------
-    group : str
-        What grows.
-    name : str
-        This size.
-    working_set : int
-        Bytes of the maps and masks that the robots write to.
-    seconds, first : list of float
-        Seconds per agent step in each repeat, of this size and of the first one.
-    allowed : float or None
-        How many times the first's time it may take; None if that is only told.
+    `group`: what grows; `name`: this size; `working_set`: bytes of the maps and masks that the robots write to;
+    `seconds`, `first`: seconds per agent step in each repeat, of this size and of the first one; `allowed`: how many
+    times the first's time it may take; None if that is only told.
     """
 
     group: str
@@ -86,10 +78,7 @@ def memory_ratios(memory: IdleMemory) -> dict[str, tuple[float, float | None]]:
         "all arrays of the environment, a robot's share": (memory.all_bytes / memory.map_bytes, None),
     }
     if memory.resident_bytes is not None:
-        ratios["growth of the process (resident)"] = (
-            memory.resident_bytes / memory.map_bytes,
-            ALLOWED_MEMORY,
-        )
+        ratios["growth of the process (resident)"] = (memory.resident_bytes / memory.map_bytes, ALLOWED_MEMORY)
     return ratios
 
 
@@ -118,10 +107,7 @@ def caches() -> str:
 def growth_result(
     growths: Sequence[Growth], memory: IdleMemory, repeats: int, told: Mapping[str, Any]
 ) -> dict[str, Any]:
-    """Return what is written to ``growth.json``.
-
-    ``told`` is what ``report.about`` tells.
-    """
+    """Return what is written to ``growth.json``. ``told`` is what ``report.about`` tells."""
     rows = [
         {
             "group": growth.group,
@@ -142,35 +128,29 @@ def growth_page(result: Mapping[str, Any], growths: Sequence[Growth], memory: Id
     """Write the page of growth; ``result`` is that of ``growth_result``."""
     return "\n".join(
         [
-            *heading("Growth", result),
-            f"One thread. {result['repeats']} repeats in which all sizes run in turn; medians, with the "
-            "interval of ranks that holds the "
-            f"true median in at least 95 of 100 cases. Caches of a core: {result['caches']}.",
+            "# Growth",
+            f"One thread. {result['repeats']} repeats in which all sizes run in turn; medians, with the interval of "
+            f"ranks that holds the true median in at least 95 of 100 cases. Caches of a core: {result['caches']}.",
             "",
             growth_table(growths),
             "",
-            "- *Robots in a batch*: the same 1,024 drives of 1 s (teams of two, 720 noisy beams over 240 deg "
-            "to 5.6 m, the straight floor "
-            "of 512 x 512 cells of 2.5 cm) are run in batches of 4, of 16 and so on: batch after batch is "
-            "put where its drives begin, on "
-            "the maps that it has. A step is `KinematicWorld.step` with motion, contact, scans, scorer and "
-            "maps.",
-            "- *On the maps of 4*: the same batch of 1,024 robots, whose maps and masks are those of the "
-            "first four. The arithmetic "
-            "is the same, cell for cell; only the memory in use is smaller. What the time falls by is what "
-            "memory costs.",
+            "- *Robots in a batch*: the same 1,024 drives of 1 s (teams of two, 720 noisy beams over 240 deg to 5.6 "
+            "m, the straight floor of 512 x 512 cells of 2.5 cm) are run in batches of 4, of 16 and so on: batch "
+            "after batch is put where its drives begin, on the maps that it has. A step is `KinematicWorld.step` with "
+            "motion, contact, scans, scorer and maps.",
+            "- *On the maps of 4*: the same batch of 1,024 robots, whose maps and masks are those of the first four. "
+            "The arithmetic is the same, cell for cell; only the memory in use is smaller. What the time falls by is "
+            "what memory costs.",
             "- *Side of the floor*: 256 drives of 5 s on floors of the same kind of rooms, four robots at a "
             "time, each alone on its floor.",
             "",
             memory_table(memory),
             "",
-            f"- *Idle robot*: {memory.robots:,} robots in teams of two that have stood still for a second at "
-            "the level of velocities, on "
-            f"the straight floor; the map of one has {memory.map_bytes / MIB:.2f} MiB. *Arrays that belong "
-            "to the robot* are its map, its "
-            "mask (an eighth of the map) and its rows of all tables; *all arrays* adds the team's masks and "
-            "two sets of observations. "
-            "*Resident* is what the process has grown by, with what the C library keeps between arrays.",
+            f"- *Idle robot*: {memory.robots:,} robots in teams of two that have stood still for a second at the level "
+            f"of velocities, on the straight floor; the map of one has {memory.map_bytes / MIB:.2f} MiB. *Arrays that "
+            "belong to the robot* are its map, its mask (an eighth of the map) and its rows of all tables; *all "
+            "arrays* adds the team's masks and two sets of observations. *Resident* is what the process has grown by, "
+            "with what the C library keeps between arrays.",
             "",
         ]
     )
@@ -180,19 +160,13 @@ REPEATS = 15
 SIZES = (4, 16, 64, 256, 1024)
 TEAM, ROBOT_STEPS = 2, 10
 SIDES, ALONE, FLOOR_DRIVES, FLOOR_STEPS = (512, 1000, 2000, 4000), 4, 256, 50
-"""Sides of the floors [cells of 2.5 cm], and how many robots drive there.
-
-Each robot is alone on the floor.
-"""
+"""Sides of the floors [cells of 2.5 cm], and how many robots drive there. Each robot is alone on the floor."""
 
 ALLOWED_TO_64, ALLOWED_TO_1024, ALLOWED_FLOORS = 1.25, {0.025: 1.8, 0.05: 1.4}, 1.25
 
 
 def repeated_in_turn(histories: dict[str, Histories], repeats: int) -> dict[str, list[float]]:
-    """Run all in turn that many times, after once to warm up.
-
-    Seconds per agent step of each.
-    """
+    """Run all in turn that many times, after once to warm up. Seconds per agent step of each."""
     for history in histories.values():
         history.run()
     seconds: dict[str, list[float]] = {name: [] for name in histories}
@@ -270,9 +244,9 @@ def main() -> None:
     print(growth_table(growths), memory_table(memory), sep="\n\n")
     if chosen.out is not None:
         command = f"python benchmarks/speed/growth/question.py --repeats {chosen.repeats} --out {chosen.out}"
-        result = growth_result(growths, memory, chosen.repeats, about(command))
+        result = growth_result(growths, memory, chosen.repeats, about(command, outside_versions()))
         chosen.out.mkdir(parents=True, exist_ok=True)
-        write_text(chosen.out / "growth.md", growth_page(result, growths, memory))
+        publish(chosen.out / "growth.md", growth_page(result, growths, memory), result)
         write_json(chosen.out / "growth.json", result)
 
 

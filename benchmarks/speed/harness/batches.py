@@ -1,7 +1,4 @@
-"""Our side of the comparisons of batches.
-
-Many teams in one vector environment are driven by drawn commands.
-"""
+"""Our side of the comparisons of batches. Many teams in one vector environment are driven by drawn commands."""
 
 from typing import Any
 
@@ -17,10 +14,7 @@ from lidarium.mapping.kernels.compilation import available_threads
 
 EPISODES, ROBOTS = 64, 2
 OBSERVED = ("scan", "pose", "velocity", "bumper", "egocentric_map")
-"""What the robots of the batches observe.
-
-Egocentric maps of 64 x 64 cells at the scales 1 and 4.
-"""
+"""What the robots of the batches observe. Egocentric maps of 64 x 64 cells at the scales 1 and 4."""
 
 
 def can_use(threads: int) -> bool:
@@ -33,12 +27,7 @@ class DrivenBatch:
 
     Each speed and turn rate is held for 2 s.
 
-    Attributes
-    ----------
-    env : ExplorationVectorEnv
-        The environment.
-    agents : int
-        Robots of all episodes.
+    `env`: the environment; `agents`: robots of all episodes.
     """
 
     def __init__(self, floor: BenchFloor, threads: int, **options: Any) -> None:  # noqa: ANN401
@@ -59,10 +48,7 @@ class DrivenBatch:
         self._count = 0
 
     def start(self, beginning: int) -> None:
-        """Begin all episodes anew.
-
-        The same ``beginning`` gives the same places and commands.
-        """
+        """Begin all episodes anew. The same ``beginning`` gives the same places and commands."""
         self.env.reset(seed=1000 * beginning)
         self._actions = (drawn_commands(self.agents, beginning) / self._limits).astype(np.float32)
         self._commands = self._actions.astype(np.float64) * self._limits

@@ -13,24 +13,11 @@ NOT_INSTALLED = "peer not installed"
 class Line:
     """A comparison.
 
-    Attributes
-    ----------
-    name : str
-        What is compared.
-    ours : str
-        Our figure, with its unit.
-    peer : str
-        The other side's figure, and who it is.
-    ratio : Comparison or None
-        Our speed over theirs; None if the peer is not installed or the line is not a ratio.
-    figure : float or None
-        The figure that is judged if the line is not a ratio of speeds.
-    to_reach : float or None
-        What was to be reached; None if the line only informs.
-    is_upper_bound : bool
-        Whether the figure must stay below ``to_reach``.
-    unit : str
-        Of ``to_reach``: ``x`` or a unit.
+    `name`: what is compared; `ours`: our figure, with its unit; `peer`: the other side's figure, and who it is;
+    `ratio`: our speed over theirs; None if the peer is not installed or the line is not a ratio; `figure`: the figure
+    that is judged if the line is not a ratio of speeds; `to_reach`: what was to be reached; None if the line only
+    informs; `is_upper_bound`: whether the figure must stay below ``to_reach``; `unit`: of ``to_reach``: ``x`` or a
+    unit.
     """
 
     name: str
@@ -66,14 +53,7 @@ class Line:
         wanted = (
             "-" if self.to_reach is None else f"{'<=' if self.is_upper_bound else '>='} {self.to_reach:,g} {self.unit}"
         )
-        return (
-            self.name,
-            self.ours,
-            self.peer,
-            judged,
-            wanted,
-            {True: "yes", False: "no", None: "-"}[self.is_reached],
-        )
+        return (self.name, self.ours, self.peer, judged, wanted, {True: "yes", False: "no", None: "-"}[self.is_reached])
 
 
 def faster(
@@ -92,12 +72,7 @@ def faster(
 
 
 def faster_than_quoted(
-    name: str,
-    ours: Sequence[float],
-    peer_name: str,
-    quoted: float,
-    to_reach: float,
-    unit: str = "agent steps/s",
+    name: str, ours: Sequence[float], peer_name: str, quoted: float, to_reach: float, unit: str = "agent steps/s"
 ) -> Line:
     """Make the line of a peer whose rate is quoted, not measured here."""
     ratios = [1.0 / (seconds * quoted) for seconds in ours]
@@ -106,33 +81,17 @@ def faster_than_quoted(
 
 
 def within(
-    name: str,
-    ours: Sequence[float],
-    part_name: str,
-    part: Sequence[float],
-    allowed: float,
-    unit: str = "agent steps/s",
+    name: str, ours: Sequence[float], part_name: str, part: Sequence[float], allowed: float, unit: str = "agent steps/s"
 ) -> Line:
-    """Make the line of a whole that may take that many times as long as a part.
-
-    Both are in seconds per unit.
-    """
+    """Make the line of a whole that may take that many times as long as a part. Both are in seconds per unit."""
     own, other = f"{shown(rate(ours))} {unit}", f"{part_name}: {shown(rate(part))}"
     return Line(
-        f"{name} (time over that of the {part_name})",
-        own,
-        other,
-        compared(part, ours),
-        allowed,
-        is_upper_bound=True,
+        f"{name} (time over that of the {part_name})", own, other, compared(part, ours), allowed, is_upper_bound=True
     )
 
 
 def needs_threads(name: str, to_reach: float, is_upper_bound: bool = False) -> Line:
-    """Make the line of a quantity that cannot be measured here.
-
-    Only one thread can run at a time.
-    """
+    """Make the line of a quantity that cannot be measured here. Only one thread can run at a time."""
     return Line(name, "needs two cores", "-", None, to_reach, is_upper_bound=is_upper_bound)
 
 

@@ -13,24 +13,15 @@ from dataclasses import dataclass
 from pathlib import Path
 
 Contender = Callable[[float], float]
-"""A contender, which runs for about so many seconds.
-
-It returns the seconds that one unit of work took.
-"""
+"""A contender, which runs for about so many seconds. It returns the seconds that one unit of work took."""
 
 
 @dataclass(frozen=True, slots=True)
 class Effort:
     """How long to measure.
 
-    Attributes
-    ----------
-    rounds : int
-        Rounds in which each contender runs once.
-    block_s : float
-        How long a contender runs in a round [s].
-    is_full : bool
-        Whether checks that take minutes are made, too.
+    `rounds`: rounds in which each contender runs once; `block_s`: how long a contender runs in a round [s]; `is_full`:
+    whether checks that take minutes are made, too.
     """
 
     rounds: int = 9
@@ -77,10 +68,7 @@ def on_cores(count: int) -> Iterator[None]:
 
 
 def _keep_threads_on(chosen: list[int]) -> None:
-    """Move all threads of the process.
-
-    Those of a pool once started would stay where their starter was then.
-    """
+    """Move all threads of the process. Those of a pool once started would stay where their starter was then."""
     tasks = Path("/proc/self/task")
     threads = [int(path.name) for path in tasks.iterdir()] if tasks.is_dir() else [0]
     for thread in threads:
@@ -111,10 +99,7 @@ def repeated(function: Callable[[], object], units: int = 1, before: Callable[[]
 
 
 def interleaved(contenders: Mapping[str, Contender], effort: Effort) -> dict[str, list[float]]:
-    """Return the seconds per unit of each contender in each round.
-
-    A round to warm up comes first.
-    """
+    """Return the seconds per unit of each contender in each round. A round to warm up comes first."""
     for contender in contenders.values():
         contender(0.25 * effort.block_s)
     seconds: dict[str, list[float]] = {name: [] for name in contenders}

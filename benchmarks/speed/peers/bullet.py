@@ -28,12 +28,8 @@ def bullet_scan(
 
     None if PyBullet is not installed.
 
-    Parameters
-    ----------
-    boxes : (B, 4) float64
-        The floor [m].
-    poses : (N, 3) float64
-        Where the scans are taken in turn [m, rad]; their rays are prepared beforehand.
+    `boxes` (B, 4) float64: the floor [m]; `poses` (N, 3) float64: where the scans are taken in turn [m, rad]; their
+    rays are prepared beforehand.
     """
     if importlib.util.find_spec("pybullet") is None:
         return None
@@ -69,20 +65,12 @@ SUBSTEPS = 24
 class BulletRig:
     """Robots on a floor in PyBullet, put together by its own calls.
 
-    Parameters
-    ----------
-    poses : (robots, 3) float64
-        Where they start [m, rad]; none for the floor alone.
-    speeds : (2,) of float
-        Of the left and the right wheel [m/s].
+    `poses` (robots, 3) float64: where they start [m, rad]; none for the floor alone; `speeds` (2,) of float: of the
+    left and the right wheel [m/s].
     """
 
     def __init__(
-        self,
-        floor: Floor,
-        robot: Robot,
-        poses: NDArray[np.float64],
-        speeds: tuple[float, float] = (0.0, 0.0),
+        self, floor: Floor, robot: Robot, poses: NDArray[np.float64], speeds: tuple[float, float] = (0.0, 0.0)
     ) -> None:
         self._client = client = Client()
         bullet = client.bullet
@@ -181,9 +169,7 @@ class BulletImages:
         """Return the depth image of a camera on a robot at x, y, theta, (rows, columns) [m]."""
         camera, (x, y, theta) = self._camera, pose
         view = self._bullet.computeViewMatrix(
-            [x, y, camera.height],
-            [x + math.cos(theta), y + math.sin(theta), camera.height],
-            [0.0, 0.0, 1.0],
+            [x, y, camera.height], [x + math.cos(theta), y + math.sin(theta), camera.height], [0.0, 0.0, 1.0]
         )
         depths = self._bullet.getCameraImage(
             camera.columns,

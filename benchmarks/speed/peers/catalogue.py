@@ -12,14 +12,7 @@ from lidarium.benchmarks.speed.peers import f1tenth_scans, vmas_peer
 class Peer:
     """Another simulator.
 
-    Attributes
-    ----------
-    name : str
-        What it is called.
-    is_there : callable
-        Whether it can take part.
-    how : str
-        How to get it.
+    `name`: what it is called; `is_there`: whether it can take part; `how`: how to get it.
     """
 
     name: str

@@ -29,10 +29,7 @@ MEMORY = {"MALLOC_MMAP_MAX_": "0", "MALLOC_TRIM_THRESHOLD_": "20000000000"}
 
 
 def interpreter() -> str | None:
-    """Return the Python that runs VMAS.
-
-    It is the one that the environment names, else this one if it has VMAS.
-    """
+    """Return the Python that runs VMAS. It is the one that the environment names, else this one if it has VMAS."""
     named = os.environ.get(INTERPRETER)
     if named:
         return named
@@ -58,19 +55,8 @@ def package_version() -> str:
 class VmasProcess:
     """VMAS on a floor of boxes; a contender of ``timing.interleaved``.
 
-    Parameters
-    ----------
-    boxes : (B, 4) float64
-        The floor [m].
-    poses : (A, 3) float64
-        Where the agents of each environment start [m, rad].
-
-    Attributes
-    ----------
-    is_there : bool
-        Whether VMAS could be started.
-    name : str
-        What it is, with its version and batch size.
+    `boxes` (B, 4) float64: the floor [m]; `poses` (A, 3) float64: where the agents of each environment start [m, rad];
+    `is_there`: whether VMAS could be started; `name`: what it is, with its version and batch size.
     """
 
     def __init__(

@@ -32,16 +32,9 @@ Rectangle = tuple[int, int, int, int]
 class BenchFloor:
     """A floor of cells.
 
-    Attributes
-    ----------
-    name : str
-        What the tables call it.
-    solid : (rows, columns) uint8
-        1 if solid; row 0 at the lowest y.
-    boxes : (B, 4) float64
-        The walls and boxes as x_low, y_low, x_high, y_high [m]; empty if they are not along the axes.
-    resolution : float
-        Side of a cell [m].
+    `name`: what the tables call it; `solid` (rows, columns) uint8: 1 if solid; row 0 at the lowest y; `boxes` (B, 4)
+    float64: the walls and boxes as x_low, y_low, x_high, y_high [m]; empty if they are not along the axes;
+    `resolution`: side of a cell [m].
     """
 
     name: str
@@ -66,10 +59,7 @@ class BenchFloor:
 
 
 def straight_floor(rows: int = 512, columns: int = 512, seed: int = 1, resolution: float = RESOLUTION) -> BenchFloor:
-    """Draw rooms of 3 to 6 m (at 2.5 cm a cell) with boxes in them.
-
-    There is a door in every wall between two rooms.
-    """
+    """Draw rooms of 3 to 6 m (at 2.5 cm a cell) with boxes in them. There is a door in every wall between two rooms."""
     generator = np.random.default_rng(seed)
     low, top, right = _MARGIN, rows - _MARGIN, columns - _MARGIN
     boxes: list[Rectangle] = [
@@ -95,10 +85,7 @@ def straight_floor(rows: int = 512, columns: int = 512, seed: int = 1, resolutio
 
 
 def turned_floor(floor: BenchFloor, angle: float = TURN) -> BenchFloor:
-    """Turn a floor about its middle at the same scale.
-
-    A cell is solid if its centre was in a solid cell.
-    """
+    """Turn a floor about its middle at the same scale. A cell is solid if its centre was in a solid cell."""
     rows, columns = floor.solid.shape
     cosine, sine = math.cos(angle), math.sin(angle)
     new_columns = math.ceil(columns * cosine + rows * sine)
@@ -114,10 +101,7 @@ def turned_floor(floor: BenchFloor, angle: float = TURN) -> BenchFloor:
         borderValue=1,
     )
     return BenchFloor(
-        f"{floor.name} turned by 17 deg",
-        _closed(np.asarray(solid, np.uint8)),
-        np.zeros((0, 4)),
-        floor.resolution,
+        f"{floor.name} turned by 17 deg", _closed(np.asarray(solid, np.uint8)), np.zeros((0, 4)), floor.resolution
     )
 
 
@@ -158,10 +142,7 @@ def team_poses(
 
 
 def _roomy_places(floor: BenchFloor, clearance: float) -> NDArray[np.float64]:
-    """Return the middles of cells inside the building, (N, 2) [m].
-
-    They are this far off everything.
-    """
+    """Return the middles of cells inside the building, (N, 2) [m]. They are this far off everything."""
     distance = ndimage.distance_transform_edt(floor.solid == 0) * floor.resolution
     parts, _ = ndimage.label(floor.solid == 0)
     inside = parts == 1 + int(np.argmax(np.bincount(parts[parts > 0])[1:]))
@@ -193,10 +174,7 @@ def _furniture(room: Rectangle, generator: np.random.Generator) -> list[Rectangl
     for _ in range(int(generator.integers(1, _MOST_BOXES + 1))):
         width, depth = (int(side) for side in generator.integers(_SMALLEST_BOX, _LARGEST_BOX, 2))
         if x_high - x_low > width + 2 * _BOX_GAP and y_high - y_low > depth + 2 * _BOX_GAP:
-            x, y = (
-                int(generator.integers(x_low, x_high - width)),
-                int(generator.integers(y_low, y_high - depth)),
-            )
+            x, y = (int(generator.integers(x_low, x_high - width)), int(generator.integers(y_low, y_high - depth)))
             boxes.append((x, y, x + width, y + depth))
     return boxes
 

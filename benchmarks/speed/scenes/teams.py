@@ -21,10 +21,7 @@ DRAWS = 50
 
 
 def drawn_commands(robots: int, seed: int) -> NDArray[np.float64]:
-    """Draw speeds and turn rates, shape (DRAWS, robots, 2) [m/s, rad/s].
-
-    Each is to be held for ``HOLD`` steps.
-    """
+    """Draw speeds and turn rates, shape (DRAWS, robots, 2) [m/s, rad/s]. Each is to be held for ``HOLD`` steps."""
     generator = np.random.default_rng(seed)
     speeds = generator.uniform(0.2, 0.7, (DRAWS, robots))
     turns = generator.uniform(-1.0, 1.0, (DRAWS, robots))

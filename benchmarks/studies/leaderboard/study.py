@@ -1,13 +1,11 @@
 """The leaderboard: all policies on generated and real floors, in worlds that are more or less real."""
 
 import json
-import platform
 from collections.abc import Iterable, Iterator, Mapping
-from datetime import date
 from pathlib import Path
 from typing import Any
 
-import lidarium
+from lidarium.benchmarks.results_page import in_file
 from lidarium.benchmarks.studies.leaderboard.pairs import merges_text, pairs_table
 from lidarium.benchmarks.studies.leaderboard.tables import Multiples, Part, short_table, table
 from lidarium.benchmarks.studies.leaderboard.worlds import (
@@ -21,14 +19,7 @@ from lidarium.benchmarks.studies.leaderboard.worlds import (
     parts,
     suites,
 )
-from lidarium.benchmarks.studies.shared.study import (
-    Bounded,
-    Progress,
-    Study,
-    do_missing,
-    kept_lines,
-    measure_bound,
-)
+from lidarium.benchmarks.studies.shared.study import Bounded, Progress, Study, do_missing, kept_lines, measure_bound
 from lidarium.evaluation.analysis.figures import over_bound
 from lidarium.evaluation.report import write_report
 from lidarium.evaluation.suites.campaign import EPISODES_FILE
@@ -47,7 +38,7 @@ BEGIN, END = "<!-- leaderboard -->", "<!-- end of the leaderboard -->"
 
 PAGE = """# Leaderboard
 
-Made by `{command}` on {date}: lidarium {version}, Python {python}. To sort and filter it, save
+To sort and filter it, save
 [leaderboard.html](leaderboard.html) and open it in a browser.
 
 Simulated time; Kobuki, the URG laser (240 deg, 5.6 m), maps of 5 cm, cut at {horizon:.0f} s. Starts are drawn
@@ -86,22 +77,13 @@ def work(folder: Path, data: Path | None, every: int, workers: int) -> Progress:
     yield from do_missing(folder / BOUNDS_FILE, "bounds", teams, measure_bound, workers)
 
 
-def page(folder: Path, command: str) -> str:
+def page(folder: Path) -> str:
     """Return the leaderboard as markdown; each suite's report goes into its folder."""
     found = _parts_in(folder)
     notes = []
-    if "--every" in command or "--share" in command:
-        notes.append(
-            "A part of the floors of each kind, too few for firm words: the intervals say so. Without "
-            "`--every` the command runs all."
-        )
     if missing := _missing(folder, found):
         notes.append(f"Not in it: {'; '.join(missing)}.")
     return PAGE.format(
-        command=command,
-        date=date.today().isoformat(),
-        version=lidarium.__version__,
-        python=platform.python_version(),
         horizon=HORIZON_S,
         pairs=pairs_table(
             {name: _episodes(folder, "test", name) for name in WORLDS},
@@ -143,7 +125,7 @@ def _missing(folder: Path, found: Mapping[str, Any]) -> list[str]:
 def _section(kind: str, found: list[Part]) -> str:
     floors = {floor for part in found for group in part.groups for floor in group["floors"]}
     about = KINDS[kind]
-    return f"## {about[0].upper()}{about[1:]} ({len(floors)})\n\n{table(found)}"
+    return f"## {about[0].upper()}{about[1:]} ({len(floors)})\n\n{in_file(table(found))}"
 
 
 def _parts_in(folder: Path) -> dict[str, list[Part]]:
@@ -203,4 +185,4 @@ def _browser_page(folder: Path) -> Path:
     return folder / ALL / "report" / "report.html"
 
 
-STUDY = Study(page, suites, work, beside)
+STUDY = Study(page, suites, work, beside, quick=200)

@@ -25,14 +25,8 @@ Multiples = Mapping[tuple[str, int], float]
 class Part:
     """What is known of a kind of floor in a world.
 
-    Attributes
-    ----------
-    world : World
-        Who explored where.
-    groups : list of dict
-        Of the report, one for each number of robots.
-    multiples : mapping
-        Multiples of the bound.
+    `world`: who explored where; `groups`: of the report, one for each number of robots; `multiples`: multiples of the
+    bound.
     """
 
     world: World

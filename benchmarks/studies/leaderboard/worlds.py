@@ -13,14 +13,7 @@ from lidarium.evaluation.suites.trial import DEFAULT_VARIANT
 HORIZON_S = 1800.0
 SETTINGS: dict[str, Any] = {"resolution": 0.05, "stop_coverage": 0.99, "horizon_s": HORIZON_S}
 
-EXPLORERS = (
-    "nearest_frontier",
-    "utility_frontier",
-    "explore_lite",
-    "srt",
-    "tour_frontier",
-    "learned",
-)
+EXPLORERS = ("nearest_frontier", "utility_frontier", "explore_lite", "srt", "tour_frontier", "learned")
 SUPERVISED = ("independent", "supervised", "supervised_tours", "supervised_learned")
 TEAMS = (1, 2, 3)
 
@@ -29,18 +22,9 @@ TEAMS = (1, 2, 3)
 class World:
     """How real a world is, who explores it, and on which share of the floors.
 
-    Attributes
-    ----------
-    about : str
-        What is different in it, for the table.
-    policies : tuple of str
-        Who explores; the first is the baseline.
-    settings : dict
-        What differs from `SETTINGS`.
-    every : int
-        Of the floors that run, every that many-th runs in this world.
-    teams : tuple of int
-        Numbers of robots.
+    `about`: what is different in it, for the table; `policies`: who explores; the first is the baseline; `settings`:
+    what differs from `SETTINGS`; `every`: of the floors that run, every that many-th runs in this world; `teams`:
+    numbers of robots.
     """
 
     about: str
@@ -70,11 +54,7 @@ KINDS = {
 EVERY = {"lifull": 3, "kth": 3, "slam": 3}
 """Of a kind every so many-th floor is taken, beside what is asked for: one for kinds that are not named."""
 
-NOT_RUN = {
-    "kth": ("unknown", "camera"),
-    "dungeon": ("lab", "unknown", "camera"),
-    "slam": ("lab", "unknown", "camera"),
-}
+NOT_RUN = {"kth": ("unknown", "camera"), "dungeon": ("lab", "unknown", "camera"), "slam": ("lab", "unknown", "camera")}
 """Worlds in which large floors are left out: an episode takes minutes there."""
 
 BOUNDED = {"test": 2, "lifull": 1}
@@ -82,11 +62,15 @@ BOUNDED = {"test": 2, "lifull": 1}
 
 
 def floors_of(data: Path | None, every: int) -> dict[str, list[str]]:
-    """Return the floors by kind, every that many-th; generated ones alone if there are no data."""
+    """Return the floors by kind, every that many-th; kinds of fewer are left out, but for generated ones."""
     found = {"test": list(set_floors("test"))}
     if data is not None:
         found |= {kind: [str(path) for path in paths] for kind, paths in real_floors(data).items()}
-    return {kind: floors[:: every * EVERY.get(kind, 1)] for kind, floors in found.items() if floors}
+    return {
+        kind: floors[:: every * EVERY.get(kind, 1)]
+        for kind, floors in found.items()
+        if kind == "test" or len(floors) >= every
+    }
 
 
 def suites(data: Path | None, every: int = 1) -> dict[str, Suite]:

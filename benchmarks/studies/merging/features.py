@@ -29,19 +29,13 @@ from lidarium.mapping.merging.pair import described
 from lidarium.mapping.merging.settings import MergeSettings
 
 REPEATS, BURST = 20, 3
-"""Rounds of each kind of work, and its repeats in each round.
-
-After another's round, caches hold nothing of it.
-"""
+"""Rounds of each kind of work, and its repeats in each round. After another's round, caches hold nothing of it."""
 
 TRAJKOVIC = (8000.0, 4000.0)
 """Thresholds of the detector of Trajkovic and Hedley that the thesis set for its maps [grey^2]."""
 
 RIGHT_M, VOTED_M = 0.15, 0.5
-"""Distances within which a match and a voted transform are right [m].
-
-The transform is one that matches vote for.
-"""
+"""Distances within which a match and a voted transform are right [m]. The transform is one that matches vote for."""
 
 
 def images(maps: dict[str, BankMap]) -> dict[str, NDArray[np.uint8]]:
@@ -170,11 +164,7 @@ def compare_methods(maps: dict[str, BankMap], pairs: list[Pair]) -> list[dict[st
 
 
 def _matched(
-    pair: Pair,
-    a: DescribedMap,
-    b: DescribedMap,
-    correspondence: CorrespondenceSettings,
-    alignment: AlignmentSettings,
+    pair: Pair, a: DescribedMap, b: DescribedMap, correspondence: CorrespondenceSettings, alignment: AlignmentSettings
 ) -> tuple[int, int, bool, float]:
     """Return the figures of one matching, with its time [ms].
 
@@ -215,10 +205,7 @@ def _timed(name: str, image: NDArray[np.uint8], work: dict[str, Callable[[NDArra
 
 
 def _shown(maps: dict[str, BankMap]) -> list[str]:
-    """Return the last maps of some test floors that fit into a standard map.
-
-    The floors are of the test half.
-    """
+    """Return the last maps of some test floors that fit into a standard map. The floors are of the test half."""
     keys = [
         key for key, one in maps.items() if one.floor.half == "test" and one.stage == 2 and max(one.levels.shape) <= 512
     ]

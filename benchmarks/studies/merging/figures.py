@@ -1,7 +1,4 @@
-"""The figures of the outcomes on the bank, with intervals.
-
-They are recall, false accepts, errors and times.
-"""
+"""The figures of the outcomes on the bank, with intervals. They are recall, false accepts, errors and times."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -90,20 +87,14 @@ def refused(tried: Tried, categories: Sequence[str]) -> Share:
 
 
 def wrong_positives(tried: Tried) -> Share:
-    """Return the share of positives that are joined by a wrong transform.
-
-    It is more than 0.5 m or 5 degrees off.
-    """
+    """Return the share of positives that are joined by a wrong transform. It is more than 0.5 m or 5 degrees off."""
     chosen = [outcome for pair, outcome in tried if pair.category in SAME_PLACE]
     return Share(sum(one.is_accepted and not _is_near(one) for one in chosen), len(chosen))
 
 
 def safe_threshold(tried: Tried, categories: Sequence[str] = NEGATIVE) -> float:
     """Return the least confidence above which no pair of some categories is accepted."""
-    return max(
-        (one.confidence for pair, one in tried if pair.category in categories and one.is_accepted),
-        default=0.0,
-    )
+    return max((one.confidence for pair, one in tried if pair.category in categories and one.is_accepted), default=0.0)
 
 
 def errors(tried: Tried) -> tuple[float, float, float]:

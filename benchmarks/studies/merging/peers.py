@@ -31,14 +31,8 @@ _CV: Any = cv2
 class PeerResult:
     """What the pipeline made of two maps.
 
-    Attributes
-    ----------
-    confidence : float
-        By which a pair is accepted; 0 if no motion was found.
-    a_from_b : Transform or None
-        The motion [m], its scale left out.
-    scale : float
-        That scale.
+    `confidence`: by which a pair is accepted; 0 if no motion was found; `a_from_b`: the motion [m], its scale left out;
+    `scale`: that scale.
     """
 
     confidence: float = 0.0

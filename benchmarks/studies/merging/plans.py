@@ -12,14 +12,9 @@ from typing import Any
 import cv2
 import numpy as np
 
+from lidarium.benchmarks.results_page import in_file
 from lidarium.benchmarks.studies.merging.figures import Share
-from lidarium.benchmarks.studies.merging.real_maps import (
-    HALMSTAD_M,
-    RIGHT_ANGLE,
-    RIGHT_M,
-    Grid,
-    single_maps,
-)
+from lidarium.benchmarks.studies.merging.real_maps import HALMSTAD_M, RIGHT_ANGLE, RIGHT_M, Grid, single_maps
 from lidarium.mapping.files.map_files import read_grey_map
 from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.merging.pair import PairResult
@@ -42,18 +37,11 @@ Rows = list[dict[str, Any]]
 class PlanRow:
     """What the merger says of a pair of unlike scales.
 
-    Attributes
-    ----------
-    pair, building : str
-        Names of the maps, and the building of which both are; ``strangers`` for maps of two buildings.
-    is_accepted, is_right : bool
-        Whether it is joined, and whether the best transform is right; strangers have no right one.
-    distance_m, angle : float or None
-        Error of the best transform at the median correspondence [m, rad].
-    scale, true_scale : float or None
-        By how much the second map grows, and should by its correspondences.
-    confidence, time_ms : float
-        Of the best hypothesis, and processor time [ms].
+    `pair`, `building`: names of the maps, and the building of which both are; ``strangers`` for maps of two buildings;
+    `is_accepted`, `is_right`: whether it is joined, and whether the best transform is right; strangers have no right
+    one; `distance_m`, `angle`: error of the best transform at the median correspondence [m, rad]; `scale`,
+    `true_scale`: by how much the second map grows, and should by its correspondences; `confidence`, `time_ms`: of the
+    best hypothesis, and processor time [ms].
     """
 
     pair: str
@@ -123,10 +111,7 @@ def _strangers(data: Path, folder: Path) -> Iterator[PlanRow]:
 
 
 def _row(
-    names: tuple[str, str],
-    found: tuple[PairResult, float],
-    error: tuple[float, float] | None,
-    true_scale: float | None,
+    names: tuple[str, str], found: tuple[PairResult, float], error: tuple[float, float] | None, true_scale: float | None
 ) -> PlanRow:
     """Return what is kept of a pair, by its name and building."""
     result, scale = found
@@ -180,7 +165,7 @@ def plan_tables(rows: Rows) -> str:
         + "\n\nThe same by the confidence from which maps are joined:\n\n"
         + _curve(rows)
         + "\n\nEach pair of one building:\n\n"
-        + _each(rows)
+        + in_file(_each(rows))
     )
 
 

@@ -14,6 +14,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from lidarium.benchmarks.results_page import in_file
 from lidarium.benchmarks.studies.merging.figures import Share
 from lidarium.mapping.files.map_files import read_grey_map, read_ros_map
 from lidarium.mapping.geometry.rigid import Transform
@@ -58,20 +59,11 @@ class Grid(NamedTuple):
 class Row:
     """What the merger says of a pair.
 
-    Attributes
-    ----------
-    pair, collection : str
-        Names of the maps, and where they come from: ``halmstad``, ``real``, ``log_split`` or ``strangers``.
-    is_tuned : bool
-        Whether the model of strangers was fitted to the pair.
-    is_accepted, is_right : bool
-        Whether it is joined, and whether the best transform is right; strangers have no right one.
-    distance_m, angle : float or None
-        Error of the best transform [m, rad].
-    found_by, reason : str
-        How it was found, and why it is refused.
-    confidence, bend_m, time_ms : float
-        Of the best hypothesis, and processor time, description included [ms].
+    `pair`, `collection`: names of the maps, and where they come from: ``halmstad``, ``real``, ``log_split`` or
+    ``strangers``; `is_tuned`: whether the model of strangers was fitted to the pair; `is_accepted`, `is_right`: whether
+    it is joined, and whether the best transform is right; strangers have no right one; `distance_m`, `angle`: error of
+    the best transform [m, rad]; `found_by`, `reason`: how it was found, and why it is refused; `confidence`, `bend_m`,
+    `time_ms`: of the best hypothesis, and processor time, description included [ms].
     """
 
     pair: str
@@ -258,10 +250,10 @@ def real_maps(rows: Rows) -> str:
         "correspondence and 8 degrees, as these maps are bent by up to 0.5 m; of the others within 0.5 m and "
         "3 degrees. Strangers are all pairs of maps of different buildings. The model was fitted to E5, the "
         "easy halves of logs, every other pair of strangers, and the bank's half for tuning.\n\n"
-        + "\n".join(lines)
+        + in_file("\n".join(lines))
         + "\n\nThe same by the confidence from which maps are joined that agree only once they are bent "
         f"(`normal` is {TOLERANCES['normal']}, `drift` {TOLERANCES['drift']}):\n\n"
-        + _curve(rows)
+        + in_file(_curve(rows))
         + "\n\nEach pair of one building that is not joined, or wrong:\n\n"
         + _missed(rows)
     )
@@ -290,10 +282,7 @@ def _figures(rows: Rows, name: str) -> str:
 
 def _curve(rows: Rows) -> str:
     """Return the curve: with each threshold what would be joined."""
-    lines = [
-        "| confidence | right of one building | wrong of one building | strangers |",
-        "|---|---|---|---|",
-    ]
+    lines = ["| confidence | right of one building | wrong of one building | strangers |", "|---|---|---|---|"]
     known = [row for row in rows if row["collection"] != "strangers"]
     strangers = [row for row in rows if row["collection"] == "strangers"]
     for threshold in THRESHOLDS:

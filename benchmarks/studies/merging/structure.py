@@ -35,14 +35,8 @@ _STAND_M = 0.4
 class View(NamedTuple):
     """What a robot has seen.
 
-    Attributes
-    ----------
-    levels : (rows, columns) uint8
-        Its map, in a frame of its own.
-    map_from_floor : Transform
-        How the floor lies in it.
-    known : (rows, columns) bool
-        Cells of the floor that it has seen.
+    `levels` (rows, columns) uint8: its map, in a frame of its own; `map_from_floor`: how the floor lies in it; `known`
+    (rows, columns) bool: cells of the floor that it has seen.
     """
 
     levels: NDArray[np.uint8]
@@ -72,11 +66,7 @@ def _draw_hall(free: NDArray[np.uint8], generator: np.random.Generator) -> None:
         ends = np.array([middle - 6 * outwards, middle + (_WALL + 12) * outwards])
         cv2.polylines(free, [np.rint(ends).astype(np.int32)], False, (1,), 18)
         room = cv2.boxPoints(
-            (
-                tuple((middle + 40 * outwards).tolist()),
-                (52.0, 52.0),
-                math.degrees(math.atan2(outwards[1], outwards[0])),
-            )
+            (tuple((middle + 40 * outwards).tolist()), (52.0, 52.0), math.degrees(math.atan2(outwards[1], outwards[0])))
         )
         cv2.fillPoly(free, [np.rint(room).astype(np.int32)], (1,))
     for x, y in generator.uniform((250, 170), (390, 270), (3, 2)).astype(int).tolist():
@@ -106,12 +96,7 @@ def seen_by(
 ) -> View:
     """Return what a robot sees from places within a part of a floor.
 
-    Parameters
-    ----------
-    floor : (rows, columns) uint8
-        The floor.
-    share : (from, to)
-        The part, along its columns.
+    `floor` (rows, columns) uint8: the floor; `share` (from, to): the part, along its columns.
     """
     generator = np.random.default_rng(seed)
     clear = cv2.distanceTransform((floor == FREE).astype(np.uint8), cv2.DIST_L2, 5) * SIDE_M
@@ -167,14 +152,9 @@ _PARTS = (0.0, 0.65), (0.35, 1.0)
 class StructureRow:
     """What comes of the pairs of one collection with one structure.
 
-    Attributes
-    ----------
-    collection, structure : str
-        Which pairs, and what proposes their transforms.
-    pairs, right, wrong : int
-        Number of pairs, of those joined right, and of those joined wrong.
-    median_ms, most_ms : float
-        Processor time of a pair, maps described, as median and 95 % [ms].
+    `collection`, `structure`: which pairs, and what proposes their transforms; `pairs`, `right`, `wrong`: number of
+    pairs, of those joined right, and of those joined wrong; `median_ms`, `most_ms`: processor time of a pair, maps
+    described, as median and 95 % [ms].
     """
 
     collection: str

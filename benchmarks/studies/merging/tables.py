@@ -4,6 +4,7 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from lidarium.benchmarks.results_page import in_file
 from lidarium.benchmarks.studies.merging import figures, thesis
 from lidarium.benchmarks.studies.merging.bank.bank import Pair
 from lidarium.benchmarks.studies.merging.features import BURST, REPEATS
@@ -27,20 +28,14 @@ def bank_table(tried: dict[str, figures.Tried]) -> str:
         ("indistinct negatives refused", lambda one: figures.refused(one, ("indistinct",))),
         ("error, median / 95 % [m]", _error),
         ("time a pair of 512 x 512 cells, median / 95 % [ms]", figures.times),
-        (
-            "the same without the fallback",
-            lambda one: figures.times(one, lambda outcome: not outcome.needed_fallback),
-        ),
+        ("the same without the fallback", lambda one: figures.times(one, lambda outcome: not outcome.needed_fallback)),
     ]
     lines += [f"| {what} | {entry(tried['default'])} | {entry(tried['thesis'])} |" for what, entry in rows]
     return "\n".join(lines)
 
 
 def peers(tried: dict[str, figures.Tried]) -> str:
-    """Return the results of the ROS map_merge pipeline on the bank.
-
-    They are for a range of its thresholds.
-    """
+    """Return the results of the ROS map_merge pipeline on the bank. They are for a range of its thresholds."""
     thresholds = ("any", "its own, 1.0", "no stranger accepted", "no negative accepted")
     lines = [
         "| features | threshold of confidence | recall, overlap 30 % and more | strangers accepted | "
@@ -53,22 +48,14 @@ def peers(tried: dict[str, figures.Tried]) -> str:
         for name, value in zip(thresholds, values, strict=True):
             shares = [figures.accepted(one, (category,), value) for category in figures.NEGATIVE]
             wrong = [f"{share.hits} of {share.total}" for share in shares]
-            cells = [
-                f"{name} ({value:.2f})",
-                figures.recall(one, figures.is_plenty, value),
-                *wrong,
-                figures.times(one),
-            ]
+            cells = [f"{name} ({value:.2f})", figures.recall(one, figures.is_plenty, value), *wrong, figures.times(one)]
             lines.append(f"| {method.upper()} | {' | '.join(str(cell) for cell in cells)} |")
     return (
-        "The pipeline of ROS map_merge (features, the best of two nearest, an affine motion without shear by "
-        "RANSAC, from OpenCV's "
-        "stitching) says how sure it is, and its users set from where on they believe it. OpenCV 5 has no "
-        "AKAZE any more; SIFT stands in "
-        "its place.\n\n" + "\n".join(lines) + "\n\n"
-        "A floor and its copy are nearly the same image, so no threshold tells look-alikes from positives: "
-        "nothing in it asks what "
-        "contradicts."
+        "The pipeline of ROS map_merge (features, the best of two nearest, an affine motion without shear by RANSAC, "
+        "from OpenCV's stitching) says how sure it is, and its users set from where on they believe it. OpenCV 5 has "
+        "no AKAZE any more; SIFT stands in its place.\n\n" + in_file("\n".join(lines)) + "\n\n"
+        "A floor and its copy are nearly the same image, so no threshold tells look-alikes from positives: nothing in "
+        "it asks what contradicts."
     )
 
 
@@ -92,26 +79,17 @@ def reading(tried: dict[str, figures.Tried]) -> str:
     inexact = sum(one.is_accepted for one in plenty)
     return (
         f"- Without the fallback a pair of 512 x 512 cells takes {without.median:.0f} ms (median, both maps "
-        "described). The fallback ran "
-        f"on {100 * (1 - without.count / max(every.count, 1)):.0f} % of these pairs, most of which are "
-        "negatives: who is refused has been "
-        f"searched for everywhere. Of all pairs 95 % are done in {every.p95:.0f} ms; of those that are "
-        "joined, half in "
-        f"{joined.median:.0f} ms.\n"
-        f"- {negatives.hits} of {negatives.total} negatives are accepted, so the rate is below "
-        f"{100 * negatives.high:.2f} % (95 %).\n"
-        f"- Of the {len(plenty)} pairs with 30 % and more that are missed, {refused} were found in the right "
-        "place and refused, because "
-        "too little wall speaks for it or more for a place that looks like it, and "
-        f"{inexact} joined less exactly than is counted as right.\n"
-        f"- Of the {len(missed)} pairs with 15 to 30 % of overlap that are missed, {poor} have less than "
-        f"{POOR_M:g} m of wall in "
-        "common under the best transform: what both know is open floor, on which any two rooms agree. "
-        "Whoever accepts on less accepts "
-        "strangers too.\n"
-        "- Indistinct negatives are like rooms that differ by less than 1 m of wall: whoever joins maps of "
-        "one room joins them. Symmetric positives "
-        "that are accepted are like rooms whose wrong overlay shows more walls than the true one."
+        f"described). The fallback ran on {100 * (1 - without.count / max(every.count, 1)):.0f} % of these pairs, most "
+        "of which are negatives: who is refused has been searched for everywhere. Of all pairs 95 % are done in "
+        f"{every.p95:.0f} ms; of those that are joined, half in {joined.median:.0f} ms.\n- {negatives.hits} of "
+        f"{negatives.total} negatives are accepted, so the rate is below {100 * negatives.high:.2f} % (95 %).\n- Of "
+        f"the {len(plenty)} pairs with 30 % and more that are missed, {refused} were found in the right place and "
+        f"refused, because too little wall speaks for it or more for a place that looks like it, and {inexact} joined "
+        f"less exactly than is counted as right.\n- Of the {len(missed)} pairs with 15 to 30 % of overlap that are "
+        f"missed, {poor} have less than {POOR_M:g} m of wall in common under the best transform: what both know is "
+        "open floor, on which any two rooms agree. Whoever accepts on less accepts strangers too.\n- Indistinct "
+        "negatives are like rooms that differ by less than 1 m of wall: whoever joins maps of one room joins them. "
+        "Symmetric positives that are accepted are like rooms whose wrong overlay shows more walls than the true one."
     )
 
 
@@ -144,10 +122,9 @@ def beside_thesis(tried: dict[str, figures.Tried]) -> str:
     lines = [
         "| | pairs that overlap | joined | negatives accepted | time a pair |",
         "|---|---:|---|---|---|",
-        f"| thesis, an apartment of 65 m2 (errors never measured) | {known.total} | {100 * known.value:.0f} "
-        f"% ({known.hits} of "
-        f"{known.total}) | 0 of {strangers.total} (the rate may be up to {100 * strangers.high:.0f} %) | "
-        f"{sum(spent) / len(spent):.0f} ms mean, {max(spent):.0f} ms worst |",
+        f"| thesis, an apartment of 65 m2 (errors never measured) | {known.total} | {100 * known.value:.0f} % "
+        f"({known.hits} of {known.total}) | 0 of {strangers.total} (the rate may be up to {100 * strangers.high:.0f} "
+        f"%) | {sum(spent) / len(spent):.0f} ms mean, {max(spent):.0f} ms worst |",
     ]
     for method, name in (("thesis", "thesis mode"), ("default", "default mode")):
         positives = figures.recall(tried[method], lambda pair: pair.category in figures.SAME_PLACE)
@@ -159,8 +136,7 @@ def beside_thesis(tried: dict[str, figures.Tried]) -> str:
         )
     return (
         "\n".join(lines) + f"\n\nThe 280 ms that it claims are the longest times of its stages, added up once: "
-        f"{thesis.claimed_ms():.0f} ms. "
-        f"With both maps described its worst pair takes {max(spent):.0f} ms."
+        f"{thesis.claimed_ms():.0f} ms. With both maps described its worst pair takes {max(spent):.0f} ms."
     )
 
 
@@ -176,14 +152,14 @@ def detectors(rows: list[dict[str, Any]]) -> str:
         ratio = row["time_us"]["goodFeaturesToTrack"] / row["time_us"]["ours"]
         lines.append(f"| {row['image']} {row['shape'][1]} x {row['shape'][0]} | {' | '.join(cells)} | {ratio:.1f} x |")
     return (
-        f"Least time of {REPEATS} turns of {BURST} runs each [us], one thread, and points found.\n\n"
+        f"Least time of {REPEATS} turns of {BURST} runs each [us], one thread, and points found; Trajkovic"
+        " and Hedley in numpy, all others compiled.\n\n"
         + "\n".join(lines)
         + "\n\n"
         + _stabilities(rows)
         + "The thesis, C++ on 2.2 GHz, on maps of 146 x 144, 113 x 113 and 398 x 402 cells [us]: "
-        f"{_printed(thesis.DETECTORS_US)}; 2.8 to 3.9 times faster than Shi-Tomasi. Its rows of Harris and "
-        "Shi-Tomasi are the same in six "
-        "of eight columns; one was copied."
+        f"{_printed(thesis.DETECTORS_US)}; 2.8 to 3.9 times faster than Shi-Tomasi. Its rows of Harris and Shi-Tomasi "
+        "are the same in six of eight columns; one was copied."
     )
 
 
@@ -224,15 +200,13 @@ def methods(rows: list[dict[str, Any]]) -> str:
     ]
     lines += [
         f"| {row['method']} | {row['matches']:.0f} | {row['right']:.0f} | {100 * row['two_right']:.0f} % | "
-        f"{100 * row['voted']:.0f} % | "
-        f"{row['time_ms']:.1f} |"
+        f"{100 * row['voted']:.0f} % | {row['time_ms']:.1f} |"
         for row in rows
     ]
     return (
         f"Medians over {rows[0]['pairs']} positives with 30 % of overlap and more.\n\n" + "\n".join(lines) + "\n\n"
-        "The thesis [ms]: distances 3.0, triplets 1.5, descriptors 208 and 85; with descriptors two right "
-        "matches in more than 85 % of its "
-        "pairs."
+        "The thesis [ms]: distances 3.0, triplets 1.5, descriptors 208 and 85; with descriptors two right matches in "
+        "more than 85 % of its pairs."
     )
 
 
@@ -240,16 +214,12 @@ def teams(rows: list[dict[str, Any]]) -> str:
     """Return how five maps of a floor are joined."""
     lines = ["| floor | joined | largest error [m] | [deg] | time [s] |", "|---|---:|---:|---:|---:|"]
     for row in rows:
-        figures_of_row = (
-            f"{row['distance_m']:.3f}",
-            f"{math.degrees(row['angle']):.2f}",
-            f"{row['time_s']:.2f}",
-        )
+        figures_of_row = (f"{row['distance_m']:.3f}", f"{math.degrees(row['angle']):.2f}", f"{row['time_s']:.2f}")
         lines.append(f"| {row['floor']} | {row['joined']} of {row['robots']} | {' | '.join(figures_of_row)} |")
     whole = sum(row["joined"] == row["robots"] for row in rows)
     return (
         f"The last maps of five drives of a floor, merged at once: all joined on {whole} of {len(rows)} "
-        "floors.\n\n" + "\n".join(lines)
+        "floors.\n\n" + in_file("\n".join(lines))
     )
 
 

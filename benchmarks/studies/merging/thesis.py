@@ -3,7 +3,8 @@
 import math
 import time
 from collections.abc import Sequence
-from itertools import combinations
+from dataclasses import replace
+from itertools import combinations, product
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,13 +12,14 @@ from numpy.typing import NDArray
 
 from lidarium.benchmarks.studies.merging.bank.bank import BankMap, Pair
 from lidarium.benchmarks.studies.merging.bank.drives import RESOLUTION
-from lidarium.benchmarks.studies.merging.bank.pairs import PLENTY
+from lidarium.benchmarks.studies.merging.bank.pairs import PLENTY, true_levels
+from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.grids.occupancy import UNKNOWN
 from lidarium.mapping.merging.agreement import compare, disc_agreement
-from lidarium.mapping.merging.correspondence import match_corners
+from lidarium.mapping.merging.correspondence import MEASURES, match_corners
 from lidarium.mapping.merging.described_map import DescribedMap
 from lidarium.mapping.merging.pair import described, merge_pair
-from lidarium.mapping.merging.settings import merge_settings
+from lidarium.mapping.merging.settings import MergeSettings, merge_settings
 
 
 class PrintedPair(NamedTuple):
@@ -58,7 +60,12 @@ DETECTION_US = {"A1": 1731, "A2": 1523, "B1": 3101, "B2": 4852, "C1": 827, "C2":
 DESCRIPTION_US = {"A1": 11171, "A2": 24335, "B1": 15320, "B2": 17891, "C1": 3004, "C2": 26048}
 """Times of each map [us]."""
 
-DETECTORS_US = {"own": (384, 228, 2349), "Shi-Tomasi": (1095, 632, 9106), "SIFT": (11321, 6510, 75746)}
+DETECTORS_US = {
+    "own": (384, 228, 2349),
+    "Shi-Tomasi": (1095, 632, 9106),
+    "Trajkovic and Hedley": (1393, 625, 15524),
+    "SIFT": (11321, 6510, 75746),
+}
 """Times on three maps of 146 x 144, 113 x 113 and 398 x 402 cells [us].
 
 The row of Shi-Tomasi may be that of Harris, copied.
@@ -74,32 +81,96 @@ DESCRIPTORS_US = {
 
 
 def pair_ms(pair: PrintedPair) -> float:
-    """Return the time of a pair [ms].
-
-    Detection and description of both of its maps are included.
-    """
+    """Return the time of a pair [ms]. Detection and description of both of its maps are included."""
     return (pair.time_us + sum(DETECTION_US[name] + DESCRIPTION_US[name] for name in (pair.a, pair.b))) / 1e3
 
 
 def claimed_ms() -> float:
-    """Return the sum claimed as the most that a pair takes [ms].
-
-    It is the longest time of each stage, once.
-    """
+    """Return the sum claimed as the most that a pair takes [ms]. It is the longest time of each stage, once."""
     return (max(DETECTION_US.values()) + max(DESCRIPTION_US.values()) + max(pair.time_us for pair in PAIRS)) / 1e3
 
 
+THRESHOLDS = (0.80, 0.60, 0.40)
+"""Similarities from which corners match; the thesis prints none, the first is that of the mode ``thesis``."""
+
+JOINED_M, JOINED_ANGLE = 0.5, math.radians(5.0)
 MOST_PAIRS, MOST_ROWS = 40, 12
 SAME_CELLS, RIGHT_M = 2.0, 0.15
 """Distance of corners that are one in two maps [cells], and of matches that are right [m]."""
 
 
+def _positives(pairs: Sequence[Pair]) -> tuple[list[Pair], list[Pair]]:
+    """Return the positives of 30 % of overlap and more, and some of them."""
+    chosen = [pair for pair in pairs if pair.category == "positive" and pair.overlap >= PLENTY]
+    return chosen, chosen[:: max(len(chosen) // MOST_PAIRS, 1)][:MOST_PAIRS]
+
+
+def thesis_thresholds(maps: dict[str, BankMap], pairs: Sequence[Pair]) -> list[dict[str, Any]]:
+    """Return what the thesis's rules make of positives by thresholds and measures, on clean maps and on the bank's."""
+    base, rows = merge_settings("thesis", RESOLUTION), []
+    for kind in ("clean", "bank"):
+        known: dict[str, DescribedMap] = {}
+        tried = []
+        for pair in _positives(pairs)[1]:
+            for key in {pair.a, pair.b} - set(known):
+                levels = true_levels(maps[key]) if kind == "clean" else maps[key].levels
+                known[key] = described(levels, RESOLUTION, base)
+            true = Transform() if kind == "clean" else pair.a_from_b
+            assert true is not None
+            tried.append((known[pair.a], known[pair.b], true))
+        for measure, threshold in product(MEASURES, THRESHOLDS):
+            chosen = replace(base.correspondence, measure=measure, threshold=threshold)
+            found = [_tried(*one, replace(base, correspondence=chosen)) for one in tried]
+            matches, right, joined, wrong = np.array(found, np.int64).reshape(-1, 4).T
+            rows.append(
+                {
+                    "maps": kind,
+                    "measure": measure,
+                    "threshold": threshold,
+                    "pairs": len(found),
+                    "matches": np.quantile(matches, (0.0, 0.5, 1.0)).tolist() if found else [0.0] * 3,
+                    "three_right": int(np.count_nonzero(right >= base.alignment.least_inliers)),
+                    "joined": int(joined.sum()),
+                    "wrong": int(wrong.sum()),
+                }
+            )
+    return rows
+
+
+def _tried(a: DescribedMap, b: DescribedMap, true: Transform, settings: MergeSettings) -> tuple[int, int, bool, bool]:
+    """Return the number of matches and of right ones, and whether a pair is joined right, and wrong."""
+    matches = match_corners(a.corners, b.corners, a.descriptors, b.descriptors, settings.correspondence)
+    apart = np.linalg.norm(true.apply(b.corners.points[matches.second]) - a.corners.points[matches.first], axis=1)
+    found = merge_pair(a, b, settings)
+    if not found.is_accepted or found.a_from_b is None:
+        return len(matches), int(np.count_nonzero(apart <= RIGHT_M)), False, False
+    distance, angle = found.a_from_b.difference(true, found.agreement.centre)
+    is_right = distance <= JOINED_M and angle <= JOINED_ANGLE
+    return len(matches), int(np.count_nonzero(apart <= RIGHT_M)), is_right, not is_right
+
+
+def thresholds_text(rows: Sequence[dict[str, Any]]) -> str:
+    """Return the table of thresholds, as markdown."""
+    lines = [
+        "| maps | measure | threshold | matches: least, median, most | pairs with three right ones | joined right | "
+        "joined wrong |",
+        "|---|---|---:|---:|---:|---:|---:|",
+    ]
+    for row in rows:
+        least, median, most = row["matches"]
+        lines.append(
+            f"| {row['maps']} | {row['measure']} | {row['threshold']:.2f} | {least:.0f}, {median:.0f}, {most:.0f} | "
+            f"{row['three_right']} of {row['pairs']} | {row['joined']} | {row['wrong']} |"
+        )
+    return "\n".join(lines)
+
+
 def thesis_stages(maps: dict[str, BankMap], pairs: Sequence[Pair]) -> list[dict[str, Any]]:
     """Return what each stage of the thesis's rules makes of positives."""
-    chosen = [pair for pair in pairs if pair.category == "positive" and pair.overlap >= PLENTY]
+    chosen, some = _positives(pairs)
     settings = merge_settings("thesis", RESOLUTION)
     known: dict[str, DescribedMap] = {}
-    for pair in chosen[:: max(len(chosen) // MOST_PAIRS, 1)][:MOST_PAIRS]:
+    for pair in some:
         for key in (pair.a, pair.b):
             known.setdefault(key, described(maps[key].levels, RESOLUTION, settings))
     return [_stages(pair, known[pair.a], known[pair.b]) for pair in chosen if {pair.a, pair.b} <= set(known)]
@@ -191,14 +262,22 @@ def stages_text(rows: Sequence[dict[str, Any]]) -> str:
 def twelve_text(rows: Sequence[dict[str, Any]]) -> str:
     """Return the table of twelve pairs, as markdown."""
     lines = [
-        "| pair | known in both | initial matches | inliers | overlap [%] | time [us] | accepted | error [m] |",
-        "|---|---:|---:|---:|---:|---:|---|---:|",
+        "| pair | known in both | initial matches | inliers | overlap [%] | time [us] | accepted | error [m] | "
+        "printed: initial matches | inliers | overlap [%] | time [us] | accepted |",
+        "|---|---:|---:|---:|---:|---:|---|---:|---:|---:|---:|---:|---|",
     ]
+    printed = {"-".join(sorted((pair.a, pair.b))): pair for pair in PAIRS}
     for row in rows:
         overlap = f"{100 * row['overlap']:.0f} %"
         error = "-" if row["error_m"] is None else f"{row['error_m']:.2f}"
+        theirs = printed[row["pair"]]
         lines.append(
             f"| {row['pair']} | {overlap} | {row['matches']} | {row['inliers']} | {row['agreement']:.3f} | "
-            f"{row['time_us']:.0f} | {'yes' if row['is_accepted'] else 'no'} | {error} |"
+            f"{row['time_us']:.0f} | {_yes(row['is_accepted'])} | {error} | {theirs.matches} | {theirs.inliers} | "
+            f"{theirs.agreement:.3f} | {theirs.time_us} | {_yes(theirs.is_accepted)} |"
         )
     return "\n".join(lines)
+
+
+def _yes(is_so: bool) -> str:
+    return "yes" if is_so else "no"

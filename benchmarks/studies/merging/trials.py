@@ -31,10 +31,7 @@ from lidarium.mapping.merging.settings import MODES, MergeSettings, merge_settin
 METHODS = (*MODES, *FEATURES)
 
 SIDE = 512
-"""Maps that are smaller are padded to squares of this side [cells].
-
-Times are quoted of pairs of such maps.
-"""
+"""Maps that are smaller are padded to squares of this side [cells]. Times are quoted of pairs of such maps."""
 
 CHUNK = 40
 """Pairs that are tried in a row and kept together."""
@@ -44,24 +41,11 @@ CHUNK = 40
 class Outcome:
     """What a method said of a pair.
 
-    Attributes
-    ----------
-    is_accepted : bool
-        Whether it joined the maps.
-    reason : str
-        Why not.
-    distance_m, angle : float or None
-        Error of its transform at the overlap's centroid [m, rad], of positives for which it has one.
-    found_by : str
-        ``corners``, ``correlation``, or the name of a peer.
-    confidence : float
-        By which a threshold may be set.
-    time_ms : float
-        Processor time, detection and description of both maps included [ms].
-    is_standard : bool
-        Whether both maps have `SIDE` x `SIDE` cells.
-    overlap_m2, agreeing_m, wall_m, across_m, contradicting_m : float
-        As of `Agreement`, of our own methods.
+    `is_accepted`: whether it joined the maps; `reason`: why not; `distance_m`, `angle`: error of its transform at the
+    overlap's centroid [m, rad], of positives for which it has one; `found_by`: ``corners``, ``correlation``, or the
+    name of a peer; `confidence`: by which a threshold may be set; `time_ms`: processor time, detection and description
+    of both maps included [ms]; `is_standard`: whether both maps have `SIDE` x `SIDE` cells; `overlap_m2`, `agreeing_m`,
+    `wall_m`, `across_m`, `contradicting_m`: as of `Agreement`, of our own methods.
     """
 
     is_accepted: bool
@@ -80,10 +64,7 @@ class Outcome:
 
     @property
     def needed_fallback(self) -> bool:
-        """Whether all rotations and translations were tried.
-
-        Corners then gave nothing that passes on its own.
-        """
+        """Whether all rotations and translations were tried. Corners then gave nothing that passes on its own."""
         return not (self.found_by == "corners" and (self.is_accepted or ": moved by" in self.reason))
 
     @property
@@ -105,10 +86,7 @@ def try_pairs(
     workers: int,
     settings: MergeSettings | None = None,
 ) -> Iterator[int]:
-    """Try a method on pairs, kept by `CHUNK` in a folder.
-
-    Yields how many are there, as they come.
-    """
+    """Try a method on pairs, kept by `CHUNK` in a folder. Yields how many are there, as they come."""
     if method not in METHODS:
         raise ValueError(f"method is {method!r}; want one of {', '.join(METHODS)}")
     chunks = [pairs[first : first + CHUNK] for first in range(0, len(pairs), CHUNK)]
@@ -137,10 +115,7 @@ def read_outcomes(folder: Path, pairs: list[Pair], method: str) -> list[Outcome]
 
 
 def padded(levels: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Return a map padded to `SIDE` rows and columns at least.
-
-    Unknown cells are added at its upper ends.
-    """
+    """Return a map padded to `SIDE` rows and columns at least. Unknown cells are added at its upper ends."""
     rows, columns = (max(side, SIDE) for side in levels.shape)
     grown = np.full((rows, columns), UNKNOWN, np.uint8)
     grown[: levels.shape[0], : levels.shape[1]] = levels
@@ -152,10 +127,7 @@ def _file_of(folder: Path, method: str, number: int) -> Path:
 
 
 def _try_chunk(
-    folder: Path,
-    method: str,
-    settings: MergeSettings | None,
-    task: tuple[int, list[tuple[Pair, BankMap, BankMap]]],
+    folder: Path, method: str, settings: MergeSettings | None, task: tuple[int, list[tuple[Pair, BankMap, BankMap]]]
 ) -> None:
     number, tasks = task
     _warm_up(method, settings)
@@ -176,13 +148,7 @@ def _tried(pair: Pair, a: BankMap, b: BankMap, method: str, settings: MergeSetti
         confidence, agreement = result.score, result.agreement
     else:
         peer = match_peers(features_of(first, method), features_of(second, method), RESOLUTION)
-        found, is_accepted, reason, by, confidence = (
-            peer.a_from_b,
-            peer.confidence > 0.0,
-            "",
-            method,
-            peer.confidence,
-        )
+        found, is_accepted, reason, by, confidence = (peer.a_from_b, peer.confidence > 0.0, "", method, peer.confidence)
     time_ms = 1e3 * (time.process_time() - began)
     distance, angle = (
         (None, None) if found is None or pair.a_from_b is None else found.difference(pair.a_from_b, pair.at)
@@ -213,10 +179,7 @@ def _both(a: NDArray[np.uint8], b: NDArray[np.uint8], settings: MergeSettings) -
 
 @lru_cache
 def _warm_up(method: str, settings: MergeSettings | None) -> None:
-    """Compile the kernels before anything is timed, and use one thread.
-
-    Everything runs on that one thread.
-    """
+    """Compile the kernels before anything is timed, and use one thread. Everything runs on that one thread."""
     from lidarium.benchmarks.studies.merging.bank.floors import BankFloor
 
     cv2.setNumThreads(1)

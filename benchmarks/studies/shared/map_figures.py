@@ -1,7 +1,10 @@
 """How well a localizer on a spline map did: its poses, its map, and its size."""
 
 import math
+import time
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +23,15 @@ from lidarium.evaluation.metrics.poses import absolute_error, moved
 from lidarium.mapping.files.spline_files import compact_bytes
 from lidarium.mapping.geometry.rigid import relative
 from lidarium.mapping.grids.scan_geometry import ScanGeometry
+from lidarium.mapping.localization.localizer import Sensing
+from lidarium.mapping.localization.on_splines.spline_filter import SplineFilterSettings
+from lidarium.mapping.localization.on_splines.spline_matches import TrackingSettings
+from lidarium.mapping.localization.on_splines.spline_tracking import SplineTracker
+from lidarium.mapping.splines.settings import spline_settings
 from lidarium.mapping.splines.spline_map import SplineMap
+
+THESIS = SplineFilterSettings(tracking=TrackingSettings(splines=spline_settings("thesis")))
+"""The particle filter on a map that is made by the thesis's rules."""
 
 SPACING = 0.01
 """Distance of the points along curves and walls that are compared [m]."""
@@ -32,21 +43,12 @@ Poses = NDArray[np.float64]
 class MapFigures:
     """Figures of a run: lengths in metres, angles in degrees, shares, bytes.
 
-    Attributes
-    ----------
-    ate_m, end_m, end_deg : float
-        Error of the poses: root of the mean square over the path, and at its end.
-    odometry_ate_m : float
-        The same of odometry alone.
-    wall_mean_m, wall_p95_m : float
-        How far curves lie from walls.
-    recall, precision : float
-        Share of the walls within 5 cm of a curve, of those where true beams end; share of the curves within 5
-        cm of a wall.
-    curves, control_points, size_bytes : int
-        Size of the map, the last in its compact form.
-    of_end_points, of_grid : float
-        Its bytes as a share of those of the end points of the scans that went into it, and of a 5 cm grid.
+    `ate_m`, `end_m`, `end_deg`: error of the poses: root of the mean square over the path, and at its end;
+    `odometry_ate_m`: the same of odometry alone; `wall_mean_m`, `wall_p95_m`: how far curves lie from walls; `recall`,
+    `precision`: share of the walls within 5 cm of a curve, of those where true beams end; share of the curves within 5
+    cm of a wall; `curves`, `control_points`, `size_bytes`: size of the map, the last in its compact form;
+    `of_end_points`, `of_grid`: its bytes as a share of those of the end points of the scans that went into it, and of a
+    5 cm grid.
     """
 
     ate_m: float
@@ -64,6 +66,28 @@ class MapFigures:
     of_grid: float
 
 
+class Followed(NamedTuple):
+    """What a localizer believed on a path (times, 3), the end points in its map, and the CPU time of each step [s]."""
+
+    believed: Poses
+    returns: int
+    seconds: list[float]
+
+
+def follow(
+    localizer: SplineTracker, scans: Sequence[NDArray[np.float32]], odometry: Poses, time_step: float
+) -> Followed:
+    """Let a localizer follow a path by what was sensed on it."""
+    believed, seconds, returns = [], [], 0
+    for k, (ranges, reckoned) in enumerate(zip(scans, odometry, strict=True)):
+        updates, began = localizer.updates, time.process_time()
+        believed.append(localizer.localize(Sensing(k * time_step, reckoned, ranges)))
+        seconds.append(time.process_time() - began)
+        if localizer.updates > updates:
+            returns += int((ranges < localizer.geometry.range_max).sum())
+    return Followed(np.array(believed), returns, seconds)
+
+
 def map_figures(
     floor: Floor,
     spline_map: SplineMap,
@@ -75,10 +99,7 @@ def map_figures(
 ) -> MapFigures:
     """Compare what a localizer believed with the truth.
 
-    Parameters
-    ----------
-    true, believed, odometry : (times, 3) float64
-        Poses x, y, theta [m, rad]; odometry in a frame of its own.
+    `true`, `believed`, `odometry` (times, 3) float64: poses x, y, theta [m, rad]; odometry in a frame of its own.
     """
     curves = spline_map.sample(SPACING)
     edges = np.concatenate([solid.edges for solid in floor.solids])

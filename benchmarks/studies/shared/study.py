@@ -3,9 +3,9 @@
 import json
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any, Protocol, TypeVar
+from typing import Any, TypeVar
 
 import lidarium
 from lidarium.envs.settings.making import make_settings
@@ -29,8 +29,8 @@ class Study:
     Attributes
     ----------
     page : callable
-        Takes the folder that the suites have run into, a folder for each by its name, and returns the page
-        for ``docs/results``.
+        Takes the folder that the suites have run into, a folder for each by its name, and returns title and
+        sections of the page for ``docs/results``; see `results_page`.
     suites : callable
         Takes the folder of real data (or None) and the share of the floors that is run, every how many-th;
         returns suites by name.
@@ -40,12 +40,15 @@ class Study:
         folder has is not done again.
     pictures : callable or None
         Takes the folder and that of the page, and draws the page's pictures.
+    quick : int
+        Every how many-th part ``--quick`` runs: at most five minutes on two slow cores.
     """
 
-    page: Callable[[Path, str], str]
+    page: Callable[[Path], str]
     suites: Callable[[Path | None, int], dict[str, Suite]] = no_suites
     work: Callable[[Path, Path | None, int, int], Iterator[tuple[str, int, int]]] | None = None
     pictures: Callable[[Path, Path], None] | None = None
+    quick: int = 100
 
 
 VERSION = "version"
@@ -55,13 +58,15 @@ Progress = Iterator[tuple[str, int, int]]
 """What is being done, how much of it is, and of how much."""
 
 
-class Task(Protocol):
-    """A part of a study that is done by itself."""
+@dataclass(frozen=True, slots=True)
+class Task:
+    """A part of a study that is done by itself; its words and numbers tell it from the others."""
 
     @property
     def key(self) -> str:
         """Name that no other one of its file has."""
-        ...
+        values = (getattr(self, each.name) for each in fields(self))
+        return " | ".join(str(value) for value in values if isinstance(value, (str, int)))
 
 
 T = TypeVar("T", bound=Task)
@@ -125,17 +130,12 @@ def real_floors(data: Path) -> dict[str, list[Path]]:
 
 
 @dataclass(frozen=True, slots=True)
-class Bounded:
+class Bounded(Task):
     """A floor, a number of robots and their settings."""
 
     floor: str
     robots: int
     settings: Mapping[str, Any]
-
-    @property
-    def key(self) -> str:
-        """Name that no other one of its file has."""
-        return f"{self.floor} | {self.robots}"
 
 
 def measure_bound(team: Bounded) -> dict[str, Any]:

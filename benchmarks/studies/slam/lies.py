@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from lidarium.benchmarks.studies.shared.study import Task
 from lidarium.benchmarks.studies.slam.logs import RANGE_M
 from lidarium.evaluation.metrics.poses import absolute_error
 from lidarium.evaluation.report.tables import markdown_table
@@ -36,17 +37,12 @@ MOST_RATIO = 1.5
 
 
 @dataclass(frozen=True, slots=True)
-class Lie:
+class Lie(Task):
     """A log and what is wrong with it."""
 
     log: str
     what: str
     number: int = 0
-
-    @property
-    def key(self) -> str:
-        """Name that no other one of its file has."""
-        return f"{self.log} | {self.what} | {self.number}"
 
 
 def lies() -> list[Lie]:

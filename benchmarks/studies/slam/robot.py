@@ -22,16 +22,10 @@ from lidarium.mapping.localization.slam.localizer import Slam
 class Robot:
     """What SLAM costs a simulated robot, and how far off it is.
 
-    Attributes
-    ----------
-    match_ms, closure_ms, correction_ms : (calls,) float64
-        CPU time of a scan that is matched and drawn into the map, of one that recognised a place, and of one
-        that corrected the past.
-    error_m, odometry_m : float
-        Root mean square of the positions given at each time against the true ones, unaligned, and of odometry
-        [m].
-    path_m : float
-        Length of the path [m].
+    `match_ms`, `closure_ms`, `correction_ms` (calls,) float64: CPU time of a scan that is matched and drawn into the
+    map, of one that recognised a place, and of one that corrected the past; `error_m`, `odometry_m`: root mean square
+    of the positions given at each time against the true ones, unaligned, and of odometry [m]; `path_m`: length of the
+    path [m].
     """
 
     match_ms: NDArray[np.float64]
@@ -118,11 +112,9 @@ def robot_lines(robot: Robot, floor: str) -> list[str]:
 
     return [
         f"A Kobuki with URG-04LX (727 beams, 5.6 m, noise of the data sheet) explores `{floor}` over "
-        f"{robot.path_m:.0f} m; its odometry "
-        "stretches motions by 5 % and pulls aside by 1 degree a metre. Positions told at each time are off "
-        "by "
-        f"{robot.error_m:.3f} m (root mean square, unaligned), those of odometry by {robot.odometry_m:.2f} "
-        "m.",
+        f"{robot.path_m:.0f} m; its odometry stretches motions by 5 % and pulls aside by 1 degree a metre. Positions "
+        f"told at each time are off by {robot.error_m:.3f} m (root mean square, unaligned), those of odometry by "
+        f"{robot.odometry_m:.2f} m.",
         "",
         "| ms of CPU time | scans | median | p95 | most | to reach |",
         "|---|---|---|---|---|---|",

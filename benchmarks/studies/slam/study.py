@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from lidarium.benchmarks.speed.harness.report import about, heading
-from lidarium.benchmarks.studies.shared.study import Progress, Study, do_missing, kept_lines
+from lidarium.benchmarks.results_page import in_file
+from lidarium.benchmarks.studies.shared.study import Progress, Study, Task, do_missing, kept_lines
 from lidarium.benchmarks.studies.slam import lies
 from lidarium.benchmarks.studies.slam.logs import OTHERS, RELATIONS, log_row, read, relation_cells
 from lidarium.benchmarks.studies.slam.robot import Robot, measured_robot, robot_lines
@@ -50,7 +50,7 @@ LOGS_HEADER = (
     "from scan to scan, m",
 )
 
-PAGE = """{heading}
+PAGE = """# SLAM
 
 One core. All logs are followed with the settings of `lidarium slam` (ranges to 30 m, cells of 5 cm, every
 scan that moved by 2 cm or 1 degree is matched). No pose is derived from the corrected poses that the logs
@@ -83,7 +83,6 @@ and the agreement with the others, so the figures are not those of logs never se
 
 ## Logs
 
-{logs_header}
 {logs}
 
 *Agreement* is the root mean square distance from the corrected poses after the best rigid motion, *most*
@@ -108,10 +107,10 @@ another direction than odometry said; *doubtful* are these, and those that no ma
 
 
 @dataclass(frozen=True, slots=True)
-class Task:
+class Followed(Task):
     """A log that is followed, or a floor that a robot explores."""
 
-    key: str
+    name: str
 
 
 def work(folder: Path, data: Path | None, every: int, _workers: int) -> Progress:
@@ -120,14 +119,14 @@ def work(folder: Path, data: Path | None, every: int, _workers: int) -> Progress
     All is done in this process, as scans are timed.
     """
     logs = None if data is None else Path(data) / LOGS_FOLDER
-    tasks = [] if logs is None else [Task(name) for name in (*RELATIONS, *OTHERS)][::every]
+    tasks = [] if logs is None else [Followed(name) for name in (*RELATIONS, *OTHERS)][::every]
     yield from do_missing(folder / LOGS_FILE, "logs", tasks, partial(_follow_log, logs), 1)
     lying = [] if logs is None else lies.lies()[::every]
     yield from do_missing(folder / LIES_FILE, "logs that lie", lying, partial(lies.measure, logs), 1)
-    yield from do_missing(folder / ROBOT_FILE, "robot", [Task(FLOOR)], partial(_follow_robot, logs), 1)
+    yield from do_missing(folder / ROBOT_FILE, "robot", [Followed(FLOOR)], partial(_follow_robot, logs), 1)
 
 
-def _follow_log(logs: Path | None, task: Task) -> dict[str, Any]:
+def _follow_log(logs: Path | None, task: Followed) -> dict[str, Any]:
     """Return the lines of a log; relations only if there are some."""
     assert logs is not None
     _warm_up(logs)
@@ -139,7 +138,7 @@ def _follow_log(logs: Path | None, task: Task) -> dict[str, Any]:
     return {"row": log_row(task.key, log, followed), "relations": cells}
 
 
-def _follow_robot(logs: Path | None, task: Task) -> dict[str, Any]:
+def _follow_robot(logs: Path | None, task: Followed) -> dict[str, Any]:
     """Return the figures of a robot."""
     _warm_up(logs)
     robot = measured_robot(task.key, HORIZON_S)
@@ -160,7 +159,7 @@ def header_rows(titles: Sequence[str]) -> str:
     return f"| {' | '.join(titles)} |\n|{'---|' * len(titles)}"
 
 
-def page(folder: Path, command: str) -> str:
+def page(folder: Path) -> str:
     """Return the results as markdown."""
     logs = kept_lines(folder / LOGS_FILE)
     [line] = kept_lines(folder / ROBOT_FILE)
@@ -171,17 +170,15 @@ def page(folder: Path, command: str) -> str:
     robot = Robot(match, closure, correction, line["error_m"], line["odometry_m"], line["path_m"])
     relations = [f"| {log['key']} | {' | '.join(log['relations'])} |" for log in logs if log["relations"]]
     return PAGE.format(
-        heading="\n".join(heading("SLAM", about(command))),
         relations_header=header_rows(RELATIONS_HEADER),
         relations="\n".join(relations),
-        logs_header=header_rows(LOGS_HEADER),
-        logs="\n".join(log["row"] for log in logs),
+        logs=in_file("\n".join([header_rows(LOGS_HEADER), *(log["row"] for log in logs)])),
         turns=lies.TURNS,
         count=len(lying),
         honest=sum(map(lies.is_honest, lying)),
-        lies=lies.table(lying),
+        lies=in_file(lies.table(lying)),
         robot="\n".join(robot_lines(robot, FLOOR)),
     )
 
 
-STUDY = Study(page, work=work)
+STUDY = Study(page, work=work, quick=11)

@@ -32,11 +32,7 @@ def figure_table(lines: Sequence[Line]) -> str:
 
 
 def _row(
-    name: str,
-    limits: tuple[float | None, float | None],
-    values: tuple[float, float],
-    is_least: bool,
-    digits: int,
+    name: str, limits: tuple[float | None, float | None], values: tuple[float, float], is_least: bool, digits: int
 ) -> list[str]:
     are_reached = [
         limit is None or (value >= limit if is_least else value <= limit)

@@ -36,12 +36,7 @@ MARGIN_M = 0.20
 class GridMap:
     """A grid of what is free, and its planner.
 
-    Parameters
-    ----------
-    log_odds : (rows, columns) int8
-        < 0 free, 0 unknown, > 0 occupied.
-    origin : (2,) float64
-        Lower left corner [m].
+    `log_odds` (rows, columns) int8: < 0 free, 0 unknown, > 0 occupied; `origin` (2,) float64: lower left corner [m].
     """
 
     def __init__(self, log_odds: NDArray[np.int8], origin: NDArray[np.float64]) -> None:

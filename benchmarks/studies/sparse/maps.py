@@ -32,14 +32,8 @@ THESIS_FRAME_CODES = 32
 class ThesisPlace:
     """What the thesis says of a place, tables 5.5 and 5.6.
 
-    Attributes
-    ----------
-    frames : int
-        Frames of the incremental map, its codes over 32.
-    codes : int
-        Codes of the full map.
-    height, connection_radius, neighbours : float, float, int
-        Parameters of the graph [m, m, nodes].
+    `frames`: frames of the incremental map, its codes over 32; `codes`: codes of the full map; `height`,
+    `connection_radius`, `neighbours`: parameters of the graph [m, m, nodes].
     """
 
     frames: int
@@ -124,9 +118,7 @@ def _graph(name: str, found: SparseMap, thesis: ThesisPlace) -> TopologicalGraph
     if "thesis" not in name:
         return build_graph(found.free, found.boxes, BODY)
     settings = ThesisGraphSettings(
-        height=thesis.height,
-        connection_radius=thesis.connection_radius,
-        neighbours=thesis.neighbours,
+        height=thesis.height, connection_radius=thesis.connection_radius, neighbours=thesis.neighbours
     )
     return build_thesis_graph(found.free, found.centres, settings)
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
-from lidarium.benchmarks.studies.shared.study import Progress, do_missing
+from lidarium.benchmarks.studies.shared.study import Progress, Task, do_missing
 from lidarium.benchmarks.studies.sparse.grids import LASER_M, laser_grid
 from lidarium.benchmarks.studies.sparse.maps import Planner, noisy_map, size_of, survey
 from lidarium.benchmarks.studies.sparse.places import BODY, CELL_M, PLACES, Place, load_place, requests_of
@@ -93,15 +93,10 @@ LENGTH, POINTS, SECONDS, DISPERSION, TURNING, RAW_DISPERSION, RAW_TURNING, COLLI
 
 
 @dataclass(frozen=True, slots=True)
-class PlaceTask:
+class PlaceTask(Task):
     """One of the places."""
 
     name: str
-
-    @property
-    def key(self) -> str:
-        """Name that no other one of its file has."""
-        return self.name
 
 
 def measure(task: PlaceTask) -> dict[str, Any]:

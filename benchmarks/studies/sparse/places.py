@@ -39,18 +39,9 @@ STEP_M = 0.005
 class Place:
     """A furnished floor as it is, for a body.
 
-    Attributes
-    ----------
-    name : str
-        Name of the floor.
-    floor : Floor
-        The floor.
-    origin : (2,) float64
-        Lower left corner of the raster [m].
-    gaps : (rows, columns) float32
-        Distance of each cell's centre from the nearest solid one at the body's heights [m].
-    reached : (rows, columns) bool
-        Cells to which the body can be driven from the first start.
+    `name`: name of the floor; `floor`: the floor; `origin` (2,) float64: lower left corner of the raster [m]; `gaps`
+    (rows, columns) float32: distance of each cell's centre from the nearest solid one at the body's heights [m];
+    `reached` (rows, columns) bool: cells to which the body can be driven from the first start.
     """
 
     name: str
@@ -106,14 +97,8 @@ CAMERA = replace(CAMERAS["xtion"], height=1.0, pitch=0.45)
 class Frame:
     """What the camera has seen.
 
-    Attributes
-    ----------
-    points : (N, 3) float64
-        Points in the camera's optical frame [m].
-    pose : (4, 4) float64
-        Pose of the optical frame in the map.
-    base : (3,) float64
-        Pose of the robot [m, rad].
+    `points` (N, 3) float64: points in the camera's optical frame [m]; `pose` (4, 4) float64: pose of the optical frame
+    in the map; `base` (3,) float64: pose of the robot [m, rad].
     """
 
     points: NDArray[np.float64]

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.benchmarks.studies.shared.study import Progress, do_missing
+from lidarium.benchmarks.studies.shared.study import Progress, Task, do_missing
 from lidarium.benchmarks.studies.sparse.places import CAMERA, frames_of, load_place
 from lidarium.mapping.point_clouds.cameras import Intrinsics
 from lidarium.mapping.point_clouds.cloud_files import read_cloud
@@ -49,16 +49,11 @@ METHODS = ("kmeans", "kmeans++", "lbg")
 
 
 @dataclass(frozen=True, slots=True)
-class CloudTask:
+class CloudTask(Task):
     """A cloud: its kind, and its file below ``clouds`` or the number of a simulated frame."""
 
     kind: str
     name: str
-
-    @property
-    def key(self) -> str:
-        """Name that no other one of its file has."""
-        return f"{self.kind} | {self.name}"
 
 
 def measure(clouds: Path | None, task: CloudTask) -> dict[str, Any]:

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from lidarium.benchmarks.speed.harness.report import about, heading
+from lidarium.benchmarks.results_page import in_file
 from lidarium.benchmarks.studies.shared.study import Progress, Study, kept_lines
 from lidarium.benchmarks.studies.sparse import paths, quantisation
 from lidarium.benchmarks.studies.sparse.figures import figure_table
@@ -16,6 +16,7 @@ from lidarium.benchmarks.studies.sparse.tables import (
     MEASURES,
     error_table,
     failure_table,
+    gpu_text,
     measure_table,
     memory_table,
     node_table,
@@ -25,7 +26,7 @@ from lidarium.benchmarks.studies.sparse.tables import (
 
 ERRORS_PICTURE, PATHS_PICTURE = "sparse_errors.png", "sparse_paths.png"
 
-PAGE = """{heading}
+PAGE = """# Sparse maps
 
 Four furnished places: two laboratories, an arena and a flat, each with furniture on legs. A robot of
 0.30 m and 1.2 m stops every {spacing} m and takes {turns} frames of 320 x 240 round about, with its
@@ -91,8 +92,8 @@ simulated frames of the apartment.
 
 {errors}
 
-What the thesis prints, with other clouds and another unit of depth, so that only ratios compare; K-means++
-there labels on a GPU:
+What the thesis prints in tables 5.3 and 5.4, with other clouds and another unit of depth, so that only ratios
+compare; K-means++ there labels on a GPU. {gpu}
 
 {thesis_errors}
 
@@ -106,7 +107,7 @@ def work(folder: Path, data: Path | None, every: int, _workers: int) -> Progress
     yield from quantisation.work(folder, data, every)
 
 
-def page(folder: Path, command: str) -> str:
+def page(folder: Path) -> str:
     """Return the results as markdown."""
     lines = kept_lines(folder / paths.PATHS_FILE)
     clouds = kept_lines(folder / quantisation.QUANTISATION_FILE)
@@ -115,7 +116,6 @@ def page(folder: Path, command: str) -> str:
         for name, title, column, digits, unit in MEASURES
     )
     return PAGE.format(
-        heading="\n".join(heading("Sparse maps", about(command))).rstrip(),
         spacing=SPACING_M,
         turns=TURNS,
         requests=f"{REQUESTS:,}",
@@ -130,8 +130,9 @@ def page(folder: Path, command: str) -> str:
         nodes=node_table(lines),
         memory=memory_table(lines),
         clouds=len(clouds),
-        errors=error_table(clouds),
-        thesis_errors=thesis_error_table(),
+        gpu=gpu_text(clouds),
+        errors=in_file(error_table(clouds)),
+        thesis_errors=in_file(thesis_error_table()),
         paths_picture=PATHS_PICTURE,
         errors_picture=ERRORS_PICTURE,
     )
@@ -149,4 +150,4 @@ def pictures(folder: Path, images: Path) -> None:
     draw_errors(images / ERRORS_PICTURE, kept_lines(folder / quantisation.QUANTISATION_FILE))
 
 
-STUDY = Study(page, work=work, pictures=pictures)
+STUDY = Study(page, work=work, pictures=pictures, quick=10)

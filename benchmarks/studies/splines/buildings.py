@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from lidarium.agents import make_policy
+from lidarium.benchmarks.results_page import in_file
+from lidarium.benchmarks.studies.shared.study import Task
 from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.settings.making import make_settings
 from lidarium.evaluation.episodes.result import EpisodeData, figures_of
@@ -34,16 +36,11 @@ LEAST_VARIANCE = 1e-12
 
 
 @dataclass(frozen=True, slots=True)
-class Stay:
+class Stay(Task):
     """A building that a robot explores with a localizer."""
 
     floor: str
     localizer: str
-
-    @property
-    def key(self) -> str:
-        """Name that no other one of its file has."""
-        return f"{self.floor} | {self.localizer}"
 
 
 @dataclass(slots=True)
@@ -85,11 +82,7 @@ def squared_distances(
 def measure_stay(stay: Stay) -> dict[str, Any]:
     """Let a robot explore a building, and compare what it believed with the truth."""
     settings = make_settings(
-        robots=1,
-        realism="lab",
-        localization=stay.localizer,
-        horizon_s=HORIZON_S,
-        resolution=RESOLUTION,
+        robots=1, realism="lab", localization=stay.localizer, horizon_s=HORIZON_S, resolution=RESOLUTION
     )
     beliefs = Beliefs()
     env = WatchedExploration(stay.floor, settings, watchers=[beliefs])
@@ -146,4 +139,4 @@ def section(lines: Sequence[dict[str, Any]]) -> str:
             f"| all steps, least to median IoU | `{name}` | {100 * within:.1f} % | "
             f"{ious.min():.2f} to {np.median(ious):.2f} | | |"
         )
-    return "\n\n".join([ABOUT, "\n".join([HEADER, *rows]), TO_REACH])
+    return "\n\n".join([ABOUT, in_file("\n".join([HEADER, *rows])), TO_REACH])

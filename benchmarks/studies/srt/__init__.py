@@ -1,4 +1,1 @@
-"""The worlds of the thesis on the sensor-based random tree, driven again.
-
-They are compared with what was published.
-"""
+"""The worlds of the thesis on the sensor-based random tree, driven again. They are compared with what was published."""

@@ -1,7 +1,4 @@
-"""The value of the parts of localization on curves.
-
-The same paths are followed with one part changed.
-"""
+"""The value of the parts of localization on curves. The same paths are followed with one part changed."""
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
@@ -10,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from lidarium.benchmarks.studies.shared.map_figures import map_figures
-from lidarium.benchmarks.studies.srt.goal_runs import GoalRun, Way, drive_to_goal
+from lidarium.benchmarks.studies.shared.map_figures import THESIS, follow, map_figures
+from lidarium.benchmarks.studies.shared.study import Task
+from lidarium.benchmarks.studies.srt.goal_runs import GoalRun, drive_to_goal
 from lidarium.evaluation.suites.episodes_file import KEY
-from lidarium.mapping.localization.localizer import Sensing
 from lidarium.mapping.localization.on_splines.spline_filter import SplineFilter, SplineFilterSettings
-from lidarium.mapping.splines.settings import FitSettings, SegmentationSettings, SplineSettings
+from lidarium.mapping.splines.settings import AssociationSettings, FitSettings, SegmentationSettings, SplineSettings
 
 _DEFAULT = SplineFilterSettings()
 NO_CORNER = 3.1
@@ -41,6 +38,15 @@ VARIANTS: Mapping[str, tuple[str, SplineFilterSettings]] = MappingProxyType(
             "no cut at corners",
             _with_splines(SplineSettings(segmentation=SegmentationSettings(corner_angle=NO_CORNER))),
         ),
+        "slopes": (
+            "corners by the difference of slopes, as in the thesis",
+            _with_splines(SplineSettings(segmentation=SegmentationSettings(corner_rule="slope"))),
+        ),
+        "robot_origin": (
+            "lines compared about the robot, as in the thesis",
+            _with_splines(SplineSettings(association=AssociationSettings(line_origin="robot"))),
+        ),
+        "thesis": ("all rules of the thesis", THESIS),
         "particles_50": ("50 particles", replace(_DEFAULT, particles=50)),
         "particles_1000": ("1000 particles", replace(_DEFAULT, particles=1000)),
         "wheels_as_told": (
@@ -57,23 +63,15 @@ VARIANTS: Mapping[str, tuple[str, SplineFilterSettings]] = MappingProxyType(
 
 
 @dataclass(frozen=True, slots=True)
-class FollowedWay:
+class FollowedWay(Task):
     """A way of the default mode in a world, to be followed by all variants."""
 
     world: str
     seed: int
 
-    @property
-    def key(self) -> str:
-        """The way in one line."""
-        return f"followed | {self.world} | {self.seed}"
-
 
 def measure_variants(task: FollowedWay) -> dict[str, Any]:
-    """Drive once, and let each variant follow what was sensed.
-
-    Returns a line with the figures of all.
-    """
+    """Drive once, and let each variant follow what was sensed. Returns a line with the figures of all."""
     episode, _, way = drive_to_goal(GoalRun("default", task.world, task.seed))
     floor, settings = episode.env.floor, episode.env.settings
     assert floor is not None
@@ -81,21 +79,7 @@ def measure_variants(task: FollowedWay) -> dict[str, Any]:
     for name, (_, variant) in VARIANTS.items():
         localizer = SplineFilter(variant, settings.lidar)
         localizer.reset(way.true[0].copy(), task.seed)
-        believed, returns = _followed(localizer, way, settings.time_step)
         true, odometry = np.array(way.true), np.array(way.odometry)
+        believed, returns, _ = follow(localizer, way.ranges, odometry, settings.time_step)
         figures[name] = asdict(map_figures(floor, localizer.map, settings.lidar, true, believed, odometry, returns))
     return {KEY: task.key, "world": task.world, "seed": task.seed, "variants": figures}
-
-
-def _followed(localizer: SplineFilter, way: Way, time_step: float) -> tuple[np.ndarray[Any, Any], int]:
-    """Return the poses (times, 3) that a localizer believes on a path.
-
-    The end points that its map took in are returned, too.
-    """
-    believed, returns = [], 0
-    for k, (ranges, odometry) in enumerate(zip(way.ranges, way.odometry, strict=True)):
-        updates = localizer.map.updates
-        believed.append(localizer.localize(Sensing(k * time_step, odometry, ranges)))
-        if localizer.map.updates > updates:
-            returns += int((ranges < localizer.geometry.range_max).sum())
-    return np.array(believed), returns

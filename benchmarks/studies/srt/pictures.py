@@ -37,13 +37,7 @@ def draw_world(path: Path, world: str, seed: int) -> None:
     edges = [(_pair(places[node.parent]), _pair(places[node.number])) for node in tree.nodes if node.parent is not None]
     regions = [place + node.safe.outline for place, node in zip(places, tree.nodes, strict=True)]
     save_spline_picture(
-        path,
-        env.floor,
-        tracker_of(env).map,
-        np.array(way.true),
-        np.array(way.believed),
-        edges,
-        safe_regions=regions,
+        path, env.floor, tracker_of(env).map, np.array(way.true), np.array(way.believed), edges, safe_regions=regions
     )
 
 

@@ -20,10 +20,7 @@ def shortest_path(tables: FloorTables, start: Place, goal: Place, radius: float)
 
     None if there is none.
 
-    Parameters
-    ----------
-    start, goal : (x, y)
-        In the floor's frame [m].
+    `start`, `goal` (x, y): in the floor's frame [m].
     """
     raster = tables.body
     log_odds = np.where(raster.solid, 1, -1).astype(np.int8)
@@ -62,11 +59,7 @@ def _tightened(
 
 
 def _is_clear(
-    start: NDArray[np.float64],
-    end: NDArray[np.float64],
-    gaps: NDArray[np.float64],
-    resolution: float,
-    radius: float,
+    start: NDArray[np.float64], end: NDArray[np.float64], gaps: NDArray[np.float64], resolution: float, radius: float
 ) -> bool:
     count = max(math.ceil(math.dist(start, end) / resolution), 1)
     cells = np.floor((start + (end - start) * np.linspace(0.0, 1.0, count + 1)[:, None]) / resolution).astype(np.int64)

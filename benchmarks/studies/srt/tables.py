@@ -29,9 +29,8 @@ UNHINDERED = WORLDS[:3]
 def goals(lines: Sequence[Line]) -> str:
     """Return the endings, times, nodes and ways of both modes besides the thesis's."""
     rows = [
-        "| world | mode | runs | ended | nodes | curves | time [s] | path [m] | of the shortest | area "
-        "covered | from the start [m] | "
-        "contacts |",
+        "| world | mode | runs | ended | nodes | curves | time [s] | path [m] | of the shortest | area covered | from "
+        "the start [m] | contacts |",
         "|---|---|---:|---|---:|---:|---:|---:|---:|---:|---:|---:|",
     ]
     for world in WORLDS:
@@ -46,24 +45,18 @@ def goals(lines: Sequence[Line]) -> str:
 
 
 def _goal_row(world: str, mode: str, runs: Sequence[Line]) -> str:
-    endings = ", ".join(f"{name} {count}" for name, count in sorted(Counter(run["ending"] for run in runs).items()))
     ratios = [run["path_m"] / run["shortest_m"] for run in runs if run["shortest_m"] and run["ending"] == "reached"]
     shortest = f"{statistics.median(ratios):.2f} (to {max(ratios):.2f})" if ratios else "-"
     return (
-        f"| {world} | {mode} | {len(runs)} | {endings} | {_spread(runs, 'nodes', 0)} | "
-        f"{_spread(runs, 'curves', 0)} | "
-        f"{_spread(runs, 'time_s', 0)} | {_spread(runs, 'path_m', 1)} | {shortest} | "
-        f"{100 * min(run['coverage'] for run in runs):.1f} % | "
-        f"{max(run['from_start_m'] for run in runs):.2f} | "
+        f"| {world} | {mode} | {len(runs)} | {_endings(runs)} | {_spread(runs, 'nodes', 0)} | "
+        f"{_spread(runs, 'curves', 0)} | {_spread(runs, 'time_s', 0)} | {_spread(runs, 'path_m', 1)} | {shortest} | "
+        f"{100 * min(run['coverage'] for run in runs):.1f} % | {max(run['from_start_m'] for run in runs):.2f} | "
         f"{sum(run['collisions'] for run in runs)} |"
     )
 
 
 def against_thesis_mode(lines: Sequence[Line]) -> str:
-    """Return the default mode's time, nodes and path over the thesis mode's.
-
-    The ratios are taken seed by seed.
-    """
+    """Return the default mode's time, nodes and path over the thesis mode's. The ratios are taken seed by seed."""
     rows = ["| world | time | nodes | path |", "|---|---:|---:|---:|"]
     for world in WORLDS:
         pairs = _pairs(_of(lines, world, "thesis"), _of(lines, world, "default"))
@@ -87,9 +80,8 @@ def _ratio(pairs: Sequence[tuple[Line, Line]], key: str) -> str:
 def maps(lines: Sequence[Line]) -> str:
     """Return the errors of poses and maps, and the maps' sizes."""
     rows = [
-        "| world | mode | ATE [mm] | end [mm] | end [deg] | odometry's ATE over ours | wall error [mm] | its "
-        "95 % [mm] | walls found | "
-        "curves right | bytes | of end points | of a grid |",
+        "| world | mode | ATE [mm] | end [mm] | end [deg] | odometry's ATE over ours | wall error [mm] | its 95 % "
+        "[mm] | walls found | curves right | bytes | of end points | of a grid |",
         "|---|---|" + "---:|" * 11,
     ]
     for world in WORLDS:
@@ -117,6 +109,26 @@ def _map_cells(runs: Sequence[Line]) -> str:
             _worst(runs, "of_grid", 100.0, 1, max, " %"),
         ]
     )
+
+
+def trees(lines: Sequence[Line]) -> str:
+    """Return what variants of the thesis's rules come to, on each floor."""
+    rows = [
+        "| floor | tree | runs | ended | nodes | time [s] | path [m] | area covered | contacts |",
+        "|---|---|---:|---|---:|---:|---:|---:|---:|",
+    ]
+    for floor, tree in dict.fromkeys((line["world"], line["mode"]) for line in lines):
+        runs = _of(lines, floor, tree)
+        rows.append(
+            f"| {floor} | {tree} | {len(runs)} | {_endings(runs)} | {_spread(runs, 'nodes', 0)} | "
+            f"{_spread(runs, 'time_s', 0)} | {_spread(runs, 'path_m', 1)} | "
+            f"{100 * min(run['coverage'] for run in runs):.1f} % | {sum(run['collisions'] for run in runs)} |"
+        )
+    return "\n".join(rows)
+
+
+def _endings(runs: Sequence[Line]) -> str:
+    return ", ".join(f"{name} {count}" for name, count in sorted(Counter(run["ending"] for run in runs).items()))
 
 
 def ablations(lines: Sequence[Line]) -> str:
@@ -168,10 +180,7 @@ def exploration(episodes: Sequence[Line], policies: Sequence[str]) -> str:
 
 
 def _means(episodes: Sequence[Line], floor: str, policy: str) -> tuple[float, float]:
-    """Return mean time [s] and path [m] to 99 %.
-
-    Infinite if a run did not get there.
-    """
+    """Return mean time [s] and path [m] to 99 %. Infinite if a run did not get there."""
     runs = [episode for episode in episodes if episode["floor"] == floor and episode["policy"] == policy]
     if not runs or any(run["t99_s"] is None for run in runs):
         return math.inf, math.inf

@@ -93,10 +93,7 @@ def path_shares(rows: Sequence[Row], alone: Iterable[Row]) -> list[float]:
 
 
 def time_ratios(rows: Sequence[Row], others: Iterable[Row]) -> list[float]:
-    """Return times to 99 % over those of partners.
-
-    A partner that was not done by the horizon counts as done then.
-    """
+    """Return times to 99 % over those of partners. A partner that was not done by the horizon counts as done then."""
     return [time_of(row) / min(time_of(other), float(other["horizon_s"])) for row, other in partners(rows, others)]
 
 

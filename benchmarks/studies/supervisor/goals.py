@@ -27,22 +27,10 @@ BUMPER = "bumper"
 class Goal:
     """A figure besides what it is to be.
 
-    Attributes
-    ----------
-    title : str
-        What it is.
-    wanted : str
-        What it is to be, for people.
-    found : Interval or None
-        What it is; None if nothing was run for it.
-    is_reached : bool
-        Whether the estimate is as wanted.
-    digits : int
-        Behind the point, for people.
-    robots : int or None
-        Size of the teams that it is about; None if it is about others, too.
-    missed_by : tuple of dict
-        Where runs are counted that do something, those that do not do as is wanted.
+    `title`: what it is; `wanted`: what it is to be, for people; `found`: what it is; None if nothing was run for it;
+    `is_reached`: whether the estimate is as wanted; `digits`: behind the point, for people; `robots`: size of the teams
+    that it is about; None if it is about others, too; `missed_by`: where runs are counted that do something, those that
+    do not do as is wanted.
     """
 
     title: str
@@ -88,10 +76,7 @@ def goals_of(rows: Mapping[str, Sequence[Row]], failing: Sequence[Row]) -> list[
     lost = chosen(failing, SUPERVISED)
     goals.append(
         _share(
-            "a robot fails at half time: runs in which the others cover 99 % of what it leaves",
-            lost,
-            is_covered,
-            1.0,
+            "a robot fails at half time: runs in which the others cover 99 % of what it leaves", lost, is_covered, 1.0
         )
     )
     return goals

@@ -18,10 +18,7 @@ def read_runs(folder: Path) -> list[Row]:
 
 
 def asked_runs(folder: Path, name: str) -> list[Row]:
-    """Return the runs of a suite that were asked for last.
-
-    The folder may hold more, of a call for a larger share.
-    """
+    """Return the runs of a suite that were asked for last. The folder may hold more, of a call for a larger share."""
     keys = read_json(folder / ASKED_FILE).get(name)
     return [row for row in read_runs(folder / name) if keys is None or row[KEY] in keys]
 

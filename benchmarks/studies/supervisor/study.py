@@ -8,29 +8,11 @@ from pathlib import Path
 from typing import Any
 
 from lidarium.benchmarks.studies.shared.study import Study
-from lidarium.benchmarks.studies.supervisor.figures import (
-    Row,
-    chosen,
-    floor_of,
-    time_of,
-    time_shares,
-)
+from lidarium.benchmarks.studies.supervisor.figures import Row, chosen, floor_of, time_of, time_shares
 from lidarium.benchmarks.studies.supervisor.goals import SUPERVISED, Goal, goals_of
 from lidarium.benchmarks.studies.supervisor.page import page
-from lidarium.benchmarks.studies.supervisor.runs import (
-    ASKED_FILE,
-    FAILING,
-    LOGS_FILE,
-    asked_runs,
-    read_json,
-    read_runs,
-)
-from lidarium.benchmarks.studies.supervisor.suites import (
-    POLICIES,
-    SETTINGS,
-    five_floors,
-    suites,
-)
+from lidarium.benchmarks.studies.supervisor.runs import ASKED_FILE, FAILING, LOGS_FILE, asked_runs, read_json, read_runs
+from lidarium.benchmarks.studies.supervisor.suites import POLICIES, SETTINGS, five_floors, suites
 from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.evaluation.episodes.events import decision_lines
 from lidarium.evaluation.episodes.runner import run_episode

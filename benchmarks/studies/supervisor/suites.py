@@ -16,10 +16,7 @@ ALONE = "independent"
 """Who explores where there is one robot: of one, all policies do the same."""
 
 SCENARIOS = ("apartment", "clinic")
-"""The thesis's two scenarios.
-
-Their starts A, B and C are those of Jade, Luna and Mars.
-"""
+"""The thesis's two scenarios. Their starts A, B and C are those of Jade, Luna and Mars."""
 
 SEEDS = 10
 RUNS_ALONE = 3
@@ -81,16 +78,10 @@ LARGE_M2 = 300.0
 """From this area on a floor is large."""
 
 FIVE_FLOORS = 5
-"""Number of floors on which five robots work, and on which robots fail.
-
-They are every third of the others' floors.
-"""
+"""Number of floors on which five robots work, and on which robots fail. They are every third of the others' floors."""
 
 EXTENDED = ("building:3000010", "building:3000009")
-"""Floors on which each extension is switched on, one of them large.
-
-What helps on the one may not on the other.
-"""
+"""Floors on which each extension is switched on, one of them large. What helps on the one may not on the other."""
 
 EXTENSIONS: Mapping[str, Mapping[str, Any]] = {
     "hungarian": {"assignment": "hungarian"},
@@ -109,9 +100,7 @@ METER: Mapping[str, Any] = {"battery": "kobuki"}
 BUMPED: Mapping[str, Any] = {"robot": "service", "pauses_when_blocked": True}
 """Robots taller than what their lasers see, which pause where they touch or meet something."""
 
-RESUMING: Mapping[str, Mapping[str, Any]] = {
-    "resumes": {"policy": "supervised", "resumes_paused": True},
-}
+RESUMING: Mapping[str, Mapping[str, Any]] = {"resumes": {"policy": "supervised", "resumes_paused": True}}
 """Who is ordered to go on where the cause of his pause is known."""
 
 MARGIN = 1.5
@@ -197,12 +186,7 @@ def _extensions(seeds: tuple[int, ...], few: int) -> dict[str, Suite]:
     """Return the suites of extensions."""
     floors = EXTENDED[::few]
     budget = {"energy budget": {"policy": "supervised", "battery_margin": MARGIN}}
-    every = {
-        "assignment": "utility",
-        "avoids_rendezvous": True,
-        "returns_home": True,
-        "battery_margin": MARGIN,
-    }
+    every = {"assignment": "utility", "avoids_rendezvous": True, "returns_home": True, "battery_margin": MARGIN}
     radio = {"radio": RADIOS["radio in line of sight"]}
 
     def suite(options: Mapping[str, Mapping[str, Any]], variants: Mapping[str, Mapping[str, Any]]) -> Suite:

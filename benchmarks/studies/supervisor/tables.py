@@ -31,10 +31,7 @@ from lidarium.evaluation.statistics import Interval
 
 
 def shown(found: Interval | None, digits: int = 2) -> str:
-    """Return an estimate with its interval.
-
-    An end that the sample does not bound is left out.
-    """
+    """Return an estimate with its interval. An end that the sample does not bound is left out."""
     if found is None:
         return "-"
     text = number(found.estimate, digits)
@@ -142,13 +139,7 @@ def one_table(rows: Sequence[Row]) -> str:
         times = [time_of(row) for row in runs]
         ways = [path_of(row) for row in runs]
         lines.append(
-            (
-                f"`{Path(floor).name}`",
-                str(len(runs)),
-                reached(runs),
-                shown(median(times), 0),
-                shown(median(ways), 0),
-            )
+            (f"`{Path(floor).name}`", str(len(runs)), reached(runs), shown(median(times), 0), shown(median(ways), 0))
         )
     return table(("floor", "runs", "reached 99 %", "time to 99 % [s]", "way [m]"), lines)
 
@@ -232,14 +223,7 @@ def failing_table(rows: Sequence[Row]) -> str:
                 ends = shown(median([float(row["time_s"]) for row in runs]), 0)
                 least = f"{min(covered):.1f}" if covered else "-"
                 lines.append(
-                    (
-                        str(robots),
-                        f"`{policy}`",
-                        f"{count} of {len(runs)}",
-                        shown(median(covered), 1),
-                        least,
-                        ends,
-                    )
+                    (str(robots), f"`{policy}`", f"{count} of {len(runs)}", shown(median(covered), 1), least, ends)
                 )
     return table(("robots", "policy", "runs with 99 %", "covered by the others [%]", "least", "end [s]"), lines)
 
@@ -257,22 +241,12 @@ def left_table(rows: Sequence[Row]) -> str:
             ends = ", ".join(sorted({str(why) for robot, why in row["ended_because"].items() if robot != "robot_0"}))
             case = f"`{Path(floor_of(row)).name}`", str(row["robots"]), str(row["seed"])
             lines.append((*case, *(covered.get(policy, "-") for policy in POLICIES), ends, f"{row['time_s']:.0f}"))
-    head = (
-        "floor",
-        "robots",
-        "seed",
-        *(f"`{policy}` [%]" for policy in POLICIES),
-        "others ended because",
-        "end [s]",
-    )
+    head = ("floor", "robots", "seed", *(f"`{policy}` [%]" for policy in POLICIES), "others ended because", "end [s]")
     return table(head, lines)
 
 
 def extension_table(rows: Sequence[Row]) -> str:
-    """Return runs with extensions switched on, beside `supervised`.
-
-    The floors and seeds are the same.
-    """
+    """Return runs with extensions switched on, beside `supervised`. The floors and seeds are the same."""
     lines = []
     for variant, policy in dict.fromkeys((str(row["variant"]), str(row["policy"])) for row in rows):
         runs = chosen(rows, policy, variant=variant)

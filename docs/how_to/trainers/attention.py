@@ -15,7 +15,19 @@ from typing import Any
 import numpy as np
 import torch
 import tyro
-from learning_run import CLASSIC, LEARNED, SEEDS_APART, UNTRAINED, Plan, final_coverage, run_classic, table
+from learning_run import (
+    CLASSIC,
+    LEARNED,
+    SEEDS_APART,
+    UNTRAINED,
+    Plan,
+    compared,
+    conclusion,
+    final_coverage,
+    run_classic,
+    table,
+    write_page,
+)
 from numpy.typing import NDArray
 from sb3_contrib import MaskablePPO
 from stable_baselines3.common.vec_env import VecMonitor
@@ -32,16 +44,16 @@ EPISODES, ROLLOUT = 32, 64
 
 PAGE = """# Attention to frontiers
 
+{conclusion}
+
 {seeds} networks learn by MaskablePPO and `FrontierPolicy` to choose frontiers, each from a seed of its own:
 {decisions:,} decisions on `{train_floors}`. They are compared on {floors} floors that none of them has seen,
-by the share of the floor that one robot has seen after {horizon_s:.0f} s. Networks choose what they prefer;
-before the first update that is the frontier of least cost, as in explore_lite.
+by the share of the floor that one robot has seen after {horizon_s:.0f} s, all from the floor's own start.
+Networks choose what they prefer; before the first update that is the frontier of least cost, as in explore_lite.
 
-| | coverage after {horizon_s:.0f} s, mean and 95 % interval | learned less this, on the same floors |
-|---|---:|---:|
 {table}
 
-The coverage of networks on a floor is the mean over the seeds; intervals are over floors. By seed the learned
+The coverage of networks on a floor is the mean over the seeds; intervals are over floors. By seed the trained
 ones reach {by_seed}. A training took {minutes:.0f} minutes on one core.
 
 Networks of [a run that learns](training.md) score each frontier by itself, and draw their choices.
@@ -92,24 +104,26 @@ def main(plan: Attention) -> None:
     """Run all seeds and policies; write the page and its numbers."""
     with ProcessPoolExecutor(plan.workers, get_context("spawn")) as pool:
         seeds = list(pool.map(partial(learn, plan), range(plan.seeds)))
-        coverage = dict(zip(CLASSIC, pool.map(partial(run_classic, plan), CLASSIC), strict=True))
-    for name in (UNTRAINED, LEARNED):
-        coverage[name] = np.mean([each[name] for each in seeds], axis=0).tolist()
+        classic = dict(zip(CLASSIC, pool.map(partial(run_classic, plan), CLASSIC), strict=True))
+    seeds = seeds or json.loads((plan.out / "attention.json").read_text())["seeds"]
+    networks = {name: np.mean([each[name] for each in seeds], axis=0).tolist() for name in (UNTRAINED, LEARNED)}
+    numbers = compared(networks, classic)
     page = PAGE.format(
-        seeds=plan.seeds,
+        seeds=len(seeds),
         decisions=plan.updates * EPISODES * ROLLOUT,
         train_floors=plan.train_floors,
         floors=len(lidarium.floor_set(plan.floors)),
         horizon_s=plan.horizon_s,
-        table=table(coverage),
+        conclusion=conclusion(plan.horizon_s, numbers["coverage"]),
+        table=table(plan.horizon_s, numbers["coverage"], numbers["drawn"]),
         by_seed=", ".join(f"{100 * np.mean(each[LEARNED]):.1f} %" for each in seeds),
         minutes=np.mean([each["minutes"] for each in seeds]),
         version=lidarium.__version__,
         torch=torch.__version__,
     )
     plan.out.mkdir(parents=True, exist_ok=True)
-    (plan.out / "attention.json").write_text(json.dumps({"coverage": coverage, "seeds": seeds}, indent=2) + "\n")
-    (plan.out / "attention.md").write_text(page)
+    (plan.out / "attention.json").write_text(json.dumps({**numbers, "seeds": seeds}, indent=2) + "\n")
+    write_page(plan.out / "attention.md", page)
     print(page)
 
 

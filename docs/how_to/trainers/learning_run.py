@@ -22,8 +22,10 @@ from scipy import stats
 
 import lidarium
 
-LEARNED, UNTRAINED = "learned", "untrained network"
-CLASSIC = ("random_walk", "nearest_frontier")
+LEARNED, UNTRAINED = "trained networks", "untrained networks"
+CLASSIC = ("random_walk", "nearest_frontier", "utility_frontier", "explore_lite", "tour_frontier", "learned")
+STARTS = {"starts": "fixed"}
+"""Starts of all that are compared; without it a batch takes each floor's own, and a policy's run draws them."""
 
 SEEDS_APART = 1000
 """Episodes of a batch have seeds that follow each other; those of networks share none."""
@@ -33,19 +35,19 @@ SMOOTHED = 4
 
 PAGE = """# A run that learns
 
+{conclusion}
+
 {seeds} networks learn to choose frontiers, each from a seed of its own: {decisions:,} decisions on
 {train_floors:,} generated floors. They are compared on {floors} floors that none of them has seen, by the
-share of the floor that one robot has seen after {horizon_s:.0f} s. Networks draw their choices as they do in
-training; before the first update they draw almost evenly.
+share of the floor that one robot has seen after {horizon_s:.0f} s, all from the floor's own start. Networks
+draw their choices as they do in training; before the first update they draw almost evenly.
 
 ![Coverage at the end of training episodes]({name}.png)
 
-| | coverage after {horizon_s:.0f} s, mean and 95 % interval | learned less this, on the same floors |
-|---|---:|---:|
 {table}
 
-The coverage of networks on a floor is the mean over the seeds; intervals are over floors. By seed the learned
-ones reach {by_seed}. Training and evaluation took {minutes:.0f} minutes with {workers} processes.
+The coverage of networks on a floor is the mean over the seeds; intervals are over floors. By seed the trained
+ones reach {by_seed}. Training took {minutes:.0f} minutes.
 
 Made with `python docs/how_to/trainers/learning_run.py`, lidarium {version}.
 """
@@ -56,7 +58,7 @@ class Plan:
     """Train explorers and compare them on unseen floors."""
 
     seeds: int = 5
-    """how many networks"""
+    """how many networks; 0 compares the figures of those that are in --out with classic policies of today"""
     updates: int = 200
     """updates of each, of 1,024 decisions"""
     train_floors: str = "set:train:1000"
@@ -77,8 +79,8 @@ def final_coverage(
     options: dict[str, Any],
 ) -> NDArray[np.float64]:
     """Return the coverage that is reached on each floor, where a callable chooses for all rows at once."""
-    env = lidarium.vector_env(len(floors), **{**options, "floor": floors[0]}, copy=False)
-    observations, infos = env.reset(seed=0, options={"floor": list(floors)})
+    env = lidarium.vector_env(len(floors), **{**STARTS, **options, "floor": floors[0]}, copy=False)
+    observations, infos = env.reset(seed=[0] * len(floors), options={"floor": list(floors)})
     reached, is_over = infos["truth"]["coverage"].copy(), np.zeros(len(floors), np.bool_)
     while not is_over.all():
         observations, _, terminated, truncated, infos = env.step(choose(observations))
@@ -120,27 +122,48 @@ def run_seed(plan: Plan, seed: int) -> dict[str, Any]:
     }
 
 
-def run_classic(plan: Plan, name: str) -> list[float]:
-    """Return what a policy of the package reaches on each of the unseen floors."""
+def classic_coverage(name: str, floors: tuple[str, ...], options: dict[str, Any]) -> list[float]:
+    """Return what a policy of the package reaches on each floor."""
     reached = []
-    for floor in lidarium.floor_set(plan.floors):
-        env = lidarium.ExplorationEnv(floor, lidarium.make_settings(robots=1, horizon_s=plan.horizon_s, starts="drawn"))
+    for floor in floors:
+        env = lidarium.ExplorationEnv(floor, lidarium.make_settings(**{**STARTS, **options}))
         lidarium.run_episode(lidarium.policy(name), env, seed=0)
         reached.append(env.scorer.coverage)
     return reached
 
 
+def run_classic(plan: Plan, name: str) -> tuple[list[float], list[float]]:
+    """Return what a policy of the package reaches on each of the unseen floors, and what from drawn starts."""
+    floors, options = lidarium.floor_set(plan.floors), {"robots": 1, "horizon_s": plan.horizon_s}
+    return classic_coverage(name, floors, options), classic_coverage(name, floors, {**options, "starts": "drawn"})
+
+
 def run(plan: Plan) -> dict[str, Any]:
     """Run all seeds and policies, side by side; return the numbers of the page."""
+    began = time.monotonic()
     with ProcessPoolExecutor(plan.workers, get_context("spawn")) as pool:
         seeds = list(pool.map(partial(run_seed, plan), range(plan.seeds)))
+        minutes = (time.monotonic() - began) / 60.0
         classic = dict(zip(CLASSIC, pool.map(partial(run_classic, plan), CLASSIC), strict=True))
-    networks = {name: np.mean([seed[name] for seed in seeds], axis=0).tolist() for name in (UNTRAINED, LEARNED)}
-    return {
-        "curves": [seed["curve"] for seed in seeds],
-        "by_seed": [float(np.mean(seed[LEARNED])) for seed in seeds],
-        "coverage": {**classic, **networks},
-    }
+    if seeds:
+        found: dict[str, Any] = {
+            "curves": [seed["curve"] for seed in seeds],
+            "by_seed": [float(np.mean(seed[LEARNED])) for seed in seeds],
+            "minutes": minutes,
+        }
+        networks = {name: np.mean([seed[name] for seed in seeds], axis=0).tolist() for name in (UNTRAINED, LEARNED)}
+    else:
+        found = json.loads((plan.out / "training.json").read_text())
+        networks = {name: found["coverage"][name] for name in (UNTRAINED, LEARNED)}
+    return {**found, **compared(networks, classic)}
+
+
+def compared(
+    networks: dict[str, list[float]], classic: dict[str, tuple[list[float], list[float]]]
+) -> dict[str, dict[str, list[float]]]:
+    """Return the coverages of all from the floors' own starts, and those of the classic policies from drawn ones."""
+    coverage = {**{name: fixed for name, (fixed, _) in classic.items()}, **networks}
+    return {"coverage": coverage, "drawn": {name: drawn for name, (_, drawn) in classic.items()}}
 
 
 def interval(sample: NDArray[np.float64]) -> tuple[float, float, float]:
@@ -150,18 +173,38 @@ def interval(sample: NDArray[np.float64]) -> tuple[float, float, float]:
     return mean, mean - half, mean + half
 
 
-def table(coverage: dict[str, list[float]]) -> str:
-    """Return the lines of the table, the least coverage first."""
-    lines = []
+def table(horizon_s: float, coverage: dict[str, list[float]], drawn: dict[str, list[float]]) -> str:
+    """Return the table of coverages, the least first."""
+    lines = [
+        f"| | seen after {horizon_s:.0f} s, mean and 95 % interval | trained networks less this, floor by floor | "
+        "seen from drawn starts |",
+        "|---|---:|---:|---:|",
+    ]
     for name, reached in sorted(coverage.items(), key=lambda each: float(np.mean(each[1]))):
         mean, low, high = 100.0 * np.array(interval(np.array(reached)))
-        less = "-"
-        if name != LEARNED:
-            gap, lowest, highest = 100.0 * np.array(interval(np.subtract(coverage[LEARNED], reached)))
-            less = f"{gap:+.1f} ({lowest:+.1f} to {highest:+.1f}) %"
-        share = f"{mean:.1f} ({low:.1f} to {high:.1f}) %"
-        lines.append(f"| `{name}` | {share} | {less} |")
+        less = "-" if name == LEARNED else _less(coverage, name)
+        other = f"{100.0 * np.mean(drawn[name]):.1f} %" if name in drawn else "-"
+        shown = f"`{name}`" if name in drawn else name
+        lines.append(f"| {shown} | {mean:.1f} ({low:.1f} to {high:.1f}) % | {less} | {other} |")
     return "\n".join(lines)
+
+
+def _less(coverage: dict[str, list[float]], name: str) -> str:
+    """Return how much more of a floor trained networks see, in points of per cent."""
+    gap, lowest, highest = 100.0 * np.array(interval(np.subtract(coverage[LEARNED], coverage[name])))
+    return f"{gap:+.1f} ({lowest:+.1f} to {highest:+.1f}) %"
+
+
+def conclusion(horizon_s: float, coverage: dict[str, list[float]]) -> str:
+    """Say how much trained networks see, and what the nearest frontier and the best classic policy do."""
+    shares = {name: 100.0 * float(np.mean(reached)) for name, reached in coverage.items()}
+    best = max(CLASSIC, key=lambda name: shares[name])
+    return (
+        f"Trained networks see {shares[LEARNED]:.1f} % of an unseen floor in {horizon_s:.0f} s with one robot, "
+        f"untrained ones {shares[UNTRAINED]:.1f} %.\nThe nearest frontier sees {shares['nearest_frontier']:.1f} % "
+        f"from the same starts, `{best}`, the best classic policy, {shares[best]:.1f} %:\n"
+        f"floor by floor the networks differ from that by {_less(coverage, best)} (mean, 95 % interval)."
+    )
 
 
 def smoothed(curve: list[float]) -> NDArray[np.float64]:
@@ -191,26 +234,30 @@ def draw(curves: dict[str, list[list[float]]], decisions: int, path: Path) -> No
 
 def main(plan: Plan, name: str = "training") -> None:
     """Run the plan, and write the page."""
-    began = time.monotonic()
     numbers = run(plan)
-    minutes = (time.monotonic() - began) / 60.0
     draw({LEARNED: numbers["curves"]}, Settings().decisions, plan.out / f"{name}.png")
     (plan.out / f"{name}.json").write_text(json.dumps(numbers, indent=2) + "\n")
     page = PAGE.format(
-        seeds=plan.seeds,
+        seeds=len(numbers["by_seed"]),
         decisions=plan.updates * Settings().decisions,
         train_floors=len(lidarium.floor_set(plan.train_floors)),
         floors=len(lidarium.floor_set(plan.floors)),
         horizon_s=plan.horizon_s,
         name=name,
-        table=table(numbers["coverage"]),
+        conclusion=conclusion(plan.horizon_s, numbers["coverage"]),
+        table=table(plan.horizon_s, numbers["coverage"], numbers["drawn"]),
         by_seed=", ".join(f"{100 * each:.1f} %" for each in numbers["by_seed"]),
-        minutes=minutes,
-        workers=plan.workers,
+        minutes=numbers["minutes"],
         version=lidarium.__version__,
     )
-    (plan.out / f"{name}.md").write_text(page)
+    write_page(plan.out / f"{name}.md", page)
     print(f"{plan.out / name}.md is written")
+
+
+def write_page(path: Path, page: str) -> None:
+    """Write a page; its section of notes, if it has one, stays."""
+    _, heading, notes = (path.read_text() if path.exists() else "").partition("\n## Notes\n")
+    path.write_text(page + heading + notes)
 
 
 if __name__ == "__main__":

@@ -137,6 +137,18 @@ def test_a_robot_that_knows_much_less_is_sent_where_there_is_more_to_map():
     assert shares["b"] < 0.5 * shares["a"]
 
 
+def test_of_a_complete_map_all_is_known_and_less_while_frontiers_are_left():
+    def shares(levels, other):
+        supervisor, _ = looked({"a": report(levels, 6.5, 2.0), "b": report(other, 2.0, 2.0)})
+        return {decision.agent: decision.inputs.map_known for decision in supervisor.decisions}
+
+    whole, half = hall(), hall(4.0)
+    assert shares(whole, whole) == {"a": 1.0, "b": 1.0}
+    assert shares(whole, half)["b"] == pytest.approx(0.5)
+    # 1 m of frontier in the wall: a square of 5.6 m around it, of which the half outside and slivers are unknown.
+    assert 0.5 < shares(hall(openings=(EAST,)), half)["a"] < 0.9
+
+
 def test_a_robot_that_drives_far_and_maps_little_within_walls_is_stopped():
     cell = hall(1.5, 1.5)
     settings = SupervisorSettings(trusts_starts=True)

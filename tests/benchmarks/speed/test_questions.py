@@ -72,7 +72,7 @@ def test_the_profile_has_all_parts_and_they_make_up_the_whole(tmp_path):
     assert sum(spent[name] for name in parts) == pytest.approx(spent[WHOLE])
     assert all(spent[name] > 0.0 for name in spent if name != REST)
     assert (rays, cells > 1000) == (720, True)
-    page = profile_page({"straight": (spent, rays, cells)}, LEAST, "python profile_step.py")
+    page = profile_page({"straight": (spent, rays, cells)}, LEAST)
     assert "| ray casting |" in page
     assert "profiling.md" in page
 

@@ -3,6 +3,7 @@
 import json
 
 import pytest
+from published_pages import assert_published, keep
 
 from lidarium.benchmarks.studies import bounds
 from lidarium.scripts.main import main
@@ -33,7 +34,7 @@ def test_one_command_makes_the_page_and_goes_on(monkeypatch, tmp_path):
     command = ["reproduce", "bounds", "--runs", str(tmp_path / "runs"), "--out", str(tmp_path / "out")]
     assert main([*command, "--workers", "1"]) == 0
     page = (tmp_path / "out" / "bounds.md").read_text()
-    assert "`lidarium reproduce bounds" in page
+    assert "Made by `lidarium reproduce bounds" in page
     (small,) = (tmp_path / "runs" / "bounds" / bounds.TIGHT_FILE).read_text().splitlines()
     found = json.loads(small)
     assert 0.0 < found["lower_m"] <= found["plan_m"] + 1e-6
@@ -59,3 +60,10 @@ def test_teams_of_which_no_plan_saw_enough_are_left_out(monkeypatch):
     first, second = bounds.table([line_of(1, None, 50.0), line_of(2, 10.0, 20.0)]).splitlines()
     assert first == "| 1 | - |" + " - |" * len(bounds.POLICIES)
     assert second.startswith("| 2 | 10 | 2.00 |")
+
+
+def test_the_page_of_stored_figures_is_that_which_is_published(tmp_path):
+    small = {"floor": "a", "places": 9, "plan_m": 8.0, "lower_m": 7.5}
+    keep(tmp_path / bounds.TIGHT_FILE, [{**small, "optimum_m": 7.9}, {**small, "optimum_m": None}])
+    keep(tmp_path / bounds.FLOORS_FILE, [line_of(robots, 10.0, 20.0) for robots in bounds.TEAMS])
+    assert_published("bounds", bounds.page(tmp_path), tmp_path)

@@ -3,6 +3,7 @@
 import json
 
 import pytest
+from published_pages import assert_published
 
 from lidarium.benchmarks.studies import STUDIES, dungeons
 
@@ -50,7 +51,8 @@ def test_maps_are_paired_in_the_order_of_the_projects_listing(folder):
 
 
 def test_ways_are_in_the_projects_metres_and_those_that_missed_count_whole(folder):
-    page = dungeons.page(folder, "lidarium reproduce dungeons")
+    page = dungeons.page(folder)
+    assert_published("dungeons", page, folder)
     assert row_of(page, "`learned`")[1:3] == ["20", "30"]
     assert row_of(page, "`learned`")[3].startswith("0.750 (")
     assert row_of(page, "a tour on the known map")[2:4] == ["40", "1"]
@@ -60,7 +62,7 @@ def test_ways_are_in_the_projects_metres_and_those_that_missed_count_whole(folde
 
 
 def test_ways_by_ariadnes_rule_are_set_beside_the_nearest_frontier(folder):
-    assert row_of(dungeons.page(folder, "lidarium reproduce dungeons"), "not run")[1] == "-"
+    assert row_of(dungeons.page(folder), "not run")[1] == "-"
     lines = []
     for policy, way in {"nearest_frontier": 20.0, "learned": 15.0}.items():
         for number, name in enumerate(("ARiADNE__1.png", "DRL__2.png", "large__3.png")):
@@ -69,7 +71,7 @@ def test_ways_by_ariadnes_rule_are_set_beside_the_nearest_frontier(folder):
             lines.append({**row, "ended_because": {"robot_0": ended}})
     (folder / "ariadne").mkdir()
     (folder / "ariadne" / "episodes.jsonl").write_text("".join(json.dumps(line) + "\n" for line in lines))
-    page = dungeons.page(folder, "lidarium reproduce dungeons")
+    page = dungeons.page(folder)
     cells = row_of(page, "`learned`", 2)
     assert cells[1:3] == ["2 of 3", "16.0"]
     assert cells[3].startswith("0.761 (")

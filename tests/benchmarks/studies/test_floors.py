@@ -1,6 +1,7 @@
 """The study of every floor: a tiny share runs, is gone on with, and has its tables."""
 
 import pytest
+from published_pages import assert_published
 
 from lidarium.benchmarks.studies import STUDIES, floors
 
@@ -15,8 +16,8 @@ def test_a_tiny_share_runs_and_is_not_run_again(tiny, tmp_path):
     study = STUDIES["floors"]
     assert list(study.work(tmp_path, None, 3, 1)) == [("runs", 1, 2), ("runs", 2, 2)]
     assert list(study.work(tmp_path, None, 3, 1)) == []
-    page = study.page(tmp_path, "lidarium reproduce floors --every 3")
-    assert "`lidarium reproduce floors --every 3`" in page
+    page = study.page(tmp_path)
+    assert_published("floors", page, tmp_path)
     assert "| generated floors (building:SEED) | 1 | 1 | 1 | 0.99" in page
     assert "0 of 2 runs below 0.99" in page
     assert "| building:4000001 | " in page
@@ -31,7 +32,7 @@ def test_floors_that_robots_do_not_fit_in_are_listed(tmp_path, monkeypatch):
     monkeypatch.setattr(floors, "GENERATED", range(4_000_000, 4_000_001))
     monkeypatch.setattr(floors, "TEAMS", (2,))
     list(STUDIES["floors"].work(tmp_path, None, 1, 1))
-    page = STUDIES["floors"].page(tmp_path, "lidarium reproduce floors")
+    page = STUDIES["floors"].page(tmp_path)
     assert "- building:4000000, 2 robots: no room for 2 robots" in page
 
 

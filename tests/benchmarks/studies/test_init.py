@@ -16,7 +16,6 @@ NAMES = (
         "learned",
         "machines",
         "merging",
-        "merging_tuning",
     ),
     *("parity", "realism", "slam", "sparse", "splines", "srt", "supervisor"),
 )

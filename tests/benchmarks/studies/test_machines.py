@@ -3,6 +3,7 @@
 import json
 
 import pytest
+from published_pages import assert_published
 
 from lidarium.benchmarks.studies import machines
 
@@ -45,7 +46,8 @@ def test_the_page_tells_what_breaks_first(tmp_path, monkeypatch):
     monkeypatch.setattr(machines, "PIECE", 5000)
     done = list(machines.work(tmp_path, None, 10, 2))
     assert done[-1] == ("killed nodes", 1, 1)
-    page = machines.page(tmp_path, "lidarium reproduce machines")
+    page = machines.page(tmp_path)
+    assert_published("machines", page, tmp_path)
     assert "| 10,000 | 4.0 | 200 | 8 |" in page
     assert "so a folder ends at\n   2,680,000 episodes" in page
     assert "| 120 | 4 | 1.90 x (1.90 to 1.90) |" in page

@@ -3,6 +3,7 @@
 import json
 
 import pytest
+from published_pages import assert_published
 
 from lidarium.benchmarks.studies import parity
 
@@ -19,5 +20,6 @@ def test_a_drive_compares_both_worlds_and_the_page_has_a_line_for_each_robot(tmp
         assert line["same"] == line["scans"] > 0
         if not any(line["touches"][:2]):
             assert line["apart"][0] < parity.DISTANCE_M
-    page = parity.page(tmp_path, "command")
+    page = parity.page(tmp_path)
+    assert_published("parity", page, tmp_path)
     assert all(f"| {robot} |" in page for robot in parity.ROBOTS)

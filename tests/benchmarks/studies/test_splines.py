@@ -6,6 +6,7 @@ from functools import partial
 
 import numpy as np
 import pytest
+from published_pages import assert_published
 
 from lidarium.benchmarks.studies import STUDIES
 from lidarium.benchmarks.studies.splines import buildings
@@ -25,8 +26,8 @@ def test_a_tiny_share_runs_and_is_not_run_again(tiny, tmp_path):
     study = STUDIES["splines"]
     assert list(study.work(tmp_path, None, 100, 1)) == [("floors", 1, 1), ("buildings", 1, 1)]
     assert list(study.work(tmp_path, None, 100, 1)) == []
-    page = study.page(tmp_path, "lidarium reproduce splines --every 100")
-    assert "Made with `lidarium reproduce splines --every 100`" in page
+    page = study.page(tmp_path)
+    assert_published("splines", page, tmp_path)
     for name in splines.LOCALIZERS:
         assert f"| srt_corridor | `{name}` | " in page
     assert "| apartment | `splines` | " in page

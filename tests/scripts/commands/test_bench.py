@@ -53,9 +53,12 @@ def test_json_is_what_is_written_and_the_page_says_the_same(two_questions, no_pe
     ]
     assert result["command"] == "lidarium bench --effort quick"
     page = (tmp_path / "out" / "speed.md").read_text()
-    assert "| rays | 1,000 agent steps/s | slow: 100 | 10 x (10 to 10) | >= 5 x | yes |" in page
+    assert "[speed_speed.csv](speed_speed.csv)" in page
+    table = (tmp_path / "out" / "speed_speed.csv").read_text()
+    assert 'rays,"1,000 agent steps/s",slow: 100,10 x (10 to 10),>= 5 x,yes' in table
     assert "- *Steps*: few." in page
-    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["speed.json", "speed.md"]
+    files = sorted(path.name for path in (tmp_path / "out").iterdir())
+    assert files == ["speed.json", "speed.md", "speed_speed.csv"]
 
 
 def test_single_questions_can_be_asked(two_questions, no_peers, capsys):

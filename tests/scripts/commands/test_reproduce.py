@@ -14,13 +14,14 @@ from lidarium.scripts.commands.reproduce import Reproduce, _command_line, _every
         ({"every": 10}, 10, " --every 10"),
         ({"share": 0.1}, 10, " --share 0.1"),
         ({"share": 1.0}, 1, " --share 1"),
+        ({"quick": True}, 30, " --quick"),
         ({"data": Path("/home/me/data"), "every": 2}, 2, " --data data --every 2"),
         ({"data": Path("shared/data")}, 1, " --data shared/data"),
     ],
 )
 def test_a_share_is_every_so_many(options, every, words):
     command = Reproduce(name="floors", **options)
-    assert _every(command) == every
+    assert _every(command, 30) == every
     assert _command_line(command) == f"lidarium reproduce floors{words}"
 
 
@@ -30,6 +31,7 @@ def test_a_share_is_every_so_many(options, every, words):
         ({"every": 0}, "--every is 0"),
         ({"workers": -1}, "--workers -1"),
         ({"share": 0.5, "every": 2}, "want one of them"),
+        ({"quick": True, "every": 2}, "want one of them"),
         ({"share": 0.0}, "want a share above 0, up to 1"),
         ({"share": 1.5}, "want a share above 0, up to 1"),
     ],

@@ -2,13 +2,7 @@
 
 import statistics
 
-from lidarium.benchmarks.speed.cases.learners.masked_training import (
-    ALL_MIB,
-    FLOORS,
-    FrontierLearner,
-    is_there,
-    timings,
-)
+from lidarium.benchmarks.speed.cases.learners.masked_training import ALL_MIB, FLOORS, FrontierLearner, is_there, timings
 from lidarium.benchmarks.speed.harness.lines import Line, shown
 from lidarium.benchmarks.speed.harness.report import run_alone
 from lidarium.benchmarks.speed.harness.timing import Effort

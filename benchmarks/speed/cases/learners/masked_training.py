@@ -26,16 +26,9 @@ WARM_DECISIONS, TIMED_ROLLOUTS = 25_000, 4
 class FrontierLearner:
     """A learner of sb3-contrib, with one robot an episode.
 
-    Attributes
-    ----------
-    policy : str or type
-        As ``MaskablePPO`` takes it.
-    episodes, rollout : int
-        Episodes side by side, and decisions of each between two updates.
-    batch, epochs : int
-        Decisions of a step of gradients, and how often an update sees all.
-    threads : int
-        Of PyTorch.
+    `policy`: as ``MaskablePPO`` takes it; `episodes`, `rollout`: episodes side by side, and decisions of each between
+    two updates; `batch`, `epochs`: decisions of a step of gradients, and how often an update sees all; `threads`: of
+    PyTorch.
     """
 
     policy: Any
@@ -66,12 +59,7 @@ def timings(learner: FrontierLearner, rounds: int, mebibytes: int | None = None)
             env = VecMonitor(lidarium.sb3_vec_env(learner.episodes, FLOORS, **ROBOT))
             inside = timed(env)
             model = MaskablePPO(
-                learner.policy,
-                env,
-                n_steps=learner.rollout,
-                batch_size=learner.batch,
-                n_epochs=learner.epochs,
-                seed=0,
+                learner.policy, env, n_steps=learner.rollout, batch_size=learner.batch, n_epochs=learner.epochs, seed=0
             )
             model.learn(WARM_DECISIONS)  # floors come into the store, and from it into memory
             count, found = TIMED_ROLLOUTS * learner.episodes * learner.rollout, []
@@ -120,11 +108,10 @@ TO_REACH = 3000.0
 LEARNER = FrontierLearner("MultiInputPolicy", episodes=64, rollout=32, batch=512, epochs=4)
 
 NOTES = (
-    f"*MaskablePPO*: of sb3-contrib, its `MultiInputPolicy`, {LEARNER.episodes} episodes of one robot on "
-    f"`{FLOORS}` from the store of floors, {LEARNER.rollout} decisions of each between updates of "
-    f"{LEARNER.epochs} epochs, PyTorch on one thread and the kernels on two. Steps are decisions, by the "
-    f"clock, floors in the store. *All floors in memory*: `{SIZE_VARIABLE}={ALL_MIB}`; usual are "
-    f"{DEFAULT_MIB:g} MiB.",
+    f"*MaskablePPO*: of sb3-contrib, its `MultiInputPolicy`, {LEARNER.episodes} episodes of one robot on `{FLOORS}` "
+    f"from the store of floors, {LEARNER.rollout} decisions of each between updates of {LEARNER.epochs} epochs, "
+    "PyTorch on one thread and the kernels on two. Steps are decisions, by the clock, floors in the store. *All "
+    f"floors in memory*: `{SIZE_VARIABLE}={ALL_MIB}`; usual are {DEFAULT_MIB:g} MiB.",
 )
 
 

@@ -100,10 +100,7 @@ def _resets(env: ExplorationEnv, effort: Effort) -> list[float]:
 
 
 def _bounded(
-    name: str,
-    ours: Sequence[float],
-    limit: tuple[float, str, float],
-    rig: Sequence[float] | None = None,
+    name: str, ours: Sequence[float], limit: tuple[float, str, float], rig: Sequence[float] | None = None
 ) -> Line:
     """Make the line of a time, with the unit's parts of a second, the unit and the most of it."""
     scale, unit, most = limit

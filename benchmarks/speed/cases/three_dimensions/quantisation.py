@@ -22,13 +22,7 @@ from lidarium.envs.settings.cameras import CAMERAS
 from lidarium.envs.settings.robots import ROBOTS
 from lidarium.envs.simulation.depth.frames import image_of
 from lidarium.mapping.geometry.rigid import Transform
-from lidarium.mapping.point_clouds.cameras import (
-    Intrinsics,
-    base_from_camera,
-    map_from_base,
-    moved,
-    points_of_depth,
-)
+from lidarium.mapping.point_clouds.cameras import Intrinsics, base_from_camera, map_from_base, moved, points_of_depth
 from lidarium.mapping.point_clouds.cloud_files import read_cloud
 from lidarium.mapping.point_clouds.point_cloud import PointCloud
 from lidarium.mapping.sparse.quantisation.lloyd import nearest_codes
@@ -91,13 +85,12 @@ LEAST_RATIOS = {"scikit-learn": 30.0, "faiss": 3.0}
 MOST_PHI = {"phi2": 0.94, "phi1": 0.975}
 
 NOTES = (
-    f"*Quantisation* is the whole call with {STEPS} of Lloyd's steps: points sorted, labelled, and all that "
-    "is known of each code. The points are of depth images of 640 x 480 in the furnished apartment, without "
-    "a limit of range and with 5 mm of noise. Peers start from the same codes, make as many steps on one "
-    "thread, and label every point at the end. *Error over theirs* compares the mean squared distances. "
-    f"*Budget* is the error after {BUDGET_S} s of the whole call over that of K-means++, the mean over "
-    f"{FRAMES} depth images: of a kitchen (7-Scenes, in the folder that LIDARIUM_DATA names), which are "
-    "judged, and of the apartment.",
+    f"*Quantisation* is the whole call with {STEPS} of Lloyd's steps: points sorted, labelled, and all that is known "
+    "of each code. The points are of depth images of 640 x 480 in the furnished apartment, without a limit of range "
+    "and with 5 mm of noise. Peers start from the same codes, make as many steps on one thread, and label every point "
+    f"at the end. *Error over theirs* compares the mean squared distances. *Budget* is the error after {BUDGET_S} s of "
+    f"the whole call over that of K-means++, the mean over {FRAMES} depth images: of a kitchen (7-Scenes, in the "
+    "folder that LIDARIUM_DATA names), which are judged, and of the apartment.",
 )
 
 
@@ -135,10 +128,7 @@ def measure(effort: Effort) -> list[Line]:
     contenders = dict(zip(LIMITS_S, (quantised(*each) for each in asked), strict=True))
     start = frame[np.random.default_rng(0).choice(len(frame), CODES, replace=False)]
     contenders["ours"] = repeated(lambda: quantise(frame, CODES, plain, start=start), 1)
-    found = {
-        "scikit-learn": scikit_learn_steps(frame, start, STEPS),
-        "faiss": faiss_steps(frame, start, STEPS),
-    }
+    found = {"scikit-learn": scikit_learn_steps(frame, start, STEPS), "faiss": faiss_steps(frame, start, STEPS)}
     peers = {name: quietly(peer) for name, peer in found.items() if peer is not None}
     contenders |= {name: repeated(peer, 1) for name, peer in peers.items()}
     seconds = interleaved(contenders, effort)

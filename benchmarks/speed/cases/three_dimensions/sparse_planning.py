@@ -35,10 +35,7 @@ def scene() -> tuple[np.ndarray, np.ndarray, TopologicalGraph]:
     floor, generator = load_floor("apartment"), np.random.default_rng(0)
     boxes = np.array(
         [
-            [
-                [*solid.polygon.min(axis=0), max(solid.z_low, 0.0)],
-                [*solid.polygon.max(axis=0), min(solid.z_high, 2.5)],
-            ]
+            [[*solid.polygon.min(axis=0), max(solid.z_low, 0.0)], [*solid.polygon.max(axis=0), min(solid.z_high, 2.5)]]
             for solid in floor.solids
         ]
     )

@@ -35,12 +35,7 @@ class Rooms(BaseScenario):
             drive = DiffDrive(world, integration="euler")
             world.add_agent(
                 Agent(
-                    f"agent_{k}",
-                    shape=Sphere(0.18),
-                    collide=True,
-                    u_range=[0.5, 1.0],
-                    dynamics=drive,
-                    sensors=[lidar],
+                    f"agent_{k}", shape=Sphere(0.18), collide=True, u_range=[0.5, 1.0], dynamics=drive, sensors=[lidar]
                 )
             )
         for k, (x_low, y_low, x_high, y_high) in enumerate(floor["boxes"]):
@@ -55,8 +50,7 @@ class Rooms(BaseScenario):
             agent.set_rot(torch.tensor([theta], dtype=torch.float32), batch_index=env_index)
         for landmark, (x_low, y_low, x_high, y_high) in zip(self.world.landmarks, self.floor["boxes"], strict=True):
             landmark.set_pos(
-                torch.tensor([(x_low + x_high) / 2, (y_low + y_high) / 2], dtype=torch.float32),
-                batch_index=env_index,
+                torch.tensor([(x_low + x_high) / 2, (y_low + y_high) / 2], dtype=torch.float32), batch_index=env_index
             )
 
     def reward(self, agent: Agent) -> torch.Tensor:

@@ -50,18 +50,8 @@ class Drive:
 class BankMap:
     """A map of the bank.
 
-    Attributes
-    ----------
-    key : str
-        Name of its drive and number of the snapshot.
-    floor : BankFloor
-        Where it was made.
-    start, stage : int
-        From where, and which snapshot.
-    levels : (rows, columns) uint8
-        The map.
-    floor_from_map : Transform
-        Where it truly lies.
+    `key`: name of its drive and number of the snapshot; `floor`: where it was made; `start`, `stage`: from where, and
+    which snapshot; `levels` (rows, columns) uint8: the map; `floor_from_map`: where it truly lies.
     """
 
     key: str
@@ -76,25 +66,12 @@ class BankMap:
 class Pair:
     """Two maps, and what is true of them.
 
-    Attributes
-    ----------
-    a, b : str
-        Keys of the maps.
-    half : str
-        ``tuning`` or ``test``.
-    category : str
-        ``positive``; ``refurnished``, a positive whose furniture was taken away between the maps;
-        ``negative``; ``look_alike``, a negative that differs by 1 m of wall or more wherever it looks alike;
-        ``symmetric``, a positive that another transform explains as well; ``indistinct``, a negative that
-        differs by less.
-    overlap : float
-        Share of the smaller known area that both know, of maps of one floor.
-    pose : (x, y, theta) or None
-        The true ``a_from_b`` of a positive [m, rad].
-    at : (x, y)
-        Centroid of the overlap in map b [m].
-    differing_m : float
-        Least length of walls that differ where a negative looks alike [m].
+    `a`, `b`: keys of the maps; `half`: ``tuning`` or ``test``; `category`: ``positive``; ``refurnished``, a positive
+    whose furniture was taken away between the maps; ``negative``; ``look_alike``, a negative that differs by 1 m of
+    wall or more wherever it looks alike; ``symmetric``, a positive that another transform explains as well;
+    ``indistinct``, a negative that differs by less; `overlap`: share of the smaller known area that both know, of maps
+    of one floor; `pose` (x, y, theta) or None: the true ``a_from_b`` of a positive [m, rad]; `at` (x, y): centroid of
+    the overlap in map b [m]; `differing_m`: least length of walls that differ where a negative looks alike [m].
     """
 
     a: str

@@ -26,10 +26,7 @@ RESOLUTION = 0.025
 
 STARTS, RUNS = 3, 2
 SNAPSHOTS = (1.0 / 3.0, 2.0 / 3.0, 0.95)
-"""Shares of the floor that a robot has seen when its map is kept.
-
-What it has not reached by the end is kept then.
-"""
+"""Shares of the floor that a robot has seen when its map is kept. What it has not reached by the end is kept then."""
 
 HORIZON_S = 300.0
 _MARGIN = 3
@@ -39,14 +36,8 @@ _MARGIN = 3
 class PoseError:
     """Errors of a pose that change smoothly with time.
 
-    Attributes
-    ----------
-    distance_m : float
-        Largest error of the position [m].
-    angle : float
-        Largest error of the heading [rad].
-    shortest_s, longest_s : float
-        Periods of the waves that it is made of [s].
+    `distance_m`: largest error of the position [m]; `angle`: largest error of the heading [rad]; `shortest_s`,
+    `longest_s`: periods of the waves that it is made of [s].
     """
 
     distance_m: float = 0.04
@@ -59,14 +50,8 @@ class PoseError:
 class Snapshot:
     """A map that a robot had made by some time.
 
-    Attributes
-    ----------
-    levels : (rows, columns) uint8
-        What was known and a small margin.
-    floor_from_map : Transform
-        Where the map's lower left corner truly lies in the floor's frame.
-    time_s, coverage : float
-        When [s], and what share of the floor was seen.
+    `levels` (rows, columns) uint8: what was known and a small margin; `floor_from_map`: where the map's lower left
+    corner truly lies in the floor's frame; `time_s`, `coverage`: when [s], and what share of the floor was seen.
     """
 
     levels: NDArray[np.uint8]
@@ -139,12 +124,7 @@ def bank_settings() -> ExplorationSettings:
     They are one robot, its laser with 3 cm of noise, and maps of 2.5 cm.
     """
     return make_settings(
-        robots=1,
-        known_starts=False,
-        noise="thesis",
-        resolution=RESOLUTION,
-        horizon_s=HORIZON_S,
-        stop_coverage=0.97,
+        robots=1, known_starts=False, noise="thesis", resolution=RESOLUTION, horizon_s=HORIZON_S, stop_coverage=0.97
     )
 
 
@@ -167,10 +147,7 @@ def drive(
 ) -> list[Snapshot]:
     """Let a robot explore a floor and return its map at three times.
 
-    Parameters
-    ----------
-    start : (3,) float64
-        From where [m, rad].
+    `start` (3,) float64: from where [m, rad].
     """
     maker = MapMaker(error or PoseError(), seed, shares)
     env = WatchedExploration(floor, bank_settings(), watchers=[maker])

@@ -58,10 +58,7 @@ def _furniture(width: float, depth: float, generator: np.random.Generator) -> li
 
 
 def _placed(piece: Box, index: int, rooms: int, width: float, depth: float, corridor: float) -> Box:
-    """Return a piece of a room in the floor's frame.
-
-    Rooms of the lower side are turned by half a turn.
-    """
+    """Return a piece of a room in the floor's frame. Rooms of the lower side are turned by half a turn."""
     column, is_upper = index % rooms, index >= rooms
     x_low, y_low, x_high, y_high = piece
     left = WALL + column * width
@@ -99,10 +96,7 @@ def _starts(
 ) -> NDArray[np.float64]:
     chosen = generator.choice(2 * rooms, 3, replace=False)
     places = [
-        (
-            WALL + (room % rooms + 0.5) * width,
-            WALL + 0.5 * depth + (depth + corridor if room >= rooms else 0.0),
-        )
+        (WALL + (room % rooms + 0.5) * width, WALL + 0.5 * depth + (depth + corridor if room >= rooms else 0.0))
         for room in chosen.tolist()
     ]
     return np.asarray(np.round(np.column_stack([places, generator.uniform(-np.pi, np.pi, 3)]), 4), np.float64)
@@ -131,21 +125,10 @@ _AREAS = {
 class BankFloor:
     """A floor of the bank.
 
-    Attributes
-    ----------
-    name : str
-        Its name, of letters that a file's name may have.
-    half : str
-        ``tuning`` or ``test``.
-    kind : str
-        ``apartment``, ``office`` and ``corridors`` are generated, ``like_rooms`` as well; ``drawn``; ``real``
-        are apartments of LIFULL.
-    seed : int
-        Of a generated one.
-    path : Path or None
-        Of a real one.
-    is_copy : bool
-        Whether furniture was taken away from the floor of that kind and seed.
+    `name`: its name, of letters that a file's name may have; `half`: ``tuning`` or ``test``; `kind`: ``apartment``,
+    ``office`` and ``corridors`` are generated, ``like_rooms`` as well; ``drawn``; ``real`` are apartments of LIFULL;
+    `seed`: of a generated one; `path`: of a real one; `is_copy`: whether furniture was taken away from the floor of
+    that kind and seed.
     """
 
     name: str

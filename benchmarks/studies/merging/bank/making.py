@@ -14,15 +14,15 @@ from lidarium.benchmarks.studies.merging.bank.bank import (
     write_pairs,
 )
 from lidarium.benchmarks.studies.merging.bank.floors import BankFloor
-from lidarium.benchmarks.studies.merging.bank.pairs import choose_pairs
+from lidarium.benchmarks.studies.merging.bank.pairs import Wanted, choose_pairs
 from lidarium.benchmarks.studies.shared.study import Progress
 from lidarium.mapping.files.output import write_json
 
 DATA_FILE = "floors.json"
 
 
-def make_bank(folder: Path, floors: list[BankFloor], workers: int) -> Progress:
-    """Drive on the floors what is missing, and choose the pairs.
+def make_bank(folder: Path, floors: list[BankFloor], workers: int, every: int = 1) -> Progress:
+    """Drive on the floors what is missing, and choose the pairs, an N-th of those that are wanted.
 
     Yields what is being done, how much is, and of how much.
     """
@@ -37,7 +37,7 @@ def make_bank(folder: Path, floors: list[BankFloor], workers: int) -> Progress:
         raise ValueError(f"{len(failures)} drives came to no end, the first is {failures[0]}")
     if read_pairs(folder) is None:
         pairs = []
-        for pair in choose_pairs(read_maps(folder, floors)):
+        for pair in choose_pairs(read_maps(folder, floors), wanted=Wanted().part(every)):
             pairs.append(pair)
             yield "labelled pairs", len(pairs), len(pairs)
         write_pairs(folder, pairs)

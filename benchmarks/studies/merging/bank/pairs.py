@@ -6,7 +6,7 @@ noise or error. Both floors have their walls along the axes, so that four rotati
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property, lru_cache
 from itertools import combinations
 
@@ -49,10 +49,7 @@ This share of its walls agrees under the transform, and less than `DIFFERENT_M` 
 """
 
 _SLIDES = [Transform(0.3 * x, 0.3 * y, 0.0) for x, y in ((1, 0), (-1, 0), (0, 1), (0, -1))]
-"""Shifts tested along a corridor of which both maps know no end.
-
-Every such shift explains them as well.
-"""
+"""Shifts tested along a corridor of which both maps know no end. Every such shift explains them as well."""
 
 _QUARTERS = np.arange(4) * (math.pi / 2.0)
 _TRUTH = ValidationSettings(hit_distance_m=0.05, miss_distance_m=0.1)
@@ -70,45 +67,46 @@ class Wanted:
     copies: int = 120
     indistinct: int = 30
 
+    def part(self, every: int) -> "Wanted":
+        """Return an N-th of what is wanted, three of each kind at least."""
+        return Wanted(**{kind: max(round(count / every), min(count, 3)) for kind, count in asdict(self).items()})
+
 
 @dataclass(frozen=True, eq=False)
 class _Known:
-    """A map with the truth of what it knows.
-
-    The truth is in the floor's frame less the raster's origin.
-    """
+    """A map with the truth of what it knows. The truth is in the floor's frame less the raster's origin."""
 
     map: BankMap
 
     @cached_property
     def truth(self) -> DescribedMap:
         """The floor's cells that the map knows."""
-        raster = _raster(self.map.floor)
-        known = self.map.levels != UNKNOWN
-        pose = Transform(-raster.origin[0], -raster.origin[1], 0.0) @ self.map.floor_from_map
-        cosine, sine = math.cos(pose.theta), math.sin(pose.theta)
-        # The centre of pixel (0, 0) is half a cell from the corner.
-        x, y = (
-            pose.x / RESOLUTION + 0.5 * (cosine - sine) - 0.5,
-            pose.y / RESOLUTION + 0.5 * (sine + cosine) - 0.5,
-        )
-        size = raster.solid.shape[::-1]
-        mask = cv2.warpAffine(
-            known.astype(np.uint8),
-            np.array([[cosine, -sine, x], [sine, cosine, y]]),
-            size,
-            flags=cv2.INTER_NEAREST,
-        )
-        beside = cv2.dilate(mask, np.ones((7, 7), np.uint8))
-        levels = np.full(raster.solid.shape, UNKNOWN, np.uint8)
-        levels[(mask > 0) & (raster.solid == 0)] = FREE
-        levels[(beside > 0) & (raster.solid != 0)] = OCCUPIED
-        return describe_map(levels, RESOLUTION, CornerSettings(limit=1))
+        return describe_map(true_levels(self.map), RESOLUTION, CornerSettings(limit=1))
 
     def truth_from_map(self) -> Transform:
         """Return the transform from the map into the frame of the truth."""
         origin = _raster(self.map.floor).origin
         return Transform(-origin[0], -origin[1], 0.0) @ self.map.floor_from_map
+
+
+def true_levels(one: BankMap) -> NDArray[np.uint8]:
+    """Return the floor's own cells that a map knows, on the floor's grid: no noise, no error of poses."""
+    raster = _raster(one.floor)
+    pose = Transform(-raster.origin[0], -raster.origin[1], 0.0) @ one.floor_from_map
+    cosine, sine = math.cos(pose.theta), math.sin(pose.theta)
+    # The centre of pixel (0, 0) is half a cell from the corner.
+    x, y = (pose.x / RESOLUTION + 0.5 * (cosine - sine) - 0.5, pose.y / RESOLUTION + 0.5 * (sine + cosine) - 0.5)
+    mask = cv2.warpAffine(
+        (one.levels != UNKNOWN).astype(np.uint8),
+        np.array([[cosine, -sine, x], [sine, cosine, y]]),
+        raster.solid.shape[::-1],
+        flags=cv2.INTER_NEAREST,
+    )
+    beside = cv2.dilate(mask, np.ones((7, 7), np.uint8))
+    levels = np.full(raster.solid.shape, UNKNOWN, np.uint8)
+    levels[(mask > 0) & (raster.solid == 0)] = FREE
+    levels[(beside > 0) & (raster.solid != 0)] = OCCUPIED
+    return levels
 
 
 def choose_pairs(maps: dict[str, BankMap], seed: int = 0, wanted: Wanted | None = None) -> Iterator[Pair]:
@@ -242,10 +240,7 @@ def _is_symmetric(a: _Known, b: _Known) -> bool:
 
 
 def _alignments(a: _Known, b: _Known) -> list[tuple[Transform, Agreement]]:
-    """Return the transforms under which the truth of two maps looks most alike.
-
-    How alike it looks is returned, too.
-    """
+    """Return the transforms under which the truth of two maps looks most alike. How alike it looks is returned, too."""
     transforms, values = best_translations(a.truth, b.truth, _QUARTERS, _SEARCH)
     order = np.argsort(-values, kind="stable")
     middle: NDArray[np.float64] = b.truth.walls.mean(axis=0) if len(b.truth.walls) else np.zeros(2)

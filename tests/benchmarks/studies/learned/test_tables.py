@@ -1,6 +1,7 @@
 """Tables of learned explorers beside classic ones."""
 
 import pytest
+from published_pages import assert_published, keep
 
 from lidarium.benchmarks.studies import learned
 
@@ -64,3 +65,21 @@ def test_what_sends_the_robots_is_summed_over_runs(episodes):
     cells = [cell.strip() for cell in lines[-1].strip("|").split("|")]
     assert cells == [learned.KINDS["test"], "1", "10.0", "65.0 %", "25.0 %", "10.0 %", "50 %"]
     assert learned.senders_table({"kth": {}}) == "No run says."
+
+
+def test_the_page_of_stored_figures_is_that_which_is_published(episodes, tmp_path):
+    for kind in learned.KINDS:
+        lines = [
+            {
+                "key": f"default | {floor} | {robots} | seed 0 | {policy}",
+                "policy": policy,
+                "robots": robots,
+                "decided_by": {"tours": 3},
+                **each,
+            }
+            for policy, of_policy in episodes.items()
+            for (floor, robots), each in of_policy.items()
+        ]
+        keep(tmp_path / kind / "episodes.jsonl", lines)
+    keep(tmp_path / learned.BOUNDS_FILE, [{"floor": "f0", "robots": 1, "known_s": 60.0}])
+    assert_published("learned", learned.page(tmp_path), tmp_path)

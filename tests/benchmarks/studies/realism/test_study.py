@@ -1,6 +1,7 @@
 """The study of worlds that are not ideal: short episodes, gone on with, and the table."""
 
 import pytest
+from published_pages import assert_published
 
 from lidarium.benchmarks.studies import STUDIES, realism
 
@@ -26,8 +27,8 @@ def test_a_tiny_share_runs_and_is_not_run_again(tiny, tmp_path, monkeypatch):
     ]
     monkeypatch.setattr(realism, "run_episode", None)
     assert list(study.work(tmp_path, None, 1, 1)) == []
-    page = study.page(tmp_path, "lidarium reproduce realism")
-    assert "Measured with `lidarium reproduce realism` on " in page
+    page = study.page(tmp_path)
+    assert_published("realism", page, tmp_path)
     assert "| apartment | 1 | " in page
     assert "| apartment | 3 | " in page
     assert "A scan that is matched takes " in page

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from published_pages import assert_published
 
 from lidarium.benchmarks.studies import STUDIES
 from lidarium.benchmarks.studies.slam import lies
@@ -21,8 +22,7 @@ def test_a_robot_is_followed_without_data_and_not_again(short, tmp_path):
     study = STUDIES["slam"]
     assert list(study.work(tmp_path, None, 1, 1)) == [("robot", 1, 1)]
     assert list(study.work(tmp_path, None, 1, 1)) == []
-    page = study.page(tmp_path, "lidarium reproduce slam")
-    assert "Measured with `lidarium reproduce slam` on " in page
+    page = study.page(tmp_path)
     assert "explores `apartment` over " in page
     assert "| scan matched, local maps and map updated | " in page
 
@@ -35,7 +35,8 @@ def test_every_so_many_th_log_is_followed(short, tmp_path, shared_data, monkeypa
     done = list(study.work(tmp_path, shared_data, 2, 1))
     assert done == [("logs", 1, 1), ("logs that lie", 1, 1), ("robot", 1, 1)]
     assert list(study.work(tmp_path, shared_data, 2, 1)) == []
-    page = study.page(tmp_path, "lidarium reproduce slam --data data --every 2")
+    page = study.page(tmp_path)
+    assert_published("slam", page, tmp_path)
     assert "| belgioioso | 395 | " in page
     assert "| acapulco |" not in page
     assert "| aces | every tenth ODOM line removed | " in page

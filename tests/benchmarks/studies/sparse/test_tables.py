@@ -3,7 +3,9 @@
 import math
 
 import pytest
+from published_pages import assert_published, keep
 
+from lidarium.benchmarks.studies.sparse import paths, quantisation, study
 from lidarium.benchmarks.studies.sparse import thesis_figures as thesis
 from lidarium.benchmarks.studies.sparse.figures import figure_table
 from lidarium.benchmarks.studies.sparse.maps import THESIS, THESIS_FRAME_CODES
@@ -108,7 +110,8 @@ def test_figures_are_judged_by_the_worst_place(lines):
     assert "| paths that collide, of all places | <= 0 | 1 | 1 | no, no |" in worse
 
 
-def test_errors_are_means_over_clouds_and_curves_are_drawn(tmp_path, lines):
+@pytest.fixture
+def clouds():
     figures = {
         "kmeans": [[codes, 1.0 / math.sqrt(codes), 1.0 / codes, 1e-3] for codes in CODES],
         "kmeans++": [[codes, 0.9 / math.sqrt(codes), 0.8 / codes, 2e-3] for codes in CODES],
@@ -118,8 +121,17 @@ def test_errors_are_means_over_clouds_and_curves_are_drawn(tmp_path, lines):
             if codes in (16, 32, 64, 128, 256, 512)
         ],
     }
-    clouds = [{"kind": "kitchen", "name": str(k), "figures": figures} for k in range(2)]
+    return [{"kind": "kitchen", "name": str(k), "figures": figures} for k in range(2)]
+
+
+def test_errors_are_means_over_clouds_and_curves_are_drawn(tmp_path, clouds):
     assert "| kitchen | 16 | 0.2500 | 0.2375 | 0.2250 | 0.900 | 1.0 | 3.0 | 2.0 |" in error_table(clouds)
     draw_errors(tmp_path / "errors.png", clouds)
     draw_paths(tmp_path / "paths.png", [line_of(place, 0) | {"straight": [3.5] * 2} for place in PLACES] * 10)
     assert all((tmp_path / f"{name}.png").stat().st_size > 10_000 for name in ("errors", "paths"))
+
+
+def test_the_page_of_stored_figures_is_that_which_is_published(tmp_path, lines, clouds):
+    keep(tmp_path / paths.PATHS_FILE, lines)
+    keep(tmp_path / quantisation.QUANTISATION_FILE, clouds)
+    assert_published("sparse", study.page(tmp_path), tmp_path)

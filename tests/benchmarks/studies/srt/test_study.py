@@ -5,12 +5,22 @@ import math
 
 import numpy as np
 import pytest
+from published_pages import assert_published, keep
 
 from lidarium.benchmarks.studies import STUDIES
 from lidarium.benchmarks.studies.srt import study as srt
 from lidarium.benchmarks.studies.srt import tables
 from lidarium.benchmarks.studies.srt.ablations import VARIANTS
-from lidarium.benchmarks.studies.srt.goal_runs import MODES, WORLDS, GoalRun, measure_goal_run
+from lidarium.benchmarks.studies.srt.goal_runs import (
+    MODES,
+    TREES,
+    VARIED_ON,
+    WORLDS,
+    GoalRun,
+    drive_to_goal,
+    measure_goal_run,
+    measure_tree,
+)
 from lidarium.benchmarks.studies.srt.shortest_path import shortest_path
 from lidarium.envs.floors.catalogue.names import set_floors
 from lidarium.envs.floors.floor import Floor, Solid
@@ -56,6 +66,27 @@ def test_tables_have_a_line_for_each_world_and_mode(line):
     assert tables.maps(lines).count("\n") == 1 + len(lines)
     assert "1.00 (1.00 to 1.00)" in tables.against_thesis_mode(lines)
     assert tables.ablations([{"variants": dict.fromkeys(VARIANTS, line)}]).count("\n") == 1 + len(VARIANTS)
+
+
+def test_trees_by_variants_of_the_thesis_are_measured_with_and_without_a_goal():
+    thesis, ball = (measure_tree(GoalRun(tree, "srt_lab", 0)) for tree in ("thesis", "thesis, ball"))
+    assert (thesis["mode"], ball["mode"]) == ("thesis", "thesis, ball")
+    assert thesis["nodes"] != ball["nodes"]
+    assert drive_to_goal(GoalRun("thesis", "srt_lab", 0))[1].settings.drive == "controls"
+    shown = tables.trees([{**thesis, "world": floor} for floor in VARIED_ON] + [ball])
+    assert f"| apartment | thesis | 1 | {thesis['ending']} 1 | " in shown
+
+
+def test_the_page_of_stored_figures_is_that_which_is_published(line, tmp_path):
+    runs = [{**line, "world": world, "mode": mode} for world in WORLDS for mode in MODES]
+    keep(tmp_path / srt.GOALS_FILE, [{**run, "key": f"{run['mode']} | {run['world']}"} for run in runs])
+    keep(tmp_path / srt.TREES_FILE, [{**line, "key": tree, "mode": tree, "world": "apartment"} for tree in TREES])
+    keep(tmp_path / srt.ABLATIONS_FILE, [{"variants": dict.fromkeys(VARIANTS, line)}])
+    explored = [
+        {"floor": "a", "policy": policy, "t99_s": 50.0, "d_sum99_m": 9.0, "key": policy} for policy in srt.POLICIES
+    ]
+    keep(tmp_path / srt.EXPLORATION / "episodes.jsonl", explored)
+    assert_published("srt", srt.page(tmp_path), tmp_path)
 
 
 def test_a_floor_on_which_a_run_did_not_get_there_is_told():

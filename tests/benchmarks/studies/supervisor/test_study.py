@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from published_pages import assert_published
 
 from lidarium.benchmarks.studies import STUDIES
 from lidarium.benchmarks.studies.supervisor import study as supervisor
@@ -76,7 +77,9 @@ def test_a_tiny_share_runs_from_end_to_end_and_is_not_run_again(tiny, tmp_path):
     steps = list(study.work(tmp_path, None, 10, 1))
     assert steps == [step for step in steps if step[0] in ("runs in which a robot fails", "logs")]
     assert list(study.work(tmp_path, None, 10, 1)) == steps
-    page = study.page(tmp_path, "lidarium reproduce supervisor --share 0.1")
+    page = study.page(tmp_path)
+    absent = ("Wrong merges", "Typical", "Runs that left", "Generated", "Real floors")
+    assert_published("supervisor", page, tmp_path, absent)
     for heading in (
         "What was to be reached",
         "Test 1",
@@ -208,7 +211,7 @@ def test_the_page_is_of_what_was_asked_for_though_the_folder_holds_more(tiny, tm
             list(Campaign(suite, tmp_path / name, records=False).run())
     asked = sum(1 for suite in study.suites(None, 10).values() for _ in suite.trials())
     assert not any(step[0] != "logs" for step in study.work(tmp_path, None, 10, 1))
-    assert f"; {asked} runs," in study.page(tmp_path, "lidarium reproduce supervisor --every 10")
+    assert f"{asked} runs," in study.page(tmp_path)
 
 
 def test_a_robot_dies_at_half_of_what_its_own_team_took():
