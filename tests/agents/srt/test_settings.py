@@ -30,5 +30,5 @@ def test_modes_and_unknown_settings():
     assert make_srt_settings("thesis", shape="ball").shape == "ball"
     with pytest.raises(ValueError, match="mode of the tree is 'printed'"):
         make_srt_settings("printed")
-    with pytest.raises(TypeError, match="unknown setting 'colour'"):
+    with pytest.raises(ValueError, match="unknown setting 'colour'"):
         make_srt_settings(colour="red")

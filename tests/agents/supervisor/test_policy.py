@@ -9,7 +9,6 @@ import pytest
 import lidarium
 from lidarium.agents import Policy
 from lidarium.agents.policy import Stop
-from lidarium.agents.random_walk import RandomWalk
 from lidarium.agents.supervisor.factories import supervised
 from lidarium.agents.supervisor.policy import LOST_S, PATIENCE_S, Supervised, _Errands, _LedTeam
 from lidarium.agents.supervisor.settings import SupervisorSettings
@@ -177,9 +176,7 @@ def test_the_station_knows_only_what_the_radio_brought():
     assert {event.event for event in policy.events} == {"silent"}
 
 
-def test_policies_that_go_to_no_goals_and_settings_given_twice_are_refused():
-    with pytest.raises(ValueError, match="velocity"):
-        Supervised(RandomWalk())
+def test_settings_given_twice_are_refused():
     with pytest.raises(ValueError, match="period_s"):
         Supervised(FirstFrontier(), SupervisorSettings(), period_s=5.0)
 
