@@ -8,6 +8,7 @@ import ctypes
 import multiprocessing
 import os
 import signal
+import sys
 import threading
 import time
 import warnings
@@ -226,6 +227,9 @@ def _state(number: int) -> str:
 Task = TypeVar("Task")
 Result = TypeVar("Result")
 
+_PR_SET_PDEATHSIG = 1
+"""Request of prctl(2): the signal that a process gets when its parent ends."""
+
 _TRIM = getattr(ctypes.CDLL(None), "malloc_trim", None) if os.name == "posix" else None
 """Gives freed memory back to the system, if the C library has that."""
 
@@ -374,16 +378,26 @@ def _begin_worker() -> None:
     import cv2
 
     cv2.setNumThreads(1)
+    leave_with_parent()
     import_own()
-    threading.Thread(target=_leave_with_parent, daemon=True).start()
 
 
-def _leave_with_parent() -> None:
-    """End this process when its parent is gone.
+def leave_with_parent() -> None:
+    """Let this process end when its parent is gone, whatever it waits for.
 
-    The parent may have been killed, so that the results are not read.
+    The parent may have been killed, so that the results are not read. On Linux the kernel sends the signal; a thread
+    that waits for the parent would not run while a library waits for a lock and holds the interpreter.
     """
     parent = multiprocessing.parent_process()
-    if parent is not None:
+    if parent is None:
+        return
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+        if not parent.is_alive():  # it was gone before
+            os._exit(1)
+
+    def leave() -> None:
         parent.join()
         os._exit(1)
+
+    threading.Thread(target=leave, daemon=True).start()

@@ -149,9 +149,11 @@ def _options(execute: Callable[[Any], Answer], name: str, words: list[str]) -> C
 
 
 def _message(error: Exception) -> str:
+    from lidarium.mapping.files.guarded_reading import shortened
+
     if isinstance(error, OSError) and error.strerror and error.filename:
         return f"{error.filename}: {error.strerror}"
-    return str(error) or type(error).__name__
+    return shortened(str(error)) or type(error).__name__
 
 
 def _open_closed_streams() -> None:

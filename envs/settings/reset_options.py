@@ -28,6 +28,9 @@ Curriculum = Callable[[int], Mapping[str, Any]]
 OPTIONS = tuple(each.name for each in fields(ResetOptions))
 """Names of the options of ``reset``."""
 
+FARTHEST_M = 1e7
+"""Maximum coordinate of starts and goals [m], and maximum heading [rad]."""
+
 SIMILARITY = 0.8
 """Minimum similarity of an unknown option's name to a known one for it to count as a typo."""
 
@@ -70,7 +73,7 @@ def read_options(options: Mapping[str, Any] | None, robots: int) -> ResetOptions
         if poses is None or poses.shape != (robots, 3):
             what = f"is {starts!r}" if poses is None else f"has shape {poses.shape}"
             raise ValueError(
-                f"option starts {what}; want ({robots}, 3) finite numbers: x, y [m] and theta [rad] "
+                f"option starts {what}; want ({robots}, 3) numbers up to {FARTHEST_M:g}: x, y [m] and theta [rad] "
                 f"of each robot; or one of {', '.join(STARTS)}"
             )
         starts = poses
@@ -78,18 +81,19 @@ def read_options(options: Mapping[str, Any] | None, robots: int) -> ResetOptions
     if goal is not None:
         place = _numbers(goal)
         if place is None or place.shape != (2,):
-            raise ValueError(f"option goal is {goal!r}; want two finite numbers: x, y [m]")
+            raise ValueError(f"option goal is {goal!r}; want two numbers up to {FARTHEST_M:g}: x, y [m]")
         goal = (float(place[0]), float(place[1]))
     return ResetOptions(options.get("floor"), starts, goal)
 
 
 def _numbers(value: Any) -> NDArray[np.float64] | None:  # noqa: ANN401
-    """Return a value as an array, or None if it is not an array of finite numbers."""
+    """Return a value as an array, or None if it is not an array of numbers within the bound."""
     try:
         array = np.asarray(value, np.float64)
     except (TypeError, ValueError):
         return None
-    return array if np.isfinite(array).all() else None
+    # Beyond this no coordinate is told from its neighbour, and indices of cells overflow.
+    return array if (np.abs(array) <= FARTHEST_M).all() else None
 
 
 def of_number(curriculum: Curriculum | None, number: int) -> Mapping[str, Any]:

@@ -85,7 +85,7 @@ class TrackFrames:
         self._colours = team_colours(len(self._agents))
         camera, robot = (record.header["settings"].get(name) for name in ("camera", "robot"))
         self._camera = with_parts(DepthCamera, camera) if floor is not None and camera else None
-        self._views = None if floor is None else views_of(floor, with_parts(Robot, robot), len(self._agents))
+        self._views = None if floor is None else views_of(floor, with_parts(Robot, robot or {}), len(self._agents))
 
     def draw(self, time_s: float) -> Frame:
         """Return the frame at a time: `picture` below a header, next to a camera's view."""

@@ -9,7 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 import lidarium
-from lidarium.mapping.geometry.bounds import Rule, above, shown, within
+from lidarium.envs.settings.exploration import PARTS, ExplorationSettings, with_parts
+from lidarium.mapping.files.guarded_reading import reason
+from lidarium.mapping.geometry.bounds import Rule, above, check_values, rules_of, shown, within
 from lidarium.mapping.grids.map_deltas import levels_of_planes
 
 
@@ -230,5 +232,22 @@ def check_header(header: Any) -> None:  # noqa: ANN401
             raise ValueError(f"its header has no key {name}")
         if not is_good(header[name]):
             raise ValueError(f"its header has {name} {shown(header[name])}; want {wanted}")
+    _check_settings(header["settings"])
     if len(header["starts"]) != header["robots"]:
         raise ValueError(f"its header has {len(header['starts'])} starts for {header['robots']} robots")
+
+
+def _check_settings(settings: dict[str, Any]) -> None:
+    """Check the parts of settings that pictures and pages are made from, as settings are checked."""
+    rules = rules_of(ExplorationSettings)
+    for name, part in PARTS.items():
+        value = settings.get(name)
+        if value is None:
+            continue
+        try:
+            if not isinstance(value, dict):
+                raise ValueError(f"want an object instead of {shown(value)}")
+            check_values(value, rules[name].inner, name)
+            with_parts(part, value)
+        except (TypeError, ValueError, OverflowError, AttributeError) as error:
+            raise ValueError(f"its header has settings with a {name} that cannot be used: {reason(error)}") from error

@@ -7,6 +7,7 @@ import subprocess
 import sys
 import threading
 import time
+from pathlib import Path
 
 import pytest
 
@@ -224,3 +225,45 @@ def test_what_a_task_has_freed_is_given_back():
     shrinking by itself."""
     found = subprocess.run([sys.executable, "-c", HOLES], capture_output=True, text=True, check=True)
     assert float(found.stdout) < 60.0
+
+
+BLOCKED = """
+import ctypes, os, pathlib, sys
+from lidarium.evaluation.processes import shared_out
+
+def blocks(task):
+    pathlib.Path(sys.argv[1], f"{task}.tmp").write_text(str(os.getpid()))
+    os.replace(f"{sys.argv[1]}/{task}.tmp", f"{sys.argv[1]}/{task}.pid")
+    ctypes.PyDLL(None).sleep(3600)  # holds the interpreter: no thread of Python runs meanwhile
+
+if __name__ == "__main__":
+    list(shared_out(blocks, [1, 2], 2))
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="the kernel tells of a parent's end on Linux")
+def test_workers_end_with_a_parent_that_is_killed_though_they_hold_the_interpreter(tmp_path):
+    script = tmp_path / "blocked.py"
+    script.write_text(BLOCKED)
+    parent = subprocess.Popen([sys.executable, str(script), str(tmp_path)])
+    files = [tmp_path / "1.pid", tmp_path / "2.pid"]
+    waited(lambda: all(file.exists() for file in files) or parent.poll() is not None)
+    numbers = [int(file.read_text()) for file in files]
+    parent.kill()
+    parent.wait()
+    waited(lambda: not any(is_running(number) for number in numbers))
+
+
+def waited(condition):
+    """Wait for a condition as long as a busy machine may take."""
+    ends = time.monotonic() + 120.0
+    while not condition():
+        assert time.monotonic() < ends
+        time.sleep(0.05)
+
+
+def is_running(number):
+    try:
+        return Path(f"/proc/{number}/stat").read_text().rpartition(")")[2].split()[0] not in "ZX"
+    except OSError:
+        return False

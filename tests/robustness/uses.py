@@ -14,6 +14,7 @@ from lidarium.envs.floors.catalogue.names import load_floor
 from lidarium.envs.floors.floor import Floor
 from lidarium.evaluation.analysis.episodes import read_episodes as read_rows
 from lidarium.evaluation.analysis.groups import grouped
+from lidarium.evaluation.drawing.record_frames import TrackFrames, radius_of
 from lidarium.evaluation.metrics.relations import read_relations
 from lidarium.evaluation.record import read_record
 from lidarium.evaluation.record.replay import drive_again
@@ -98,6 +99,8 @@ def _record(path: Path) -> None:
     display.poses_at(1.0)
     display.coverage_at(1.0)
     drive_again(record)
+    TrackFrames(record, size=64).draw(0.5)
+    radius_of(record)
 
 
 def _suite(path: Path) -> None:

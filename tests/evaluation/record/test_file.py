@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import lidarium
+from lidarium.evaluation.drawing.record_frames import TrackFrames, radius_of
 from lidarium.evaluation.record import read_record, write_record
 
 
@@ -114,6 +115,8 @@ def test_a_newer_format_is_refused_naming_both(path):
 def test_a_record_of_another_version_can_be_shown(apartment_record, path):
     record = read_record(with_header(path, version="0.0.7", settings={}, what_comes_later=1))
     np.testing.assert_array_equal(record.display.map_at(30.0), apartment_record.display.map_at(30.0))
+    assert radius_of(record) > 0.0
+    assert TrackFrames(record, size=64).draw(1.0).shape[2] == 3
 
 
 @pytest.mark.parametrize(
@@ -131,6 +134,11 @@ def test_a_record_of_another_version_can_be_shown(apartment_record, path):
         ({"steps": 5}, "commands has shape"),
         ({"map_shape": [2, 2]}, "do not fit a map of 2 x 2 words"),
         ({"final_sha256": "short"}, "64 hexadecimal digits"),
+        ({"settings": {"robot": 5}}, "settings with a robot that cannot be used: want an object instead of 5"),
+        ({"settings": {"robot": {"radius": 10**400}}}, "settings with a robot that cannot be used"),
+        ({"settings": {"robot": {"radius": -1.0}}}, "settings with a robot that cannot be used"),
+        ({"settings": {"robot": {"a": 1}}}, "unknown setting 'a'"),
+        ({"settings": {"camera": {"columns": "many"}}}, "settings with a camera that cannot be used"),
     ],
 )
 def test_a_header_that_is_not_good_is_refused(path, changes, words):

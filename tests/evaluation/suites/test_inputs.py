@@ -124,3 +124,34 @@ def test_wrong_settings_of_policies_are_answered_in_one_line(here, name, given, 
     error = capsys.readouterr().err
     assert said in error
     assert "Traceback" not in error
+
+
+HOSTILE = """
+policies = ["{name}"]
+floors = ["apartment"]
+"""
+
+
+@pytest.mark.parametrize("table", [False, True])
+def test_a_suite_file_calls_nothing_that_it_names(here, table, capsys):
+    marker = here / "ran"
+    command = f'command = "touch {marker}"'
+    if table:
+        text = f'policies = ["a"]\nfloors = ["apartment"]\n[policy_settings.a]\npolicy = "os:system"\n{command}\n'
+    else:
+        text = HOSTILE.format(name="os:system") + f'[policy_settings."os:system"]\n{command}\n'
+    (here / "suite.toml").write_text(text)
+    for flag, said in (([], "want --own-policies if you trust the file"), (["--own-policies"], "want a subclass")):
+        assert main(["evaluate", "suite.toml", "--out", "out", *flag]) == 2
+        assert said in capsys.readouterr().err
+    assert not marker.exists()
+    assert not (here / "out" / "episodes.jsonl").exists()
+
+
+def test_a_module_that_a_suite_names_is_imported_only_if_it_is_allowed(here, capsys):
+    (here / "leaves_a_mark.py").write_text("open('mark', 'w').close()\n" + POLICY)
+    (here / "suite.toml").write_text(HOSTILE.format(name="leaves_a_mark:Mine") + "[settings]\nhorizon_s = 1.0\n")
+    assert main(["evaluate", "suite.toml", "--out", "out", "--workers", "1"]) == 2
+    assert not (here / "mark").exists()
+    assert main(["evaluate", "suite.toml", "--out", "out", "--workers", "1", "--own-policies"]) == 0
+    assert (here / "mark").exists()
