@@ -141,10 +141,21 @@ class Policy(ABC):
         """
 
     @abstractmethod
-    def act(self, observations: Mapping[str, Observation], agents: Collection[str] | None = None) -> dict[str, Action]:
-        """Return an action for every agent in ``observations``, or for some agents, for ``step`` of the environment.
+    def act(self, *args: Any, **kwargs: Any) -> dict[str, Action]:  # noqa: ANN401 (subclasses take observations alone)
+        """Return an action for every agent in ``observations``: ``act(observations, agents=None)``.
 
-        Subclasses need no ``agents``: they get the observations of the chosen ones.
+        Parameters
+        ----------
+        observations : dict
+            Observations by agent, as ``reset`` and ``step`` of the environment return them.
+        agents : collection of str, optional
+            The agents to decide for. All live ones by default. A subclass has no such parameter: it gets the
+            observations of the chosen ones.
+
+        Returns
+        -------
+        dict
+            Actions by agent, for ``step`` of the environment.
         """
 
     _driven: Any = None
@@ -319,7 +330,7 @@ class PerRobot(Policy):
         """How often the robots set out, by the part of their instances that sent them."""
         return sum((Counter(policy.decided_by) for policy in self._policies.values()), Counter())
 
-    def reset(self, team: Team, seed: int) -> None:
+    def reset(self, team: Team, seed: int = 0) -> None:
         """Begin an episode with a new instance for each robot.
 
         Each instance has a seed of its own.

@@ -27,7 +27,7 @@ class RandomWalk(Policy):
         self._speed = speed
         self._headings: dict[str, float | None] = {}
 
-    def reset(self, team: Team, seed: int) -> None:
+    def reset(self, team: Team, seed: int = 0) -> None:
         """Begin an episode."""
         self._team = team
         self._generators = {

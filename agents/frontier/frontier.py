@@ -55,7 +55,7 @@ class FrontierExplorer(Policy):
         self._given_up: list[tuple[GivenUp, NavigationMap, Cell]] = []
         self._unreached: list[GivenUp] = []
 
-    def reset(self, team: Team, seed: int) -> None:
+    def reset(self, team: Team, seed: int = 0) -> None:
         """Begin an episode."""
         self.team = team
         self._given_up, self._unreached = [], []

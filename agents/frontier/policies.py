@@ -93,7 +93,7 @@ class ExploreLite(FrontierExplorer):
         self._minimum_size, self._period_s = minimum_size, period_s
         self._last_s = -math.inf
 
-    def reset(self, team: Team, seed: int) -> None:
+    def reset(self, team: Team, seed: int = 0) -> None:
         """Begin an episode."""
         super().reset(team, seed)
         self._last_s = -math.inf

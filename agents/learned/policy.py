@@ -30,7 +30,7 @@ class ChosenTours(TourFrontier):
         super().__init__(shares_map, **settings)
         self.choose_option = choose
 
-    def reset(self, team: Team, seed: int) -> None:
+    def reset(self, team: Team, seed: int = 0) -> None:
         """Begin an episode."""
         super().reset(team, seed)
         self._known: dict[int, deque[tuple[float, float]]] = {}

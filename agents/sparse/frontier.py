@@ -152,7 +152,7 @@ class SparseFrontier(Policy):
         self._given_up: list[GivenUp] = []
         self._work: dict[str, _Work] = {}
 
-    def reset(self, team: Team, seed: int) -> None:
+    def reset(self, team: Team, seed: int = 0) -> None:
         """Begin an episode; nothing is drawn."""
         self.team = team
         self._given_up = []

@@ -40,7 +40,7 @@ class SensorBasedRandomTree(Policy):
         self.tree = Tree()
         self._explorers: dict[str, Explorer] = {}
 
-    def reset(self, team: Team, seed: int) -> None:
+    def reset(self, team: Team, seed: int = 0) -> None:
         """Begin an episode."""
         self._team, self.tree = team, Tree()
         children = np.random.SeedSequence(seed).spawn(len(team.agents))

@@ -307,7 +307,7 @@ class Supervised(Policy):
             "dropped": sum(event.event == "dropped" for event in self.events),
         }
 
-    def reset(self, team: Team, seed: int) -> None:
+    def reset(self, team: Team, seed: int = 0) -> None:
         """Begin an episode."""
         self._team, self.has_begun = team, True
         belief = team.belief(team.agents[0])

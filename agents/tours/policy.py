@@ -67,7 +67,7 @@ class TourFrontier(FrontierExplorer):
         self.settings = TourSettings(**settings)  # type: ignore[arg-type]
         self._decided_by: Counter[str] = Counter()
 
-    def reset(self, team: Team, seed: int) -> None:
+    def reset(self, team: Team, seed: int = 0) -> None:
         """Begin an episode."""
         super().reset(team, seed)
         self._rules = self.settings.rules(team.belief(team.agents[0]).lidar.range_max)

@@ -133,11 +133,11 @@ class _TalkingSpace(spaces.Dict):
 
     def sample(self, mask: Any = None, probability: Any = None) -> dict[str, Any]:  # noqa: ANN401
         """Draw an action and a message; a mask (actions,) is that of the action."""
-        whole = mask if mask is None or isinstance(mask, Mapping) else {ACTION: mask, MESSAGE: None}
-        odds = probability
-        if odds is not None and not isinstance(odds, Mapping):
-            odds = {ACTION: odds, MESSAGE: None}
-        return super().sample(whole) if odds is None else super().sample(whole, odds)
+        if mask is not None and not isinstance(mask, Mapping):
+            mask = {ACTION: mask, MESSAGE: None}
+        if probability is not None and not isinstance(probability, Mapping):
+            probability = {ACTION: probability, MESSAGE: None}
+        return super().sample(mask) if probability is None else super().sample(mask, probability)
 
 
 def talking_space(space: spaces.Space[Any], floats: int) -> spaces.Space[Any]:

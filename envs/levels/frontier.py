@@ -275,13 +275,12 @@ class FrontierLevel(WaypointLevel):
         """
         operating, robots = turn.operating, self.settings.robots
         picks = decoded if isinstance(decoded, _Picks) else None
-        if picks is not None:
-            decoded = picks.numbers
+        chosen = decoded.numbers if isinstance(decoded, _Picks) else decoded
         is_sent = np.zeros(self.rows, np.bool_)
         is_sent[list(operating.sent)] = True
         is_stopping = np.zeros(self.rows, np.bool_)
         is_stopping[list(operating.stopping)] = True
-        numbers = np.where(is_sent, self._stay, decoded)
+        numbers = np.where(is_sent, self._stay, chosen)
         choosing = turn.given & ~is_stopping & ~operating.held | is_sent
         orders = self.offers.choose(choosing, numbers)
         is_free = (turn.given | ~turn.acting).reshape(-1, robots).all(axis=1)

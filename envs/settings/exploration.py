@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, is_dataclass
+from dataclasses import dataclass, field, fields, is_dataclass
 from typing import Annotated, Any, get_args, get_type_hints
 
 import numpy as np
@@ -352,9 +352,10 @@ def localizer_settings(localization: str, values: Mapping[str, Any]) -> Any:  # 
 def with_parts(kind: type, values: Mapping[str, Any]) -> Any:  # noqa: ANN401
     """Make a dataclass from values; those of parts that are dataclasses may be mappings."""
     hints = get_type_hints(kind)
+    known = [each.name for each in fields(kind)]
     for name in values:
-        if name not in kind.__dataclass_fields__:
-            raise ValueError(f"{kind.__name__}: {unknown('setting', name, kind.__dataclass_fields__)}")
+        if name not in known:
+            raise ValueError(f"{kind.__name__}: {unknown('setting', name, known)}")
     made = {
         name: with_parts(hints[name], value) if isinstance(value, Mapping) and is_dataclass(hints.get(name)) else value
         for name, value in values.items()

@@ -42,10 +42,10 @@ def check_options(options: Any, known: Iterable[str] = OPTIONS) -> None:  # noqa
     """
     if options is not None and not isinstance(options, Mapping):
         raise ValueError(f"options of reset are {shown(options)}; want a dict of any of {', '.join(known)}, or None")
-    for name in options or ():
+    for name, value in (options or {}).items():
         if name in ExplorationSettings.__dataclass_fields__ and name not in known:
             raise ValueError(
-                f"{name} is no option of reset, but a setting of the environment; want {name}={shown(options[name])} "
+                f"{name} is no option of reset, but a setting of the environment; want {name}={shown(value)} "
                 "where it is made, or randomize"
             )
         near = difflib.get_close_matches(str(name)[:100], known, n=1, cutoff=SIMILARITY)

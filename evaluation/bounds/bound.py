@@ -89,7 +89,7 @@ class _WalkPolicy(Policy):
     def __init__(self, walks: Sequence[Walk], offsets: NDArray[np.float64]) -> None:
         self._walks, self._offsets = walks, offsets
 
-    def reset(self, team: Team, seed: int) -> None:
+    def reset(self, team: Team, seed: int = 0) -> None:
         """Start an episode."""
         self._team = team
         self._left = {

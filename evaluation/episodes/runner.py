@@ -112,7 +112,7 @@ def run_episode(
     if plans_sparsely and env.driver is None:
         raise ValueError("plans_sparsely is set, but the policy decides speeds; want waypoints or frontiers")
     world: World = SparsePlanning(env, policy.shares_map) if plans_sparsely else env
-    if merging not in (None, False):
+    if merging:
         world = MergedMaps(world, None if merging is True else merging)
     episode = Episode(env, policy, seed)
     began = time.perf_counter()

@@ -281,10 +281,14 @@ def _refuse_modules(path: Path, content: Mapping[str, Any]) -> None:
         *(policies if isinstance(policies, list) else [policies]),
         *(table.get("policy") for table in tables if isinstance(table, Mapping)),
     ]
-    aliases = set(settings) if isinstance(settings, Mapping) else set()
+    # A name with a table that says which policy it is stands for that.
+    aliases = {
+        name
+        for name, table in (settings.items() if isinstance(settings, Mapping) else ())
+        if isinstance(table, Mapping) and "policy" in table
+    }
     for name in named:
-        is_alias = name in aliases and "policy" in settings[name] if isinstance(name, str) and aliases else False
-        if isinstance(name, str) and ":" in name and name not in POLICIES and not is_alias:
+        if isinstance(name, str) and ":" in name and name not in POLICIES and name not in aliases:
             raise ValueError(
                 f"{path} names the policy {shown(name)} of a module, which would be imported and run; want "
                 "--own-policies if you trust the file"

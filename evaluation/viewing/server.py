@@ -64,7 +64,7 @@ def view_server(port: int) -> Iterator["ViserServer"]:
 
 def address_of(server: "ViserServer") -> str:
     """Return the address for a browser; its path is a secret that other pages and users of the machine do not know."""
-    return f"http://{server.get_host()}:{server.get_port()}/{server.lidarium_token}/"  # type: ignore[attr-defined]
+    return f"http://{server.get_host()}:{server.get_port()}/{server.lidarium_token}/"
 
 
 @contextmanager

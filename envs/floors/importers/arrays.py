@@ -1,6 +1,7 @@
 """Numpy arrays as floors: grey levels (KTH floors of MapEx) or solid cells."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,7 +32,7 @@ def load(path: Path, resolution: float | None) -> Floor:
     return floor_of_array(content, resolution, path)
 
 
-def floor_of_array(array: NDArray[np.generic], resolution: float | None, path: Path = Path("array")) -> Floor:
+def floor_of_array(array: NDArray[Any], resolution: float | None, path: Path = Path("array")) -> Floor:
     """Return the floor of an image, row 0 at the top: grey levels (above 127 is free) or booleans (true is solid)."""
     if resolution is None:
         raise ValueError(
