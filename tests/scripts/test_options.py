@@ -213,7 +213,7 @@ def address(process):
     while True:
         line = process.stderr.readline()
         assert line, "it has ended"
-        found = re.search(r"the run is shown at (http://127\.0\.0\.1:\d+)", line)
+        found = re.search(r"the run is shown at (http://127\.0\.0\.1:\d+/\S+/)", line)
         if found:
             return found.group(1)
 
