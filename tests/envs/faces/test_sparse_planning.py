@@ -139,3 +139,21 @@ def test_a_policy_of_the_laser_explores_along_sparse_routes(backend):
     assert env.scorer.coverage > 0.7
     assert env.world.collisions.sum() == 0
     env.close()
+
+
+def test_a_batch_drives_along_the_routes_of_single_environments():
+    options = {"robots": 1, "camera": "xtion_tilted", "resolution": 0.05, "stop_coverage": None, "map_cells": 64}
+    batch = lidarium.vector_env(2, LOW_TABLE, level="waypoint", plans_sparsely=True, **options)
+    single = SparsePlanning(made())
+    batch.reset(seed=0)
+    single.reset(seed=0)
+    target = Target(4.0, 0.0)
+    for _ in range(12):
+        _, _, _, _, wanted = single.step({"robot_0": target})
+        _, _, _, _, infos = batch.step([{"robot_0": target}, {"robot_0": Target(1.0, 0.0)}])
+        assert infos["route"][0] == wanted["robot_0"]["route"]
+        assert infos["_route"].all()
+    assert np.array_equal(batch.engine.world.poses[0], single.unwrapped.world.poses[0])
+    assert batch.engine.world.collisions[0] == 0
+    with pytest.raises(ValueError, match="SparsePlanning is put around the level 'velocity'"):
+        lidarium.vector_env(1, LOW_TABLE, plans_sparsely=True, **options)
