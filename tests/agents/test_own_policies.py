@@ -40,7 +40,7 @@ def test_a_class_of_a_module_is_made_with_its_settings():
         (":Walker", "module '' cannot be imported"),
         ("own_walkers:Walkr", "unknown class of own_walkers 'Walkr'; did you mean 'Walker'"),
         ("own_walkers:", "unknown class of own_walkers ''"),
-        ("own_walkers:number", "makes int; want a subclass of Policy"),
+        ("own_walkers:number", "want a subclass of lidarium.Policy"),
     ],
 )
 @pytest.mark.usefixtures("folder")
