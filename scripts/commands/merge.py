@@ -257,6 +257,8 @@ def _deformation(found: "Deformation | None") -> dict[str, float] | None:
 
 def _summary(merged: "Merged", files: list[str], out: Path, scale: float | None) -> str:
     """Return the printed text; ``scale`` is by how much the second map has grown, None if it may not."""
+    from lidarium.mapping.merging.bend.hypotheses import MAX_GROWTH
+
     lines = [f"joined: {', '.join(group)}" if len(group) > 1 else f"alone:  {group[0]}" for group in merged.groups()]
     dropped = {(edge.a, edge.b) for edge in merged.tree.dropped}
     rows = []
@@ -272,7 +274,10 @@ def _summary(merged: "Merged", files: list[str], out: Path, scale: float | None)
             if scale is not None:
                 reason += f", {b} grown {scale:.3f} times"
             if found.found_by == "bend":
-                reason += f", bent by {found.ranked[0].bend.bend_m:.2f} m"
+                bend = found.ranked[0].bend
+                reason += f", bent by {bend.bend_m:.2f} m"
+                if abs(bend.scale - 1.0) > MAX_GROWTH:
+                    reason += f", of which the scale {bend.scale:.3f} explains {100.0 * bend.growth_share:.0f} %"
         else:
             reason = f"refused: {found.reason}"
         rows.append((a, b, reason))

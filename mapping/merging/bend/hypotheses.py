@@ -66,6 +66,9 @@ on their way, and rooms of strangers bend until they fit."""
 MAX_GROWTH, UNLIKE_SHARE = 0.015, 0.8
 """Growth that drift explains, and share of the bend from which on a larger one is of the scales."""
 
+MAX_GROWTH_M = 0.25
+"""Most that a growth may move walls in the root mean square [m]: those at the far end move about twice as much."""
+
 SHARP_SPREAD_M, FEW_ROOMS_M2, SHARP_QUALITY = 0.035, 60.0, 0.9
 """Spread of gaps of sharp maps [m], overlap of a few rooms [m2], and their least quality."""
 
@@ -169,8 +172,9 @@ class _Signs(NamedTuple):
         By how much of the distance one map is stretched or sheared against the other.
     spread_m : float
         Spread of the gaps between walls that the bend leaves [m].
-    scale, growth_share : float
-        By how much the second map would have to grow, and share of the bend that this explains.
+    scale, growth_share, growth_m : float
+        By how much the second map would have to grow, share of the bend that this explains, and how much
+        that is [m].
     """
 
     evidence_m: float
@@ -184,6 +188,7 @@ class _Signs(NamedTuple):
     spread_m: float
     scale: float = 1.0
     growth_share: float = 0.0
+    growth_m: float = 0.0
 
 
 def signs_of(a: DescribedMap, b: DescribedMap, ranked: list[Hypothesis]) -> _Signs:
@@ -203,6 +208,7 @@ def signs_of(a: DescribedMap, b: DescribedMap, ranked: list[Hypothesis]) -> _Sig
         best.bend.spread_m,
         best.bend.scale,
         best.bend.growth_share,
+        best.bend.growth_m,
     )
 
 
@@ -254,7 +260,7 @@ def _objection(signs: _Signs) -> str | None:
         return f"small overlap: {signs.overlap_m2:.1f} m2 known in both once they are bent, want {MIN_OVERLAP_M2:g}"
     if signs.evidence_m < MIN_EVIDENCE_M:
         return f"small overlap: {signs.evidence_m:.1f} m of walls speak for it, want {MIN_EVIDENCE_M:g}"
-    if has_unlike_scale(signs.scale, signs.growth_share):
+    if has_unlike_scale(signs.scale, signs.growth_share) and signs.growth_m > MAX_GROWTH_M:
         return f"unlike scales: the second map would have to grow about {signs.scale:.3f} times"
     most_strain = MAX_STRAIN if signs.overlap_m2 >= FEW_ROOMS_M2 else MAX_STRAIN_OF_ROOMS
     if signs.strain > most_strain:

@@ -60,7 +60,10 @@ def test_hypotheses_are_of_different_places():
         ({"rival_share": 0.7}, "ambiguous: another place explains 70 % as much"),
         ({"overlap_m2": 12.0}, "small overlap: 12.0 m2"),
         ({"evidence_m": 3.0}, "small overlap: 3.0 m of walls"),
-        ({"scale": 0.97, "growth_share": 0.9}, "unlike scales: the second map would have to grow about 0.970 times"),
+        (
+            {"scale": 0.97, "growth_share": 0.9, "growth_m": 0.3},
+            "unlike scales: the second map would have to grow about 0.970 times",
+        ),
         ({"strain": 0.06}, "contradiction: one map would be stretched by 6.0 %, want at most 5 %"),
         (
             {"strain": 0.04, "overlap_m2": 20.0},
@@ -83,8 +86,9 @@ def test_a_hypothesis_that_nothing_excludes_is_refused_by_its_confidence():
 
 
 def test_drift_that_also_grows_a_map_is_no_other_scale():
-    for changed in ({"scale": 1.034, "growth_share": 0.73}, {"scale": 1.01, "growth_share": 1.0}):
-        assert confidence_of(PLAIN._replace(**changed)) == confidence_of(PLAIN)
+    for scale, share, growth_m in ((1.034, 0.73, 0.3), (1.01, 1.0, 0.3), (1.025, 0.9, 0.15)):
+        grown = PLAIN._replace(scale=scale, growth_share=share, growth_m=growth_m)
+        assert confidence_of(grown) == confidence_of(PLAIN)
 
 
 @pytest.mark.parametrize(
