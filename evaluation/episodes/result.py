@@ -4,6 +4,7 @@ The format is in docs/reference/files.md.
 """
 
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 from functools import cached_property, partial
 from typing import Any
 
@@ -335,7 +336,12 @@ def _energy(data: EpisodeData) -> list[float] | None:
 
 
 def _merges(data: EpisodeData) -> dict[str, Any]:
-    trajectories = None if data.history is None else data.trajectories
+    trajectories = None
+    if data.history is not None:
+        # If starts are known, robots believe poses on the floor; those of merges are of the robots' maps.
+        offsets = np.zeros((data.robots, 3))
+        offsets[:, :2] = data.env.perception.poses.offsets
+        trajectories = replace(data.trajectories, believed=data.trajectories.believed - offsets)
     return merge_figures(data.run.merges, data.settings.occupancy.resolution, trajectories)
 
 

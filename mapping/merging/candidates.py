@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from lidarium.mapping.geometry.rigid import Transform, halfway
 from lidarium.mapping.merging.agreement import Agreement, compare, is_rival, why_refused
 from lidarium.mapping.merging.alignment import Candidate, distinct, find_inliers
-from lidarium.mapping.merging.correlation import best_translations
+from lidarium.mapping.merging.bend.hypotheses import RIVAL_ANGLE, RIVAL_M
+from lidarium.mapping.merging.correlation import CorrelationSettings, best_translations
 from lidarium.mapping.merging.correspondence import Matches
 from lidarium.mapping.merging.described_map import DescribedMap
 from lidarium.mapping.merging.regions.proposals import propose_motions
@@ -114,6 +115,23 @@ def correlated(
     reach, samples = settings.alignment.refinement_reach_m, settings.alignment.wall_samples
     refined = (refine_on_walls(a, b, Transform(*transforms[k].tolist()), reach, samples) for k in chosen)
     return [judge(a, b, Candidate(transform, NO_INLIERS), settings) for transform in refined]
+
+
+BENDABLE = CorrelationSettings(cell_m=0.3, rotations=120, peaks=3)
+"""How all transforms of bent maps are tried: in cells as wide as bends are long, at rotations 3 degrees apart."""
+
+
+def bendable(a: DescribedMap, b: DescribedMap, settings: MergeSettings) -> list[Transform]:
+    """Return the best transforms of maps that are bent, the best first.
+
+    In fine cells, a bend keeps most walls from meeting.
+    """
+    angles = np.arange(BENDABLE.rotations) * (2.0 * math.pi / BENDABLE.rotations)
+    transforms, values = best_translations(a, b, angles, BENDABLE, RIVAL_M)
+    order = np.argsort(-values, kind="stable")
+    chosen = distinct(transforms, order, _middle(b), settings.bend.proposals, (RIVAL_M, RIVAL_ANGLE))
+    reach, samples = settings.bend.reach_m, settings.alignment.wall_samples
+    return [refine_on_walls(a, b, Transform(*transforms[k].tolist()), reach, samples) for k in chosen]
 
 
 def region_candidates(a: DescribedMap, b: DescribedMap, settings: MergeSettings) -> list[Judged]:

@@ -13,9 +13,18 @@ from numpy.typing import ArrayLike, NDArray
 from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.grids.occupancy import UNKNOWN
 from lidarium.mapping.merging.described_map import DescribedMap, check_resolution, resampled, three_levels_of
+from lidarium.mapping.merging.doubts import doubted
 from lidarium.mapping.merging.frame_tree import FrameTree
 from lidarium.mapping.merging.joining import Merged, joined_tree, pair_edge
-from lidarium.mapping.merging.pair import PairResult, described, explained, merge_near, merge_pair, verify_pair
+from lidarium.mapping.merging.pair import (
+    PairResult,
+    best_bent,
+    described,
+    explained,
+    merge_near,
+    merge_pair,
+    verify_pair,
+)
 from lidarium.mapping.merging.settings import TOLERANCES, MergeSettings
 
 
@@ -93,8 +102,10 @@ def merge_maps(
         a, b = features
         _check_guess(features[a], features[b], question.guess)
         pairs = {(a, b): merge_near(features[a], features[b], question.guess, settings)}
-    if question.is_explained:
-        pairs = {(a, b): explained(features[a], features[b], result, settings) for (a, b), result in pairs.items()}
+    if question.is_explained or question.is_forced:
+        for (a, b), result in pairs.items():
+            known = explained(features[a], features[b], result, settings)
+            pairs[a, b] = doubted(features[a], features[b], known, settings)
     if question.is_forced:
         pairs = {pair: _forced(result) for pair, result in pairs.items()}
     return Merged(levels, resolution, pairs, joined_tree(features, pairs, settings))
@@ -115,10 +126,10 @@ def _check_guess(a: DescribedMap, b: DescribedMap, guess: Transform) -> None:
 
 
 def _forced(result: PairResult) -> PairResult:
-    """Return a result that is accepted whatever speaks against it."""
+    """Return a refused result as its best hypothesis, which is accepted whatever speaks against it."""
     if result.is_accepted or result.a_from_b is None:
         return result
-    return replace(result, is_accepted=True, reason=f"forced against: {result.reason}")
+    return replace(best_bent(result), is_accepted=True, reason=f"forced against: {result.reason}")
 
 
 def _all_pairs(features: Mapping[str, DescribedMap], settings: MergeSettings) -> dict[tuple[str, str], PairResult]:

@@ -2,6 +2,7 @@
 
 import math
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
@@ -12,11 +13,19 @@ from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.grids.occupancy import OCCUPIED, UNKNOWN
 from lidarium.mapping.merging.agreement import Agreement, compare, disc_agreement, has_contradiction
 from lidarium.mapping.merging.alignment import Candidate, refine
-from lidarium.mapping.merging.bend.hypotheses import Hypothesis, confidence_of, ranked_hypotheses, signs_of
+from lidarium.mapping.merging.bend.hypotheses import (
+    Hypothesis,
+    confidence_of,
+    is_other,
+    ranked_hypotheses,
+    signs_of,
+    why_unsure,
+)
 from lidarium.mapping.merging.candidates import (
     NO_INLIERS,
     Judged,
     ambiguity,
+    bendable,
     beside,
     corner_candidates,
     correlated,
@@ -112,6 +121,9 @@ class PairResult:
         `explained`.
     confidence : float
         That the best of these is right, by a model of strangers.
+    doubt : str
+        Why an accepted pair may be wrong all the same, empty if nothing is known; only of pairs that are
+        `explained`.
     """
 
     is_accepted: bool
@@ -127,10 +139,19 @@ class PairResult:
     tried: tuple[Transform, ...] = ()
     ranked: tuple[Hypothesis, ...] = ()
     confidence: float = 0.0
+    doubt: str = ""
 
 
-def explained(a: DescribedMap, b: DescribedMap, result: PairResult, settings: MergeSettings) -> PairResult:
+def explained(
+    a: DescribedMap,
+    b: DescribedMap,
+    result: PairResult,
+    settings: MergeSettings,
+    proposals: Sequence[Transform] = (),
+) -> PairResult:
     """Return a result with its hypotheses ranked, and the confidence of the best.
+
+    If the maps are refused and the best hypothesis is of another place, the result becomes that hypothesis.
 
     Parameters
     ----------
@@ -140,26 +161,29 @@ def explained(a: DescribedMap, b: DescribedMap, result: PairResult, settings: Me
         Their results.
     settings : MergeSettings
         How much they may be bent.
+    proposals : sequence of Transform
+        Further transforms that are tried with a bend.
     """
     if result.ranked or not (len(a.walls) and len(b.walls)):
         return result
     found = () if result.a_from_b is None else (result.a_from_b,)
-    ranked = ranked_hypotheses(a, b, [*found, *result.tried], settings.bend)
-    return replace(result, ranked=tuple(ranked), confidence=confidence_of(signs_of(a, b, ranked)) if ranked else 0.0)
-
-
-def _or_bent(a: DescribedMap, b: DescribedMap, result: PairResult, settings: MergeSettings) -> PairResult:
-    """Return a refused result, or that of the maps bent if they agree then."""
-    if result.is_accepted or settings.confidence > 1.0 or settings.bend.candidates == 0:
+    ranked = ranked_hypotheses(a, b, [*found, *result.tried], settings.bend, proposals)
+    if not ranked:
         return result
-    known = explained(a, b, result, settings)
-    if not known.ranked or known.confidence < settings.confidence:
+    signs = signs_of(a, b, ranked)
+    known = replace(result, ranked=tuple(ranked), confidence=confidence_of(signs))
+    if result.is_accepted or result.a_from_b is None or not is_other(ranked[0], result.a_from_b):
         return known
-    best = known.ranked[0]
+    return replace(best_bent(known), reason=why_unsure(signs, settings.confidence))
+
+
+def best_bent(result: PairResult) -> PairResult:
+    """Return a result as its best hypothesis has it, if there is one."""
+    if not result.ranked:
+        return result
+    best = result.ranked[0]
     return replace(
-        known,
-        is_accepted=True,
-        reason="accepted",
+        result,
         a_from_b=best.bend.a_from_b,
         inliers=0,
         score=best.agreement.score,
@@ -167,6 +191,21 @@ def _or_bent(a: DescribedMap, b: DescribedMap, result: PairResult, settings: Mer
         found_by="bend",
         joined=(NO_POINTS, NO_POINTS),
     )
+
+
+def _or_bent(
+    a: DescribedMap, b: DescribedMap, result: PairResult, settings: MergeSettings, is_search: bool = False
+) -> PairResult:
+    """Return a refused result, or that of the maps bent if they agree then.
+
+    In a search, the transforms that a coarse one proposes are tried too.
+    """
+    if result.is_accepted or settings.confidence > 1.0 or settings.bend.candidates == 0:
+        return result
+    known = explained(a, b, result, settings, bendable(a, b, settings) if is_search else ())
+    if not known.ranked or known.confidence < settings.confidence:
+        return known
+    return replace(best_bent(known), is_accepted=True, reason="accepted")
 
 
 NO_WALLS = "too few corners: a map has no walls that border on free space"
@@ -341,7 +380,7 @@ def _merge_by_walls(a: DescribedMap, b: DescribedMap, matches: Matches, settings
         joined=joined,
         tried=tuple(one.candidate.a_from_b for one in judged),
     )
-    return _or_bent(a, b, result, settings)
+    return _or_bent(a, b, result, settings, is_search=True)
 
 
 class _Search(NamedTuple):

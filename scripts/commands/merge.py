@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from tyro.conf import Positional
 
-from lidarium.scripts.common import DONE, NO, Answer, Command, file_name, table
+from lidarium.scripts.common import DONE, DOUBTFUL, NO, Answer, Command, file_name, table
 from lidarium.scripts.transforms import PlacedMaps, transforms
 
 if TYPE_CHECKING:
@@ -109,8 +109,11 @@ def execute(command: _Merge) -> Answer:
     if command.mode == "default":
         confidence = TOLERANCES[command.tolerance]
         settings = replace(settings, confidence=confidence, structure=command.structure)
+    given = images
     merged, images, scale = _merged(command, images, settings)
     result = transforms(_placed(merged, images))
+    remarks = _remarks(merged) or _unlike_scale(command, merged, given, settings)
+    result["remarks"] = remarks
     second = result["maps"][list(images)[1]]
     if command.scale != "fixed" and second is not None:
         second["scale"] = round(scale, 5)
@@ -123,11 +126,32 @@ def execute(command: _Merge) -> Answer:
     if command.regions:
         files.append(draw_regions(merged, images, settings.regions, out))
     is_whole = len(merged.groups()) == 1
-    return Answer(
-        result,
-        _summary(merged, files, out, None if command.scale == "fixed" else scale),
-        DONE if is_whole else NO,
-    )
+    summary = _summary(merged, files, out, None if command.scale == "fixed" else scale)
+    code = NO if not is_whole else DOUBTFUL if remarks else DONE
+    return Answer(result, "\n".join([summary, *remarks]), code)
+
+
+def _remarks(merged: "Merged") -> list[str]:
+    """Return what makes the pairs doubtful that join the maps."""
+    pairs = [(edge.a, edge.b) for edge in merged.tree.edges]
+    found = {pair: merged.pairs[pair].doubt for pair in pairs if pair in merged.pairs}
+    return [f"doubtful: {a} and {b}: {doubt}" for (a, b), doubt in found.items() if doubt]
+
+
+def _unlike_scale(
+    command: _Merge, merged: "Merged", images: "dict[str, MapImage]", settings: "MergeSettings"
+) -> list[str]:
+    """Return at which scale two refused maps would be joined, if there is one."""
+    from lidarium.mapping.merging.bend.hypotheses import MAX_GROWTH
+    from lidarium.mapping.merging.scaling import ScaleSettings, merge_scaled
+
+    is_asked = command.scale == "fixed" and command.guess is None and command.mode == "default"
+    if not is_asked or len(images) != 2 or len(merged.groups()) == 1:
+        return []
+    found = merge_scaled(_grids(images), settings, ScaleSettings(least=0.8, most=1.25))
+    if len(found.merged.groups()) > 1 or abs(found.scale - 1.0) <= MAX_GROWTH:
+        return []
+    return [f"the scales are unlike: {list(images)[1]} would be joined if grown {found.scale:.3f} times (--scale auto)"]
 
 
 def _merged(
@@ -233,6 +257,8 @@ def _deformation(found: "Deformation | None") -> dict[str, float] | None:
 
 def _summary(merged: "Merged", files: list[str], out: Path, scale: float | None) -> str:
     """Return the printed text; ``scale`` is by how much the second map has grown, None if it may not."""
+    from lidarium.mapping.merging.bend.hypotheses import MAX_GROWTH
+
     lines = [f"joined: {', '.join(group)}" if len(group) > 1 else f"alone:  {group[0]}" for group in merged.groups()]
     dropped = {(edge.a, edge.b) for edge in merged.tree.dropped}
     rows = []
@@ -248,7 +274,10 @@ def _summary(merged: "Merged", files: list[str], out: Path, scale: float | None)
             if scale is not None:
                 reason += f", {b} grown {scale:.3f} times"
             if found.found_by == "bend":
-                reason += f", bent by {found.ranked[0].bend.bend_m:.2f} m"
+                bend = found.ranked[0].bend
+                reason += f", bent by {bend.bend_m:.2f} m"
+                if abs(bend.scale - 1.0) > MAX_GROWTH:
+                    reason += f", of which the scale {bend.scale:.3f} explains {100.0 * bend.growth_share:.0f} %"
         else:
             reason = f"refused: {found.reason}"
         rows.append((a, b, reason))

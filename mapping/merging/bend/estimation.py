@@ -208,6 +208,9 @@ class BendSettings:
     candidates : int
         Number of transforms that are tried with a bend if none is believed without; 0 for maps that are
         not bent.
+    proposals : int
+        Number of transforms of a coarse search over all rotations and translations that are tried beside
+        these.
     """
 
     spacing_m: Distance = 3.0
@@ -218,6 +221,7 @@ class BendSettings:
     rounds: Count = 6
     samples: Count = 1500
     candidates: Annotated[int, within(0, 1000)] = 16
+    proposals: Annotated[int, within(0, 1000)] = 6
 
     def __post_init__(self) -> None:
         check_settings(self, "bend")
@@ -243,6 +247,8 @@ class Bend:
         By how much map b would have to grow to fit best.
     covariance : (3, 3) float64
         Of x, y [m2] and theta [rad2] of the motion, about the middle of the walls that agree.
+    growth_m : float
+        Root mean square of what the scale explains of the offsets [m].
     """
 
     a_from_b: Transform
@@ -252,11 +258,17 @@ class Bend:
     spread_m: float
     scale: float
     covariance: NDArray[np.float64]
+    growth_m: float = 0.0
 
     @property
     def is_held(self) -> bool:
         """Whether walls hold the maps on each other at all."""
         return bool(np.isfinite(self.covariance).all())
+
+    @property
+    def growth_share(self) -> float:
+        """Share of the squared offsets that the scale explains, from 0 to 1."""
+        return min((self.growth_m / self.bend_m) ** 2, 1.0) if self.bend_m > 0.0 else 0.0
 
 
 def estimate_bend(a: DescribedMap, b: DescribedMap, a_from_b: Transform, settings: BendSettings) -> Bend:
@@ -342,7 +354,8 @@ def _described(
     spread = math.sqrt(0.5 * math.pi) * float(np.abs(gaps[found]).mean())
     variance = spread**2 + bend_m**2 + MIN_SPREAD_M**2
     covariance = _covariance(target - target.mean(axis=0), normals[found], variance, wall_m)
-    return Bend(nearest, rest, bend_m, strain, spread, scale, covariance)
+    growth_m = abs(scale - 1.0) * float(np.sqrt(((held - held.mean(axis=0)) ** 2).sum(axis=1).mean()))
+    return Bend(nearest, rest, bend_m, strain, spread, scale, covariance, growth_m)
 
 
 def _nearest_motion(points: NDArray[np.float64], target: NDArray[np.float64]) -> tuple[Transform, float]:

@@ -5,6 +5,7 @@ real buildings; see the reference on merging for which, and for those kept for t
 """
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -58,8 +59,15 @@ LOOSE = ValidationSettings(hit_distance_m=0.3, miss_distance_m=0.6)
 MIN_OVERLAP_M2, MIN_EVIDENCE_M, MAX_RIVAL_SHARE = 15.0, 4.0, 0.6
 """Overlap of a room, which is like others [m2], least evidence [m], and most that a rival may have."""
 
-MAX_STRAIN = 0.05
-"""Most that a map is stretched against another of the same place."""
+MAX_STRAIN, MAX_STRAIN_OF_ROOMS = 0.05, 0.035
+"""Most that a map is stretched against another of the same place, and if both know a few rooms alone: maps drift
+on their way, and rooms of strangers bend until they fit."""
+
+MAX_GROWTH, UNLIKE_SHARE = 0.015, 0.8
+"""Growth that drift explains, and share of the bend from which on a larger one is of the scales."""
+
+MAX_GROWTH_M = 0.25
+"""Most that a growth may move walls in the root mean square [m]: those at the far end move about twice as much."""
 
 SHARP_SPREAD_M, FEW_ROOMS_M2, SHARP_QUALITY = 0.035, 60.0, 0.9
 """Spread of gaps of sharp maps [m], overlap of a few rooms [m2], and their least quality."""
@@ -97,13 +105,30 @@ class Hypothesis(NamedTuple):
 
 
 def ranked_hypotheses(
-    a: DescribedMap, b: DescribedMap, transforms: list[Transform], settings: BendSettings
+    a: DescribedMap,
+    b: DescribedMap,
+    transforms: Sequence[Transform],
+    settings: BendSettings,
+    proposals: Sequence[Transform] = (),
 ) -> list[Hypothesis]:
-    """Return the most promising transforms with the bend under each, that with most evidence first."""
+    """Return the most promising transforms and all proposals with the bend under each, one of each place.
+
+    That with most evidence is first.
+    """
     loose = [compare(a, b, transform, LOOSE).evidence_m for transform in transforms]
     order = np.argsort(-np.array(loose), kind="stable")[: settings.candidates].tolist()
-    found = [_bent(a, b, transforms[k], settings) for k in order]
-    return sorted(found, key=lambda one: -one.evidence_m)
+    found = [_bent(a, b, transform, settings) for transform in [*(transforms[k] for k in order), *proposals]]
+    kept: list[Hypothesis] = []
+    for one in sorted(found, key=lambda one: -one.evidence_m):
+        if all(is_other(other, one) for other in kept):
+            kept.append(one)
+    if not kept:
+        return []
+    # Springs hold a map near the motion that it was bent from, so that an error of this one is bent into it:
+    # of one place, what is stretched too far may be so by a bad start alone.
+    again = _bent(a, b, kept[0].bend.a_from_b, settings)
+    place = [one for one in [*found, again] if not is_other(kept[0], one)]
+    return [max(place, key=lambda one: (one.bend.strain <= MAX_STRAIN, one.evidence_m)), *kept[1:]]
 
 
 def _bent(a: DescribedMap, b: DescribedMap, a_from_b: Transform, settings: BendSettings) -> Hypothesis:
@@ -111,9 +136,10 @@ def _bent(a: DescribedMap, b: DescribedMap, a_from_b: Transform, settings: BendS
     return Hypothesis(bend, compare_bent(a, b, bend))
 
 
-def _is_other(one: Hypothesis, other: Hypothesis) -> bool:
-    """Whether two hypotheses are of different places."""
-    distance, angle = one.bend.a_from_b.difference(other.bend.a_from_b, one.agreement.centre)
+def is_other(one: Hypothesis, other: Hypothesis | Transform) -> bool:
+    """Whether two hypotheses, or one and a rigid motion, are of different places."""
+    transform = other if isinstance(other, Transform) else other.bend.a_from_b
+    distance, angle = one.bend.a_from_b.difference(transform, one.agreement.centre)
     return distance > RIVAL_M or angle > RIVAL_ANGLE
 
 
@@ -146,6 +172,9 @@ class _Signs(NamedTuple):
         By how much of the distance one map is stretched or sheared against the other.
     spread_m : float
         Spread of the gaps between walls that the bend leaves [m].
+    scale, growth_share, growth_m : float
+        By how much the second map would have to grow, share of the bend that this explains, and how much
+        that is [m].
     """
 
     evidence_m: float
@@ -157,13 +186,16 @@ class _Signs(NamedTuple):
     contradicting_m: float
     strain: float
     spread_m: float
+    scale: float = 1.0
+    growth_share: float = 0.0
+    growth_m: float = 0.0
 
 
 def signs_of(a: DescribedMap, b: DescribedMap, ranked: list[Hypothesis]) -> _Signs:
     """Return the features that distinguish the best of ranked hypotheses from chance."""
     best = ranked[0]
     evidence = max(best.evidence_m, 0.0)
-    rival = next((one.evidence_m for one in ranked[1:] if _is_other(best, one)), 0.0)
+    rival = next((one.evidence_m for one in ranked[1:] if is_other(best, one)), 0.0)
     return _Signs(
         evidence,
         evidence / max(best.agreement.agreeing_m, 1e-9),
@@ -174,7 +206,15 @@ def signs_of(a: DescribedMap, b: DescribedMap, ranked: list[Hypothesis]) -> _Sig
         best.agreement.contradicting_m,
         best.bend.strain,
         best.bend.spread_m,
+        best.bend.scale,
+        best.bend.growth_share,
+        best.bend.growth_m,
     )
+
+
+def has_unlike_scale(scale: float, growth_share: float) -> bool:
+    """Return whether maps differ by their scale, not by drift: this bends a map in more ways than one."""
+    return abs(scale - 1.0) > MAX_GROWTH and growth_share > UNLIKE_SHARE
 
 
 def confidence_of(signs: _Signs) -> float:
@@ -184,14 +224,7 @@ def confidence_of(signs: _Signs) -> float:
     nearly as well, if one map would have to be stretched more than robots' maps are, and if much
     differs between sharp maps of a few rooms: in these, only furniture may.
     """
-    is_sharp = signs.spread_m < SHARP_SPREAD_M and signs.overlap_m2 < FEW_ROOMS_M2
-    if (
-        signs.overlap_m2 < MIN_OVERLAP_M2
-        or signs.evidence_m < MIN_EVIDENCE_M
-        or signs.rival_share > MAX_RIVAL_SHARE
-        or signs.strain > MAX_STRAIN
-        or (is_sharp and signs.quality < SHARP_QUALITY)
-    ):
+    if _objection(signs) is not None:
         return 0.0
     known = (
         1.0,
@@ -205,3 +238,36 @@ def confidence_of(signs: _Signs) -> float:
     )
     total = sum(weight * value for weight, value in zip(WEIGHTS, known, strict=True))
     return 1.0 / (1.0 + math.exp(-min(max(total, -50.0), 50.0)))
+
+
+def why_unsure(signs: _Signs, wanted: float) -> str:
+    """Return why bent maps are refused; ``wanted`` is the confidence from which they are joined."""
+    objection = _objection(signs)
+    if objection is not None:
+        return objection
+    confidence = confidence_of(signs)
+    if confidence < wanted <= 1.0:
+        return f"contradiction: the confidence is {confidence:.2f}, want {wanted:g}"
+    return "contradiction: the maps agree only once they are bent"
+
+
+def _objection(signs: _Signs) -> str | None:
+    """Return what excludes a hypothesis whatever else speaks for it, None if nothing does."""
+    if signs.rival_share > MAX_RIVAL_SHARE:
+        percent, most = 100.0 * signs.rival_share, 100.0 * MAX_RIVAL_SHARE
+        return f"ambiguous: another place explains {percent:.0f} % as much, at most {most:.0f} % may"
+    if signs.overlap_m2 < MIN_OVERLAP_M2:
+        return f"small overlap: {signs.overlap_m2:.1f} m2 known in both once they are bent, want {MIN_OVERLAP_M2:g}"
+    if signs.evidence_m < MIN_EVIDENCE_M:
+        return f"small overlap: {signs.evidence_m:.1f} m of walls speak for it, want {MIN_EVIDENCE_M:g}"
+    if has_unlike_scale(signs.scale, signs.growth_share) and signs.growth_m > MAX_GROWTH_M:
+        return f"unlike scales: the second map would have to grow about {signs.scale:.3f} times"
+    most_strain = MAX_STRAIN if signs.overlap_m2 >= FEW_ROOMS_M2 else MAX_STRAIN_OF_ROOMS
+    if signs.strain > most_strain:
+        percent, most = 100.0 * signs.strain, 100.0 * most_strain
+        return f"contradiction: one map would be stretched by {percent:.1f} %, want at most {most:g} %"
+    is_sharp = signs.spread_m < SHARP_SPREAD_M and signs.overlap_m2 < FEW_ROOMS_M2
+    if is_sharp and signs.quality < SHARP_QUALITY:
+        percent, least = 100.0 * signs.quality, 100.0 * SHARP_QUALITY
+        return f"contradiction: {percent:.0f} % of the walls of sharp maps speak for it, want {least:.0f} %"
+    return None

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import lidarium
+from lidarium.envs.faces.merged_maps import MergingSettings
 from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.settings.making import make_settings
 from lidarium.evaluation.episodes.events import in_floor_frame
@@ -78,6 +79,17 @@ def watched(on_decision=None, **options):
     env = WatchedExploration("apartment", settings, watchers=[history])
     episode = run_episode(lidarium.policy("nearest_frontier"), env, 0, on_decision=on_decision, raise_interrupt=False)
     return episode, history, result_of(episode, history=history)
+
+
+@pytest.mark.parametrize("known_starts", [True, False])
+def test_merges_by_given_frames_are_right_whichever_frame_poses_are_believed_in(known_starts):
+    history, merging = History(), MergingSettings(known_starts=True)
+    settings = make_settings(robots=2, resolution=0.05, horizon_s=3.0, known_starts=known_starts)
+    env = WatchedExploration("apartment", settings, watchers=[history])
+    episode = run_episode(lidarium.policy("nearest_frontier"), env, 0, merging=merging)
+    merges = result_of(episode, history=history)["merges"]
+    assert (merges["accepted"], merges["wrong"]) == (1, 0)
+    assert merges["worst_here_m"] == pytest.approx(0.0, abs=1e-6)
 
 
 def test_a_result_has_the_keys_of_the_design_and_is_json():

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from lidarium.mapping.files.map_files import FREE, OCCUPIED, UNKNOWN
 from lidarium.mapping.geometry.rigid import Transform
+from lidarium.mapping.merging.candidates import bendable
 from lidarium.mapping.merging.described_map import describe_map
 from lidarium.mapping.merging.pair import PairResult, _exact_motion, _or_bent, described, explained, merge_pair
 from lidarium.mapping.merging.settings import TOLERANCES, MergeSettings, merge_settings
@@ -293,6 +294,28 @@ def test_what_was_tried_is_ranked_with_the_best_first(maps):
     assert known.confidence > 0.9
     assert (known.is_accepted, known.a_from_b) == (False, REFUSED.a_from_b)
     assert explained(*maps, known, SETTINGS) is known
+
+
+def test_a_refused_pair_is_told_as_its_best_hypothesis(maps):
+    """Pose, agreement, reason and confidence are of one hypothesis, whichever transform was refused at first."""
+    elsewhere = replace(REFUSED, a_from_b=Transform(3.0, 1.0, 0.4), inliers=5, tried=(Transform(0.05, 0.05, 0.0),))
+    known = explained(*maps, elsewhere, replace(SETTINGS, confidence=2.0))
+    assert known.ranked[0].bend.a_from_b.difference(Transform(), (5.0, 4.0))[0] < 0.3
+    assert (known.is_accepted, known.a_from_b) == (False, known.ranked[0].bend.a_from_b)
+    assert known.agreement is known.ranked[0].agreement
+    assert (known.score, known.inliers) == (known.agreement.score, 0)
+    assert known.reason == "contradiction: the maps agree only once they are bent"
+
+
+def test_bent_maps_are_found_by_a_coarse_search():
+    truth = about_middle(2.1, hall())
+    a, b = describe_map(moved(hall(), truth), RESOLUTION), describe_map(bowed(hall(), 0.5), RESOLUTION)
+    found = bendable(a, b, SETTINGS)
+    assert len(found) == SETTINGS.bend.proposals
+    distance, angle = found[0].difference(truth, b.walls.mean(axis=0))
+    assert distance < 0.6
+    assert angle < math.radians(3.0)
+    assert bendable(a, b, replace(SETTINGS, bend=replace(SETTINGS.bend, proposals=1))) == found[:1]
 
 
 def test_maps_without_walls_are_explained_by_nothing(maps):

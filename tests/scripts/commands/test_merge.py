@@ -233,6 +233,29 @@ def test_a_refused_pair_is_joined_by_a_guess_or_by_force(maps, elsewhere, tmp_pa
     assert pair["reason"].startswith("forced against: ")
 
 
+def test_maps_of_unlike_scale_are_refused_with_the_scale(shared_cases, tmp_path, capsys):
+    folder, out = shared_cases / "maps-of-unlike-scale", str(tmp_path / "out")
+    for percent, wanted in ((3, 0.971), (10, 0.909)):
+        paths = [str(folder / "first.yaml"), str(folder / f"second_{percent}.yaml")]
+        assert main(["merge", *paths, "--json", "--out", out]) == 3
+        (remark,) = json.loads(capsys.readouterr().out)["remarks"]
+        assert float(remark.split(" times")[0].split()[-1]) == pytest.approx(wanted, abs=0.005)
+
+
+def test_a_symmetric_place_is_joined_and_doubtful(tmp_path, capsys):
+    levels = room(room(blank(240, 240), 20, 20, 90, 190), 106, 90, 100, 50)
+    levels[104:112, 100:130] = FREE
+    turned = moved(levels, about_middle(0.4, levels))
+    paths = [
+        str(write_ros_map(tmp_path / "in", name, grid, (0.0, 0.0, 0.0), RESOLUTION))
+        for name, grid in (("one", levels), ("other", turned))
+    ]
+    assert main(["merge", *paths, "--out", str(tmp_path / "out")]) == 4
+    assert "doubtful: one and other: the place is symmetric or a map is mirrored" in capsys.readouterr().out
+    (remark,) = json.loads((tmp_path / "out" / "transforms.json").read_text())["remarks"]
+    assert remark.startswith("doubtful: one and other")
+
+
 @pytest.mark.parametrize(
     ("guess", "word"),
     [

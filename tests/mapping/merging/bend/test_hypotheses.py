@@ -20,8 +20,10 @@ from lidarium.mapping.merging.bend.hypotheses import (
     _tolerance,
     compare_bent,
     confidence_of,
+    is_other,
     ranked_hypotheses,
     signs_of,
+    why_unsure,
 )
 from lidarium.mapping.merging.described_map import describe_map
 from lidarium.mapping.merging.pair import described, merge_pair
@@ -40,6 +42,53 @@ def test_the_best_hypothesis_leads_and_others_are_told():
     assert signs.rival_share < 0.3
     assert signs.overlap_m2 > 80.0
     assert ranked_hypotheses(a, b, [wrong, Transform()], BendSettings(candidates=1))[0].evidence_m > 20.0
+
+
+def test_hypotheses_are_of_different_places():
+    a, b = (describe_map(levels, RESOLUTION) for levels in (hall(), bowed(hall(), 0.2)))
+    starts = [Transform(), Transform(0.1, 0.0, 0.01), Transform(0.0, 0.2, 0.0), Transform(3.0, 1.0, 0.4)]
+    ranked = ranked_hypotheses(a, b, starts[:3], BendSettings(), starts[3:])
+    assert len(ranked) == 2
+    assert is_other(*ranked)
+    assert not is_other(ranked[0], Transform())
+    assert ranked_hypotheses(a, b, [], BendSettings()) == []
+
+
+@pytest.mark.parametrize(
+    ("changed", "reason"),
+    [
+        ({"rival_share": 0.7}, "ambiguous: another place explains 70 % as much"),
+        ({"overlap_m2": 12.0}, "small overlap: 12.0 m2"),
+        ({"evidence_m": 3.0}, "small overlap: 3.0 m of walls"),
+        (
+            {"scale": 0.97, "growth_share": 0.9, "growth_m": 0.3},
+            "unlike scales: the second map would have to grow about 0.970 times",
+        ),
+        ({"strain": 0.06}, "contradiction: one map would be stretched by 6.0 %, want at most 5 %"),
+        (
+            {"strain": 0.04, "overlap_m2": 20.0},
+            "contradiction: one map would be stretched by 4.0 %, want at most 3.5 %",
+        ),
+        ({"spread_m": 0.02, "overlap_m2": 20.0}, "contradiction: 85 % of the walls of sharp maps"),
+    ],
+)
+def test_what_excludes_a_hypothesis_is_its_reason(changed, reason):
+    signs = PLAIN._replace(**changed)
+    assert confidence_of(signs) == 0.0
+    assert why_unsure(signs, 0.8).startswith(reason)
+
+
+def test_a_hypothesis_that_nothing_excludes_is_refused_by_its_confidence():
+    doubtful = PLAIN._replace(quality=0.3, contradicting_m=40.0, evidence_m=8.0)
+    assert 0.0 < confidence_of(doubtful) < 0.8
+    assert why_unsure(doubtful, 0.8) == f"contradiction: the confidence is {confidence_of(doubtful):.2f}, want 0.8"
+    assert why_unsure(PLAIN, 2.0) == "contradiction: the maps agree only once they are bent"
+
+
+def test_drift_that_also_grows_a_map_is_no_other_scale():
+    for scale, share, growth_m in ((1.034, 0.73, 0.3), (1.01, 1.0, 0.3), (1.025, 0.9, 0.15)):
+        grown = PLAIN._replace(scale=scale, growth_share=share, growth_m=growth_m)
+        assert confidence_of(grown) == confidence_of(PLAIN)
 
 
 @pytest.mark.parametrize(
