@@ -242,6 +242,8 @@ def test_facts_name_what_was_assumed():
         "name": "hall",
         "size_m": (4.0, 2.5),
         "area_m2": 9.87,
+        "reachable_m2": 9.5,
+        "whole_m2": 12.0,
         "rooms": 1,
         "loops": 0,
         "clutter": 0.125,
@@ -253,6 +255,7 @@ def test_facts_name_what_was_assumed():
     assert text.startswith("hall\n")
     assert "4 x 2.5 m" in text
     assert "12.5 %" in text
+    assert "9.5 m2 of 12.0 m2" in text
     assert "none, cells of an image" in text
     assert "note" not in text
     assert "scale was assumed" in floor_description({**result, "remark": "scale was assumed"}, None, [], "a hall")
