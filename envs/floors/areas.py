@@ -44,7 +44,8 @@ def floor_of_area(
     count, *found, _ = cv2.connectedComponentsWithStats(free.astype(np.uint8), connectivity=4, ltype=cv2.CV_32S)
     labels, statistics = (np.asarray(each) for each in found)
     statistics[0] = 0
-    label, outside, remark = (int(labels[seed_cell]), 0, "") if seed_cell is not None else _chosen(labels, statistics)
+    along = _border_shares(labels, len(statistics))
+    label, remark = (int(labels[seed_cell]), "") if seed_cell is not None else _chosen(labels, statistics, along)
     if label == 0:
         raise ValueError(f"{name} has its start in a wall; want it in free space")
     left, bottom, width, height = (int(value) for value in statistics[label, :4])
@@ -56,7 +57,8 @@ def floor_of_area(
     has_others = others.max(initial=0) * resolution**2 >= MIN_OTHER_M2
     areas = Raster((~free).astype(np.uint8), origin, resolution) if has_others else None
     proposed = np.zeros((0, 3)) if starts is None else starts
-    statistics[[label, outside]] = 0
+    statistics[label] = 0
+    statistics[along >= OUTSIDE_BORDER] = 0
     rest = statistics[:, cv2.CC_STAT_AREA] * resolution**2
     remarks = [each for each in (remark, left_out(rest)) if each]
     return Floor(
@@ -97,18 +99,22 @@ def around(floor: Floor, places: NDArray[np.float64]) -> Floor:
     return floor_of_area(floor.name, areas.solid == 0, areas.origin, areas.resolution, (row, column), floor.starts)
 
 
-def _chosen(labels: NDArray[Any], statistics: NDArray[Any]) -> tuple[int, int, str]:
-    """Return the numbers of the area that is the floor and of the one outside (or 0), and a remark on it."""
-    largest = int(np.argmax(statistics[:, cv2.CC_STAT_AREA]))
+def _border_shares(labels: NDArray[Any], count: int) -> NDArray[np.float64]:
+    """Return the share of the picture's border that each area has."""
     border = np.concatenate([labels[0], labels[-1], labels[1:-1, 0], labels[1:-1, -1]])
-    along = np.bincount(border, minlength=len(statistics)) / len(border)
+    return np.asarray(np.bincount(border, minlength=count) / len(border))
+
+
+def _chosen(labels: NDArray[Any], statistics: NDArray[Any], along: NDArray[np.float64]) -> tuple[int, str]:
+    """Return the number of the area that is the floor, and a remark on it."""
+    largest = int(np.argmax(statistics[:, cv2.CC_STAT_AREA]))
     if along[largest] < OUTSIDE_BORDER:
-        return largest, 0, ""
+        return largest, ""
     enclosed = np.where(along > 0.0, 0, statistics[:, cv2.CC_STAT_WIDTH] * statistics[:, cv2.CC_STAT_HEIGHT])
     widest = int(np.argmax(enclosed))
     surrounded = labels != largest
     rows, columns = np.flatnonzero(surrounded.any(axis=1)), np.flatnonzero(surrounded.any(axis=0))
     span = (rows[-1] - rows[0] + 1) * (columns[-1] - columns[0] + 1) if len(rows) else 1
     if enclosed[widest] >= BUILDING_SHARE * span:
-        return widest, largest, "the free space along the picture's border was taken for outside"
-    return largest, 0, "the free space reaches the picture's border"
+        return widest, "the free space along the picture's border was taken for outside"
+    return largest, "the free space reaches the picture's border"

@@ -236,15 +236,17 @@ def load(path: Path, resolution: float | None, *, layers: Sequence[str] = ()) ->
         raise ValueError(f"{path} has no lines {where}; want a plan of {', '.join(sorted(KINDS))}")
     if not np.isfinite(segments).all():
         raise ValueError(f"{path} has lines that lead nowhere; want finite coordinates")
-    floor = floor_of_lines(path, segments, np.zeros((0, 4)))
-    x_min, y_min, x_max, y_max = floor.bounds
-    if resolution is None and not _MIN_SIDE_M <= max(x_max - x_min, y_max - y_min) <= _MAX_SIDE_M:
-        remark = (
-            f"by the unit of its header, {scale:g} m, the drawing is {x_max - x_min:.3g} x {y_max - y_min:.3g} m; "
-            "if that is wrong, give --resolution, the metres of a unit"
-        )
-        return replace(floor, remark=remark)
-    return floor
+    wide, high = np.ptp(segments.reshape(-1, 2), axis=0).tolist()
+    if resolution is not None or _MIN_SIDE_M <= max(wide, high) <= _MAX_SIDE_M:
+        return floor_of_lines(path, segments, np.zeros((0, 4)))
+    remark = (
+        f"by the unit of its header, {scale:g} m, the drawing is {wide:,.0f} x {high:,.0f} m; "
+        "if that is wrong, give --resolution, the metres of a unit"
+    )
+    try:
+        return replace(floor_of_lines(path, segments, np.zeros((0, 4))), remark=remark)
+    except ValueError as error:
+        raise ValueError(f"{error}; {remark}") from error
 
 
 def _limited(path: Path, lines: Iterable[NDArray[np.float64]], maximum: int) -> Iterator[NDArray[np.float64]]:

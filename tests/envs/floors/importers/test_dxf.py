@@ -185,7 +185,8 @@ def test_a_drawing_without_a_unit_needs_a_resolution(drawing, tmp_path):
 def test_the_size_by_a_unit_that_is_hardly_meant_is_told(drawing, tmp_path, shared_cases):
     assert load_file(saved(drawing, tmp_path)).remark == ""
     drawing.header["$INSUNITS"] = 2
-    assert "is 1.83e+03 x 1.22e+03 m; if that is wrong, give" in load_file(saved(drawing, tmp_path)).remark
+    with pytest.raises(ValueError, match=r"the drawing is 1,829 x 1,219 m; if that is wrong, give --resolution"):
+        load_file(saved(drawing, tmp_path))
     hall = shared_cases / "dxf-unit-not-of-the-drawing" / "hall_mm.dxf"
     assert "the drawing is 254 x 203 m" in load_file(hall).remark
     described = describe_floor(load_file(hall, 0.001))
