@@ -72,7 +72,7 @@ def floor_of_area(
     )
 
 
-def left_out(areas_m2: NDArray[np.float64]) -> str:
+def left_out(areas_m2: NDArray[np.floating]) -> str:
     """Return a remark on areas that are free, but not connected with the floor (n,) [m2]; empty if they are small."""
     large = areas_m2[areas_m2 >= MIN_OTHER_M2]
     if not len(large):

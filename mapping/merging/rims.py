@@ -32,20 +32,24 @@ def without_rims(levels: NDArray[np.uint8], resolution: float) -> NDArray[np.uin
         return levels
     for _ in range(steps):
         # Free space grows along the axes, so that it does not pass through walls that are drawn aslant.
-        grown.append(grown[-1] | (cv2.dilate(grown[-1], _CROSS) & unknown))
+        grown.append(grown[-1] | (_grown(grown[-1]) & unknown))
     counts = [_bordering(occupied, free) for free in grown]
     if counts[0] >= FEW * counts[-1]:
         return levels
     width = next(k for k, count in enumerate(counts) if count >= 0.9 * counts[-1])
-    near = unknown & cv2.dilate(occupied, np.ones((2 * width + 1, 2 * width + 1), np.uint8))
+    near = unknown & np.asarray(cv2.dilate(occupied, np.ones((2 * width + 1,) * 2, np.uint8)), np.uint8)
     free = grown[0]
     for _ in range(2 * width):  # corners are twice as far along the axes
-        free = free | (cv2.dilate(free, _CROSS) & near)
+        free = free | (_grown(free) & near)
     filled = levels.copy()
     filled[free != 0] = FREE
     return filled
 
 
+def _grown(cells: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    return np.asarray(cv2.dilate(cells, _CROSS), np.uint8)
+
+
 def _bordering(occupied: NDArray[np.uint8], free: NDArray[np.uint8]) -> int:
     """Return the number of occupied cells beside free ones."""
-    return int(np.count_nonzero(occupied & cv2.dilate(free, _CROSS)))
+    return int(np.count_nonzero(occupied & _grown(free)))

@@ -51,7 +51,8 @@ def _parse_obj(content: bytes) -> Content:
 
 def _parse_xyz(content: bytes) -> Content:
     """Return the points of lines of x, y and z, apart by blanks, commas or semicolons."""
-    content, remarks = content.replace(b"//", b"#").replace(b";", b" "), ()
+    content = content.replace(b"//", b"#").replace(b";", b" ")
+    remarks: tuple[str, ...] = ()
     if b"," in content:
         lines = [line.split(b"#")[0] for line in content.splitlines() if line.strip() and line.lstrip()[:1] != b"#"]
         words = [line.split() for line in lines[:_CHECKED_LINES]]
@@ -369,8 +370,8 @@ def _cloud_of(content: Content, scale: float | None, source: str) -> PointCloud:
         is_zero = (points == 0.0).all(axis=1)
         if 1 < (zeros := int(np.count_nonzero(is_zero))) < len(points):
             remarks.append(f"{zeros:,} points at the origin are left out, as sensors write them for no return")
-            points, weights, normals = (None if each is None else each[~is_zero] for each in (points, weights, normals))
-            assert points is not None
+            points = points[~is_zero]
+            weights, normals = (None if each is None else each[~is_zero] for each in (weights, normals))
     offset = _whole_offset(points)
     if offset.any():
         remarks.append(

@@ -163,10 +163,10 @@ def _find_lists(body: Array, start: int, sizes: Array, wanted: int, is_little: b
                     shift = 8 * (byte if is_little else sizes[k, 1] - 1 - byte)
                     length |= int(body[place + byte]) << shift
                 place += sizes[k, 1]
+            if length < 0 or length > len(body):
+                return False
             if k == wanted:
                 found[i, 0], found[i, 1] = place, length
-            if length > len(body):
-                return False
             place += length * sizes[k, 0]
             if place > len(body):
                 return False
@@ -209,7 +209,7 @@ def _with_property(element: _Element, words: list[str]) -> _Element:
     if words[1] != "list" and words[1] not in _PLY_TYPES:
         raise ValueError(f"its header has a property of type {words[1]}, which PLY has not")
     counts, kind = ("", words[1]) if words[1] != "list" else (words[2], words[-2])
-    if kind not in _PLY_TYPES or counts not in ("", *_PLY_TYPES):
+    if kind not in _PLY_TYPES or _PLY_TYPES.get(counts, "f" if counts else "u")[0] == "f":
         raise ValueError(f"its header has a list of {counts} and {kind}, which PLY has not")
     described = (words[-1], _PLY_TYPES[kind], _PLY_TYPES[counts] if counts else "")
     return _Element(element.name, element.count, (*element.properties, described))

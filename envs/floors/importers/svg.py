@@ -440,4 +440,4 @@ def _placed(use: Element, used: Element) -> NDArray[np.float64]:
     scale = min(wide / box[2], high / box[3])
     # The middle of the view box is in the middle of the size.
     shift_x, shift_y = 0.5 * wide - scale * (box[0] + 0.5 * box[2]), 0.5 * high - scale * (box[1] + 0.5 * box[3])
-    return matrix @ np.array([[scale, 0.0, shift_x], [0.0, scale, shift_y], [0.0, 0.0, 1.0]])
+    return np.asarray(matrix @ np.array([[scale, 0.0, shift_x], [0.0, scale, shift_y], [0.0, 0.0, 1.0]]), np.float64)

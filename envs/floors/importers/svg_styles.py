@@ -18,8 +18,9 @@ _COMBINED = re.compile(r"\s*(>)\s*|\s+")
 
 Declarations = dict[str, str]
 
-_Compound = tuple[str, frozenset[str]]
-"""Name of an element or ``*``, and the classes (``.a``) and the id (``#a``) that it has to have."""
+_Part = tuple[str, frozenset[str], bool]
+"""Part of a selector: name of an element or ``*``, the classes (``.a``) and the id (``#a``) that it has to have, and
+whether it is directly in the element of the part before."""
 
 
 def declared(text: str) -> Declarations:
@@ -46,7 +47,7 @@ class StyleSheet:
         text = _OTHER_MEDIA.sub("", re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL))
         self.unread = 0
         # By what their last part has to have, so that few are compared with an element.
-        self._rules: dict[str, list[tuple[tuple[int, int, int, int], list[_Compound | str], Declarations]]] = {}
+        self._rules: dict[str, list[tuple[tuple[int, int, int, int], list[_Part], Declarations]]] = {}
         for order, (selectors, body) in enumerate(_RULES.findall(text)):
             found = declared(body)
             for selector in selectors.split(","):
@@ -54,7 +55,7 @@ class StyleSheet:
                 if parts is None:
                     self.unread += not selector.strip().startswith("@")
                     continue
-                name, wanted = parts[-1]
+                name, wanted, _ = parts[-1]
                 self._rules.setdefault(min(wanted, default=name), []).append((_rank(parts, order), parts, found))
 
     @property
@@ -76,33 +77,30 @@ class StyleSheet:
         return merged
 
 
-def _parsed(selector: str) -> "list[_Compound | str] | None":
-    """Return the parts of a selector, with ``>`` between a parent and its child; None if it is not understood."""
-    parts: list[_Compound | str] = []
-    place = 0
+def _parsed(selector: str) -> list[_Part] | None:
+    """Return the parts of a selector; None if it is not understood."""
+    parts: list[_Part] = []
+    place, is_child = 0, False
     while place < len(selector):
         found = _COMPOUND.match(selector, place)
         if found is None or not found[0]:
             return None
-        parts.append((found[1] or "*", frozenset(_SIMPLE.findall(found[2]))))
+        parts.append((found[1] or "*", frozenset(_SIMPLE.findall(found[2])), is_child))
         place = found.end()
         if place == len(selector):
             return parts
         between = _COMBINED.match(selector, place)
         if between is None:
             return None
-        if between[1]:
-            parts.append(">")
-        place = between.end()
+        place, is_child = between.end(), between[1] is not None
     return None
 
 
-def _rank(parts: "list[_Compound | str]", order: int) -> tuple[int, int, int, int]:
+def _rank(parts: list[_Part], order: int) -> tuple[int, int, int, int]:
     """Return how specific a selector is: ids, classes, names, and its place."""
-    compounds = [part for part in parts if not isinstance(part, str)]
-    wanted = [each for _, features in compounds for each in features]
+    wanted = [each for _, features, _ in parts for each in features]
     ids = sum(each.startswith("#") for each in wanted)
-    return ids, len(wanted) - ids, sum(name != "*" for name, _ in compounds), order
+    return ids, len(wanted) - ids, sum(name != "*" for name, *_ in parts), order
 
 
 def _features(element: Element) -> tuple[str, ...]:
@@ -112,19 +110,17 @@ def _features(element: Element) -> tuple[str, ...]:
     return (name, *classes, *([f"#{element.get('id')}"] if element.get("id") else []))
 
 
-def _matches(parts: "list[_Compound | str]", path: tuple[Element, ...]) -> bool:
+def _matches(parts: list[_Part], path: tuple[Element, ...]) -> bool:
     """Return whether a selector matches the last element of a path."""
     if not path:
         return False
-    name, wanted = parts[-1]
+    name, wanted, is_child = parts[-1]
     features = _features(path[-1])
     if name not in ("*", features[0]) or not wanted.issubset(features):
         return False
     rest = parts[:-1]
-    if not rest:
-        return True
-    if rest[-1] == ">":
-        return _matches(rest[:-1], path[:-1])
+    if not rest or is_child:
+        return not rest or _matches(rest, path[:-1])
     return any(_matches(rest, path[:end]) for end in range(len(path) - 1, 0, -1))
 
 

@@ -339,6 +339,10 @@ def test_small_faces_add_nothing_and_huge_ones_stay_within_bounds(tmp_path):
 @pytest.mark.parametrize(
     ("content", "message"),
     [
+        (
+            mesh_ply("ascii", b"3 0 1 2\n", 1, "property list float int vertex_indices\n"),
+            "a list of float and int, which PLY has not",
+        ),
         (mesh_ply("ascii", b"3 0 1 9\n", 1), "name the points 0 to 9; there are 4"),
         (mesh_ply("ascii", b"3 0 1 2\n", 4000), "claims 4,004 elements"),
         (mesh_ply("ascii", b"3 0 1 2\n", 9), "claims 9 faces and holds . lines: truncated"),

@@ -274,3 +274,17 @@ def test_an_out_that_is_a_file_is_refused(tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(OSError, match="file"):
         check_out(Command(out=tmp_path / "file"))
+
+
+def test_layers_meshes_and_what_cannot_be_reached_are_told(shared_cases, tmp_path, capsys):
+    flat = str(shared_cases / "dxf-layers-and-doors" / "flat.dxf")
+    assert main(["floors", "show", flat, "--json"]) == 4
+    assert "cannot be reached and are left out" in json.loads(capsys.readouterr().out)["remark"]
+    assert main(["floors", "import", flat, "--layers", "A-WALL", "--out", str(tmp_path / "flat"), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["area_m2"] == pytest.approx(77.5, abs=0.05)
+    hall = str(shared_cases / "sdf-frames-and-meshes" / "two_meshes.world")
+    assert main(["floors", "show", hall]) == 2
+    assert "--skip-meshes leaves them out" in capsys.readouterr().err
+    assert main(["floors", "show", hall, "--skip-meshes"]) == 0
+    assert "2 collisions are left out" in capsys.readouterr().out
+    assert main(["floors", "show", "apartment", "--skip-meshes"]) == 2
