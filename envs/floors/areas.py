@@ -44,7 +44,8 @@ def floor_of_area(
     count, *found, _ = cv2.connectedComponentsWithStats(free.astype(np.uint8), connectivity=4, ltype=cv2.CV_32S)
     labels, statistics = (np.asarray(each) for each in found)
     statistics[0] = 0
-    label, remark = (int(labels[seed_cell]), "") if seed_cell is not None else _chosen(labels, statistics)
+    along = _border_shares(labels, len(statistics))
+    label, remark = (int(labels[seed_cell]), "") if seed_cell is not None else _chosen(labels, statistics, along)
     if label == 0:
         raise ValueError(f"{name} has its start in a wall; want it in free space")
     left, bottom, width, height = (int(value) for value in statistics[label, :4])
@@ -56,7 +57,28 @@ def floor_of_area(
     has_others = others.max(initial=0) * resolution**2 >= MIN_OTHER_M2
     areas = Raster((~free).astype(np.uint8), origin, resolution) if has_others else None
     proposed = np.zeros((0, 3)) if starts is None else starts
-    return Floor(name, bounds, cells=cells, starts=proposed, areas=areas, remark=remark)
+    statistics[label] = 0
+    statistics[along >= OUTSIDE_BORDER] = 0
+    rest = statistics[:, cv2.CC_STAT_AREA] * resolution**2
+    remarks = [each for each in (remark, left_out(rest)) if each]
+    return Floor(
+        name,
+        bounds,
+        cells=cells,
+        starts=proposed,
+        areas=areas,
+        left_out_m2=float(rest.sum()),
+        remark="; ".join(remarks),
+    )
+
+
+def left_out(areas_m2: NDArray[np.floating]) -> str:
+    """Return a remark on areas that are free, but not connected with the floor (n,) [m2]; empty if they are small."""
+    large = areas_m2[areas_m2 >= MIN_OTHER_M2]
+    if not len(large):
+        return ""
+    where = "one other area" if len(large) == 1 else f"{len(large)} other areas"
+    return f"{large.sum():.1f} m2 in {where} cannot be reached and are left out"
 
 
 def around(floor: Floor, places: NDArray[np.float64]) -> Floor:
@@ -77,11 +99,15 @@ def around(floor: Floor, places: NDArray[np.float64]) -> Floor:
     return floor_of_area(floor.name, areas.solid == 0, areas.origin, areas.resolution, (row, column), floor.starts)
 
 
-def _chosen(labels: NDArray[Any], statistics: NDArray[Any]) -> tuple[int, str]:
+def _border_shares(labels: NDArray[Any], count: int) -> NDArray[np.float64]:
+    """Return the share of the picture's border that each area has."""
+    border = np.concatenate([labels[0], labels[-1], labels[1:-1, 0], labels[1:-1, -1]])
+    return np.asarray(np.bincount(border, minlength=count) / len(border))
+
+
+def _chosen(labels: NDArray[Any], statistics: NDArray[Any], along: NDArray[np.float64]) -> tuple[int, str]:
     """Return the number of the area that is the floor, and a remark on it."""
     largest = int(np.argmax(statistics[:, cv2.CC_STAT_AREA]))
-    border = np.concatenate([labels[0], labels[-1], labels[1:-1, 0], labels[1:-1, -1]])
-    along = np.bincount(border, minlength=len(statistics)) / len(border)
     if along[largest] < OUTSIDE_BORDER:
         return largest, ""
     enclosed = np.where(along > 0.0, 0, statistics[:, cv2.CC_STAT_WIDTH] * statistics[:, cv2.CC_STAT_HEIGHT])

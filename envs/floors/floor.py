@@ -198,8 +198,10 @@ class Floor:
         Height of the ceiling, to which solids without a height reach [m].
     areas : Raster or None
         Solid cells of a picture with several free areas, of which one is the floor; see ``areas.around``.
+    left_out_m2 : float
+        Free area of a picture that is not connected with the floor, what lies around a building apart [m2].
     remark : str
-        Assumptions on an image that does not state them.
+        Assumptions on a file that does not state them, and what of it is left out.
     """
 
     name: str
@@ -210,6 +212,7 @@ class Floor:
     goal: tuple[float, float] | None = None
     ceiling: float = CEILING
     areas: Raster | None = None
+    left_out_m2: float = 0.0
     remark: str = ""
 
     def __post_init__(self) -> None:

@@ -255,12 +255,18 @@ class _BuildingMeasures:
         Share of the area between the walls that is under furniture, all that ends below the ceiling.
     rooms : int
         Spaces that openings up to 1.1 m wide separate, halls and corridors included.
+    left_out_m2 : (n,) float64
+        Free areas that a robot of radius 0.30 m cannot reach from the largest one [m²].
+    whole_m2 : float
+        Free area with those [m²].
     """
 
     area_m2: float
     loops: int
     clutter: float
     rooms: int
+    left_out_m2: NDArray[np.float64]
+    whole_m2: float
 
 
 def measure_building(floor: Floor) -> _BuildingMeasures:
@@ -283,7 +289,28 @@ def measure_building(floor: Floor) -> _BuildingMeasures:
         loops=_holes(largest),
         clutter=round(1.0 - free / between_walls, 4),
         rooms=cv2.connectedComponents((wide & inside).astype(np.uint8), connectivity=4)[0] - 1,
+        left_out_m2=_unreached(full),
+        whole_m2=float(np.count_nonzero(full.solid == 0)) * _RESOLUTION**2,
     )
+
+
+def _unreached(raster: Raster) -> NDArray[np.float64]:
+    """Return the free areas behind walls or openings that are too narrow, seen from the largest one, (n,) [m2].
+
+    Corners and gaps that a disc does not fit into belong to the area around them.
+    """
+    space = configuration_space(raster, MEASURED_RADIUS)
+    if not space.any():
+        return np.zeros(0)
+    free, largest = raster.solid == 0, _largest_part(space)
+    reach = MEASURED_RADIUS / raster.resolution + 1.0
+    near, near_others = (
+        cv2.distanceTransform((~part).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE) <= reach
+        for part in (largest, space & ~largest)
+    )
+    left = free & ~near & (near_others | ~_containing(free, largest))
+    stats = cv2.connectedComponentsWithStats(left.astype(np.uint8), connectivity=4)[2]
+    return np.asarray(stats[1:, cv2.CC_STAT_AREA] * raster.resolution**2)
 
 
 def _largest_part(cells: NDArray[np.bool_]) -> NDArray[np.bool_]:

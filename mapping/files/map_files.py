@@ -16,7 +16,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path, PureWindowsPath
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import yaml
@@ -36,30 +36,39 @@ def _shades(pixels: NDArray[Any]) -> tuple[NDArray[np.float64], NDArray[np.float
     scaled = pixels.astype(np.float64) * (255.0 / np.iinfo(pixels.dtype).max)
     if scaled.ndim == 2:
         return scaled, np.ones((1, 1))
-    if scaled.shape[2] in (2, 4):
+    if _has_alpha(pixels):
         return scaled[..., :-1].mean(axis=2), scaled[..., -1] / 255.0
     return scaled.mean(axis=2), np.ones((1, 1))
 
 
+def _has_alpha(pixels: NDArray[Any]) -> bool:
+    return pixels.ndim == 3 and pixels.shape[2] in (2, 4)
+
+
+_Alpha = Literal["ignored", "unknown", "averaged"]
+
+
 def _levels_by_blocks(
-    pixels: NDArray[Any], rule: Callable[[NDArray[np.float64]], NDArray[np.uint8]], sees_through: bool
+    pixels: NDArray[Any], rule: Callable[[NDArray[np.float64]], NDArray[np.uint8]], alpha: _Alpha
 ) -> NDArray[np.uint8]:
     """Return the levels of pixels by a rule for shades, block by block, as shades take much memory.
 
-    ``sees_through`` makes unknown pixels that are not opaque.
+    ``alpha`` says what opacity does: nothing, or it makes unknown what is not opaque, or it counts as a fourth colour.
     """
     levels = np.empty(pixels.shape[:2], np.uint8)
     rows = max(_BLOCK_PIXELS // max(pixels.shape[1], 1), 1)
     for row in range(0, len(pixels), rows):
         shades, opacity = _shades(pixels[row : row + rows])
+        if alpha == "averaged" and _has_alpha(pixels):
+            shades = 0.25 * (3.0 * shades + 255.0 * opacity)
         levels[row : row + rows] = rule(shades)
-        if sees_through:
+        if alpha == "unknown":
             levels[row : row + rows][np.broadcast_to(opacity < 1.0, shades.shape)] = UNKNOWN
     return levels
 
 
 def _levels_of(
-    shades: NDArray[np.float64], *, negate: bool, low: float, high: float, unknown: int | None = None
+    shades: NDArray[np.float64], *, negate: bool, low: float, high: float, unknown: float | None = None
 ) -> NDArray[np.uint8]:
     """Return the levels of shades in trinary mode: below and above the thresholds.
 
@@ -144,7 +153,9 @@ MAX_COORDINATE_M = 1e8
 """Farthest that a map may lie from the origin of its frame [m]."""
 
 _LOG = logging.getLogger(__name__)
-_MODES = ("trinary", "scale", "raw")
+_ALPHA_OF_MODES: dict[str, _Alpha] = {"trinary": "averaged", "scale": "unknown", "raw": "ignored"}
+"""What map_server does with opacity in each mode."""
+
 _REQUIRED = ("image", "resolution", "origin", "negate", "occupied_thresh", "free_thresh")
 _PGM_LEVELS = {OCCUPIED: 0, UNKNOWN: 205, FREE: 254}
 
@@ -180,7 +191,8 @@ def read_ros_map(yaml_path: Path | str) -> MapImage:
     -------
     MapImage
         The map. In scale and raw mode too, cells between the thresholds are unknown. In trinary mode the
-        grey that map_saver writes for unknown is unknown whatever the thresholds.
+        grey that map_saver writes for unknown is unknown whatever the thresholds, and opacity counts as a fourth
+        colour, as in map_server: transparent white is unknown.
 
     Raises
     ------
@@ -207,14 +219,16 @@ def read_ros_map(yaml_path: Path | str) -> MapImage:
             "occupied_thresh <= 1"
         )
     mode = str(header.get("mode", "trinary"))
-    if mode not in _MODES:
-        raise ValueError(f"{yaml_path}: mode is {shown(mode)}; want one of {', '.join(_MODES)}")
+    if mode not in _ALPHA_OF_MODES:
+        raise ValueError(f"{yaml_path}: mode is {shown(mode)}; want one of {', '.join(_ALPHA_OF_MODES)}")
     negate = bool(_number(yaml_path, header, "negate"))
     # map_saver of nav2 writes unknown as 205, which its free_thresh of 0.25 calls free.
     may_mistake = mode == "trinary" and not negate
-    unknown = unknown_grey(pixels, (MAP_SERVER_GREYS,)) if may_mistake else None
+    unknown: float | None = unknown_grey(pixels, (MAP_SERVER_GREYS,)) if may_mistake else None
+    if unknown is not None and _has_alpha(pixels):
+        unknown = 0.25 * (3.0 * unknown + 255.0)  # of opaque pixels
     rule = _raw_levels if mode == "raw" else partial(_levels_of, negate=negate, unknown=unknown)
-    levels = _levels_by_blocks(pixels, lambda shades: rule(shades, low=low, high=high), mode == "scale")
+    levels = _levels_by_blocks(pixels, lambda shades: rule(shades, low=low, high=high), _ALPHA_OF_MODES[mode])
     return MapImage(np.ascontiguousarray(levels[::-1]), _origin(yaml_path, header), _resolution(yaml_path, header))
 
 
@@ -233,7 +247,7 @@ def read_grey_map(path: Path, resolution: float) -> MapImage:
     pixels = read_image(Path(path))
     unknown = unknown_grey(pixels, (MAP_SERVER_GREYS, MIDDLE_GREYS))
     rule = partial(_levels_of, negate=False, low=0.196, high=0.65, unknown=unknown)
-    levels = _levels_by_blocks(pixels, rule, True)
+    levels = _levels_by_blocks(pixels, rule, "unknown")
     return MapImage(np.ascontiguousarray(levels[::-1]), (0.0, 0.0, 0.0), resolution)
 
 

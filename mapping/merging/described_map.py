@@ -12,6 +12,7 @@ from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.merging.corners import Corners, CornerSettings, detect_corners
 from lidarium.mapping.merging.descriptors import Descriptors, DescriptorSettings, describe_corners
 from lidarium.mapping.merging.regions.graph import RegionGraph
+from lidarium.mapping.merging.rims import without_rims
 
 MAX_SIDE, MAX_CELLS = 20_000, 50_000_000
 """Most rows or columns of a map, and most cells: each takes some 20 bytes while maps are compared."""
@@ -100,6 +101,7 @@ def describe_map(
     corner_settings = corner_settings or CornerSettings()
     three = three_levels_of(levels, corner_settings)
     check_resolution(resolution)
+    three = without_rims(three, resolution)
     corners = detect_corners(three, resolution, corner_settings)
     descriptors = describe_corners(three, resolution, corners, descriptor_settings)
     cells, normals = _walls(three)

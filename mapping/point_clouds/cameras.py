@@ -83,7 +83,9 @@ def moved(cloud: PointCloud, motion: ArrayLike) -> PointCloud:
     rotation = matrix[:3, :3].T
     points = cloud.points.astype(np.float64) @ rotation + matrix[:3, 3]
     normals = None if cloud.normals is None else (cloud.normals @ rotation).astype(np.float32)
-    return PointCloud(points.astype(np.float32), cloud.weights, normals, cloud.source)
+    found = points.astype(np.float32), cloud.weights, normals, cloud.source
+    # The offset turns with the points.
+    return PointCloud(*found, cloud.offset @ rotation, cloud.remarks)
 
 
 def map_from_base(pose: Transform, height: float = 0.0) -> Matrix:

@@ -1,8 +1,9 @@
 """Point clouds as files: PCD, PLY, OBJ, XYZ, arrays and depth images, recognised by name and content."""
 
+import itertools
 import re
 import struct
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -19,77 +20,52 @@ from lidarium.mapping.files.guarded_reading import (
 from lidarium.mapping.files.output import write_whole
 from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.point_clouds.cameras import MILLIMETRES, Intrinsics, read_depth_image
+from lidarium.mapping.point_clouds.columns import POINTS, Content, cloud_of_columns, text_columns, wanted_columns
+from lidarium.mapping.point_clouds.faces import SPACING_M, sampled, triangles_of
+from lidarium.mapping.point_clouds.ply_files import MAX_HEADER, parse_ply
 from lidarium.mapping.point_clouds.point_cloud import PointCloud
 
-POINTS = ("x", "y", "z")
-NORMALS = (("normal_x", "normal_y", "normal_z"), ("nx", "ny", "nz"))
-WEIGHT = "weight"
-
-
-def _wanted_columns(names: Sequence[str]) -> list[str]:
-    """Return which columns of a file are read."""
-    missing = [name for name in POINTS if name not in names]
-    if missing:
-        raise ValueError(f"it has no field {', '.join(missing)}, but {', '.join(names) or 'none'}")
-    normals = next((each for each in NORMALS if all(name in names for name in each)), ())
-    return [*POINTS, *normals, *([WEIGHT] if WEIGHT in names else [])]
-
-
-def _cloud_of_columns(columns: Mapping[str, NDArray[np.generic]], source: str) -> PointCloud:
-    """Return the cloud of columns by their names.
-
-    Parameters
-    ----------
-    columns : mapping of str to (N,) array
-        Those that ``_wanted_columns`` named.
-    """
-    normals = next((each for each in NORMALS if each[0] in columns), None)
-    return PointCloud(
-        _stacked(columns, POINTS),
-        None if WEIGHT not in columns else columns[WEIGHT].astype(np.float32),
-        None if normals is None else _stacked(columns, normals),
-        source,
-    )
-
-
-def _stacked(columns: Mapping[str, NDArray[np.generic]], names: Sequence[str]) -> NDArray[np.float32]:
-    # What is above float32 becomes inf, and is refused with all that is not finite.
-    with np.errstate(over="ignore", invalid="ignore"):
-        return np.stack([columns[name].astype(np.float32) for name in names], axis=1)
-
-
-def _text_columns(content: bytes, places: Sequence[int], rows: int | None = None) -> NDArray[np.float64]:
-    """Return columns of lines of numbers.
-
-    Returns
-    -------
-    (rows, columns) float64
-        The numbers.
-    """
-    lines = [line for line in content.splitlines() if line.strip() and not line.lstrip().startswith(b"#")]
-    if not lines:
-        raise ValueError("it holds no points")
-    if rows is not None and len(lines) < rows:
-        raise ValueError(f"it claims {rows:,} points and holds {len(lines):,} lines: truncated")
-    return np.loadtxt(lines[:rows], np.float64, usecols=places, ndmin=2, encoding="ascii")
-
-
 _VERTICES = re.compile(rb"^[ \t]*v[ \t]([^\r\n]*)", re.MULTILINE)
+_FACES = re.compile(rb"^[ \t]*f[ \t]([^\r\n]*)", re.MULTILINE)
+_DECIMAL_COMMA = re.compile(rb"[-+]?\d*,\d+(?:[eE][-+]?\d+)?")
+_CHECKED_LINES = 100
 
 
-def _parse_obj(content: bytes, source: str) -> PointCloud:
-    """Return the vertices of an OBJ file's bytes; faces and all else are passed over."""
-    return PointCloud(_coordinates(b"\n".join(_VERTICES.findall(content))), source=source)
+def _parse_obj(content: bytes) -> Content:
+    """Return the vertices and faces of an OBJ file's bytes; all else is passed over."""
+    points = text_columns(b"\n".join(_VERTICES.findall(content)), (0, 1, 2))
+    groups: dict[int, list[list[int]]] = {}
+    before: NDArray[np.int64] | None = None
+    for face in _FACES.finditer(content):
+        corners = [int(word.partition(b"/")[0]) for word in face[1].split(b"#")[0].split()]
+        if min(corners, default=1) < 0:
+            if before is None:
+                before = np.array([vertex.start() for vertex in _VERTICES.finditer(content)])
+            # The last point before the face is -1.
+            count = int(np.searchsorted(before, face.start()))
+            corners = [corner + count + 1 if corner < 0 else corner for corner in corners]
+        groups.setdefault(len(corners), []).append(corners)
+    polygons = [np.array(group, np.int64).reshape(len(group), -1) - 1 for group in groups.values()]
+    return Content(points, triangles=triangles_of(polygons, len(points)))
 
 
-def _parse_xyz(content: bytes, source: str) -> PointCloud:
-    """Return the points of lines of x, y and z, apart by blanks or commas."""
-    return PointCloud(_coordinates(content.replace(b",", b" ").replace(b"//", b"#")), source=source)
-
-
-def _coordinates(lines: bytes) -> NDArray[np.float32]:
-    with np.errstate(over="ignore"):  # what is above float32 is refused as not finite
-        return _text_columns(lines, (0, 1, 2)).astype(np.float32)
+def _parse_xyz(content: bytes) -> Content:
+    """Return the points of lines of x, y and z, apart by blanks, commas or semicolons."""
+    content = content.replace(b"//", b"#").replace(b";", b" ")
+    remarks: tuple[str, ...] = ()
+    if b"," in content:
+        lines = [line.split(b"#")[0] for line in content.splitlines() if line.strip() and line.lstrip()[:1] != b"#"]
+        words = [line.split() for line in lines[:_CHECKED_LINES]]
+        has_decimals = [any(_DECIMAL_COMMA.fullmatch(word) for word in line) for line in words]
+        if any(len(line) >= 3 and has for line, has in zip(words, has_decimals, strict=True)):
+            if b"." in b"".join(itertools.chain.from_iterable(words)):
+                raise ValueError("it has points and commas within numbers; want decimal points, and one separator")
+            content, remarks = content.replace(b",", b"."), ("commas are taken for decimal points",)
+        elif any(re.search(rb",0\d", line) for line in lines[:_CHECKED_LINES]) and b"." not in content:
+            raise ValueError("its commas part numbers such as 05, as those after a decimal comma; want decimal points")
+        else:
+            content = content.replace(b",", b" ")
+    return Content(text_columns(content, (0, 1, 2)), remarks=remarks)
 
 
 MAX_RATIO = 88
@@ -148,9 +124,6 @@ def _unpack(packed: Array, room: Array) -> int:
     return written
 
 
-MAX_HEADER = 65536
-"""Most bytes of a header."""
-
 _PCD_TYPES = {"F": "f", "I": "i", "U": "u"}
 _SIZES = {"f": (4, 8), "i": (1, 2, 4, 8), "u": (1, 2, 4, 8)}
 _FORMS = ("ascii", "binary", "binary_compressed")
@@ -174,25 +147,25 @@ class _PcdHeader:
         return np.dtype([(f"{place}", f"<{kind}", (count,)) for place, (kind, count) in enumerate(fields)])
 
 
-def _parse_pcd(content: bytes, source: str) -> PointCloud:
-    """Return the cloud of a PCD file's bytes."""
+def _parse_pcd(content: bytes) -> Content:
+    """Return the content of a PCD file's bytes."""
     header = _pcd_header(content)
-    wanted = _wanted_columns(header.names)
+    wanted = wanted_columns(header.names)
     places = [header.names.index(name) for name in wanted]
     if any(header.counts[place] != 1 for place in places):
         raise ValueError(f"fields {', '.join(wanted)} have counts {header.counts}; want one number each")
     body = content[header.start :]
     if header.form == "ascii":
         starts = np.concatenate([[0], np.cumsum(header.counts)])
-        table = _text_columns(body, [int(starts[place]) for place in places], header.points)
+        table = text_columns(body, [int(starts[place]) for place in places], header.points)
         columns: dict[str, NDArray[np.generic]] = dict(zip(wanted, table.T, strict=True))
     elif header.form == "binary":
         rows = np.frombuffer(_checked_size(body, header), header.row)
         columns = {name: rows[f"{place}"][:, 0] for name, place in zip(wanted, places, strict=True)}
     else:
         columns = _unpacked_columns(body, header, wanted, places)
-    cloud = _cloud_of_columns(columns, source)
-    return cloud.chosen(~np.isnan(cloud.points).any(axis=1))
+    there = ~np.isnan(np.stack([columns[name] for name in POINTS])).any(axis=0)
+    return cloud_of_columns({name: column[there] for name, column in columns.items()})
 
 
 def _checked_size(body: bytes, header: _PcdHeader) -> bytes:
@@ -289,124 +262,14 @@ def write_pcd(path: Path | str, cloud: PointCloud) -> None:
     write_whole(Path(path), header.encode() + np.concatenate(table, axis=1).astype("<f4").tobytes())
 
 
-"""Most bytes of a header."""
+FAR = 4096.0
+"""Coordinates beyond it lose digits in single precision: an offset is taken off."""
 
-_PLY_TYPES = {
-    "char": "i1",
-    "uchar": "u1",
-    "short": "i2",
-    "ushort": "u2",
-    "int": "i4",
-    "uint": "u4",
-    "float": "f4",
-    "double": "f8",
-    "int8": "i1",
-    "uint8": "u1",
-    "int16": "i2",
-    "uint16": "u2",
-    "int32": "i4",
-    "uint32": "u4",
-    "float32": "f4",
-    "float64": "f8",
-}
-_ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
+_FARTHEST = 1e10
+"""Coordinates beyond it are no places."""
 
-
-@dataclass(frozen=True, slots=True)
-class _Element:
-    """An element: its name, their number, names and kinds of its properties; None for lists."""
-
-    name: str
-    count: int
-    properties: tuple[tuple[str, str | None], ...]
-
-    def row(self, order: str) -> np.dtype[np.void]:
-        """Return the numbers of one, in an order of bytes."""
-        fields = [(name, f"{order}{kind}") for name, kind in self.properties if kind is not None]
-        if len(fields) < len(self.properties):
-            raise ValueError(f"element {self.name} holds lists and comes before or among the points")
-        return np.dtype(fields)
-
-
-def _parse_ply(content: bytes, source: str) -> PointCloud:
-    """Return the cloud of a PLY file's bytes: its element ``vertex``."""
-    order, elements, start = _ply_header(content)
-    place = next((at for at, element in enumerate(elements) if element.name == "vertex"), None)
-    if place is None or elements[place].count < 1:
-        raise ValueError("it holds no points")
-    vertices, before = elements[place], elements[:place]
-    names = [name for name, _ in vertices.properties]
-    wanted = _wanted_columns(names)
-    row = vertices.row(order or "<")
-    if not order:
-        body = content[start:]
-        for _ in range(sum(element.count for element in before)):
-            _, _, body = body.partition(b"\n")
-        table = _text_columns(body, [names.index(name) for name in wanted], vertices.count)
-        columns: dict[str, NDArray[np.generic]] = dict(zip(wanted, table.T, strict=True))
-        return _cloud_of_columns(columns, source)
-    start += sum(element.count * element.row(order).itemsize for element in before)
-    if start + vertices.count * row.itemsize > len(content):
-        raise ValueError(
-            f"it claims {vertices.count:,} points of {row.itemsize} bytes and holds "
-            f"{max(len(content) - start, 0):,} bytes of points: truncated"
-        )
-    rows = np.frombuffer(content, row, vertices.count, start)
-    return _cloud_of_columns({name: rows[name] for name in wanted}, source)
-
-
-def _ply_header(content: bytes) -> tuple[str, list[_Element], int]:
-    """Return the order of bytes, the elements, and the offset of their values."""
-    end = content.find(b"end_header", 0, MAX_HEADER)
-    line_end = content.find(b"\n", end)
-    if not content.startswith(b"ply") or end < 0 or line_end < 0:
-        raise ValueError("its header has no line end_header: no PLY file, or truncated")
-    order, elements = None, []
-    for line in content[:end].decode("ascii", "replace").splitlines()[1:]:
-        words = line.split()
-        if not words or words[0] in ("comment", "obj_info"):
-            continue
-        if words[0] == "format" and len(words) > 1:
-            order = _ORDERS.get(words[1])
-        elif words[0] == "element" and len(words) == 3:
-            elements.append(_Element(words[1], _count_of(words[2]), ()))
-        elif words[0] == "property" and elements and len(words) > 2:
-            elements[-1] = _with_property(elements[-1], words)
-        else:
-            raise ValueError(f"its header has the line {line!r}")
-    if order is None:
-        raise ValueError(f"its header has no format of {', '.join(_ORDERS)}")
-    return order, elements, line_end + 1
-
-
-def _count_of(word: str) -> int:
-    count = int(word)
-    if not 0 <= count <= MAX_FILE_BYTES:
-        raise ValueError(f"it claims {count:,} elements")
-    return count
-
-
-def _with_property(element: _Element, words: list[str]) -> _Element:
-    """Return an element with one more property."""
-    if words[1] != "list" and words[1] not in _PLY_TYPES:
-        raise ValueError(f"its header has a property of type {words[1]}, which PLY has not")
-    kind = None if words[1] == "list" else _PLY_TYPES[words[1]]
-    return _Element(element.name, element.count, (*element.properties, (words[-1], kind)))
-
-
-def write_ply(path: Path | str, cloud: PointCloud) -> None:
-    """Write a cloud as a binary PLY file, with its normals and weights."""
-    names, table = ["x", "y", "z"], [cloud.points]
-    if cloud.normals is not None:
-        names += ["nx", "ny", "nz"]
-        table.append(cloud.normals)
-    if cloud.weights is not None:
-        names.append("weight")
-        table.append(cloud.weights[:, None])
-    properties = "".join(f"property float {name}\n" for name in names)
-    header = f"ply\nformat binary_little_endian 1.0\nelement vertex {len(cloud)}\n{properties}end_header\n"
-    write_whole(Path(path), header.encode() + np.concatenate(table, axis=1).astype("<f4").tobytes())
-
+_COARSE = 0.001
+"""Steps of coordinates that are told."""
 
 LARGEST_EXTENT = 1000.0
 """Largest extent that is taken for metres [m]."""
@@ -423,9 +286,9 @@ KINDS = {
 }
 """Type of a file by the end of its name."""
 
-_PARSERS: dict[str, Callable[[bytes, str], PointCloud]] = {
+_PARSERS: dict[str, Callable[[bytes], Content]] = {
     "PCD": _parse_pcd,
-    "PLY": _parse_ply,
+    "PLY": parse_ply,
     "OBJ": _parse_obj,
     "XYZ": _parse_xyz,
 }
@@ -462,7 +325,8 @@ def read_cloud(
     Returns
     -------
     PointCloud
-        ``points`` (N, 3) float32 [m], all of them finite.
+        ``points`` (N, 3) float32 [m], all of them finite; ``offset`` (3,) is to be added if they are far from the
+        origin of the file. Faces of meshes have points 2 cm apart.
 
     Raises
     ------
@@ -490,13 +354,58 @@ def read_cloud(
         camera = Intrinsics(*intrinsics) if isinstance(intrinsics, tuple) else intrinsics
         return _checked_cloud(read_depth_image(path, camera, scale or MILLIMETRES, pose))
     if kind == "NPZ":
-        cloud = _read_npz(path)
+        content = _read_npz(path)
     else:
         with reading(path, f"a whole {kind} file"):
-            cloud = _PARSERS[kind](read_bytes(path), str(path))
+            content = _PARSERS[kind](read_bytes(path))
+    return _cloud_of(content, scale, str(path))
+
+
+def _cloud_of(content: Content, scale: float | None, source: str) -> PointCloud:
+    """Return the cloud of a file in metres: near the origin, with points on its faces, and without zeros."""
+    remarks = list(content.remarks)
+    points, weights, normals = content.points, content.weights, content.normals
+    if not len(content.triangles):
+        # Sensors write no return as zeros; a single one may be a point.
+        is_zero = (points == 0.0).all(axis=1)
+        if 1 < (zeros := int(np.count_nonzero(is_zero))) < len(points):
+            remarks.append(f"{zeros:,} points at the origin are left out, as sensors write them for no return")
+            points = points[~is_zero]
+            weights, normals = (None if each is None else each[~is_zero] for each in (weights, normals))
+    offset = _whole_offset(points)
+    if offset.any():
+        remarks.append(
+            f"{', '.join(f'{value:,.0f}' for value in offset)} is taken off its coordinates, which are too large for "
+            "single precision"
+        )
+        if points.dtype == np.float32 and (step := float(np.spacing(np.float32(np.abs(offset).max())))) > _COARSE:
+            remarks.append(f"its coordinates are single precision in the file, in steps of {step:g}: digits are lost")
+    with np.errstate(over="ignore"):  # what is above float32 is refused as not finite
+        near = (points - offset if offset.any() else points).astype(np.float32)
+    factor = 1.0 if scale is None else scale
     if scale is not None:
-        cloud = PointCloud(cloud.points * np.float32(scale), cloud.weights, cloud.normals, cloud.source)
-    return _checked_cloud(cloud)
+        near = near * np.float32(scale)
+    cloud = _checked_cloud(PointCloud(near, weights, normals, source, offset * factor, tuple(remarks)))
+    if not len(content.triangles):
+        return cloud
+    exact = (points - offset) * factor
+    on_faces, spacing = sampled(exact, content.triangles)
+    if not len(on_faces):
+        return cloud
+    if spacing > SPACING_M:
+        remarks.append(f"points on its faces are {spacing:.3f} m apart, since it is large")
+    near = np.concatenate([near, on_faces.astype(np.float32)])
+    return PointCloud(near, source=source, offset=cloud.offset, remarks=tuple(remarks))
+
+
+def _whole_offset(points: NDArray[np.floating]) -> NDArray[np.float64]:
+    """Return whole hundreds that bring points near the origin, (3,); zeros along axes on which they are near."""
+    finite = points[np.isfinite(points).all(axis=1)]
+    if not len(finite):
+        return np.zeros(3)
+    farthest, middle = np.abs(finite).max(axis=0), np.median(finite, axis=0)
+    is_far = (farthest > FAR) & (np.ptp(finite, axis=0) < farthest / 2.0) & (farthest <= _FARTHEST)
+    return np.where(is_far, np.rint(middle / 100.0) * 100.0, 0.0).astype(np.float64)
 
 
 def _kind_of(path: Path) -> str:
@@ -530,10 +439,13 @@ def _checked_cloud(cloud: PointCloud) -> PointCloud:
     return cloud
 
 
-def _read_npz(path: Path) -> PointCloud:
+def _read_npz(path: Path) -> Content:
     """Read the array ``xyz`` of an NPZ file."""
     arrays = read_arrays(path, "a whole NPZ file")
     if not isinstance(arrays, dict) or _COORDINATES not in arrays:
         raise ValueError(f"{path} holds no array {_COORDINATES}; want points of shape (N, 3)")
     with reading(path, "a cloud"):
-        return PointCloud(arrays[_COORDINATES].astype(np.float32), source=str(path))
+        points = arrays[_COORDINATES]
+        if points.ndim != 2 or points.shape[1] != 3:
+            raise ValueError(f"its {_COORDINATES} have shape {points.shape}; want (N, 3)")
+        return Content(points.astype(np.float32 if points.dtype in (np.float16, np.float32) else np.float64))

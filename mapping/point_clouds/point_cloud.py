@@ -1,6 +1,6 @@
 """Point clouds, and their voxels: at most one point for each cube of space."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -22,12 +22,18 @@ class PointCloud:
         Unit vectors across the surface.
     source : str
         Source for messages: the name of a file.
+    offset : (3,) float64
+        What is to be added to the points for the coordinates of the file, whose digits float32 would lose [m].
+    remarks : tuple of str
+        What was assumed of a file, and what of it is left out.
     """
 
     points: NDArray[np.float32]
     weights: NDArray[np.float32] | None = None
     normals: NDArray[np.float32] | None = None
     source: str = "points"
+    offset: NDArray[np.float64] = field(default_factory=lambda: np.zeros(3))
+    remarks: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         count = len(self.points)
@@ -52,6 +58,8 @@ class PointCloud:
             None if self.weights is None else self.weights[places],
             None if self.normals is None else self.normals[places],
             self.source,
+            self.offset,
+            self.remarks,
         )
 
 
@@ -90,7 +98,8 @@ def thinned(cloud: PointCloud, edge: float) -> PointCloud:
         sums = _sums(cloud.normals, labels, weights, count)
         lengths = np.linalg.norm(sums, axis=1, keepdims=True)
         normals = (sums / np.where(lengths > 0.0, lengths, 1.0)).astype(np.float32)
-    return PointCloud(points.astype(np.float32), masses.astype(np.float32), normals, cloud.source)
+    found = points.astype(np.float32), masses.astype(np.float32), normals
+    return PointCloud(*found, cloud.source, cloud.offset, cloud.remarks)
 
 
 def _sums(values: Array, labels: Array, weights: Array, count: int) -> Array:

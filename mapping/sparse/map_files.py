@@ -135,8 +135,12 @@ FARTHEST_M = 1e6
 """Largest coordinate [m]."""
 
 MAX_FILE_BYTES = 256 << 20
-MAX_BODY_BYTES = 1 << 30
-_MAX_DEFLATED = 1032
+MAX_BODY_BYTES = 32 << 20
+"""Longest body, unpacked: a code takes some ten times as much in memory."""
+
+MIN_BODY_BYTES, BODY_RATIO = 4 << 20, 64
+"""Longest body of any file, and its length for each packed byte: maps of rooms have 5 to 16."""
+
 _HEADER = struct.Struct("<8sHHIIIIIII")
 _WIDTHS = (COLUMNS + 3, COLUMNS, COLUMNS, 2)
 """Columns of boxes, free codes, nodes and edges."""
@@ -246,8 +250,8 @@ def _unpacked(content: bytes) -> tuple[list[int], bytes]:
         raise ValueError(f"it claims {packed_length:,} bytes after the header; there are {len(packed):,}")
     if zlib.crc32(packed) != checksum:
         raise ValueError("its checksum is wrong: it is damaged")
-    if length > min(MAX_BODY_BYTES, _MAX_DEFLATED * (len(packed) + 1)):
-        raise ValueError(f"it claims {length:,} bytes when unpacked; so few bytes cannot hold them")
+    if length > min(MAX_BODY_BYTES, max(MIN_BODY_BYTES, BODY_RATIO * len(packed))):
+        raise ValueError(f"it claims {length:,} bytes when unpacked, too many for {len(packed):,} packed ones")
     if _bytes_of(counts) > length:
         raise ValueError(f"it claims {sum(counts):,} codes, nodes and edges; {length:,} bytes cannot hold them")
     unpacking = zlib.decompressobj()

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from tyro.conf import Positional, subcommand
 
-from lidarium.scripts.common import INTERRUPTED, Answer, Command, counted, file_name, table
+from lidarium.scripts.common import DONE, DOUBTFUL, INTERRUPTED, Answer, Command, counted, file_name, table
 
 if TYPE_CHECKING:
     from lidarium.envs.floors.floor import Floor
@@ -28,6 +28,10 @@ class _Show(Command):
     """name in the catalogue, building:SEED, or a file"""
     resolution: float | None = None
     """metres per pixel, if the floor is a plain image"""
+    skip_meshes: bool = False
+    """leave out collisions of a Gazebo world that are meshes, instead of taking their bounding boxes"""
+    layers: tuple[str, ...] = ()
+    """layers of a DXF drawing that are walls; by default all that are not off or frozen"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,11 +63,14 @@ class _Import(Command):
     file: Positional[Path]
     """ROS map (yaml), plain image or other floor file.
 
-    Formats: ROS map (yaml), dungeon or plain image, KTH XML, LIFULL or AMRL text, HouseExpo JSON, numpy
-    array.
+    Formats: `lidarium show formats`.
     """
     resolution: float | None = None
-    """metres per pixel, if the file is a plain image"""
+    """metres per pixel, if the file is a plain image; the length of a unit of a drawing, whatever its header says"""
+    skip_meshes: bool = False
+    """leave out collisions of a Gazebo world that are meshes, instead of taking their bounding boxes"""
+    layers: tuple[str, ...] = ()
+    """layers of a DXF drawing that are walls; by default all that are not off or frozen"""
     map_resolution: float = 0.025
     """side of a cell of the ROS map [m]"""
 
@@ -163,9 +170,15 @@ def _list_floors(command: _List) -> Answer:
 def _show_floor(command: _Show) -> Answer:
     """Describe a floor."""
     from lidarium.envs.floors.catalogue.names import about_floor, describe_floor, floor_names, load_floor
+    from lidarium.envs.floors.importers import load_file
 
     check_out(command)
-    floor = load_floor(command.name, command.resolution)
+    options = _import_options(command)
+    floor = (
+        load_file(Path(command.name), command.resolution, **options)
+        if options
+        else load_floor(command.name, command.resolution)
+    )
     result = describe_floor(floor)
     about = about_floor(command.name) if command.name in floor_names() else ""
     files = []
@@ -173,7 +186,7 @@ def _show_floor(command: _Show) -> Answer:
         _save_picture(command.out / f"{file_name(floor.name)}.png", floor)
         write_result(command, f"{file_name(floor.name)}.json", result)
         files = [f"{file_name(floor.name)}.json", f"{file_name(floor.name)}.png"]
-    return Answer(result, floor_description(result, command.out, files, about))
+    return Answer(result, floor_description(result, command.out, files, about), _verdict(result))
 
 
 def _generate_floor(command: _Generate) -> Answer:
@@ -190,7 +203,14 @@ def _import_floor(command: _Import) -> Answer:
     from lidarium.envs.floors.importers import load_file
 
     check_out(command)
-    return write_floor(command, load_file(command.file, command.resolution), command.map_resolution)
+    floor = load_file(command.file, command.resolution, **_import_options(command))
+    return write_floor(command, floor, command.map_resolution)
+
+
+def _import_options(command: _Show | _Import) -> dict[str, Any]:
+    """Return the options of formats that are given."""
+    given = {"skip_meshes": command.skip_meshes, "layers": command.layers}
+    return {name: value for name, value in given.items() if value}
 
 
 def _prepare_floors(command: _Prepare) -> Answer:
@@ -296,7 +316,12 @@ def write_floor(command: Command, floor: "Floor", resolution: float) -> Answer:
     write_result(command, f"{stem}.json", result, folder)
     files = [f"{stem}.{kind}" for kind in ("yaml", "pgm", "png", "json")]
     check_written(folder, files)
-    return Answer(result, floor_description(result, folder, files))
+    return Answer(result, floor_description(result, folder, files), _verdict(result))
+
+
+def _verdict(result: dict[str, Any]) -> int:
+    """Return the exit code: a floor of which robots reach the smaller part is hardly what was meant."""
+    return DOUBTFUL if result["reachable_m2"] < 0.5 * result["whole_m2"] else DONE
 
 
 def _levels(solid: Any, resolution: float) -> Any:  # noqa: ANN401
@@ -344,6 +369,7 @@ def floor_description(result: dict[str, Any], folder: Path | None, files: list[s
     facts = [
         ("size", f"{width:g} x {height:g} m"),
         ("free area", f"{result['area_m2']:.1f} m2"),
+        ("reachable", f"{result['reachable_m2']:.1f} m2 of {result['whole_m2']:.1f} m2"),
         ("rooms", f"{result['rooms']}"),
         ("loops", f"{result['loops']}"),
         ("clutter", f"{100.0 * result['clutter']:.1f} % of the area under furniture"),

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from lidarium.scripts import first_start
-from lidarium.scripts.common import DONE, DOUBTFUL, INTERRUPTED, Answer, Progress, TeamCommand, file_name
+from lidarium.scripts.common import DONE, DOUBTFUL, INTERRUPTED, Answer, Progress, TeamCommand, file_name, notify
 from lidarium.scripts.options import (
     FilmOptions,
     ViewOptions,
@@ -144,6 +144,9 @@ def _answer(command: Run, policy: "Policy", options: dict[str, Any], views: "Seq
     result = result_of(episode, command.chosen_policy, history)
     if options:
         result["policy_settings"] = options
+    if env.floor.remark:
+        notify(f"{env.floor.name}: {env.floor.remark}")
+        result["floor_remark"] = env.floor.remark
     files = write_run(folder, episode, result, recorder, command.chosen_policy, command.films)
     return Answer(
         result,

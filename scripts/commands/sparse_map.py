@@ -1,14 +1,14 @@
 """`lidarium sparse-map`: make a sparse map of point clouds or depth images."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from tyro.conf import Positional
 
-from lidarium.scripts.common import Answer, Command, counted, table
+from lidarium.scripts.common import DONE, DOUBTFUL, Answer, Command, counted, notify, table
 
 if TYPE_CHECKING:
     import numpy as np
@@ -73,7 +73,8 @@ def execute(command: _SparseMapping) -> Answer:
     path = command.map_path
     check_writable(path.parent)
     began = perf_counter()
-    sparse_map, points = _mapped(command)
+    told = _Told()
+    sparse_map, points = _mapped(command, told)
     seconds = perf_counter() - began
     path.parent.mkdir(parents=True, exist_ok=True)
     write_sparse_map(path, sparse_map)
@@ -87,23 +88,41 @@ def execute(command: _SparseMapping) -> Answer:
         "bytes": path.stat().st_size,
         "seconds": round(seconds, 3),
         "pictures": pictures,
+        "floor": told.floor,
+        "offset": told.offset,
+        "remarks": told.remarks,
+        "probably_wrong": told.is_doubtful,
     }
+    for remark in told.remarks:
+        notify(remark)
+    floor = "{area_m2} m2 with {share:.0%} of the points, up is {up}".format(**told.floor)
     facts = [
         ("map", f"{len(sparse_map.boxes)} boxes, {len(sparse_map.free)} free codes of {points:,} points"),
+        ("floor", floor),
         ("size", f"{result['bytes']:,} bytes"),
         ("time", f"{seconds:.2f} s"),
         ("files", ", ".join([str(path), *pictures])),
     ]
-    return Answer(result, table(facts))
+    return Answer(result, table(facts), DOUBTFUL if told.is_doubtful else DONE)
 
 
-def _mapped(command: _SparseMapping) -> "tuple[SparseMap, int]":
+@dataclass
+class _Told:
+    """What is told of clouds beside their map: remarks, offset of the map, its floor, and whether it is doubtful."""
+
+    remarks: list[str] = field(default_factory=list)
+    offset: list[float] = field(default_factory=lambda: [0.0, 0.0, 0.0])
+    floor: dict[str, Any] = field(default_factory=dict)
+    is_doubtful: bool = False
+
+
+def _mapped(command: _SparseMapping, told: _Told) -> "tuple[SparseMap, int]":
     """Return the map of a command's clouds, and how many points they have."""
     from lidarium.mapping.sparse.mapper.full import map_cloud
     from lidarium.mapping.sparse.mapper.incremental import IncrementalMapper
 
     settings, total = _settings(command), 0
-    clouds = _clouds(command)
+    clouds = _clouds(command, told)
     if len(command.clouds) == 1:
         points, pose = next(clouds)
         return map_cloud(points, command.codes or 1024, settings, pose=pose), len(points)
@@ -122,25 +141,54 @@ def _settings(command: _SparseMapping) -> "MapperSettings":
     return MapperSettings(mode=command.mode, robot_height_m=command.robot_height, seed=command.seed, floor=floor)
 
 
-def _clouds(command: _SparseMapping) -> "Iterator[tuple[NDArray[np.floating], NDArray[np.float64]]]":
-    """Yield the points of each cloud and its pose in the map."""
+def _clouds(command: _SparseMapping, told: _Told) -> "Iterator[tuple[NDArray[np.floating], NDArray[np.float64]]]":
+    """Yield the points of each cloud and its pose in the map, whose origin is near the first cloud."""
     import numpy as np
 
     from lidarium.mapping.point_clouds.cameras import read_pose
-    from lidarium.mapping.point_clouds.cloud_files import read_cloud
+    from lidarium.mapping.point_clouds.cloud_files import FAR, read_cloud
     from lidarium.mapping.sparse.floor_plane import find_floor
     from lidarium.mapping.sparse.settings import FloorSettings
 
     x, y, z = numbers_of("--up", command.up, (3,))
     levelling: NDArray[np.float64] | None = None
     for place, path in enumerate(command.clouds):
-        points = read_cloud(path, command.scale, _intrinsics(command)).points
+        cloud = read_cloud(path, command.scale, _intrinsics(command))
+        points = cloud.points
+        told.remarks += [f"{path}: {remark}" for remark in cloud.remarks]
         pose = read_pose(command.poses[place]) if command.poses else np.eye(4)
+        pose[:3, 3] += pose[:3, :3] @ cloud.offset
+        if place == 0 and np.abs(pose[:3, 3]).max() > FAR:
+            told.offset = (np.rint(pose[:3, 3] / 100.0) * 100.0).tolist()
+            if command.poses:
+                told.remarks.append(f"the map's origin is at {', '.join(f'{value:,.0f}' for value in told.offset)}")
+        pose[:3, 3] -= told.offset
+        if place == 0:
+            _check_floor(command, points @ pose[:3, :3].T + pose[:3, 3], (x, y, z), told)
         if command.levels and levelling is None:
             in_first = points @ pose[:3, :3].T + pose[:3, 3]
             floor = find_floor(in_first, FloorSettings(up_x=x, up_y=y, up_z=z), command.seed)
             levelling = floor.levelling()
         yield points, pose if levelling is None else levelling @ pose
+
+
+def _check_floor(
+    command: _SparseMapping, points: "NDArray[np.floating]", up: tuple[float, float, float], told: _Told
+) -> None:
+    """Tell which floor the first cloud has; of one of several frames it may be small."""
+    from lidarium.mapping.sparse.up_axis import check_up
+
+    found = check_up(points, up, command.seed)
+    told.floor = {
+        "up": command.up,
+        "area_m2": round(found.area_m2, 1),
+        "share": round(found.share, 3),
+        "normal": None if found.plane is None else found.plane.normal.round(4).tolist(),
+        "offset": None if found.plane is None else round(found.plane.offset, 3),
+    }
+    if found.doubt and not (command.levels and len(command.clouds) > 1):
+        told.remarks.append(f"{command.clouds[0]}: the map is probably wrong: {found.doubt}")
+        told.is_doubtful = True
 
 
 def _intrinsics(command: _SparseMapping) -> "Intrinsics | None":

@@ -55,6 +55,15 @@ PLANS = {
     "<geometry><box><size>6 0.2 2</size></box>"
     '</geometry></collision><collision name="d"><geometry><cylinder><radius>0.4</radius><length>1</length>'
     "</cylinder></geometry></collision></link></model></world></sdf>",
+    "posed.world": '<sdf version="1.9"><world name="w"><frame name="f"><pose>1 0 0 0 0 1</pose></frame><model name="m">'
+    '<pose relative_to="f">1 0 0 0 0 1</pose><link name="a"><pose relative_to="b">1 0 0 0 0 0</pose>'
+    '<collision name="c"><geometry><box><size>6 0.2 2</size></box></geometry></collision></link>'
+    '<link name="b"/></model></world></sdf>',
+    "stage.world": 'define plan model ( boundary 1 )\nplan ( size [6 4 1] pose [1 2 0 0] bitmap "image.pgm" )\n'
+    "position ( pose [ 0 1 0 90 ] )\n",
+    "styled.svg": "<svg viewBox='0 0 60 40'><style>.a > rect {fill: none} #b {stroke: #0008}</style><g class='a' "
+    "opacity='.9'><rect width='60' height='40' stroke='black'/></g><path id='b' d='M 30 0 v 25'/>"
+    "<linearGradient id='c'><stop stop-color='#000'/></linearGradient><use href='#b' x='9' fill='url(#c)'/></svg>",
     "movingai.map": "type octile\nheight 4\nwidth 6\nmap\n@@@@@@\n@...T@\n@.S..@\n@@@@@@\n",
 }
 SUITE = """

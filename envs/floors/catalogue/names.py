@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from lidarium.envs.floors.areas import left_out
 from lidarium.envs.floors.catalogue.drawn import DATA, about_drawn, drawn_names, load_drawn
 from lidarium.envs.floors.catalogue.store import floor_store, hash_of_code
 from lidarium.envs.floors.floor import Floor, Solid
@@ -213,17 +214,20 @@ def _hash_of_floors(specs: Iterable[str]) -> str:
 def describe_floor(floor: Floor) -> dict[str, Any]:
     """Describe a floor in figures."""
     measures = measure_building(floor)
+    remarks = [each for each in (floor.remark, left_out(measures.left_out_m2)) if each]
     x_min, y_min, x_max, y_max = floor.bounds
     return {
         "name": floor.name,
         "size_m": [round(x_max - x_min, 3), round(y_max - y_min, 3)],
         "area_m2": measures.area_m2,
+        "reachable_m2": round(measures.whole_m2 - float(measures.left_out_m2.sum()), 3),
+        "whole_m2": round(measures.whole_m2 + floor.left_out_m2, 3),
         "loops": measures.loops,
         "clutter": measures.clutter,
         "rooms": measures.rooms,
         "solids": len(floor.solids),
         "sha256": floor.sha256,
-        "remark": floor.remark,
+        "remark": "; ".join(remarks),
     }
 
 

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from lidarium.envs.floors.floor import Floor
 from lidarium.envs.floors.importers import (
@@ -16,6 +17,7 @@ from lidarium.envs.floors.importers import (
     movingai,
     ros_map,
     sdf,
+    stage,
     svg,
 )
 from lidarium.mapping.files.guarded_reading import check_file, reading
@@ -35,15 +37,18 @@ class Format:
     matches : callable
         Whether a file with such a name is of this format, by its content.
     load : callable
-        Reads the file; gets the path and the resolution asked for, or None.
+        Reads the file; gets the path, the resolution asked for or None, and its options by keyword.
     has_scale : callable
         Whether a file states its scale, by its name.
+    options : tuple of str
+        Names of further options of `load`.
     """
 
     suffixes: tuple[str, ...]
     matches: Callable[[Path], bool]
-    load: Callable[[Path, float | None], Floor]
+    load: Callable[..., Floor]
     has_scale: Callable[[Path], bool] = lambda path: True
+    options: tuple[str, ...] = ()
 
 
 def _always(path: Path) -> bool:
@@ -63,8 +68,9 @@ FORMATS.register(
     Format((".map", ".map.gz"), movingai.matches, movingai.load, movingai.has_scale),
     "MovingAI grid map",
 )
-FORMATS.register("dxf", Format((".dxf",), _always, dxf.load, dxf.has_scale), "DXF drawing")
-FORMATS.register("sdf", Format(sdf.SUFFIXES, _always, sdf.load), "SDF, a world of Gazebo")
+FORMATS.register("dxf", Format((".dxf",), _always, dxf.load, dxf.has_scale, ("layers",)), "DXF drawing")
+FORMATS.register("stage", Format(stage.SUFFIXES, stage.matches, stage.load), "world of Stage with its picture")
+FORMATS.register("sdf", Format(sdf.SUFFIXES, _always, sdf.load, options=("skip_meshes",)), "SDF, a world of Gazebo")
 FORMATS.register("svg", Format((".svg",), _always, svg.load, svg.has_scale), "SVG drawing")
 FORMATS.register("array", Format((".npy", ".npz"), _always, arrays.load, arrays.has_scale), "numpy array")
 FORMATS.register("dungeon", Format(images.SUFFIXES, images.is_dungeon, images.load_dungeon), "picture of a dungeon")
@@ -75,7 +81,7 @@ FORMATS.register(
 )
 
 
-def load_file(path: Path, resolution: float | None = None) -> Floor:
+def load_file(path: Path, resolution: float | None = None, **options: Any) -> Floor:  # noqa: ANN401
     """Read a floor from a file of any known format.
 
     The format is recognised by the file's name and content.
@@ -85,6 +91,8 @@ def load_file(path: Path, resolution: float | None = None) -> Floor:
     resolution : float or None
         Side of a pixel [m] if the file does not state it: needed for plain images, numpy arrays,
         grid maps and drawings.
+    options
+        Options of the format, as ``skip_meshes`` of worlds and ``layers`` of DXF drawings.
     """
     path = Path(path)
     check_file(path)
@@ -93,7 +101,9 @@ def load_file(path: Path, resolution: float | None = None) -> Floor:
     with reading(path, "a floor"):
         known = _format_of(path)
         if known is not None:
-            return known.load(path, resolution)
+            if unknown := sorted(set(options) - set(known.options)):
+                raise ValueError(f"{path} takes no {' or '.join(unknown)}; want {', '.join(known.options) or 'none'}")
+            return known.load(path, resolution, **options)
     suffixes = sorted({suffix for known in FORMATS.values() for suffix in known.suffixes})
     raise ValueError(f"{path} is of no known floor format; want a file that ends in {', '.join(suffixes)}")
 

@@ -10,9 +10,9 @@ Autodesk, DXF Reference: Group Codes in Numerical Order; ENTITIES Section.
 import io
 import logging
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from lidarium.envs.floors.floor import MAX_COORDINATE_M, Floor
 from lidarium.envs.floors.importers.common import MAX_POINTS, MAX_TEXT_BYTES, floor_of_lines
-from lidarium.mapping.files.guarded_reading import READING_ERRORS, read_bytes
+from lidarium.mapping.files.guarded_reading import READING_ERRORS, read_bytes, shortened
 
 KINDS = frozenset(("LINE", "LWPOLYLINE", "POLYLINE", "ARC", "CIRCLE", "ELLIPSE", "SPLINE"))
 """Entities that are walls; texts, dimensions, hatches and the like are not."""
@@ -195,6 +195,12 @@ Those of CAD programs take more bytes; files with more of them take long, and ar
 
 _DEEPEST = 16
 
+_MIN_SIDE_M, _MAX_SIDE_M = 2.0, 200.0
+"""Sides of drawings whose unit is not remarked on [m]."""
+
+_MAX_NAMED = 200
+"""Most letters of names of layers in a message."""
+
 
 def has_scale(path: Path) -> bool:
     """Return whether the drawing has a unit; the rest of it is not parsed for that."""
@@ -202,10 +208,11 @@ def has_scale(path: Path) -> bool:
     return found is not None and int(found[1]) in _METRES
 
 
-def load(path: Path, resolution: float | None) -> Floor:
-    """Read a drawing; ``resolution`` is the length of a unit if the drawing has none [m].
+def load(path: Path, resolution: float | None, *, layers: Sequence[str] = ()) -> Floor:
+    """Read a drawing; ``resolution`` is the length of a unit [m], whatever the drawing says of it.
 
-    Entities on layers that are off or frozen are left out, and so are those in paper space.
+    Entities on other layers than ``layers`` are left out, if some are named, otherwise those on layers that are off
+    or frozen; and so are those in paper space.
     """
     content = read_bytes(path, MAX_TEXT_BYTES)
     if not content.rstrip(b"\r\n\0 ").endswith(b"EOF"):
@@ -216,21 +223,30 @@ def load(path: Path, resolution: float | None) -> Floor:
         raise ValueError(_too_dense(path, maximum["parsed"], "entities beside straight walls"))
     document = _document(path, sifted)
     unit = _unit(document)
-    if unit is not None and resolution is not None:
-        raise ValueError(f"{path} has units of {unit:g} m, but a resolution of {resolution} m is given; want none")
-    if unit is None and resolution is None:
+    scale = unit if resolution is None else resolution
+    if scale is None:
         raise ValueError(f"{path} has no unit; want image_resolution (--resolution), the metres of a unit")
-    scale = resolution if unit is None else unit
-    assert scale is not None
+    shows = _Layers(document, layers)
     with _damage(path):
-        walls = _walls(path, document, sifted, CURVE_ERROR_M / scale, maximum["parsed"])
+        walls = _walls(path, document, sifted, CURVE_ERROR_M / scale, maximum["parsed"], shows)
         limited = _limited(path, walls, min(maximum["wall"], MAX_POINTS))
         segments = np.concatenate([np.zeros((0, 4)), *limited]) * scale
     if not len(segments):
-        raise ValueError(f"{path} has no lines in model space; want a plan of {', '.join(sorted(KINDS))}")
+        where = f"on {', '.join(map(repr, layers))}; it has {shows.named()}" if layers else "in model space"
+        raise ValueError(f"{path} has no lines {where}; want a plan of {', '.join(sorted(KINDS))}")
     if not np.isfinite(segments).all():
         raise ValueError(f"{path} has lines that lead nowhere; want finite coordinates")
-    return floor_of_lines(path, segments, np.zeros((0, 4)))
+    wide, high = np.ptp(segments.reshape(-1, 2), axis=0).tolist()
+    if resolution is not None or _MIN_SIDE_M <= max(wide, high) <= _MAX_SIDE_M:
+        return floor_of_lines(path, segments, np.zeros((0, 4)))
+    remark = (
+        f"by the unit of its header, {scale:g} m, the drawing is {wide:,.0f} x {high:,.0f} m; "
+        "if that is wrong, give --resolution, the metres of a unit"
+    )
+    try:
+        return replace(floor_of_lines(path, segments, np.zeros((0, 4))), remark=remark)
+    except ValueError as error:
+        raise ValueError(f"{error}; {remark}") from error
 
 
 def _limited(path: Path, lines: Iterable[NDArray[np.float64]], maximum: int) -> Iterator[NDArray[np.float64]]:
@@ -285,13 +301,14 @@ def _walls(
     sifted: _Sifted,
     error: float,
     maximum: int,
+    shows: "_Layers",
 ) -> Iterator[NDArray[np.float64]]:
     """Yield the walls as polylines (n, 2) in the drawing's units."""
     from ezdxf.path import make_path
 
-    hidden = {layer for layer in {layer for layer, _ in sifted.walls} if not _shows(document, layer)}
+    hidden = {layer for layer in {layer for layer, _ in sifted.walls} if not shows.hold(layer)}
     yield from (wall for layer, wall in sifted.walls if layer not in hidden)
-    for entity in _entities(path, document, maximum):
+    for entity in _entities(path, document, maximum, shows):
         if entity.dxftype() == "LINE":  # paths of them cost ten times as much
             start, end = entity.dxf.start, entity.dxf.end
             yield np.array([(start.x, start.y), (end.x, end.y)])
@@ -314,14 +331,15 @@ def _flattened(path: Path, part: Any, error: float) -> NDArray[np.float64]:  # n
     return np.array([(point.x, point.y) for point in points]).reshape(-1, 2)
 
 
-def _entities(path: Path, document: Any, maximum: int) -> Iterator[Any]:  # noqa: ANN401
+def _entities(path: Path, document: Any, maximum: int, shows: "_Layers") -> Iterator[Any]:  # noqa: ANN401
     """Yield walls, with blocks taken apart.
 
     A few blocks that hold each other a few times make more entities than there is time for; all are counted.
     """
-    waiting, count = [iter(document.modelspace())], 0
+    waiting, count = [("0", iter(document.modelspace()))], 0
     while waiting:
-        entity = next(waiting[-1], None)
+        around, entities = waiting[-1]
+        entity = next(entities, None)
         if entity is None:
             waiting.pop()
             continue
@@ -329,21 +347,36 @@ def _entities(path: Path, document: Any, maximum: int) -> Iterator[Any]:  # noqa
         if count > maximum:
             raise ValueError(f"{path} has blocks of more than {maximum:,} entities; want a plan")
         kind = entity.dxftype()
-        if not _shows(document, entity.dxf.layer, is_insert=kind == "INSERT"):
+        # What a block has on layer 0 is on the layer that the block is inserted on.
+        layer = around if entity.dxf.layer == "0" else entity.dxf.layer
+        if not shows.hold(layer, is_insert=kind == "INSERT"):
             continue
         if kind in COMPOUND:
             if len(waiting) > _DEEPEST:
                 raise ValueError(f"{path} has blocks nested more than {_DEEPEST} deep; want a plan")
             has_rows = kind == "INSERT" and entity.mcount > 1
-            waiting.append(iter(entity.multi_insert() if has_rows else entity.virtual_entities()))
+            waiting.append((layer, iter(entity.multi_insert() if has_rows else entity.virtual_entities())))
         elif kind in KINDS:
             yield entity
 
 
-def _shows(document: Any, name: str, *, is_insert: bool = False) -> bool:  # noqa: ANN401
-    """Return whether a layer shows its entities; entities of a block have their own layers."""
-    if name not in document.layers:
-        return True
-    layer = document.layers.get(name)
-    is_off = not is_insert and layer.is_off()
-    return not (is_off or layer.is_frozen())
+class _Layers:
+    """The layers of a drawing whose entities count: the chosen ones, otherwise all that are on and not frozen."""
+
+    def __init__(self, document: Any, chosen: Sequence[str]) -> None:  # noqa: ANN401
+        self._layers = document.layers
+        self._chosen = {name.lower() for name in chosen}
+
+    def hold(self, name: str, *, is_insert: bool = False) -> bool:
+        """Return whether the entities of a layer count; entities of a block have layers of their own."""
+        if self._chosen and (name.lower() in self._chosen or is_insert):
+            return True
+        if self._chosen or name not in self._layers:
+            return not self._chosen
+        layer = self._layers.get(name)
+        is_off = not is_insert and layer.is_off()
+        return not (is_off or layer.is_frozen())
+
+    def named(self) -> str:
+        """Return the names of all layers."""
+        return shortened(", ".join(repr(layer.dxf.name) for layer in self._layers), _MAX_NAMED)

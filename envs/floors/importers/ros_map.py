@@ -24,11 +24,22 @@ def load(path: Path, resolution: float | None) -> Floor:
     A map turned by the yaw of its origin is redrawn along the axes.
     """
     refuse_resolution(path, resolution)
-    image = read_ros_map(path)
+    return floor_of_map(path, read_ros_map(path))
+
+
+def floor_of_map(path: Path, image: MapImage, starts: NDArray[np.float64] | None = None) -> Floor:
+    """Return the floor of a map; the first of the starts (K, 3), if there are some, is in its area."""
     free = image.levels == FREE
     if math.remainder(image.origin[2], 2.0 * math.pi) == 0.0:
-        return floor_of_cells(path, free, image.origin[:2], image.resolution)
-    return floor_of_cells(path, *_turned(image, free))
+        cells, origin, side = free, image.origin[:2], image.resolution
+    else:
+        cells, origin, side = _turned(image, free)
+    seed = None
+    if starts is not None and len(starts):
+        column, row = (math.floor((value - low) / side) for value, low in zip(starts[0, :2], origin, strict=True))
+        is_free = 0 <= row < cells.shape[0] and 0 <= column < cells.shape[1] and cells[row, column]
+        seed, starts = ((row, column), starts) if is_free else (None, None)
+    return floor_of_cells(path, cells, origin, side, seed, starts)
 
 
 def _turned(image: MapImage, free: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], tuple[float, float], float]:

@@ -3,14 +3,13 @@
 Lines are as wide as they are drawn, and at least so wide that nothing leaks through them.
 """
 
-import functools
 import itertools
 import math
 import operator
 import re
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
@@ -21,6 +20,7 @@ from svgelements import Arc, CubicBezier, Matrix, PathSegment, QuadraticBezier
 from lidarium.envs.floors.drawing import fill_shapes, ring_edges, strip_edges
 from lidarium.envs.floors.floor import Floor, check_extent
 from lidarium.envs.floors.importers.common import MAX_POINTS, few_enough, floor_of_cells, read_text
+from lidarium.envs.floors.importers.svg_styles import StyleSheet, declared, light_of, share_of
 from lidarium.mapping.files.images import MAX_PIXELS
 from lidarium.mapping.geometry.bounds import shown
 
@@ -181,6 +181,9 @@ MIN_WIDTH = 0.05
 _MARGIN = 0.5
 _FREE_ABOVE = 127 / 255
 _DEEPEST = 64
+_MAX_ELEMENTS = 250_000
+"""Most elements that are drawn, each as often as it is used."""
+
 _UNSEEN = frozenset(
     (
         "defs",
@@ -197,7 +200,17 @@ _UNSEEN = frozenset(
         "text",
     )
 )
-_OF_STYLE = ("fill", "stroke", "stroke-width", "display", "visibility")
+_OF_STYLE = (
+    "fill",
+    "stroke",
+    "stroke-width",
+    "display",
+    "visibility",
+    "color",
+    "opacity",
+    "fill-opacity",
+    "stroke-opacity",
+)
 _HAS_STYLE = frozenset(("class", "style", *_OF_STYLE))
 _DEFAULTS = {
     "fill": "black",
@@ -205,8 +218,11 @@ _DEFAULTS = {
     "stroke-width": "1",
     "display": "inline",
     "visibility": "visible",
+    "color": "black",
+    "opacity": "1",
+    "fill-opacity": "1",
+    "stroke-opacity": "1",
 }
-_RULES = re.compile(r"([^{}]+)\{([^{}]*)\}")
 
 Style = dict[str, str]
 
@@ -245,7 +261,8 @@ def load(path: Path, resolution: float | None) -> Floor:
     if _kind(root) != "svg":
         raise ValueError(f"{path} begins with {shown(_kind(root))}; want an svg element")
     to_metres = np.diag([resolution, -resolution, 1.0])
-    found = _shapes(root, to_metres, dict(_DEFAULTS), _classes(root), 0)
+    drawing = _Drawing(root)
+    found = drawing.shapes(root, to_metres, dict(_DEFAULTS), ())
     shapes = list(few_enough(path, found, lambda shape: sum(map(len, shape.outlines))))
     drawn = [shape for shape in shapes if shape.is_solid_line or shape.is_solid_inside]
     if not drawn:
@@ -268,7 +285,9 @@ def load(path: Path, resolution: float | None) -> Floor:
         segments = np.concatenate(lines)
         of_segments = np.repeat(widths, [len(each) for each in lines])
         fill_shapes(solid, origin, RESOLUTION, strip_edges(segments, of_segments, 0.5), value)
-    return floor_of_cells(path, solid == 0, origin, RESOLUTION)
+    floor = floor_of_cells(path, solid == 0, origin, RESOLUTION)
+    remarks = [each for each in (floor.remark, *drawing.remarks()) if each]
+    return replace(floor, remark="; ".join(remarks))
 
 
 def _layers(shape: _Shape) -> Iterator[_Layer]:
@@ -283,32 +302,118 @@ def _layers(shape: _Shape) -> Iterator[_Layer]:
         yield int(shape.is_solid_line), None, np.concatenate(segments), width
 
 
-def _shapes(
-    element: Element, around: NDArray[np.float64], inherited: Style, classes: dict[str, Style], depth: int
-) -> Iterator[_Shape]:
-    """Yield the shapes of an element and of all within it, in the order in which they are painted."""
-    kind = _kind(element)
-    if kind in _UNSEEN:
-        return
-    if depth > _DEEPEST:
-        raise ValueError(f"elements are nested more than {_DEEPEST} deep; want a plan")
-    style = _style(element, inherited, classes)
-    if style["display"].strip() == "none":
-        return
-    matrix = around @ _transform_of(element) if "transform" in element.attrib else around
-    found = outlines(element, kind)
-    if found and style["visibility"].strip() == "visible":
-        placed = [outline @ matrix[:2, :2].T + matrix[:2, 2] for outline in found]
-        (a, b), (c, d) = matrix[:2, :2].tolist()
-        scale = math.sqrt(abs(a * d - b * c))
-        yield _Shape(
-            placed,
-            None if kind == "line" else _is_dark(style["fill"]),
-            _is_dark(style["stroke"]),
-            _length(style["stroke-width"], 1.0) * scale,
-        )
-    for child in element:
-        yield from _shapes(child, matrix, style, classes, depth + 1)
+class _Drawing:
+    """The elements of a drawing, with their styles.
+
+    Parameters
+    ----------
+    root : Element
+        The svg element.
+    """
+
+    def __init__(self, root: Element) -> None:
+        self._named = {name: each for each in root.iter() if (name := each.get("id"))}
+        self._sheet = StyleSheet("".join("".join(each.itertext()) for each in root.iter() if _kind(each) == "style"))
+        self._pictures = self._drawn = 0
+
+    def remarks(self) -> Iterator[str]:
+        """Yield what of the drawing is left out."""
+        if self._pictures:
+            yield f"{self._pictures} pictures in the drawing are left out"
+        if self._sheet.unread:
+            yield f"{self._sheet.unread} rules of its style sheet are not understood and left out"
+
+    def shapes(
+        self, element: Element, around: NDArray[np.float64], inherited: Style, path: tuple[Element, ...]
+    ) -> Iterator[_Shape]:
+        """Yield the shapes of an element and of all within it, in the order in which they are painted.
+
+        ``path`` holds the elements around it, the outermost first.
+        """
+        kind = _kind(element)
+        if kind in _UNSEEN and not (kind == "symbol" and path and _kind(path[-1]) == "use"):
+            return
+        self._drawn += 1
+        if len(path) > _DEEPEST:
+            raise ValueError(f"elements are nested more than {_DEEPEST} deep; want a plan")
+        if self._drawn > _MAX_ELEMENTS:
+            raise ValueError(f"it draws more than {_MAX_ELEMENTS:,} elements; want a plan, or a picture of it")
+        path = (*path, element)
+        style = self._style(path, inherited)
+        if style["display"].strip() == "none":
+            return
+        matrix = around @ _transform_of(element) if "transform" in element.attrib else around
+        found = outlines(element, kind)
+        if found and style["visibility"].strip() == "visible":
+            placed = [outline @ matrix[:2, :2].T + matrix[:2, 2] for outline in found]
+            (a, b), (c, d) = matrix[:2, :2].tolist()
+            scale = math.sqrt(abs(a * d - b * c))
+            yield _Shape(
+                placed,
+                None if kind == "line" else self._is_dark(style, "fill"),
+                self._is_dark(style, "stroke"),
+                _length(style["stroke-width"], 1.0) * scale,
+            )
+        self._pictures += kind == "image"
+        if kind == "use" and (used := self._named.get(_link(element))) is not None:
+            shifted = matrix @ _placed(element, used)
+            yield from self.shapes(used, shifted, style, path)
+        for child in element:
+            yield from self.shapes(child, matrix, style, path)
+
+    def _style(self, path: tuple[Element, ...], inherited: Style) -> Style:
+        """Return the style of an element.
+
+        Its own style takes precedence over the style sheet, this over its attributes, these over inherited ones.
+        Opacity is not inherited: that of a group is of all in it.
+        """
+        element = path[-1]
+        if self._sheet.is_empty and _HAS_STYLE.isdisjoint(element.attrib):
+            return inherited
+        own = {name: value for name in _OF_STYLE if (value := element.get(name)) is not None}
+        own |= {name: value for name, value in self._sheet.declared(path).items() if name in _OF_STYLE}
+        own |= {name: value for name, value in declared(element.get("style", "")).items() if name in _OF_STYLE}
+        opacity = share_of(own.pop("opacity", "1"), 1.0) * float(inherited["opacity"])
+        own = {name: inherited[name] if value.strip() == "inherit" else value for name, value in own.items()}
+        return {**inherited, **own, "opacity": str(opacity)}
+
+    def _is_dark(self, style: Style, what: str) -> bool | None:
+        """Return whether a paint makes dark what it covers, whatever was there; None if that depends on it.
+
+        What is painted thinly is seen through: it counts as what is seen on white if that is dark, and as light if
+        even on black it is.
+        """
+        opacity = float(style["opacity"]) * share_of(style[f"{what}-opacity"], 1.0)
+        colour = style[what].strip()
+        if colour.lower() == "currentcolor":
+            colour = style["color"]
+        if found := re.match(r"url\(\s*['\"]?#([^)'\"]*)['\"]?\s*\)\s*(.*)", colour):
+            server = self._named.get(found[1])
+            lights = [] if server is None else self._stops(server, 0)
+            if not lights and server is not None and _kind(server) == "pattern":
+                lights = [(0.0, 1.0)]  # hatched, as walls are
+            if not lights:
+                lights = [light_of(found[2] or "none")]
+            light, own = (sum(values) / len(values) for values in zip(*lights, strict=True))
+        else:
+            light, own = light_of(colour)
+        opacity *= own
+        if opacity * light + 1.0 - opacity <= _FREE_ABOVE:
+            return True
+        return False if opacity * light > _FREE_ABOVE else None
+
+    def _stops(self, gradient: Element, depth: int) -> list[tuple[float, float]]:
+        """Return lightness and opacity of the stops of a gradient; those of another one that it refers to."""
+        found = []
+        for stop in gradient:
+            if _kind(stop) == "stop":
+                given = {**stop.attrib, **self._sheet.declared((stop,)), **declared(stop.get("style", ""))}
+                light, opacity = light_of(given.get("stop-color", "black"))
+                found.append((light, opacity * share_of(given.get("stop-opacity", "1"), 1.0)))
+        other = self._named.get(_link(gradient))
+        if found or other is None or depth > _DEEPEST:
+            return found
+        return self._stops(other, depth + 1)
 
 
 def _kind(element: Element) -> str:
@@ -316,51 +421,23 @@ def _kind(element: Element) -> str:
     return str(element.tag).rpartition("}")[2]
 
 
-def _style(element: Element, inherited: Style, classes: dict[str, Style]) -> Style:
-    """Return the style of an element.
-
-    Its own style takes precedence over its classes, these over its attributes, these over inherited ones.
-    """
-    if not classes and _HAS_STYLE.isdisjoint(element.attrib):
-        return inherited
-    style = {**inherited, **{name: value for name in _OF_STYLE if (value := element.get(name)) is not None}}
-    for name in (_kind(element), *(f".{each}" for each in element.get("class", "").split())):
-        style |= classes.get(name, {})
-    style |= _declared(element.get("style", ""))
-    return {name: inherited[name] if value.strip() == "inherit" else value for name, value in style.items()}
+def _link(element: Element) -> str:
+    """Return the name of the element that one refers to."""
+    link = element.get("href") or element.get("{http://www.w3.org/1999/xlink}href") or ""
+    return link.strip().removeprefix("#")
 
 
-def _classes(root: Element) -> dict[str, Style]:
-    """Return the rules of style sheets whose selector is a class or the name of an element."""
-    sheets = "".join("".join(each.itertext()) for each in root.iter() if _kind(each) == "style")
-    rules: dict[str, Style] = {}
-    for selectors, text in _RULES.findall(re.sub(r"/\*.*?\*/", "", sheets, flags=re.DOTALL)):
-        for selector in selectors.split(","):
-            rules.setdefault(selector.strip(), {}).update(_declared(text))
-    return rules
-
-
-def _declared(text: str) -> Style:
-    pairs = (declaration.partition(":") for declaration in text.split(";"))
-    found = {name.strip(): value.replace("!important", "").strip() for name, _, value in pairs}
-    return {name: value for name, value in found.items() if name in _OF_STYLE}
-
-
-@functools.cache
-def _is_dark(colour: str) -> bool | None:
-    """Return whether a colour is dark; None if nothing is painted. Gradients and their like are dark."""
-    from matplotlib.colors import to_rgb
-
-    word = colour.strip().lower()
-    if word in ("none", "transparent"):
-        return None
-    if found := re.fullmatch(r"rgba?\(([^)]*)\)", word):
-        parts = [part.strip() for part in re.split(r"[\s,/]+", found[1].strip())]
-        levels = [float(part[:-1]) * 2.55 if part.endswith("%") else float(part) for part in parts[:3]]
-        red, green, blue = (level / 255.0 for level in levels)
-    else:
-        try:
-            red, green, blue = to_rgb(word)
-        except ValueError:
-            return True
-    return bool(0.299 * red + 0.587 * green + 0.114 * blue <= _FREE_ABOVE)
+def _placed(use: Element, used: Element) -> NDArray[np.float64]:
+    """Return where an element is used, (3, 3): a symbol with a view box fits into the size asked for."""
+    x, y = (_length(use.get(name)) for name in ("x", "y"))
+    box = _numbers(used.get("viewBox", ""))
+    matrix = np.array([[1.0, 0.0, x], [0.0, 1.0, y], [0.0, 0.0, 1.0]])
+    if _kind(used) != "symbol" or len(box) != 4 or not (box[2] > 0.0 and box[3] > 0.0):
+        return matrix
+    wide, high = (
+        _length(use.get(name) or used.get(name), size) for name, size in (("width", box[2]), ("height", box[3]))
+    )
+    scale = min(wide / box[2], high / box[3])
+    # The middle of the view box is in the middle of the size.
+    shift_x, shift_y = 0.5 * wide - scale * (box[0] + 0.5 * box[2]), 0.5 * high - scale * (box[1] + 0.5 * box[3])
+    return np.asarray(matrix @ np.array([[scale, 0.0, shift_x], [0.0, scale, shift_y], [0.0, 0.0, 1.0]]), np.float64)

@@ -6,6 +6,9 @@ import pytest
 import lidarium
 from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.floors.areas import around, floor_of_area
+from lidarium.envs.floors.catalogue.names import describe_floor
+from lidarium.envs.floors.floor import Floor, Solid
+from lidarium.envs.floors.importers import load_file
 from lidarium.envs.settings.making import make_settings
 
 SIDE = 0.1
@@ -59,13 +62,14 @@ def test_a_room_that_is_cut_within_its_walls_stays_the_floor():
     assert "border" in floor.remark
 
 
-def test_a_building_in_unknown_space_has_nothing_to_be_said_of():
+def test_areas_that_are_left_out_are_told():
     free = np.zeros((60, 80), np.bool_)
     free[5:40, 5:70] = True
     free[45:50, 5:70] = True
     floor = floor_of_area("house", free, (0.0, 0.0), SIDE)
     assert area(floor) == pytest.approx(35 * 65 * SIDE**2)
-    assert floor.remark == ""
+    assert floor.remark == "3.3 m2 in one other area cannot be reached and are left out"
+    assert floor.left_out_m2 == pytest.approx(5 * 65 * SIDE**2)
     assert area(around(floor, np.array([[1.0, 4.7, 0.0]]))) == pytest.approx(5 * 65 * SIDE**2)
 
 
@@ -95,3 +99,20 @@ def test_a_record_of_robots_in_another_area_is_run_again(tmp_path):
     run_episode(lidarium.policy("nearest_frontier"), env, 0, {"starts": [(7.0, 6.0, 0.0)]})
     again = rerun(recorder.finish(is_interrupted=False))
     assert again.floor.sha256 == env.floor.sha256
+
+
+def test_a_hall_behind_a_wall_of_glass_is_told(shared_cases):
+    described = describe_floor(load_file(shared_cases / "areas-left-out" / "map.yaml"))
+    assert described["reachable_m2"] == pytest.approx(66.7, abs=0.1)
+    assert described["whole_m2"] == pytest.approx(120.1, abs=0.1)
+    assert described["remark"] == "53.4 m2 in one other area cannot be reached and are left out"
+
+
+def test_what_lies_behind_an_opening_that_is_too_narrow_is_told():
+    walls = [np.array([[4.0, 0.0], [4.1, 0.0], [4.1, 2.8], [4.0, 2.8]])]
+    for gap, left in ((0.8, 0.0), (0.2, 1.9 * 3.0)):
+        wall = walls[0].copy()
+        wall[2:, 1] = 3.0 - gap
+        described = describe_floor(Floor("two", (0.0, 0.0, 6.0, 3.0), (Solid(wall),)))
+        assert described["whole_m2"] - described["reachable_m2"] == pytest.approx(left, abs=0.25)
+        assert ("cannot be reached" in described["remark"]) == (left > 0.0)

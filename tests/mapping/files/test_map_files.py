@@ -59,23 +59,23 @@ def test_greys_colours_and_sixteen_bits_give_the_same_levels(channels):
     grey = np.array([[0, 128, 255]], np.uint8)
     pixels = grey if channels == 1 else np.repeat(grey[..., None], 3, axis=2)
     expected = trinary(grey.astype(float))
-    np.testing.assert_array_equal(_levels_by_blocks(pixels, trinary, False), expected)
+    np.testing.assert_array_equal(_levels_by_blocks(pixels, trinary, "ignored"), expected)
     deep = pixels.astype(np.uint16) * np.uint16(257)
-    np.testing.assert_array_equal(_levels_by_blocks(deep, trinary, False), expected)
+    np.testing.assert_array_equal(_levels_by_blocks(deep, trinary, "ignored"), expected)
 
 
 def test_what_is_not_opaque_is_unknown_where_that_is_asked_for():
     pixels = np.zeros((1, 3, 4), np.uint8)
     pixels[..., 3] = [[255, 254, 0]]
-    assert _levels_by_blocks(pixels, trinary, True).tolist() == [[OCCUPIED, UNKNOWN, UNKNOWN]]
-    assert _levels_by_blocks(pixels, trinary, False).tolist() == [[OCCUPIED] * 3]
+    assert _levels_by_blocks(pixels, trinary, "unknown").tolist() == [[OCCUPIED, UNKNOWN, UNKNOWN]]
+    assert _levels_by_blocks(pixels, trinary, "ignored").tolist() == [[OCCUPIED] * 3]
 
 
 def test_blocks_make_no_difference(monkeypatch):
     pixels = np.random.default_rng(0).integers(0, 256, (50, 40, 2)).astype(np.uint8)
-    whole = _levels_by_blocks(pixels, trinary, True)
+    whole = _levels_by_blocks(pixels, trinary, "unknown")
     monkeypatch.setattr(map_files, "_BLOCK_PIXELS", 130)
-    np.testing.assert_array_equal(_levels_by_blocks(pixels, trinary, True), whole)
+    np.testing.assert_array_equal(_levels_by_blocks(pixels, trinary, "unknown"), whole)
 
 
 def test_values_are_read(tmp_path):
@@ -288,7 +288,18 @@ def test_scale_mode_leaves_the_middle_and_the_transparent_unknown(tmp_path):
     np.testing.assert_array_equal(
         read_ros_map(write_of_map_files(tmp_path, pixels, mode="scale")).levels, [[0, 255, 127]]
     )
-    np.testing.assert_array_equal(read_ros_map(write_of_map_files(tmp_path, pixels)).levels, [[0, 255, 255]])
+    raw = read_ros_map(write_of_map_files(tmp_path, pixels, mode="raw"))
+    np.testing.assert_array_equal(raw.levels, [[255, 127, 127]])
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16])
+def test_opacity_is_a_fourth_colour_in_trinary_mode(tmp_path, dtype):
+    pixels = np.zeros((4, 50, 4), dtype)
+    pixels[..., :3] = np.array([0, 254, 254, 205], dtype)[:, None, None] * (1 if dtype == np.uint8 else 257)
+    pixels[..., 3] = np.iinfo(dtype).max
+    pixels[2, :, 3] = 0
+    levels = read_ros_map(write_of_map_files(tmp_path, pixels)).levels
+    np.testing.assert_array_equal(levels[::-1, 0], [OCCUPIED, FREE, UNKNOWN, UNKNOWN])
 
 
 def test_raw_pixels_are_occupancy_in_percent(tmp_path):

@@ -6,49 +6,42 @@ import zlib
 import numpy as np
 import pytest
 from cloud_files import POINTS, lines_of, packed_body, pcd, ply
+from scipy.spatial import cKDTree
 
 from lidarium.mapping.point_clouds.cameras import Intrinsics
-from lidarium.mapping.point_clouds.cloud_files import (
-    _cloud_of_columns,
-    _parse_obj,
-    _parse_xyz,
-    _text_columns,
-    _wanted_columns,
-    read_cloud,
-    write_pcd,
-    write_ply,
-)
+from lidarium.mapping.point_clouds.cloud_files import _parse_obj, _parse_xyz, read_cloud, write_pcd
+from lidarium.mapping.point_clouds.columns import cloud_of_columns, text_columns, wanted_columns
+from lidarium.mapping.point_clouds.ply_files import write_ply
 from lidarium.mapping.point_clouds.point_cloud import PointCloud
 
 
 def test_points_come_first_then_whole_normals_and_weights():
-    assert _wanted_columns(["weight", "z", "rgb", "y", "x"]) == ["x", "y", "z", "weight"]
-    assert _wanted_columns(["x", "y", "z", "nx", "ny", "nz"]) == ["x", "y", "z", "nx", "ny", "nz"]
+    assert wanted_columns(["weight", "z", "rgb", "y", "x"]) == ["x", "y", "z", "weight"]
+    assert wanted_columns(["x", "y", "z", "nx", "ny", "nz"]) == ["x", "y", "z", "nx", "ny", "nz"]
     # Two of three are no normal.
-    assert _wanted_columns(["x", "y", "z", "nx", "ny"]) == ["x", "y", "z"]
+    assert wanted_columns(["x", "y", "z", "nx", "ny"]) == ["x", "y", "z"]
 
 
 def test_what_is_missing_is_named():
     with pytest.raises(ValueError, match="it has no field y, z, but x, intensity"):
-        _wanted_columns(["x", "intensity"])
+        wanted_columns(["x", "intensity"])
     with pytest.raises(ValueError, match="but none"):
-        _wanted_columns([])
+        wanted_columns([])
 
 
 def test_columns_become_a_cloud():
     columns = {name: np.array([k, k + 10.0]) for k, name in enumerate(("x", "y", "z", "nx", "ny", "nz"))}
     columns["nx"][:], columns["ny"][:], columns["nz"][:] = 0.0, 0.0, 1.0
-    cloud = _cloud_of_columns({**columns, "weight": np.array([2, 3])}, "a.ply")
+    cloud = cloud_of_columns({**columns, "weight": np.array([2, 3])})
     np.testing.assert_array_equal(cloud.points, [[0.0, 1.0, 2.0], [10.0, 11.0, 12.0]])
     np.testing.assert_array_equal(cloud.normals, [[0.0, 0.0, 1.0]] * 2)
     np.testing.assert_array_equal(cloud.weights, [2.0, 3.0])
-    assert cloud.points.dtype == np.float32
 
 
 def test_lines_of_numbers_are_read_by_their_places():
     content = b"# remark\n1 2 3\n\n4 5 6 \n  # another\n7 8 9\n"
-    np.testing.assert_array_equal(_text_columns(content, (2, 0)), [[3, 1], [6, 4], [9, 7]])
-    np.testing.assert_array_equal(_text_columns(content, (0,), 2), [[1], [4]])
+    np.testing.assert_array_equal(text_columns(content, (2, 0)), [[3, 1], [6, 4], [9, 7]])
+    np.testing.assert_array_equal(text_columns(content, (0,), 2), [[1], [4]])
 
 
 @pytest.mark.parametrize(
@@ -61,16 +54,16 @@ def test_lines_of_numbers_are_read_by_their_places():
 )
 def test_lines_that_are_no_such_numbers_are_refused(content, rows, message):
     with pytest.raises(ValueError, match=message):
-        _text_columns(content, (0, 1), rows)
+        text_columns(content, (0, 1), rows)
 
 
 def test_vertices_of_an_obj_are_points_and_all_else_is_passed_over():
-    content = b"# v 9 9 9\nv 1 2 3\nvn 0 0 1\n\tv\t4 5 6 1.0\nf 1 2 3\nvt 0 0\n"
-    np.testing.assert_array_equal(_parse_obj(content, "a.obj").points, [[1, 2, 3], [4, 5, 6]])
+    content = b"# v 9 9 9\nv 1 2 3\nvn 0 0 1\n\tv\t4 5 6 1.0\nl 1 2\nvt 0 0\n"
+    np.testing.assert_array_equal(_parse_obj(content).points, [[1, 2, 3], [4, 5, 6]])
 
 
 def test_lines_of_an_xyz_are_points_whatever_follows():
-    cloud = _parse_xyz(b"1 2 3 255 0 0\n-4.5 5 6e1 1 1 1\n", "a.xyz")
+    cloud = _parse_xyz(b"1 2 3 255 0 0\n-4.5 5 6e1 1 1 1\n")
     np.testing.assert_array_equal(cloud.points, [[1, 2, 3], [-4.5, 5, 60]])
 
 
@@ -85,7 +78,7 @@ def test_lines_of_an_xyz_are_points_whatever_follows():
 )
 def test_what_holds_no_points_is_refused(parse, content, message):
     with pytest.raises(ValueError, match=message):
-        parse(content, "a")
+        parse(content)
 
 
 def test_lzf_pieces_that_come_again_are_unpacked(tmp_path):
@@ -155,7 +148,7 @@ GOOD = {
     "double.ply": ply("binary_big_endian", POINTS.astype(">f8").tobytes(), "double double double"),
     "a.obj": b"# by hand\no thing\n"
     + b"".join(b"v " + line + b"\n" for line in lines_of(POINTS).split(b"\n")[:-1])
-    + b"vn 0 0 1\nf 1 2 3\n",
+    + b"vn 0 0 1\nl 1 2 3\n",
     "a.xyz": lines_of(POINTS),
     "commas.txt": b"// x, y, z\n" + lines_of(POINTS).replace(b" ", b", "),
     "colours.xyz": b"".join(line + b" 10 20 30\n" for line in lines_of(POINTS).split(b"\n")[:-1]),
@@ -287,3 +280,140 @@ def test_real_depth_images_lie_on_the_fused_cloud_of_their_room(shared_data):
     fused = read_cloud(folder / "redkitchen_fused_2cm.npz")
     low, high = fused.points.min(axis=0) - 0.1, fused.points.max(axis=0) + 0.1
     assert ((frame.points >= low) & (frame.points <= high)).all(axis=1).mean() > 0.95
+
+
+WALL = np.array([[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [4.0, 0.0, 2.5], [0.0, 0.0, 2.5]], np.float32)
+
+
+def mesh_ply(form, faces, count=2, lists="property list uchar int vertex_indices\n", before=""):
+    order = {"ascii": None, "binary_little_endian": "<", "binary_big_endian": ">"}[form]
+    points = lines_of(WALL) if order is None else WALL.astype(f"{order}f4").tobytes()
+    header = f"ply\nformat {form} 1.0\nelement vertex 4\n" + "".join(f"property float {axis}\n" for axis in "xyz")
+    return f"{header}{before}element face {count}\n{lists}end_header\n".encode() + points + faces
+
+
+MESHES = {
+    "wall.obj": b"".join(b"v " + line + b"\n" for line in lines_of(WALL).splitlines()) + b"f 1 2 3\nf 1/1/1 3//2 4/7\n",
+    "square.obj": b"".join(b"v " + line + b"\n" for line in lines_of(WALL).splitlines()) + b"f -4 -3 -2 -1\n",
+    "ascii.ply": mesh_ply("ascii", b"3 0 1 2\n3 0 2 3\n"),
+    "square.ply": mesh_ply("ascii", b"4 0 1 2 3\n", 1),
+    "little.ply": mesh_ply("binary_little_endian", struct.pack("<B3iB3i", 3, 0, 1, 2, 3, 0, 2, 3)),
+    "big.ply": mesh_ply("binary_big_endian", struct.pack(">B3iB3i", 3, 0, 1, 2, 3, 0, 2, 3)),
+    "mixed.ply": mesh_ply(
+        "binary_little_endian",
+        struct.pack("<fI3HfI4Hf", 1.0, 3, 0, 1, 2, 7.0, 4, 0, 1, 2, 3, 7.0)[:-4],
+        lists="property float a\nproperty list uint ushort vertex_index\n",
+    ),
+    "edges.ply": mesh_ply(
+        "binary_little_endian",
+        bytes(8) + struct.pack("<B3iB3i", 3, 0, 1, 2, 3, 0, 2, 3),
+        before="element edge 2\nproperty short a\nproperty short b\n",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", MESHES)
+def test_faces_have_points_two_centimetres_apart(name, tmp_path):
+    (tmp_path / name).write_bytes(MESHES[name])
+    cloud = read_cloud(tmp_path / name)
+    np.testing.assert_array_equal(cloud.points[:4], WALL)
+    np.testing.assert_array_equal(cloud.points[:, 1], 0.0)
+    assert cloud.points.min(axis=0) == pytest.approx([0.0, 0.0, 0.0], abs=1e-6)
+    assert cloud.points.max(axis=0) == pytest.approx([4.0, 0.0, 2.5], abs=1e-6)
+    x, z = np.meshgrid(np.linspace(0.0, 4.0, 101), np.linspace(0.0, 2.5, 63))
+    distances, _ = cKDTree(cloud.points).query(np.stack([x, 0.0 * x, z], axis=-1))
+    assert distances.max() < 0.0145  # half the diagonal of 2 cm
+    assert len(cloud) < 3.0 * 4.0 * 2.5 / 0.02**2
+    # Of millimetres, too.
+    assert len(read_cloud(tmp_path / name, scale=0.1)) < 0.02 * len(cloud)
+
+
+def test_small_faces_add_nothing_and_huge_ones_stay_within_bounds(tmp_path):
+    (tmp_path / "a.ply").write_bytes(MESHES["ascii.ply"])
+    assert len(read_cloud(tmp_path / "a.ply", scale=0.002)) == 4
+    cloud = read_cloud(tmp_path / "a.ply", scale=200.0)
+    assert len(cloud) < 4_100_000
+    assert "m apart, since it is large" in cloud.remarks[0]
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (
+            mesh_ply("ascii", b"3 0 1 2\n", 1, "property list float int vertex_indices\n"),
+            "a list of float and int, which PLY has not",
+        ),
+        (mesh_ply("ascii", b"3 0 1 9\n", 1), "name the points 0 to 9; there are 4"),
+        (mesh_ply("ascii", b"3 0 1 2\n", 4000), "claims 4,004 elements"),
+        (mesh_ply("ascii", b"3 0 1 2\n", 9), "claims 9 faces and holds . lines: truncated"),
+        (mesh_ply("binary_little_endian", struct.pack("<B3i", 3, 0, 1, 2), 2), "ends before their last: truncated"),
+        (mesh_ply("binary_little_endian", struct.pack("<B", 255), 1), "ends before their last: truncated"),
+        (mesh_ply("binary_little_endian", b"", 2**31), "claims 2,147,483,652 elements in"),
+        (mesh_ply("ascii", b"", 2**31), "claims 2,147,483,652 elements in"),
+        (
+            b"ply\nformat ascii 1.0\nelement face 2147483647\nproperty list uchar int vertex_indices\n"
+            b"element vertex 3\nproperty float x\nproperty float y\nproperty float z\nend_header\n",
+            "truncated|claims",
+        ),
+    ],
+)
+def test_faces_that_are_not_there_are_refused(tmp_path, content, message):
+    (tmp_path / "a.ply").write_bytes(content)
+    with pytest.raises(ValueError, match=message):
+        read_cloud(tmp_path / "a.ply")
+
+
+def test_coordinates_of_a_grid_keep_their_digits(tmp_path):
+    generator = np.random.default_rng(0)
+    points = generator.uniform(0.0, 5.0, (100, 3)) + np.array([530_000.0, 4_181_000.0, 35.0])
+    np.savetxt(tmp_path / "a.xyz", points, "%.4f")
+    np.savez(tmp_path / "a.npz", xyz=points)
+    for name in ("a.xyz", "a.npz"):
+        cloud = read_cloud(tmp_path / name)
+        assert cloud.offset.tolist() == [530_000.0, 4_181_000.0, 0.0]
+        assert np.abs(cloud.points + cloud.offset - points).max() < 1e-4
+        assert "530,000, 4,181,000, 0 is taken off" in cloud.remarks[0]
+    np.savez(tmp_path / "a.npz", xyz=points.astype(np.float32))
+    assert "in steps of 0.25: digits are lost" in read_cloud(tmp_path / "a.npz").remarks[1]
+
+
+def test_coordinates_of_another_grid_keep_their_digits(shared_cases):
+    grid, local = (read_cloud(shared_cases / "cloud-grid-coordinates" / f"{name}.ply") for name in ("grid", "local"))
+    assert np.abs(grid.points + grid.offset - local.points - np.array([530_000.0, 181_000.0, 35.0])).max() < 1e-3
+    assert not local.offset.any()
+    assert not local.remarks
+
+
+def test_zeros_of_sensors_are_left_out_and_told(tmp_path):
+    (tmp_path / "a.xyz").write_text("0 0 0\n" * 3 + "1 2 3\n4 5 6\n")
+    cloud = read_cloud(tmp_path / "a.xyz")
+    assert cloud.points.tolist() == [[1, 2, 3], [4, 5, 6]]
+    assert cloud.remarks == ("3 points at the origin are left out, as sensors write them for no return",)
+    (tmp_path / "a.xyz").write_text("0 0 0\n1 2 3\n")
+    assert len(read_cloud(tmp_path / "a.xyz")) == 2
+
+
+@pytest.mark.parametrize(
+    ("text", "points"),
+    [
+        ("1,5 2,25 -3,0\n4 5 6,5\n", [[1.5, 2.25, -3.0], [4.0, 5.0, 6.5]]),
+        ("1,5;2,25;3,125\n", [[1.5, 2.25, 3.125]]),
+        ("1,5\t2,25\t3e0\n", [[1.5, 2.25, 3.0]]),
+        ("1;2.5;3\n", [[1.0, 2.5, 3.0]]),
+        ("1,2.5,3\n", [[1.0, 2.5, 3.0]]),
+        ("1, 2, 3\n4,5,6\n", [[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]),
+        ("1,2,3 255,0,0\n", [[1.0, 2.0, 3.0]]),
+    ],
+)
+def test_commas_part_numbers_or_are_decimal(tmp_path, text, points):
+    (tmp_path / "a.xyz").write_text(text)
+    cloud = read_cloud(tmp_path / "a.xyz")
+    assert cloud.points.tolist() == points
+    assert ("decimal" in "".join(cloud.remarks)) == ("1,5" in text)
+
+
+@pytest.mark.parametrize("text", ["1,5 2.5 3,5\n", "1,05,2,5,3,5\n"])
+def test_commas_that_may_be_either_are_refused(tmp_path, text):
+    (tmp_path / "a.xyz").write_text(text)
+    with pytest.raises(ValueError, match="want decimal points"):
+        read_cloud(tmp_path / "a.xyz")

@@ -172,7 +172,7 @@ def test_a_damaged_binary_file_is_refused(data):
     [
         ({"version": 3}, "version 3"),
         ({"boxes": 2**32 - 1}, "cannot hold them"),
-        ({"length": 2**32 - 1, "boxes": 10**8}, "so few bytes cannot hold them"),
+        ({"length": 2**32 - 1, "boxes": 10**8}, "claims 4,294,967,295 bytes when unpacked, too many"),
         ({"boxes": 59}, "do not fit its length"),
         ({"checksum": 1}, "checksum"),
         ({"packed": 5}, "claims 5 bytes"),
@@ -186,6 +186,15 @@ def test_a_binary_file_that_lies_is_refused_by_its_name(tmp_path, changes, messa
     with pytest.raises(ValueError, match=message) as caught:
         _read_binary(path)
     assert str(path) in str(caught.value)
+
+
+def test_a_small_file_that_unpacks_to_millions_of_codes_is_refused(tmp_path):
+    content = binary_content(some_map())
+    body = zlib.compress(bytes(64 << 20), 9)
+    path = tmp_path / "bomb.smap"
+    path.write_bytes(rewritten(content, length=64 << 20, body=body, free=10**6))
+    with pytest.raises(ValueError, match=r"bomb.smap.* claims 67,108,864 bytes when unpacked, too many for"):
+        _read_binary(path)
 
 
 def test_a_binary_file_with_a_place_too_far_away_is_refused_by_its_name(tmp_path):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from furnished_room import room_points
 
-from lidarium.mapping.point_clouds.cloud_files import write_ply
+from lidarium.mapping.point_clouds.ply_files import write_ply
 from lidarium.mapping.point_clouds.point_cloud import PointCloud
 from lidarium.scripts.main import main
 

@@ -242,6 +242,8 @@ def test_facts_name_what_was_assumed():
         "name": "hall",
         "size_m": (4.0, 2.5),
         "area_m2": 9.87,
+        "reachable_m2": 9.5,
+        "whole_m2": 12.0,
         "rooms": 1,
         "loops": 0,
         "clutter": 0.125,
@@ -253,6 +255,7 @@ def test_facts_name_what_was_assumed():
     assert text.startswith("hall\n")
     assert "4 x 2.5 m" in text
     assert "12.5 %" in text
+    assert "9.5 m2 of 12.0 m2" in text
     assert "none, cells of an image" in text
     assert "note" not in text
     assert "scale was assumed" in floor_description({**result, "remark": "scale was assumed"}, None, [], "a hall")
@@ -271,3 +274,17 @@ def test_an_out_that_is_a_file_is_refused(tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(OSError, match="file"):
         check_out(Command(out=tmp_path / "file"))
+
+
+def test_layers_meshes_and_what_cannot_be_reached_are_told(shared_cases, tmp_path, capsys):
+    flat = str(shared_cases / "dxf-layers-and-doors" / "flat.dxf")
+    assert main(["floors", "show", flat, "--json"]) == 4
+    assert "cannot be reached and are left out" in json.loads(capsys.readouterr().out)["remark"]
+    assert main(["floors", "import", flat, "--layers", "A-WALL", "--out", str(tmp_path / "flat"), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["area_m2"] == pytest.approx(77.5, abs=0.05)
+    hall = str(shared_cases / "sdf-frames-and-meshes" / "two_meshes.world")
+    assert main(["floors", "show", hall]) == 2
+    assert "--skip-meshes leaves them out" in capsys.readouterr().err
+    assert main(["floors", "show", hall, "--skip-meshes"]) == 0
+    assert "2 collisions are left out" in capsys.readouterr().out
+    assert main(["floors", "show", "apartment", "--skip-meshes"]) == 2

@@ -1,10 +1,13 @@
 """A cloud becomes a map, and the map answers requests, on the command line."""
 
+import json
+
 import numpy as np
 import pytest
 from furnished_room import room_points
+from scipy.spatial import cKDTree
 
-from lidarium.mapping.point_clouds.cloud_files import write_ply
+from lidarium.mapping.point_clouds.ply_files import write_ply
 from lidarium.mapping.point_clouds.point_cloud import PointCloud
 from lidarium.mapping.sparse.map_files import read_sparse_map
 from lidarium.scripts.main import main
@@ -46,3 +49,37 @@ def test_bad_clouds_are_refused_and_nothing_is_written(room, tmp_path, arguments
     assert main(["sparse-map", *named, "--out", str(out / "map.smap")]) == 2
     assert message in capsys.readouterr().err
     assert not out.exists() or not list(out.iterdir())
+
+
+def test_no_path_leads_through_a_wall_of_faces(shared_cases, tmp_path):
+    cloud = shared_cases / "cloud-mesh-faces" / "partition.obj"
+    assert main(["sparse-map", str(cloud), "--out", str(tmp_path)]) == 0
+    assert main(["plan", str(tmp_path / "map.smap"), "--from", "2,3", "--to", "6,3"]) == 3
+
+
+def test_a_cloud_with_another_axis_upwards_is_doubtful(shared_cases, tmp_path, capsys):
+    cloud = str(shared_cases / "cloud-up-axis" / "y_up.obj")
+    assert main(["sparse-map", cloud, "--out", str(tmp_path / "a"), "--json"]) == 4
+    shown = capsys.readouterr()
+    result = json.loads(shown.out)
+    assert result["probably_wrong"]
+    assert "lies along another axis: --levels --up 0,1,0?" in result["remarks"][0]
+    assert result["remarks"][0] in shown.err
+    assert main(["sparse-map", cloud, "--levels", "--up", "0,1,0", "--out", str(tmp_path / "b"), "--json"]) == 0
+    result = json.loads(capsys.readouterr().out)
+    assert result["floor"]["area_m2"] == pytest.approx(24.0, rel=0.15)
+    assert result["remarks"] == []
+
+
+def test_a_map_of_grid_coordinates_is_that_of_the_room_at_an_offset(shared_cases, tmp_path, capsys):
+    maps = {}
+    for name in ("grid", "local"):
+        cloud = str(shared_cases / "cloud-grid-coordinates" / f"{name}.ply")
+        assert main(["sparse-map", cloud, "--out", str(tmp_path / name), "--json"]) == 0
+        maps[name] = read_sparse_map(tmp_path / name / "map.smap")[0]
+        result = json.loads(capsys.readouterr().out)
+        assert result["offset"] == ([530_000.0, 181_000.0, 0.0] if name == "grid" else [0.0, 0.0, 0.0])
+        assert len(result["remarks"]) == (name == "grid")
+    assert len(maps["grid"].free) == len(maps["local"].free)
+    low, high = (maps["grid"].free - np.array([0.0, 0.0, 35.0]), maps["local"].free)
+    assert cKDTree(low).query(high)[0].max() < 0.05

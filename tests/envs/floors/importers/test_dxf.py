@@ -6,6 +6,7 @@ import math
 import numpy as np
 import pytest
 
+from lidarium.envs.floors.catalogue.names import describe_floor
 from lidarium.envs.floors.importers import dxf as drawing_module
 from lidarium.envs.floors.importers import load_file, takes_resolution
 from lidarium.envs.floors.importers.dxf import _sift, _Sifted
@@ -178,8 +179,43 @@ def test_a_drawing_without_a_unit_needs_a_resolution(drawing, tmp_path):
         load_file(path)
     assert load_file(path, 0.001).bounds == pytest.approx((-0.05, -0.05, 6.05, 4.05))
     drawing.header["$INSUNITS"] = 4
-    with pytest.raises(ValueError, match=r"has units of 0.001 m, but a resolution of 0.01 m is given"):
-        load_file(saved(drawing, tmp_path), 0.01)
+    assert load_file(saved(drawing, tmp_path), 0.01).bounds == pytest.approx((-0.05, -0.05, 60.05, 40.05))
+
+
+def test_the_size_by_a_unit_that_is_hardly_meant_is_told(drawing, tmp_path, shared_cases):
+    assert load_file(saved(drawing, tmp_path)).remark == ""
+    drawing.header["$INSUNITS"] = 2
+    with pytest.raises(ValueError, match=r"the drawing is 1,829 x 1,219 m; if that is wrong, give --resolution"):
+        load_file(saved(drawing, tmp_path))
+    hall = shared_cases / "dxf-unit-not-of-the-drawing" / "hall_mm.dxf"
+    assert "the drawing is 254 x 203 m" in load_file(hall).remark
+    described = describe_floor(load_file(hall, 0.001))
+    assert described["size_m"] == pytest.approx([10.1, 8.1])
+    assert described["area_m2"] == pytest.approx(77.5, abs=0.05)
+
+
+def test_chosen_layers_alone_are_walls(drawing, tmp_path, shared_cases):
+    for layer in ("WALLS", "DOORS"):
+        drawing.layers.add(layer)
+    drawing.layers.get("WALLS").freeze()
+    block = drawing.blocks.new("door")
+    block.add_line((0, 0), (0, 4000))
+    drawing.modelspace().add_blockref("door", (2000, 0), {"layer": "DOORS"})
+    corners = [(0, 0), (4000, 0), (4000, 4000), (0, 4000)]
+    drawing.modelspace().add_lwpolyline(corners, close=True, dxfattribs={"layer": "WALLS"})
+    path = saved(drawing, tmp_path)
+    assert free_area(load_file(path, layers=["walls"])) == pytest.approx(3.9 * 3.9, rel=0.01)
+    assert free_area(load_file(path, layers=["WALLS", "doors"])) == pytest.approx(3.8 * 3.9, rel=0.01)
+    with pytest.raises(ValueError, match=r"has no lines on 'wall'; it has '0', .*'WALLS', 'DOORS'"):
+        load_file(path, layers=["wall"])
+    flat = shared_cases / "dxf-layers-and-doors" / "flat.dxf"
+    for layers, area in ((["A-WALL"], 77.5), (["A-WALL", "A-FURN"], 75.3)):
+        described = describe_floor(load_file(flat, layers=layers))
+        assert described["size_m"] == pytest.approx([10.1, 8.1])
+        assert (described["area_m2"], described["rooms"]) == (pytest.approx(area, abs=0.05), 2)
+    described = describe_floor(load_file(flat))
+    assert "m2 in 4 other areas cannot be reached" in described["remark"]
+    assert described["reachable_m2"] < 0.5 * described["whole_m2"]
 
 
 def test_what_is_no_plan_is_refused(tmp_path):

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from lidarium.envs.floors.catalogue.names import describe_floor
 from lidarium.envs.floors.importers import load_file, takes_resolution
 
 
@@ -123,6 +124,123 @@ def test_included_models_are_found_beside_the_world(tmp_path):
         load_file(tmp_path / "worlds" / "hall.world")
 
 
+def test_the_pose_of_an_include_takes_the_place_of_the_models_own(tmp_path):
+    (tmp_path / "post").mkdir()
+    own = model(box("post", 0, 0, 0.5, 0.5, 1.0), "2 1 0.5 0 0 0", "post")
+    (tmp_path / "post" / "model.sdf").write_text(f'<sdf version="1.6">{own}</sdf>')
+    for pose, middle in (("<pose>4 3 0 0 0 0</pose>", (4.0, 3.0, 0.0)), ("", (2.0, 1.0, 0.5))):
+        include = f"<include><uri>model://post</uri>{pose}</include>"
+        solid = load_file(world(tmp_path, model(WALLS) + include)).solids[-1]
+        assert (*solid.polygon.mean(axis=0), solid.z_low) == pytest.approx(middle)
+
+
+@pytest.mark.parametrize(
+    "pose",
+    [
+        '<pose relative_to="__model__">1 0 0 0 0 0</pose>',
+        '<pose relative_to="other">0 -1 0 0 0 -1.5707963</pose>',
+        '<pose relative_to="turned">1 0 0 0 0 0</pose>',
+        '<pose relative_to="inner::core">0 0 0 0 0 0</pose>',
+        '<pose rotation_format="quat_xyzw">1 0 0 0 0 0 1</pose>',
+    ],
+)
+def test_poses_are_relative_to_the_frames_that_they_name(tmp_path, pose):
+    core = '<model name="inner"><pose>0.5 0 0 0 0 0</pose><link name="core"><pose>0.5 0 0 0 0 0</pose></link></model>'
+    frames = (
+        '<link name="other"><pose>2 0 0 0 0 1.5707963</pose></link>'
+        '<frame name="turned" attached_to="other"><pose>0 2 0 0 0 -1.5707963</pose></frame>'
+    )
+    post = (
+        f'<link name="post">{pose}<collision name="c"><geometry><box><size>1 0.5 1</size></box></geometry>'
+        "</collision></link>"
+    )
+    floor = load_file(world(tmp_path, model(WALLS) + model(frames + core + post, "2 2 0.5 0 0 0", "thing")))
+    x, y = (5.0, 2.0) if "other" in pose else (3.0, 2.0)
+    assert floor.solids[-1].polygon.mean(axis=0) == pytest.approx((x, y), abs=1e-5)
+
+
+def test_what_gazebos_reader_takes_is_read(tmp_path):
+    hall = model(WALLS)
+    wanted = load_file(world(tmp_path, hall)).sha256
+    document = f'<sdf version="1.6"><world name="default">{hall}</world></sdf>'
+    for text in (
+        f'\n<?xml version="1.0"?>{document}',
+        f'<!-- hall --><?xml version="1.0"?>{document}',
+        document.replace(hall, f"<!-- sim -r --verbose -->{hall}<gz:level>low</gz:level>"),
+    ):
+        (tmp_path / "hall.world").write_text(text)
+        assert load_file(tmp_path / "hall.world").sha256 == wanted
+    (tmp_path / "hall.world").write_text(f'<!DOCTYPE sdf [<!ENTITY a "b">]>{document}')
+    with pytest.raises(ValueError, match="declares the entity 'a'"):
+        load_file(tmp_path / "hall.world")
+
+
+def test_ground_and_ceiling_are_no_obstacles(tmp_path):
+    empty = free_area(load_file(world(tmp_path, model(WALLS))), 0.0, 1.0)
+    ground = box("ground", 3, 2, 20, 20, high=0.2, z=0.0)
+    tiles = box("left", 1.5, 2, 3, 4, high=0.1, z=0.05) + box("right", 4.5, 2, 3, 4, high=0.1, z=0.05)
+    roof = box("roof", 3, 2, 8, 8, high=0.2, z=2.6)
+    for slabs in (ground, tiles, roof, ground + roof):
+        floor = load_file(world(tmp_path, model(WALLS + slabs)))
+        assert floor.bounds == pytest.approx((0.0, 0.0, 6.0, 4.0))
+        assert free_area(floor, 0.0, 1.0) == pytest.approx(empty)
+        assert floor.ceiling == pytest.approx(2.5 - 0.1 * (slabs == ground + roof))
+    # A platform beside is an obstacle.
+    floor = load_file(world(tmp_path, model(WALLS + box("platform", 3, 2, 2, 2, high=0.2, z=0.1))))
+    assert free_area(floor, 0.0, 1.0) == pytest.approx(empty - 4.0, rel=0.01)
+
+
+def test_meshes_stand_as_their_boxes_or_are_left_out(tmp_path):
+    (tmp_path / "chair").mkdir()
+    (tmp_path / "chair" / "seat.obj").write_text("v -1 -2 0\nv 1 2 0\nv 0 0 10\nf 1 2 3\n")
+    facets = np.zeros(1, np.dtype([("numbers", "<f4", 12), ("other", "<u2")]))
+    facets["numbers"][0, 3:] = [-1, -2, 0, 1, 2, 0, 0, 0, 10]
+    (tmp_path / "chair" / "seat.stl").write_bytes(b" " * 80 + (1).to_bytes(4, "little") + facets.tobytes())
+    for ending in ("obj", "stl"):
+        mesh = f"<mesh><uri>model://chair/seat.{ending}</uri><scale>0.25 0.25 0.1</scale></mesh>"
+        path = world(tmp_path, model(WALLS) + shape(mesh, "3 2 0 0 0 0"))
+        floor = load_file(path)
+        assert (floor.solids[-1].z_low, floor.solids[-1].z_high) == pytest.approx((0.0, 1.0))
+        assert free_area(floor) == pytest.approx(5.8 * 3.8 - 0.5, rel=0.01)
+        assert floor.remark == f"1 meshes stand as their bounding boxes: thing (model://chair/seat.{ending})"
+        left_out = load_file(path, skip_meshes=True)
+        assert left_out.sha256 == load_file(world(tmp_path, model(WALLS))).sha256
+        assert "1 collisions are left out: thing" in left_out.remark
+    building = shape("<mesh><uri>model://chair/seat.obj</uri><scale>3 1 1</scale></mesh>", "3 2 0 0 0 0")
+    with pytest.raises(ValueError, match="fills the world"):
+        load_file(world(tmp_path, model(WALLS) + building))
+    with pytest.raises(ValueError, match="takes no layers; want skip_meshes"):
+        load_file(path, layers=("a",))
+
+
+@pytest.mark.parametrize(
+    ("name", "area"),
+    [
+        ("sdf-include-pose/include.world", 76.08),
+        ("sdf-frames-and-meshes/relative_to_world.world", 76.08),
+        ("sdf-frames-and-meshes/relative_to_model.world", 76.08),
+        ("sdf-frames-and-meshes/relative_to_another.world", 76.08),
+        ("sdf-frames-and-meshes/cone.world", 76.16),
+        ("gazebo-xml/plain.world", 76.44),
+        ("gazebo-xml/blank_first.world", 76.44),
+        ("gazebo-xml/hyphens.world", 76.44),
+        ("gazebo-xml/late_declaration.world", 76.44),
+        ("gazebo-xml/prefix.world", 76.44),
+    ],
+)
+def test_worlds_of_other_programs_have_their_area(shared_cases, name, area):
+    assert describe_floor(load_file(shared_cases / name))["area_m2"] == pytest.approx(area, abs=0.01)
+
+
+def test_all_meshes_that_cannot_be_read_are_named(shared_cases):
+    path = shared_cases / "sdf-frames-and-meshes" / "two_meshes.world"
+    with pytest.raises(ValueError, match=r"2 collisions .* seat .* foot .*--skip-meshes"):
+        load_file(path)
+    floor = load_file(path, skip_meshes=True)
+    assert "2 collisions are left out" in floor.remark
+    assert describe_floor(floor)["area_m2"] == pytest.approx(76.44)
+
+
 def test_light_and_ground_of_gazebo_are_no_obstacles(tmp_path):
     library = "<include><uri>model://sun</uri></include><include><uri>model://ground_plane</uri></include>"
     plane = shape("<plane><normal>0 0 1</normal><size>100 100</size></plane>")
@@ -144,13 +262,17 @@ def test_a_saved_world_has_its_models_where_they_were_then(tmp_path):
     [
         (
             shape("<mesh><uri>model://a/b.dae</uri></mesh>"),
-            r"thing collides as mesh 'model://a/b.dae'; want one of box",
+            r"1 collisions that cannot be read: thing \(model://a/b.dae\); want box.*--skip-meshes leaves them out",
         ),
-        (shape("<heightmap/>"), r"thing collides as heightmap"),
+        (shape("<heightmap/>"), r"cannot be read: thing \(heightmap\)"),
         (shape("<box><size>1 2</size></box>"), r"the size of a box '1 2'; want 3 numbers"),
         (shape("<box><size>1 2 nan</size></box>"), r"want 3 numbers"),
         (model(WALLS, "0 0 0"), r"the pose '0 0 0'; want 6 numbers"),
-        ('<model name="a"><pose relative_to="b">0 0 0 0 0 0</pose></model>', r"a pose relative to 'b'"),
+        ('<model name="a"><pose relative_to="b">0 0 0 0 0 0</pose></model>', r"relative to 'b'; want a frame"),
+        (
+            '<model name="a"><pose relative_to="b"/></model><model name="b"><pose relative_to="a"/></model>',
+            r"poses that are relative to each other",
+        ),
         ("<include><uri>../../etc</uri></include>", r"which is not there"),
         ("", r"no collision above the ground"),
         ("<model>", r"is not XML"),

@@ -6,6 +6,7 @@ import xml.etree.ElementTree as ElementTree
 import numpy as np
 import pytest
 
+from lidarium.envs.floors.catalogue.names import describe_floor
 from lidarium.envs.floors.importers import load_file, takes_resolution
 from lidarium.envs.floors.importers.svg import _length, _numbers, _transform_of, outlines
 
@@ -140,6 +141,74 @@ def test_a_thin_line_lets_nothing_through(tmp_path):
 def test_what_is_dark_is_solid(tmp_path, shape, area):
     # Where a ring encloses something, what it encloses is no part of the largest area.
     assert free_area(tmp_path, ROOM + shape) == pytest.approx(5.9 * 3.9 - area, abs=0.06)
+
+
+BOX = '<rect x="100" y="100" width="100" height="100" {}/>'
+
+
+@pytest.mark.parametrize(
+    ("shape", "area"),
+    [
+        (BOX.format('opacity="0.4"'), 0.0),
+        (BOX.format('opacity="80%"'), 1.0),
+        (BOX.format('fill-opacity=".2"'), 0.0),
+        (BOX.format('style="fill:#00000030"'), 0.0),
+        (BOX.format('fill="rgba(0, 0, 0, 0.2)"'), 0.0),
+        (BOX.format('fill="rgb(0 0 0 / 90%)"'), 1.0),
+        (BOX.format('fill="hsl(0, 0%, 90%)"'), 0.0),
+        (BOX.format('fill="currentColor" color="#eee"'), 0.0),
+        (f'<g opacity="0.6"><g opacity="0.6">{BOX.format("")}</g></g>', 0.0),
+        (BOX.format("") + BOX.format('fill="white" opacity="0.2"'), 1.0),
+        (BOX.format("") + BOX.format('fill="white" opacity="0.9"'), 0.0),
+        ('<linearGradient id="g"><stop stop-color="#fff"/></linearGradient>' + BOX.format('fill="url(#g)"'), 0.0),
+        (
+            '<linearGradient id="g"><stop stop-color="#222"/></linearGradient><radialGradient id="h" href="#g"/>'
+            + BOX.format("fill=\"url('#h')\""),
+            1.0,
+        ),
+        ('<pattern id="p"/>' + BOX.format('fill="url(#p)"'), 1.0),
+        (BOX.format('fill="url(#none)"'), 0.0),
+        ('<defs><rect id="r" width="100" height="100"/></defs><use href="#r" x="200" y="100"/>', 1.0),
+        ('<g fill="white"><rect id="r" width="9" height="9"/></g><use href="#r" x="99"/>', 0.0081),
+        (
+            '<symbol id="s" viewBox="0 0 10 10"><rect width="10" height="10"/></symbol>'
+            '<use href="#s" x="100" y="100" width="100" height="200"/>',
+            1.0,
+        ),
+        ('<style>g.room > rect {fill: none}</style><g class="room">' + BOX.format("") + "</g>", 0.0),
+        ('<style>.a .b {fill: none}</style><g class="a"><g>' + BOX.format('class="b"') + "</g></g>", 0.0),
+        ('<style>.a > .b {fill: none}</style><g class="a"><g>' + BOX.format('class="b"') + "</g></g>", 1.0),
+        ("<style>#x {fill: none} .b {fill: red} rect.b {fill: #eee}</style>" + BOX.format('class="b" id="x"'), 0.0),
+        ("<style>rect.b {fill: #eee} .b {fill: red}</style>" + BOX.format('class="b"'), 0.0),
+        ("<style>@media print { .b {fill: none} }</style>" + BOX.format('class="b"'), 1.0),
+    ],
+)
+def test_what_is_seen_as_dark_is_solid(tmp_path, shape, area):
+    assert free_area(tmp_path, ROOM + shape) == pytest.approx(5.9 * 3.9 - area, abs=0.06)
+
+
+def test_what_is_left_out_of_a_drawing_is_told(tmp_path):
+    left_out = '<style>rect:hover {fill: none} [a] {fill: none}</style><image href="a.png"/>'
+    remark = load_file(written(tmp_path, ROOM + left_out), 0.01).remark
+    assert remark == (
+        "1 pictures in the drawing are left out; 2 rules of its style sheet are not understood and left out"
+    )
+
+
+def test_a_drawing_that_uses_itself_is_refused(tmp_path):
+    with pytest.raises(ValueError, match="nested more than 64 deep"):
+        load_file(written(tmp_path, ROOM + '<g id="a"><use href="#a"/></g>'), 0.01)
+    doubled = "".join(f'<g id="g{k}"><use href="#g{k + 1}"/><use href="#g{k + 1}"/></g>' for k in range(30))
+    with pytest.raises(ValueError, match="draws more than 250,000 elements"):
+        load_file(written(tmp_path, f"{ROOM}<defs>{doubled}</defs><use href='#g0'/>"), 0.01)
+
+
+def test_tints_close_no_rooms(shared_cases):
+    paths = sorted((shared_cases / "svg-opacity").glob("*.svg"))
+    assert len(paths) == 7
+    for path in paths:
+        described = describe_floor(load_file(path, 0.01))
+        assert (described["area_m2"], described["rooms"]) == (pytest.approx(55.8, abs=0.15), 2), path.name
 
 
 def test_a_drawing_needs_a_resolution(tmp_path):
