@@ -36,6 +36,7 @@ from lidarium.benchmarks.speed.cases.learners import (
 from lidarium.benchmarks.speed.cases.three_dimensions import (
     bullet_world,
     depth_image,
+    path_server,
     quantisation,
     sparse_planning,
 )
@@ -65,6 +66,7 @@ _MODULES: tuple[ModuleType, ...] = (
     depth_image,
     quantisation,
     sparse_planning,
+    path_server,
 )
 
 QUESTIONS: dict[str, Any] = {module.__name__.split(".")[-1]: module for module in _MODULES}
