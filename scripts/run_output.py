@@ -52,6 +52,7 @@ def write_run(
     if env.settings.camera is not None:
         _save_view(folder / "view.png", episode)
         files += ["view.png", *_write_sparse_maps(folder, episode)]
+    files += _write_spline_maps(folder, episode)
     report = episode.policy.report()
     if report.supervision is not None:
         write_text(folder / "decisions.jsonl", decision_lines(report))
@@ -87,6 +88,24 @@ def _write_sparse_maps(folder: Path, episode: "Episode") -> list[str]:
             write_sparse_map(path, mapper.map)
             pictures = save_sparse_pictures(path, mapper.map.boxes, mapper.map.free, way=mapper.trail)
             files += [path.name, *(Path(picture).name for picture in pictures)]
+    return files
+
+
+def _write_spline_maps(folder: Path, episode: "Episode") -> list[str]:
+    """Write the spline maps of localizers on splines, in the frame of their poses, and their pictures."""
+    from lidarium.evaluation.drawing.spline_picture import save_spline_picture
+    from lidarium.mapping.files.spline_files import write_spline_map
+    from lidarium.mapping.localization.on_splines.spline_tracking import SplineTracker
+
+    env, files = episode.env, []
+    assert env.floor is not None
+    for agent, localizer in zip(env.possible_agents, env.perception.poses.localizers, strict=False):
+        if isinstance(localizer, SplineTracker):
+            path = folder / f"{agent}_splines.npz"
+            write_spline_map(path, localizer.map)
+            picture = path.with_suffix(".png")
+            save_spline_picture(picture, env.floor, localizer.map, title=f"{env.floor.name}: {agent}")
+            files += [path.name, picture.name]
     return files
 
 

@@ -42,7 +42,7 @@ class _SparseMapping(Command):
     codes: int = 0
     """codes of a cloud; 0 for 1024 of one cloud and 256 of each frame"""
     range: float | None = None
-    """points farther from the sensor are left out [m], as far points of a depth camera are too noisy; none by default"""
+    """points farther from the sensor are left out [m], as depth cameras are noisy far off; none by default"""
     robot_height: float = 1.2
     """points more than 0.3 m higher are left out [m]"""
     levels: bool = False
