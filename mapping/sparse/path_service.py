@@ -150,6 +150,7 @@ class PathService:
             "requests": self._requests,
             "errors": self._errors,
             "seconds": round(time.monotonic() - self._began, 3),
+            "cpu_s": round(time.process_time(), 6),
         }
 
 

@@ -58,6 +58,7 @@ With the noise of an Xtion in its frames, of {requests} requests each, increment
 
 Boxes hold all of their points. Noise and rounding of 3 cm at 4 m widen boxes to both sides, so narrow places
 close and starts and goals lie in boxes. Every place is seen from nearer as well, so far points are left out.
+Boxes of the maps: {boxes_all} of all points, {boxes_precise} of precise ones.
 
 Table tops and seats: of places that only they take up, and no laser's plane shows, the inflated grid of the
 laser lets a robot stand at {laser}.
@@ -130,6 +131,8 @@ def page(folder: Path, command: str) -> str:
         figures=figure_table(lines),
         noisy_all=_noisy(lines, "all"),
         noisy_precise=_noisy(lines, "precise"),
+        boxes_all=_boxes(lines, "all"),
+        boxes_precise=_boxes(lines, "precise"),
         precise=CAMERAS["xtion_noisy"].precise_m,
         laser=", ".join(f"{100.0 * (1.0 - line['tops']['laser']):.1f} % ({line['place']})" for line in lines),
         measures="\n\n".join(measures),
@@ -149,6 +152,10 @@ def _noisy(lines: Sequence[Mapping[str, Any]], points: str) -> str:
     answered = [line["noisy"][points]["answered"] for line in lines]
     collide = int(np.sum([line["noisy"][points]["collide"] for line in lines]))
     return f"{', '.join(map(str, answered))} are answered, and {collide} paths collide"
+
+
+def _boxes(lines: Sequence[Mapping[str, Any]], points: str) -> str:
+    return ", ".join(str(line["noisy"][points]["occupied"]) for line in lines)
 
 
 def pictures(folder: Path, images: Path) -> None:
