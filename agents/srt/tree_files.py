@@ -115,7 +115,11 @@ def _check(arrays: dict[str, NDArray[Any]], count: int) -> None:
     """Check the arrays of a tree."""
     if count > MAX_NODES:
         raise ValueError(f"it has {count:,} nodes; want at most {MAX_NODES:,}")
-    wanted = {"poses": (count, 3), "views": (count, DIRECTIONS), "ways": (len(arrays["ways"]), 2)}
+    wanted: dict[str, tuple[int, ...]] = {
+        "poses": (count, 3),
+        "views": (count, DIRECTIONS),
+        "ways": (len(arrays["ways"]), 2),
+    }
     wanted |= dict.fromkeys(("agent", "bodies", "parents", "has_turned", "openings"), (count,))
     for name, shape in wanted.items():
         if arrays[name].shape != shape:

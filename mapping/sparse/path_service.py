@@ -107,12 +107,10 @@ class PathService:
         return call(**request)
 
     def _plan(self, start: object, goal: object) -> dict[str, Any]:
-        ends = []
-        for name, given in (("start", start), ("goal", goal)):
-            point = _numbers(name, given, (2, 3))
+        first, last = _numbers("start", start, (2, 3)), _numbers("goal", goal, (2, 3))
+        for name, point in (("start", first), ("goal", last)):
             check_on_map(self._bounds, name, point)
-            ends.append(point)
-        return plan(self._changing.graph, *ends).result
+        return plan(self._changing.graph, first, last).result
 
     def _add_obstacle(self, low: object, high: object) -> dict[str, Any]:
         box = np.array([_numbers(name, given, (3,)) for name, given in (("low", low), ("high", high))])
@@ -160,8 +158,7 @@ def _line(answer: dict[str, Any]) -> bytes:
 
 def _numbers(name: str, given: object, counts: tuple[int, ...]) -> NDArray[np.float64]:
     """Return numbers of a request, finite ones."""
-    is_list = isinstance(given, list) and len(given) in counts
-    if is_list and all(_is_number(each) for each in given):
+    if isinstance(given, list) and len(given) in counts and all(map(_is_number, given)):
         return np.array(given, np.float64)
     wanted = " or ".join({2: "[x, y]", 3: "[x, y, z]"}[count] for count in counts)
     raise ValueError(f"{name} is {_shown(given)}; want {wanted} in metres, finite numbers")

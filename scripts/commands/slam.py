@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from tyro.conf import Positional
 
@@ -16,16 +16,13 @@ if TYPE_CHECKING:
 
     from lidarium.evaluation.metrics.relations import Relations
     from lidarium.mapping.files.laser_logs import LaserLog
-    from lidarium.mapping.localization.on_splines.spline_ekf import SplineEkf, SplineEkfSettings
-    from lidarium.mapping.localization.on_splines.spline_filter import SplineFilter, SplineFilterSettings
+    from lidarium.mapping.localization.on_splines.spline_matches import TrackingSettings
     from lidarium.mapping.localization.on_splines.spline_tracking import SplineTracker
     from lidarium.mapping.localization.settings import SlamSettings
     from lidarium.mapping.localization.slam.following import Followed
     from lidarium.mapping.localization.slam.localizer import Slam
 
-    _AnyFollowed = Followed[Slam] | Followed[SplineFilter] | Followed[SplineEkf]
-
-Settings = TypeVar("Settings", "SplineFilterSettings", "SplineEkfSettings")
+    _AnyFollowed = Followed[Slam] | Followed[SplineTracker]
 
 DEFAULT_FOLDER = Path("slam")
 FILES = ("map.yaml", "map.pgm", "trajectory.tum", "slam.json")
@@ -145,28 +142,31 @@ def _followed(command: _Slam, log: "LaserLog", watch: "Callable[[Iterable[int]],
 
     if command.localizer == "slam":
         return follow(log, _settings_of(command), watch)
+    return follow_with(_on_splines(command, log), log, watch)
+
+
+def _on_splines(command: _Slam, log: "LaserLog") -> "SplineTracker":
+    """Return the localizer on splines that a command asks for."""
     from lidarium.mapping.localization.on_splines.spline_ekf import SplineEkf
     from lidarium.mapping.localization.on_splines.spline_filter import SplineFilter
 
     if log.odometry is None:
         raise ValueError(f"{command.log} has no odometry, which {command.localizer} needs; want --localizer slam")
-    kind: type[SplineFilter] | type[SplineEkf] = SplineFilter if command.localizer == "splines" else SplineEkf
-    return follow_with(kind(_spline_settings(command, log, kind.Settings()), log.geometry), log, watch)
+    if command.localizer == "splines":
+        of_filter = SplineFilter.Settings()
+        return SplineFilter(replace(of_filter, tracking=_tracking(command, log, of_filter.tracking)), log.geometry)
+    of_ekf = SplineEkf.Settings()
+    return SplineEkf(replace(of_ekf, tracking=_tracking(command, log, of_ekf.tracking)), log.geometry)
 
 
-def _spline_settings(command: _Slam, log: "LaserLog", settings: "Settings") -> "Settings":
-    """Return the settings of a localizer on splines that a command asks for."""
-    tracking = settings.tracking
+def _tracking(command: _Slam, log: "LaserLog", tracking: "TrackingSettings") -> "TrackingSettings":
+    """Return the settings of tracking on splines that a command asks for."""
     points = replace(tracking.splines.points, beam_interval_s=log.beam_interval_s or command.beam_interval)
-    path = replace(tracking.path, submaps=replace(tracking.path.submaps, resolution=command.resolution))
     return replace(
-        settings,
-        tracking=replace(
-            tracking,
-            splines=replace(tracking.splines, points=points),
-            path=path,
-            start_map="" if command.start_map is None else str(command.start_map),
-        ),
+        tracking,
+        splines=replace(tracking.splines, points=points),
+        path=replace(tracking.path, submaps=replace(tracking.path.submaps, resolution=command.resolution)),
+        start_map="" if command.start_map is None else str(command.start_map),
     )
 
 
@@ -319,7 +319,8 @@ def _write(out: Path, log: "LaserLog", followed: "_AnyFollowed", result: dict[st
     from lidarium.mapping.localization.slam.localizer import Slam
 
     out.mkdir(parents=True, exist_ok=True)
-    slam, files = followed.slam, FILES
+    slam = followed.slam
+    files: tuple[str, ...] = FILES
     grid = slam.map if isinstance(slam, Slam) else slam.grid
     if not isinstance(slam, Slam):
         write_spline_map(out / SPLINES, slam.map)

@@ -11,6 +11,7 @@ filter knows.
 import math
 from abc import ABC, abstractmethod
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,6 +37,8 @@ class SplineTracker(ABC):
 
     Attributes
     ----------
+    settings : dataclass
+        How; the heir's own.
     local_map : SplineMap
         The local map that grows, in a frame of its own.
     local : (3,) float64
@@ -43,6 +46,8 @@ class SplineTracker(ABC):
     updates : int
         How many scans the local maps have taken in.
     """
+
+    settings: Any
 
     def __init__(self, settings: TrackingSettings, geometry: ScanGeometry) -> None:
         self.tracking, self.geometry = settings, geometry
