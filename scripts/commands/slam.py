@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from tyro.conf import Positional
 
-from lidarium.scripts.common import Answer, Command, counted, notify, table
+from lidarium.scripts.common import DONE, DOUBTFUL, Answer, Command, counted, notify, table
 
 if TYPE_CHECKING:
     import numpy as np
@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 DEFAULT_FOLDER = Path("slam")
 FILES = ("map.yaml", "map.pgm", "trajectory.tum", "slam.json")
 SPLINES = "splines.npz"
+MOST_FAR = 0.05
+"""Share of scans that may be too far from the last one for a localizer on splines."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -128,12 +130,18 @@ def execute(command: _Slam) -> Answer:
             f"{command.log} holds no scan with a return within {command.range} m; want a larger --range or another log"
         )
     result = _result(command, log, followed)
+    doubt = (
+        None if command.localizer == "slam" else _doubt(log, _tracking(command, log, followed.slam.settings.tracking))
+    )
+    if doubt is not None:
+        notify(f"{command.log}: {doubt}")
+        result["remarks"].append(doubt)
     if reference is not None:
         result |= _against_reference(command, log, followed.poses, reference)
     if relations is not None:
         result["relations"] = _against_relations(command, log, followed.poses, relations)
     files = _write(out, log, followed, result)
-    return Answer(result, _summary(result, out, files))
+    return Answer(result, _summary(result, out, files), DONE if doubt is None else DOUBTFUL)
 
 
 def _followed(command: _Slam, log: "LaserLog", watch: "Callable[[Iterable[int]], Iterable[int]]") -> "_AnyFollowed":
@@ -167,6 +175,21 @@ def _tracking(command: _Slam, log: "LaserLog", tracking: "TrackingSettings") -> 
         splines=replace(tracking.splines, points=points),
         path=replace(tracking.path, submaps=replace(tracking.path.submaps, resolution=command.resolution)),
         start_map="" if command.start_map is None else str(command.start_map),
+    )
+
+
+def _doubt(log: "LaserLog", tracking: "TrackingSettings") -> str | None:
+    """Return why the poses of a localizer on splines are probably wrong; None if scans are near to each other."""
+    import numpy as np
+
+    assert log.odometry is not None
+    steps = np.hypot(*np.diff(log.odometry[:, :2], axis=0).T)
+    share = float((steps > tracking.curve_distance).mean()) if len(steps) else 0.0
+    if share <= MOST_FAR:
+        return None
+    return (
+        f"{100.0 * share:.0f} % of the scans are more than {tracking.curve_distance:g} m apart, as far as walls are "
+        "matched: poses are probably wrong; want --localizer slam"
     )
 
 

@@ -205,3 +205,22 @@ def test_a_localizer_on_splines_refuses_a_log_without_odometry(log, tmp_path, ca
     np.savez(tmp_path / "bare.npz", **arrays)
     assert main(["slam", str(tmp_path / "bare.npz"), "--localizer", "splines", "--out", str(tmp_path / "out")]) == 2
     assert "has no odometry, which splines needs" in capsys.readouterr().err
+
+
+def test_scans_too_far_apart_for_splines_make_the_result_doubtful(log, tmp_path, capsys):
+    with np.load(log) as archive:
+        arrays = dict(archive)
+    arrays["pose_odom"] = arrays["pose_odom"] * [20.0, 20.0, 1.0]
+    np.savez(
+        tmp_path / "wide.npz", **{name: _every_tenth(array, len(arrays["stamp"])) for name, array in arrays.items()}
+    )
+    out = tmp_path / "out"
+    assert main(["slam", str(tmp_path / "wide.npz"), "--localizer", "splines", "--out", str(out), "--json"]) == 4
+    told = capsys.readouterr()
+    (remark,) = json.loads(told.out)["remarks"]
+    assert "more than 0.3 m apart" in remark
+    assert remark in told.err
+
+
+def _every_tenth(array, count):
+    return array[::10] if array.shape[:1] == (count,) else array
