@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from lidarium.evaluation.episodes.runner import Episode
     from lidarium.evaluation.episodes.watching import WatchedExploration
     from lidarium.evaluation.record import Recorder
+    from lidarium.mapping.geometry.rigid import Transform
 
 
 VIEW_SIZE = 900, 1200
@@ -52,6 +53,7 @@ def write_run(
     if env.settings.camera is not None:
         _save_view(folder / "view.png", episode)
         files += ["view.png", *_write_sparse_maps(folder, episode)]
+    files += [*_write_spline_maps(folder, episode), *_write_trees(folder, episode)]
     report = episode.policy.report()
     if report.supervision is not None:
         write_text(folder / "decisions.jsonl", decision_lines(report))
@@ -88,6 +90,54 @@ def _write_sparse_maps(folder: Path, episode: "Episode") -> list[str]:
             pictures = save_sparse_pictures(path, mapper.map.boxes, mapper.map.free, way=mapper.trail)
             files += [path.name, *(Path(picture).name for picture in pictures)]
     return files
+
+
+def _write_spline_maps(folder: Path, episode: "Episode") -> list[str]:
+    """Write the spline maps of localizers on splines, in the frame of their poses, and their pictures."""
+    from lidarium.evaluation.drawing.spline_picture import save_spline_picture
+    from lidarium.mapping.files.spline_files import write_spline_map
+    from lidarium.mapping.localization.on_splines.spline_tracking import SplineTracker
+
+    env, files = episode.env, []
+    assert env.floor is not None
+    for row, (agent, localizer) in enumerate(zip(env.possible_agents, env.perception.poses.localizers, strict=True)):
+        if isinstance(localizer, SplineTracker):
+            path = folder / f"{agent}_splines.npz"
+            write_spline_map(path, localizer.map)
+            on_floor = localizer.map.around(_floor_frame(env, row).inverse(), math.inf)
+            save_spline_picture(path.with_suffix(".png"), env.floor, on_floor, title=f"{env.floor.name}: {agent}")
+            files += [path.name, path.with_suffix(".png").name]
+    return files
+
+
+def _floor_frame(env: "ExplorationEnv", row: int) -> "Transform":
+    """Return the frame of a robot's poses on the floor: that of its true start if it does not know it."""
+    from lidarium.mapping.geometry.rigid import Transform
+
+    return Transform() if env.settings.known_starts else Transform(*map(float, env.world.starts[row]))
+
+
+def _write_trees(folder: Path, episode: "Episode") -> list[str]:
+    """Write the trees of safe regions, in the frame of the robots' poses, and their pictures."""
+    import numpy as np
+
+    from lidarium.agents.srt.policy import SensorBasedRandomTree
+    from lidarium.agents.srt.tree_files import read_tree
+    from lidarium.evaluation.drawing.spline_picture import save_spline_picture
+
+    env = episode.env
+    if not isinstance(episode.policy, SensorBasedRandomTree):
+        return []
+    assert env.floor is not None
+    names = episode.policy.write_trees(folder)
+    for row, name in enumerate(names):
+        nodes, frame = read_tree(folder / name).nodes, _floor_frame(env, row)
+        places = frame.apply(np.array([node.place for node in nodes]).reshape(-1, 2))
+        edges = [(tuple(places[node.parent]), tuple(places[node.number])) for node in nodes if node.parent is not None]
+        regions = [frame.apply(node.place + node.safe.outline) for node in nodes]
+        picture = (folder / name).with_suffix(".png")
+        save_spline_picture(picture, env.floor, None, tree=edges, safe_regions=regions, title=env.floor.name)
+    return [*names, *(str(Path(name).with_suffix(".png")) for name in names)]
 
 
 def write_team(folder: Path, episode: "Episode") -> list[str]:

@@ -13,19 +13,11 @@ from lidarium.agents.srt.candidates import Candidate, CandidateSource
 from lidarium.agents.srt.choice import Choice, WayChooser, home_way
 from lidarium.agents.srt.memories import Memory
 from lidarium.agents.srt.motion import Blocks, Remedy
-from lidarium.agents.srt.safe_region import (
-    Opening,
-    SafeRegion,
-    joined_views,
-    openings_of,
-    safe_region,
-    seen_region,
-    view_of,
-)
+from lidarium.agents.srt.safe_region import joined_views, view_of
 from lidarium.agents.srt.senses import Senses
 from lidarium.agents.srt.settings import SrtSettings
 from lidarium.agents.srt.travel import BACKING_SPEED, REST, Command, Travel
-from lidarium.agents.srt.tree import Node, Tree, sees_back_and_forth
+from lidarium.agents.srt.tree import Node, RegionRules, Tree, sees_back_and_forth
 from lidarium.envs.settings.lidar import Lidar
 from lidarium.envs.settings.robots import Robot
 
@@ -57,12 +49,17 @@ class _TreeGrowth:
         Its first node and the one where it is, -1 before it has one.
     count : int
         How many nodes it has added.
+    rules : RegionRules
+        How their regions are found.
     """
 
     def __init__(self, agent: str, tree: Tree, settings: SrtSettings, lidar: Lidar, body: float) -> None:
-        self._agent, self._settings, self._lidar, self._body = agent, settings, lidar, body
+        self._agent, self._settings, self._lidar = agent, settings, lidar
         self.tree, self.known = tree, set[int]()
         self.perception = min(settings.perception, lidar.range_max)
+        self.rules = RegionRules(
+            settings.shape, body, self.perception, settings.turn_room, with_blind=settings.memory == "map"
+        )
         self.root = self.number = -1
         self.count = 0
 
@@ -78,7 +75,7 @@ class _TreeGrowth:
     def add(self, senses: Senses, parent: int | None, pose: NDArray[np.float64], memory: Memory) -> int:
         """Add a node at the robot's position, and return its number."""
         view = view_of(senses.scan, self._lidar, float(senses.pose[2]))
-        node = Node(len(self.tree.nodes), self._agent, np.array(pose), *self._regions(pose, view), parent, view)
+        node = self.rules.node(len(self.tree.nodes), self._agent, pose, parent, view)
         self._insert(node, memory)
         return node.number
 
@@ -92,7 +89,7 @@ class _TreeGrowth:
         node = self.node
         view = joined_views(node.view, view_of(senses.scan, self._lidar, float(senses.pose[2])))
         node.view = view
-        node.safe, node.seen, node.openings = self._regions(node.pose, view)
+        node.safe, node.seen, node.openings = self.rules.regions(node.pose, view)
 
     def move_to(self, number: int) -> Node:
         """Return the node to which the robot has come; the two are neighbours from now on."""
@@ -113,17 +110,6 @@ class _TreeGrowth:
         self.known.add(node.number)
         self.number = node.number
         self.count += 1
-
-    def _regions(
-        self, pose: NDArray[np.float64], view: NDArray[np.float64]
-    ) -> tuple[SafeRegion, SafeRegion, list[Opening]]:
-        """Return the safe region, the seen region and the openings of a view."""
-        settings, position = self._settings, np.array(pose[:2])
-        safe = safe_region(
-            position, view, float(pose[2]), settings.shape, self._body, self.perception, settings.turn_room
-        )
-        openings = openings_of(position, view, self.perception, self._body, with_blind=settings.memory == "map")
-        return safe, seen_region(position, view, self.perception), openings
 
 
 FINAL = ("budget", "goal_missed", "blocked")
@@ -181,6 +167,11 @@ class Explorer:
     def known(self) -> set[int]:
         """Nodes that it knows: its own, and those of teammates that it was in contact with."""
         return self._growth.known
+
+    @property
+    def rules(self) -> RegionRules:
+        """How the regions of its nodes are found."""
+        return self._growth.rules
 
     @property
     def root(self) -> int:

@@ -4,6 +4,7 @@ The trees (Oriolo, Vendittelli, Freda and Troso 2004) are joined to one graph.
 """
 
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from lidarium.agents.srt.explorer import Explorer
 from lidarium.agents.srt.senses import CONTACT_AGE_S, memory_of, senses_of
 from lidarium.agents.srt.settings import make_srt_settings
 from lidarium.agents.srt.tree import Tree
+from lidarium.agents.srt.tree_files import read_tree, write_tree
 from lidarium.envs.faces.parallel import Observation
 
 
@@ -26,6 +28,15 @@ class SensorBasedRandomTree(Policy):
     graph, whose trees are joined by bridges, and leave each other their goals. A robot without work goes
     home; all stop when none has work.
 
+    Parameters
+    ----------
+    mode : str
+        ``default`` or ``thesis``.
+    tree : str or Path
+        File of the tree of an earlier run in the same place, which goes on growing; needs ``memory="regions"``.
+    **settings
+        Settings of `SrtSettings`.
+
     Attributes
     ----------
     tree : Tree
@@ -35,20 +46,24 @@ class SensorBasedRandomTree(Policy):
     level = "velocity"
     observes = ("scan",)
 
-    def __init__(self, mode: str = "default", **settings: Any) -> None:  # noqa: ANN401
+    def __init__(self, mode: str = "default", tree: str | Path = "", **settings: Any) -> None:  # noqa: ANN401
         self.settings = make_srt_settings(mode, **settings)
-        self.tree = Tree()
+        if tree and self.settings.memory != "regions":
+            raise ValueError(f"tree is {tree} and memory is 'map'; want memory=regions, as maps begin blank")
+        self.tree, self._saved = Tree(), Path(tree) if tree else None
         self._explorers: dict[str, Explorer] = {}
 
     def reset(self, team: Team, seed: int = 0) -> None:
         """Begin an episode."""
-        self._team, self.tree = team, Tree()
+        self._team, self.tree = team, Tree() if self._saved is None else self._read(self._saved, team)
+        saved = range(len(self.tree.nodes))
         children = np.random.SeedSequence(seed).spawn(len(team.agents))
         self._explorers = {}
         for agent, child in zip(team.agents, children, strict=True):
             belief = team.belief(agent)
             generator = np.random.default_rng(child)
             self._explorers[agent] = Explorer(agent, self.tree, self.settings, belief.robot, belief.lidar, generator)
+            self._explorers[agent].known.update(saved)
 
     def act(self, observations: Mapping[str, Observation]) -> dict[str, Action]:
         """Drive every robot for a step."""
@@ -68,6 +83,27 @@ class SensorBasedRandomTree(Policy):
             return {explorer.agent: Stop(explorer.ending or "explored") for explorer in explorers}
         return actions
 
+    def write_trees(self, folder: Path) -> list[str]:
+        """Write the tree to a folder, one for each robot if they do not know their starts; return the names."""
+        by_name = {"tree.npz": list(self._explorers)}
+        if len(self._explorers) > 1 and not self._team.settings.known_starts:
+            by_name = {f"{agent}_tree.npz": [agent] for agent in self._explorers}
+        for name, agents in by_name.items():
+            nodes = [node for node in self.tree.nodes if node.agent in agents]
+            rules = {agent: explorer.rules for agent, explorer in self._explorers.items()}
+            write_tree(folder / name, nodes, rules, _origin(self._team, agents[0]))
+        return list(by_name)
+
+    @staticmethod
+    def _read(path: Path, team: Team) -> Tree:
+        """Read the tree of an earlier run."""
+        if len(team.agents) > 1 and not team.settings.known_starts:
+            raise ValueError(
+                f"tree is {path} and the {len(team.agents)} robots do not know their starts; want one robot, or known "
+                "starts"
+            )
+        return read_tree(path, _origin(team, team.agents[0]))
+
     def _contacts(self, agent: str) -> list[str]:
         """Return the teammates that share a frame with a robot and were heard recently."""
         belief = self._team.belief(agent)
@@ -78,6 +114,12 @@ class SensorBasedRandomTree(Policy):
             for name, teammate in belief.teammates.items()
             if teammate.age_s <= CONTACT_AGE_S and name in self._explorers
         ]
+
+
+def _origin(team: Team, agent: str) -> NDArray[np.float64]:
+    """Return the origin of the graph's frame in that of the poses [m], (2,)."""
+    belief = team.belief(agent)
+    return belief.frame + belief.map_origin
 
 
 def _shares(speed: float, turn_rate: float) -> NDArray[np.float32]:

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.agents.srt.safe_region import Opening, SafeRegion
+from lidarium.agents.srt.safe_region import Opening, SafeRegion, openings_of, safe_region, seen_region
 
 
 @dataclass(eq=False, slots=True)
@@ -60,6 +60,46 @@ class Node:
     def place(self) -> NDArray[np.float64]:
         """x, y [m]."""
         return self.pose[:2]
+
+
+@dataclass(frozen=True, slots=True)
+class RegionRules:
+    """How the regions of a robot's nodes are found from its views.
+
+    Attributes
+    ----------
+    shape : str
+        Shape of safe regions.
+    body : float
+        Radius that the robot needs on its way [m].
+    perception : float
+        Rays count as far as this [m].
+    turn_room : float
+        As in `safe_region` [m].
+    with_blind : bool
+        As in `openings_of`.
+    """
+
+    shape: str
+    body: float
+    perception: float
+    turn_room: float
+    with_blind: bool
+
+    def regions(
+        self, pose: NDArray[np.float64], view: NDArray[np.float64]
+    ) -> tuple[SafeRegion, SafeRegion, list[Opening]]:
+        """Return the safe region, the seen region and the openings of a view (directions,) from a pose (3,)."""
+        place = np.array(pose[:2])
+        safe = safe_region(place, view, float(pose[2]), self.shape, self.body, self.perception, self.turn_room)
+        openings = openings_of(place, view, self.perception, self.body, with_blind=self.with_blind)
+        return safe, seen_region(place, view, self.perception), openings
+
+    def node(
+        self, number: int, agent: str, pose: NDArray[np.float64], parent: int | None, view: NDArray[np.float64]
+    ) -> Node:
+        """Return a node with its regions."""
+        return Node(number, agent, np.array(pose), *self.regions(pose, view), parent, view)
 
 
 def sees_back_and_forth(first: Node, second: Node) -> bool:

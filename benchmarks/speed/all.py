@@ -33,7 +33,13 @@ from lidarium.benchmarks.speed.cases.learners import (
     learned_training,
     masked_training,
 )
-from lidarium.benchmarks.speed.cases.three_dimensions import bullet_world, depth_image, quantisation, sparse_planning
+from lidarium.benchmarks.speed.cases.three_dimensions import (
+    bullet_world,
+    depth_image,
+    path_server,
+    quantisation,
+    sparse_planning,
+)
 from lidarium.benchmarks.speed.harness.lines import Line, table
 from lidarium.benchmarks.speed.harness.report import speed_result, with_effort, write_speed
 from lidarium.benchmarks.speed.harness.timing import EFFORTS, Effort, on_cores
@@ -60,6 +66,7 @@ _MODULES: tuple[ModuleType, ...] = (
     depth_image,
     quantisation,
     sparse_planning,
+    path_server,
 )
 
 QUESTIONS: dict[str, Any] = {module.__name__.split(".")[-1]: module for module in _MODULES}

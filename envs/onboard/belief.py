@@ -77,6 +77,11 @@ class Belief:
         return self._perception.poses.origin_in_frame(self._row)
 
     @property
+    def frame(self) -> NDArray[np.float64]:
+        """Origin of the map frame on the floor [m], shape (2,); zeros with unknown starts."""
+        return np.array(self._perception.poses.offset(self._row))
+
+    @property
     def shared_map(self) -> NavigationMap | None:
         """The team's map, if it reached this robot.
 

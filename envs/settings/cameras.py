@@ -21,6 +21,9 @@ from lidarium.registry import Registry
 MOST_PIXELS = 2048
 """Longest side of a depth image [pixels]."""
 
+MAX_DEVIATION_M = 0.01
+"""Standard deviation of depths up to which boxes of maps are made of them [m]: half a voxel."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DepthCamera:
@@ -92,6 +95,19 @@ class DepthCamera:
     def is_noisy(self) -> bool:
         """Whether depths carry noise or are rounded."""
         return self.noise_floor > 0.0 or self.noise_share > 0.0 or self.disparity_step > 0.0
+
+    @property
+    def precise_m(self) -> float:
+        """Depth up to which noise and rounding deviate by at most ``MAX_DEVIATION_M`` [m].
+
+        Boxes hold all of their points, so that noise widens them; what is farther will be seen from nearer before
+        a robot is there. It is ``depth_max`` if all depths are precise, or none.
+        """
+        depths = np.linspace(self.depth_min, self.depth_max, 1000)
+        noise = self.noise_floor + self.noise_share * (depths - self.depth_min) ** 2
+        rounding = depths**2 * self.disparity_step / math.sqrt(12.0)
+        precise = depths[np.hypot(noise, rounding) <= MAX_DEVIATION_M]
+        return float(precise[-1]) if len(precise) else self.depth_max
 
     def period_steps(self, time_step: float) -> int:
         """Return after how many time steps the next image is taken, at least 1."""

@@ -42,7 +42,7 @@ _TRUSTED = 3
 def save_spline_picture(
     path: Path,
     floor: Floor,
-    spline_map: SplineMap,
+    spline_map: SplineMap | None,
     true_path: NDArray[np.float64] | None = None,
     believed_path: NDArray[np.float64] | None = None,
     tree: Sequence[tuple[tuple[float, float], tuple[float, float]]] = (),
@@ -53,6 +53,8 @@ def save_spline_picture(
 
     Parameters
     ----------
+    spline_map : SplineMap or None
+        The map; None to draw a tree alone.
     true_path, believed_path : (times, 2 or more) float64 or None
         Positions of the robot x, y first [m].
     tree : sequence of ((x, y), (x, y))
@@ -66,7 +68,10 @@ def save_spline_picture(
     axes = figure.add_subplot()
     solid = drawn_together((raster.solid[box.rows, box.columns] != 0).astype(np.uint8))
     show_cells(axes, np.stack([rgb("#ffffff"), rgb(SOLID)])[solid], box, SOLID)
-    handles = [*_draw_map(axes, spline_map), *_draw_paths(axes, true_path, believed_path)]
+    handles = [
+        *([] if spline_map is None else _draw_map(axes, spline_map)),
+        *_draw_paths(axes, true_path, believed_path),
+    ]
     if tree:
         handles.append(_draw_tree(axes, tree, safe_regions))
     if floor.goal is not None:
@@ -82,9 +87,13 @@ def save_spline_picture(
         goal[0].set_label("goal")
         handles += goal
     axes.legend(handles=handles, loc="upper center", bbox_to_anchor=(0.5, -0.05), ncols=3, frameon=False, fontsize=8.5)
-    controls = sum(len(curve.spline.control_points) for curve in spline_map.curves)
-    note = f"{len(spline_map.curves)} curves with {controls} control points, {spline_map.length:.1f} m of wall"
+    note = f"{len(safe_regions)} safe regions" if spline_map is None else _note(spline_map)
     save_titled_figure(path, figure, title or floor.name, note)
+
+
+def _note(spline_map: SplineMap) -> str:
+    controls = sum(len(curve.spline.control_points) for curve in spline_map.curves)
+    return f"{len(spline_map.curves)} curves with {controls} control points, {spline_map.length:.1f} m of wall"
 
 
 def _draw_tree(

@@ -258,6 +258,36 @@ class Plan:
         """Length of the path [m]; inf if there is none."""
         return float(_path_length(self.path)) if self.is_found else float("inf")
 
+    @property
+    def result(self) -> dict[str, Any]:
+        """The answer for JSON, in tenths of millimetres."""
+        return {
+            "found": self.is_found,
+            "reason": self.reason,
+            "length_m": round(self.length, 4) if self.is_found else None,
+            "points": np.round(self.path, 4).tolist(),
+            "nodes": self.nodes,
+        }
+
+
+def map_bounds(graph: TopologicalGraph) -> NDArray[np.float64]:
+    """Return the low and the high corner of the ground and boxes of a graph, z of the floor alone, (2, 3) [m]."""
+    nodes, boxes = graph.nodes, graph.index.boxes.reshape(-1, 2, 3)
+    low, high = nodes.min(axis=0), nodes.max(axis=0)
+    if len(boxes):
+        low[:2] = np.minimum(low[:2], boxes[:, 0, :2].min(axis=0))
+        high[:2] = np.maximum(high[:2], boxes[:, 1, :2].max(axis=0))
+    low[2], high[2] = low[2] - graph.body.height, high[2] + graph.body.height
+    return np.stack([low, high])
+
+
+def check_on_map(bounds: NDArray[np.float64], name: str, point: NDArray[np.float64]) -> None:
+    """Check that a point (2,) or (3,) is within bounds (2, 3): outside nothing is known, and nothing in the way."""
+    low, high = bounds[:, : len(point)]
+    if not ((low <= point) & (point <= high)).all():
+        area = ", ".join(f"{axis} from {a:.2f} to {b:.2f}" for axis, a, b in zip("xyz", low, high, strict=False))
+        raise ValueError(f"{name} is {', '.join(f'{x:g}' for x in point)}; want a point on the map: {area} m")
+
 
 def plan(
     graph: TopologicalGraph,

@@ -42,7 +42,7 @@ def execute(command: _Plan) -> Answer:
     from lidarium.mapping.files.output import check_writable, write_json
     from lidarium.mapping.sparse.graph import GraphSettings, build_graph
     from lidarium.mapping.sparse.map_files import read_sparse_map
-    from lidarium.mapping.sparse.planning import plan
+    from lidarium.mapping.sparse.planning import check_on_map, map_bounds, plan
     from lidarium.mapping.sparse.swept_body import SweptBody
 
     if command.out is not None:
@@ -54,17 +54,15 @@ def execute(command: _Plan) -> Answer:
     body = SweptBody(radius=command.radius, height=command.height)
     settings = GraphSettings(clearance_weight=command.clearance_weight)
     graph = build_graph(sparse_map.free, sparse_map.boxes, body, settings)
+    for name, point in (("--from", start), ("--to", goal)):
+        check_on_map(map_bounds(graph), name, point)
     plan(graph, start, goal)  # compiles
     began = perf_counter()
     answer = plan(graph, start, goal)
     seconds = perf_counter() - began
     result = {
         "map": str(command.map),
-        "found": answer.is_found,
-        "reason": answer.reason,
-        "length_m": round(answer.length, 4) if answer.is_found else None,
-        "points": np.round(answer.path, 4).tolist(),
-        "nodes": answer.nodes,
+        **answer.result,
         "graph": {"nodes": len(graph.nodes), "edges": len(graph.edges)},
         "seconds": round(seconds, 6),
     }

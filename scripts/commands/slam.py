@@ -1,7 +1,7 @@
 """`lidarium slam`: make a map and a trajectory of a recorded log of laser scans."""
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
@@ -16,17 +16,26 @@ if TYPE_CHECKING:
 
     from lidarium.evaluation.metrics.relations import Relations
     from lidarium.mapping.files.laser_logs import LaserLog
+    from lidarium.mapping.localization.on_splines.spline_matches import TrackingSettings
+    from lidarium.mapping.localization.on_splines.spline_tracking import SplineTracker
     from lidarium.mapping.localization.settings import SlamSettings
     from lidarium.mapping.localization.slam.following import Followed
+    from lidarium.mapping.localization.slam.localizer import Slam
+
+    _AnyFollowed = Followed[Slam] | Followed[SplineTracker]
 
 DEFAULT_FOLDER = Path("slam")
+FILES = ("map.yaml", "map.pgm", "trajectory.tum", "slam.json")
+SPLINES = "splines.npz"
+MOST_FAR = 0.05
+"""Share of scans that may be too far from the last one for a localizer on splines."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class _Slam(Command):
     """Make a map of a log of laser scans.
 
-    Writes map.yaml, map.pgm, trajectory.tum and slam.json.
+    Writes map.yaml, map.pgm, trajectory.tum and slam.json, and splines.npz with a localizer on splines.
     """
 
     compiles: ClassVar[bool] = True
@@ -38,6 +47,10 @@ class _Slam(Command):
     pose_odom; bags are .mcap, .db3 or .bag files with LaserScan messages, or folders of these (extra bags);
     logs of Mines are .dat.
     """
+    localizer: Literal["slam", "splines", "splines_ekf"] = "slam"
+    """matching of scans on grids, or a filter on walls as B-splines, which needs odometry"""
+    start_map: Path | None = None
+    """spline map to begin with, in the frame of the first pose; of localizers on splines"""
     topic: str | None = None
     """topic of the scans, if a bag has several"""
     resolution: float = 0.05
@@ -98,8 +111,11 @@ def execute(command: _Slam) -> Answer:
     """Run SLAM over a log and write the results."""
     from lidarium.mapping.files.output import check_writable
     from lidarium.mapping.files.trajectories import read_tum
-    from lidarium.mapping.localization.slam.following import follow
 
+    if command.start_map is not None and command.localizer == "slam":
+        raise ValueError(f"--start-map is {command.start_map} and the localizer slam; want --localizer splines")
+    if command.ignore_odometry and command.localizer != "slam":
+        raise ValueError(f"--ignore-odometry is set and the localizer {command.localizer}; want --localizer slam")
     out = command.out or DEFAULT_FOLDER
     check_writable(out)
     log = _log(command)
@@ -109,26 +125,79 @@ def execute(command: _Slam) -> Answer:
     def watch(scans: Iterable[int]) -> Iterator[int]:
         return counted(scans, len(log.stamps), "scans", command.json)
 
-    followed = follow(log, _settings_of(command), watch)
+    followed = _followed(command, log, watch)
     if not len(followed.slam.key_scans.poses):
         raise ValueError(
             f"{command.log} holds no scan with a return within {command.range} m; want a larger --range or another log"
         )
-    verdict = None
-    if followed.reasons_to_doubt:
-        verdict = f"this map is probably wrong: {'; '.join(followed.reasons_to_doubt)}"
-        notify(f"{command.log}: {verdict}")
-    result = _result(command, log, followed, verdict)
+    if command.localizer != "slam":
+        doubt = _doubt(log, _tracking(command, log, followed.slam.settings.tracking))
+    elif followed.reasons_to_doubt:
+        doubt = f"this map is probably wrong: {'; '.join(followed.reasons_to_doubt)}"
+    else:
+        doubt = None
+    if doubt is not None:
+        notify(f"{command.log}: {doubt}")
+    result = _result(command, log, followed, doubt)
     if reference is not None:
         result |= _against_reference(command, log, followed.poses, reference)
     if relations is not None:
         result["relations"] = _against_relations(command, log, followed.poses, relations)
-    _write(command, out, log, followed, result)
-    return Answer(result, _summary(result, out), DONE if verdict is None else DOUBTFUL)
+    files = _write(out, log, followed, result)
+    return Answer(result, _summary(result, out, files), DONE if doubt is None else DOUBTFUL)
+
+
+def _followed(command: _Slam, log: "LaserLog", watch: "Callable[[Iterable[int]], Iterable[int]]") -> "_AnyFollowed":
+    """Run the localizer that a command asks for over a log."""
+    from lidarium.mapping.localization.slam.following import follow, follow_with
+
+    if command.localizer == "slam":
+        return follow(log, _settings_of(command), watch)
+    return follow_with(_on_splines(command, log), log, watch)
+
+
+def _on_splines(command: _Slam, log: "LaserLog") -> "SplineTracker":
+    """Return the localizer on splines that a command asks for."""
+    from lidarium.mapping.localization.on_splines.spline_ekf import SplineEkf
+    from lidarium.mapping.localization.on_splines.spline_filter import SplineFilter
+
+    if log.odometry is None:
+        raise ValueError(f"{command.log} has no odometry, which {command.localizer} needs; want --localizer slam")
+    if command.localizer == "splines":
+        of_filter = SplineFilter.Settings()
+        return SplineFilter(replace(of_filter, tracking=_tracking(command, log, of_filter.tracking)), log.geometry)
+    of_ekf = SplineEkf.Settings()
+    return SplineEkf(replace(of_ekf, tracking=_tracking(command, log, of_ekf.tracking)), log.geometry)
+
+
+def _tracking(command: _Slam, log: "LaserLog", tracking: "TrackingSettings") -> "TrackingSettings":
+    """Return the settings of tracking on splines that a command asks for."""
+    points = replace(tracking.splines.points, beam_interval_s=log.beam_interval_s or command.beam_interval)
+    return replace(
+        tracking,
+        splines=replace(tracking.splines, points=points),
+        path=replace(tracking.path, submaps=replace(tracking.path.submaps, resolution=command.resolution)),
+        start_map="" if command.start_map is None else str(command.start_map),
+    )
+
+
+def _doubt(log: "LaserLog", tracking: "TrackingSettings") -> str | None:
+    """Return why the poses of a localizer on splines are probably wrong; None if scans are near to each other."""
+    import numpy as np
+
+    assert log.odometry is not None
+    steps = np.hypot(*np.diff(log.odometry[:, :2], axis=0).T)
+    share = float((steps > tracking.curve_distance).mean()) if len(steps) else 0.0
+    if share <= MOST_FAR:
+        return None
+    return (
+        f"{100.0 * share:.0f} % of the scans are more than {tracking.curve_distance:g} m apart, as far as walls are "
+        "matched: poses are probably wrong; want --localizer slam"
+    )
 
 
 def _settings_of(command: _Slam) -> "SlamSettings":
-    """Return the settings that a command asks for."""
+    """Return the settings of SLAM that a command asks for."""
     from lidarium.mapping.localization.slam.following import LOG_SETTINGS
 
     matching = replace(
@@ -160,7 +229,7 @@ def _log(command: _Slam) -> "LaserLog":
     return log.limited(command.range, command.clear_without_return)
 
 
-def _result(command: _Slam, log: "LaserLog", followed: "Followed", verdict: str | None) -> dict[str, Any]:
+def _result(command: _Slam, log: "LaserLog", followed: "_AnyFollowed", verdict: str | None) -> dict[str, Any]:
     import numpy as np
 
     from lidarium import __version__
@@ -168,7 +237,9 @@ def _result(command: _Slam, log: "LaserLog", followed: "Followed", verdict: str 
     data_s = float(log.stamps[-1] - log.stamps[0])
     cpu_s = float(followed.scan_s.sum() + followed.finish_s)
     steps = np.diff(followed.poses[:, :2], axis=0)
-    settings = asdict(_settings_of(command)) | {
+    slam = followed.slam
+    settings = asdict(slam.settings) | {
+        "localizer": command.localizer,
         "range_m": command.range,
         "clear_without_return": command.clear_without_return,
     }
@@ -186,10 +257,25 @@ def _result(command: _Slam, log: "LaserLog", followed: "Followed", verdict: str 
             f"p{percent}": round(1e3 * float(np.percentile(followed.scan_s, percent)), 3) for percent in (50, 95)
         },
         "path_m": round(float(np.hypot(steps[:, 0], steps[:, 1]).sum()), 3),
-        **asdict(followed.slam.counts),
-        "doubtful": [asdict(doubt) for doubt in followed.slam.doubts.stretches],
+        **_counts_of(slam),
         "settings": settings,
         "version": __version__,
+    }
+
+
+def _counts_of(slam: "Slam | SplineTracker") -> dict[str, Any]:
+    from lidarium.mapping.localization.slam.localizer import Slam
+
+    if isinstance(slam, Slam):
+        return {**asdict(slam.counts), "doubtful": [asdict(doubt) for doubt in slam.doubts.stretches]}
+    walls = slam.map
+    return {
+        "updates": slam.updates,
+        "closures": slam.closures,
+        "corrections": slam.corrections,
+        "curves": len(walls.curves),
+        "wall_m": round(walls.length, 3),
+        "doubtful": [],
     }
 
 
@@ -251,20 +337,30 @@ def _against_relations(
     return {name: round(value, 8) for name, value in errors.as_dict().items()}
 
 
-def _write(command: _Slam, out: Path, log: "LaserLog", followed: "Followed", result: dict[str, Any]) -> None:
+def _write(out: Path, log: "LaserLog", followed: "_AnyFollowed", result: dict[str, Any]) -> tuple[str, ...]:
+    """Write the results; return the names of the files."""
     from lidarium.mapping.files.map_files import cropped, write_ros_map
     from lidarium.mapping.files.output import check_written, write_json
+    from lidarium.mapping.files.spline_files import write_spline_map
     from lidarium.mapping.files.trajectories import write_tum
+    from lidarium.mapping.localization.slam.localizer import Slam
 
-    grid = followed.slam.map
+    out.mkdir(parents=True, exist_ok=True)
+    slam = followed.slam
+    files: tuple[str, ...] = FILES
+    grid = slam.map if isinstance(slam, Slam) else slam.grid
+    if not isinstance(slam, Slam):
+        write_spline_map(out / SPLINES, slam.map)
+        files = (*files, SPLINES)
     levels, origin = cropped(grid.levels(), grid.origin, grid.settings.resolution)
     write_ros_map(out, "map", levels, (*origin, 0.0), grid.settings.resolution)
     write_tum(out / "trajectory.tum", log.stamps, followed.poses)
     write_json(out / "slam.json", result)
-    check_written(out, ("map.yaml", "map.pgm", "trajectory.tum", "slam.json"))
+    check_written(out, files)
+    return files
 
 
-def _summary(result: dict[str, Any], out: Path) -> str:
+def _summary(result: dict[str, Any], out: Path, files: tuple[str, ...]) -> str:
     rows = [
         ("scans", f"{result['scans']:,} over {result['data_s']:.0f} s and {result['path_m']:.0f} m"),
         (
@@ -273,8 +369,11 @@ def _summary(result: dict[str, Any], out: Path) -> str:
             f"{result['scan_ms']['p95']:.1f} ms)",
         ),
         ("closures", f"{result['closures']} in {result['corrections']} corrections"),
-        ("failed matches", f"{result['failures']} of {result['failures'] + result['matches']}"),
     ]
+    if "failures" in result:
+        rows.append(("failed matches", f"{result['failures']} of {result['failures'] + result['matches']}"))
+    else:
+        rows.append(("walls", f"{result['wall_m']:.1f} m in {result['curves']} curves"))
     if result["doubtful"]:
         scans = sum(doubt["scans"] for doubt in result["doubtful"])
         rows.append(("doubtful", f"{scans} scans in {len(result['doubtful'])} stretches, see slam.json"))
@@ -286,4 +385,4 @@ def _summary(result: dict[str, Any], out: Path) -> str:
         errors = result["relations"]
         figures = f"{errors['translation_m']:.4f} m, {math.degrees(errors['rotation_rad']):.3f} deg"
         rows.append(("relations", f"{figures} of {errors['relations']}"))
-    return "\n".join([table(rows), "", f"written to {out}: map.yaml, map.pgm, trajectory.tum, slam.json"])
+    return "\n".join([table(rows), "", f"written to {out}: {', '.join(files)}"])

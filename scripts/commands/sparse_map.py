@@ -41,6 +41,8 @@ class _SparseMapping(Command):
     """metres of a unit; 1 by default, 0.001 of depth images"""
     codes: int = 0
     """codes of a cloud; 0 for 1024 of one cloud and 256 of each frame"""
+    range: float | None = None
+    """points farther from the sensor are left out [m], as depth cameras are noisy far off; none by default"""
     robot_height: float = 1.2
     """points more than 0.3 m higher are left out [m]"""
     levels: bool = False
@@ -138,7 +140,13 @@ def _settings(command: _SparseMapping) -> "MapperSettings":
 
     x, y, z = numbers_of("--up", command.up, (3,))
     floor = FloorSettings(up_x=x, up_y=y, up_z=z) if not command.levels else FloorSettings()
-    return MapperSettings(mode=command.mode, robot_height_m=command.robot_height, seed=command.seed, floor=floor)
+    return MapperSettings(
+        mode=command.mode,
+        range_m=command.range,
+        robot_height_m=command.robot_height,
+        seed=command.seed,
+        floor=floor,
+    )
 
 
 def _clouds(command: _SparseMapping, told: _Told) -> "Iterator[tuple[NDArray[np.floating], NDArray[np.float64]]]":

@@ -7,6 +7,7 @@ import pytest
 from short_runs import short_run
 
 import lidarium
+from lidarium.agents.srt.tree_files import read_tree
 from lidarium.envs.faces.merged_maps import true_frames
 from lidarium.envs.settings.making import make_settings
 from lidarium.evaluation.drawing.films import FilmSettings, ScanFrames, frames_of
@@ -14,6 +15,7 @@ from lidarium.evaluation.drawing.map_film import MapFrames
 from lidarium.evaluation.episodes.watching import WatchedExploration
 from lidarium.evaluation.record import Recorder, read_record
 from lidarium.mapping.files.map_files import read_ros_map
+from lidarium.mapping.files.spline_files import read_spline_map
 from lidarium.scripts.run_output import RunFilms, _of_station, write_run, write_team
 
 
@@ -110,3 +112,26 @@ def test_pauses_are_named_where_there_were_any():
 
 def test_without_a_station_nothing_is_said():
     assert _of_station({"supervisor": None, "merges": None}) == []
+
+
+@pytest.mark.parametrize("known_starts", [True, False])
+def test_spline_maps_and_trees_are_left_to_be_read_and_begun_with(tmp_path, known_starts):
+    settings = {"localization": "splines", "known_starts": known_starts}
+    env = WatchedExploration("apartment", make_settings(robots=1, horizon_s=10.0, **settings))
+    episode = lidarium.run_episode(lidarium.policy("srt", memory="regions"), env, seed=0)
+    files = write_run(tmp_path, episode, {}, None, "srt", [])
+    assert sorted(files) == sorted(path.name for path in tmp_path.iterdir())
+    assert set(files) > {"robot_0_splines.npz", "robot_0_splines.png", "tree.npz", "tree.png"}
+    found, made = read_spline_map(tmp_path / "robot_0_splines.npz"), env.perception.poses.localizers[0].map
+    assert len(found.curves) == len(made.curves) > 3
+    assert found.length == pytest.approx(made.length, rel=0.01)
+    assert len(read_tree(tmp_path / "tree.npz").nodes) == len(episode.policy.tree.nodes)
+    begun = make_settings(
+        robots=1,
+        horizon_s=2.0,
+        assigned=[f"localizer.tracking.start_map={tmp_path / 'robot_0_splines.npz'}"],
+        **settings,
+    )
+    again = WatchedExploration("apartment", begun)
+    lidarium.run_episode(lidarium.policy("srt", memory="regions", tree=tmp_path / "tree.npz"), again, seed=0)
+    assert again.perception.poses.localizers[0].map.length == pytest.approx(found.length, rel=0.15)

@@ -14,6 +14,7 @@ from lidarium.mapping.files.laser_logs import LaserLog
 from lidarium.mapping.files.npz_logs import read_npz_log
 from lidarium.mapping.geometry.rigid import composed, relative
 from lidarium.mapping.localization.slam.following import Followed
+from lidarium.mapping.localization.slam.localizer import Slam
 
 RELATIONS = {"freiburg-079": "fr079", "intel": "intel"}
 OTHERS = ("acapulco", "aces", "belgioioso", "csail", "edmonton", "infinite-corridor", "orebro")
@@ -51,7 +52,7 @@ def _errors(errors: RelationErrors) -> str:
     return "{:.4f} ± {:.4f} m, {:.3f} ± {:.3f}°".format(*translation, *(math.degrees(angle) for angle in rotation))
 
 
-def log_row(name: str, log: LaserLog, followed: Followed) -> str:
+def log_row(name: str, log: LaserLog, followed: Followed[Slam]) -> str:
     """Return a log's line: size, times, closures, agreement with the corrected poses."""
     milliseconds, counts = 1e3 * followed.scan_s, followed.slam.counts
     data_s, cpu_s = float(log.stamps[-1] - log.stamps[0]), float(followed.scan_s.sum() + followed.finish_s)

@@ -90,14 +90,15 @@ def survey(place: Place) -> Survey:
     return Survey(len(frames), sparse, graphs, planners, octomap.sizes())
 
 
-def noisy_map(place: Place) -> SparseMap:
-    """Return the incremental map of a place by a camera with noise."""
-    named = CAMERAS["xtion_noisy"]
-    camera = replace(named, height=CAMERA.height, pitch=CAMERA.pitch)
-    mapper = IncrementalMapper(FRAME_CODES, MapperSettings(range_m=RANGE_M))
+def noisy_maps(place: Place) -> dict[str, SparseMap]:
+    """Return the incremental maps of a place by a camera with noise: of all its points, and of the precise ones."""
+    camera = replace(CAMERAS["xtion_noisy"], height=CAMERA.height, pitch=CAMERA.pitch)
+    ranges = {"all": RANGE_M, "precise": camera.precise_m}
+    mappers = {name: IncrementalMapper(FRAME_CODES, MapperSettings(range_m=far)) for name, far in ranges.items()}
     for frame in frames_of(place, camera):
-        mapper.add(frame.points, frame.pose)
-    return mapper.map
+        for mapper in mappers.values():
+            mapper.add(frame.points, frame.pose)
+    return {name: mapper.map for name, mapper in mappers.items()}
 
 
 def _kept_frames(place: Place) -> list[Frame]:

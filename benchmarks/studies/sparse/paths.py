@@ -13,10 +13,11 @@ from scipy.sparse.csgraph import dijkstra
 
 from lidarium.benchmarks.studies.shared.study import Progress, Task, do_missing
 from lidarium.benchmarks.studies.sparse.grids import LASER_M, laser_grid
-from lidarium.benchmarks.studies.sparse.maps import Planner, noisy_map, size_of, survey
+from lidarium.benchmarks.studies.sparse.maps import Planner, noisy_maps, size_of, survey
 from lidarium.benchmarks.studies.sparse.places import BODY, CELL_M, PLACES, Place, load_place, requests_of
 from lidarium.mapping.sparse.graph import TopologicalGraph, build_graph
 from lidarium.mapping.sparse.planning import measure_path, plan
+from lidarium.mapping.sparse.sparse_map import SparseMap
 from lidarium.mapping.sparse.swept_body import are_free
 
 ARC_SEGMENTS = 8
@@ -106,8 +107,6 @@ def measure(task: PlaceTask) -> dict[str, Any]:
     optimum = ShortestPaths(place)
     for planner in found.planners.values():
         planner(*requests[0])  # compiles
-    noisy = noisy_map(place)
-    noisy_graph = build_graph(noisy.free, noisy.boxes, BODY)
     return {
         "place": task.name,
         "frames": found.frames,
@@ -119,7 +118,7 @@ def measure(task: PlaceTask) -> dict[str, Any]:
         "graphs": {name: [len(each.nodes), len(each.edges)] for name, each in found.graphs.items()},
         "tree": [found.tree.bits, found.tree.full, found.tree.bits_deflated],
         "tops": _tops(place, found.graphs),
-        "noisy": _noisy(place, noisy_graph, requests) | {"occupied": len(noisy.occupied)},
+        "noisy": {name: _noisy(place, each, requests) for name, each in noisy_maps(place).items()},
     }
 
 
@@ -158,11 +157,13 @@ def _tops(place: Place, graphs: dict[str, TopologicalGraph]) -> dict[str, float]
     return shares
 
 
-def _noisy(place: Place, graph: TopologicalGraph, requests: NDArray[np.float64]) -> dict[str, int]:
-    """Return how many requests a map of noisy frames answers, and how many of the paths collide."""
+def _noisy(place: Place, noisy: SparseMap, requests: NDArray[np.float64]) -> dict[str, int]:
+    """Return how many requests a map of noisy frames answers, how many of the paths collide, and its boxes."""
+    graph = build_graph(noisy.free, noisy.boxes, BODY)
     paths = [plan(graph, start, goal) for start, goal in requests]
     answered = [each.path for each in paths if each.is_found]
-    return {"answered": len(answered), "collide": sum(place.collides(path) for path in answered)}
+    collide = sum(place.collides(path) for path in answered)
+    return {"answered": len(answered), "collide": collide, "occupied": len(noisy.occupied)}
 
 
 def work(folder: Path, every: int) -> Progress:

@@ -178,6 +178,8 @@ class TrackingSettings:
     path : SlamSettings
         How local maps follow each other, places are recognised and poses brought to agree; its matching
         serves to recognise places only.
+    start_map : str
+        File of a spline map that the robot begins with, in the frame of its poses; empty for none.
     """
 
     splines: SplineSettings = field(default_factory=SplineSettings)
@@ -199,6 +201,7 @@ class TrackingSettings:
     map_distance: Positive = 0.1
     map_turn: Angle = math.radians(5.0)
     path: SlamSettings = field(default_factory=lambda: SlamSettings(graph=_GRAPH))
+    start_map: str = ""
 
     def __post_init__(self) -> None:
         check_settings(self, "tracking")

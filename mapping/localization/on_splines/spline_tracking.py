@@ -10,11 +10,15 @@ filter knows.
 
 import math
 from abc import ABC, abstractmethod
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from lidarium.mapping.files.spline_files import read_spline_map
 from lidarium.mapping.geometry.rigid import Transform, composed, relative, turned, wrapped
+from lidarium.mapping.grids.occupancy import OccupancyGrid
 from lidarium.mapping.grids.scan_geometry import ScanGeometry
 from lidarium.mapping.localization.localizer import KeyScans, Sensing
 from lidarium.mapping.localization.matching.scan_points import at_last_beam
@@ -33,6 +37,8 @@ class SplineTracker(ABC):
 
     Attributes
     ----------
+    settings : dataclass
+        How; the heir's own.
     local_map : SplineMap
         The local map that grows, in a frame of its own.
     local : (3,) float64
@@ -41,12 +47,16 @@ class SplineTracker(ABC):
         How many scans the local maps have taken in.
     """
 
+    settings: Any
+
     def __init__(self, settings: TrackingSettings, geometry: ScanGeometry) -> None:
         self.tracking, self.geometry = settings, geometry
+        # The walls that are known from the start, in the frame of the poses.
+        self._known = read_spline_map(Path(settings.start_map), settings.splines) if settings.start_map else None
         self.reset(np.zeros(3), 0)
 
     def reset(self, pose: NDArray[np.float64], seed: int) -> None:
-        """Begin again at x, y, theta (3,) [m, rad] with a blank map.
+        """Begin again at x, y, theta (3,) [m, rad] with a blank map, or the one of ``start_map``.
 
         Whatever is drawn comes from ``seed``.
         """
@@ -55,7 +65,7 @@ class SplineTracker(ABC):
             raise ValueError(f"pose is {pose}; want x, y, theta, all finite")
         begin[2] = wrapped(float(begin[2]))
         self.local, self.updates = np.zeros(3), 0
-        self.local_map = SplineMap(self.tracking.splines)
+        self.local_map = self._known_around(begin, self.geometry.range_max + 1.0)
         self._mount = np.array([self.tracking.splines.points.laser_x, 0.0, 0.0])
         self._path = MappedPath(self.tracking.path, self.geometry, composed(begin, self._mount))
         self._path.local = self._path.at_node = self._mount.copy()
@@ -90,7 +100,9 @@ class SplineTracker(ABC):
             self.tracking.splines,
         )
         tracking = self.tracking
-        if self._is_mapped and _is_beyond(self._uncorrected, tracking.still_distance, tracking.still_turn):
+        is_on_known = not self._is_mapped and self._known is not None
+        has_moved = _is_beyond(self._uncorrected, tracking.still_distance, tracking.still_turn)
+        if is_on_known or (self._is_mapped and has_moved):
             self._uncorrected = Transform()
             matches = self._match(observation)
             if matches.features >= tracking.least_features or len(matches.rays) >= tracking.least_rays:
@@ -121,9 +133,36 @@ class SplineTracker(ABC):
     def map(self) -> SplineMap:
         """The map of all local maps, at the poses that are now believed."""
         nodes, whole = self._path.nodes, SplineMap(self.tracking.splines)
+        if self._known is not None:
+            whole.absorb(self._known, Transform())
         for node, part in [*self._finished, (self._path.mapper_node, self.local_map)]:
             whole.absorb(part, Transform(*nodes[node].tolist()))
         return whole
+
+    @property
+    def grid(self) -> OccupancyGrid:
+        """The same scans as a grid, rendered again after corrections."""
+        return self._path.map
+
+    @property
+    def place(self) -> tuple[int, NDArray[np.float64]]:
+        """The last node, and the laser's pose x, y, theta (3,) in its frame."""
+        return self._path.place
+
+    @property
+    def nodes(self) -> NDArray[np.float64]:
+        """Poses of all nodes as they are now believed, shape (nodes, 3) [m, rad]."""
+        return self._path.nodes
+
+    @property
+    def closures(self) -> int:
+        """Number of places that were recognised."""
+        return self._path.closures
+
+    @property
+    def corrections(self) -> int:
+        """How often the past was corrected."""
+        return self._path.corrections
 
     @property
     def key_scans(self) -> KeyScans:
@@ -206,8 +245,16 @@ class SplineTracker(ABC):
         self.local = relative(np.array([frame.x, frame.y, frame.theta]), self.local)
         reach = self.geometry.range_max + 1.0 + float(np.hypot(*self.local[:2]))
         self.local_map = self.local_map.around(frame, reach)
+        if self._known is not None:
+            # What was cut off before may be around again.
+            self.local_map.absorb(self._known_around(self._path.nodes[self._path.mapper_node], reach), Transform())
         self._spread_at_node = turned(self._spread_at_node, -frame.theta)
         self._change_frame(frame.inverse(), reach)
+
+    def _known_around(self, frame: NDArray[np.float64], reach: float) -> SplineMap:
+        """Return the known walls around a frame x, y, theta (3,), in that frame."""
+        known = SplineMap(self.tracking.splines) if self._known is None else self._known
+        return known.around(Transform(*frame.tolist()), reach)
 
     def _growth(self) -> NDArray[np.float64]:
         """Return how much less well the pose in the local map is known than at the last node, (3, 3).

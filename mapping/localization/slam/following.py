@@ -4,13 +4,14 @@ import math
 import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
+from typing import Generic, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.mapping.files.laser_logs import LaserLog
 from lidarium.mapping.geometry.rigid import composed, relative
-from lidarium.mapping.localization.localizer import Sensing
+from lidarium.mapping.localization.localizer import KeyScans, Localizer, Sensing
 from lidarium.mapping.localization.settings import (
     ClosureSettings,
     CompassSettings,
@@ -49,13 +50,39 @@ robots err by more than walls are thick.
 """
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Followed:
+class _LogLocalizer(Localizer, Protocol):
+    """A localizer whose past poses are corrected by nodes."""
+
+    @property
+    def place(self) -> tuple[int, NDArray[np.float64]]:
+        """The last node, and the laser's pose x, y, theta (3,) in its frame."""
+        ...
+
+    @property
+    def nodes(self) -> NDArray[np.float64]:
+        """Poses of all nodes as they are now believed, shape (nodes, 3) [m, rad]."""
+        ...
+
+    @property
+    def key_scans(self) -> KeyScans:
+        """The scans that were mapped, at their poses as believed now."""
+        ...
+
+    def finish(self) -> None:
+        """Let all closures act that were found so far."""
+        ...
+
+
+LocalizerOfLog = TypeVar("LocalizerOfLog", bound=_LogLocalizer)
+
+
+@dataclass(frozen=True, eq=False)
+class Followed(Generic[LocalizerOfLog]):
     """Result of a log.
 
     Attributes
     ----------
-    slam : Slam
+    slam : Slam or SplineTracker
         The localizer at the end: its map, its graph, its counts.
     poses : (scans, 3) float64
         Pose of the robot at each scan, as believed at the end; the first is (0, 0, 0) [m, rad].
@@ -69,7 +96,7 @@ class Followed:
         Why the map is probably wrong; empty if nothing says so.
     """
 
-    slam: Slam
+    slam: LocalizerOfLog
     poses: NDArray[np.float64]
     online: NDArray[np.float64]
     scan_s: NDArray[np.float64]
@@ -82,7 +109,7 @@ def follow(
     settings: SlamSettings,
     watch: Callable[[Iterable[int]], Iterable[int]] = iter,
     clock: Callable[[], float] = time.process_time,
-) -> Followed:
+) -> Followed[Slam]:
     """Run SLAM over a log.
 
     Parameters
@@ -101,6 +128,24 @@ def follow(
         replace(settings, matching=matching, uses_odometry=settings.uses_odometry and log.odometry is not None),
         log.geometry,
     )
+    followed = follow_with(slam, log, watch, clock)
+    reasons = reasons_to_doubt(
+        followed.poses,
+        log.odometry if settings.uses_odometry else None,
+        sum(doubt.scans for doubt in slam.doubts.stretches),
+        slam.counts.matches + slam.counts.failures,
+        slam.counts.restarts,
+    )
+    return replace(followed, reasons_to_doubt=tuple(reasons))
+
+
+def follow_with(
+    slam: LocalizerOfLog,
+    log: LaserLog,
+    watch: Callable[[Iterable[int]], Iterable[int]] = iter,
+    clock: Callable[[], float] = time.process_time,
+) -> Followed[LocalizerOfLog]:
+    """Run a localizer of the log's laser over a log; see `follow`."""
     slam.reset(log.laser_pose, 0)
     scans = len(log.stamps)
     odometry = np.zeros((scans, 3)) if log.odometry is None else composed(log.odometry, log.laser_pose)
@@ -115,18 +160,11 @@ def follow(
     slam.finish()
     finish_s = clock() - began
     laser = composed(slam.nodes[numbers], positions)
-    poses, counts = _of_robot(laser, log.laser_pose), slam.counts
-    reasons = reasons_to_doubt(
-        poses,
-        log.odometry if settings.uses_odometry else None,
-        sum(doubt.scans for doubt in slam.doubts.stretches),
-        counts.matches + counts.failures,
-        counts.restarts,
-    )
-    return Followed(slam, poses, _of_robot(online, log.laser_pose), scan_s, finish_s, tuple(reasons))
+    poses = _of_robot(laser, log.laser_pose)
+    return Followed(slam, poses, _of_robot(online, log.laser_pose), scan_s, finish_s)
 
 
-def run_slam(log: LaserLog, settings: SlamSettings | None = None, range_m: float = 30.0) -> Followed:
+def run_slam(log: LaserLog, settings: SlamSettings | None = None, range_m: float = 30.0) -> Followed[Slam]:
     """Make a map and a trajectory of a recorded log, as the command ``lidarium slam`` does.
 
     Parameters

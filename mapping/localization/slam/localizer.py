@@ -99,6 +99,8 @@ class Slam:
 
     Attributes
     ----------
+    settings : SlamSettings
+        How.
     counts : SlamCounts
         Counts so far.
     doubts : Doubts
@@ -108,15 +110,15 @@ class Slam:
     Settings = SlamSettings
 
     def __init__(self, settings: SlamSettings, geometry: ScanGeometry) -> None:
-        self._settings, self._geometry = settings, geometry
+        self.settings, self._geometry = settings, geometry
         self.reset(np.zeros(3), 0)
 
     def reset(self, pose: NDArray[np.float64], seed: int) -> None:
         """Begin again at x, y, theta (3,) [m, rad]; nothing is drawn."""
-        self._path = MappedPath(self._settings, self._geometry, pose)
+        self._path = MappedPath(self.settings, self._geometry, pose)
         self.counts, self.doubts = _SlamCounts(), _Doubts()
         self._has_begun = False
-        self._motion = OdometryMotion(self._settings)
+        self._motion = OdometryMotion(self.settings)
         self._failed, self._time_s = 0, 0.0
 
     def localize(self, sensing: Sensing) -> NDArray[np.float64]:
@@ -132,7 +134,7 @@ class Slam:
         motion, period = self._motion.take(sensing)
         path = self._path
         path.local = composed(path.local, motion)
-        matching = self._settings.matching
+        matching = self.settings.matching
         moved = relative(path.matched, path.local)
         is_far = np.hypot(moved[0], moved[1]) >= matching.distance_m or abs(moved[2]) >= matching.angle
         if is_far or not self._has_begun or not self._motion.is_measured:
@@ -236,7 +238,7 @@ class Slam:
             return NO_MATCH
         if self._path.mapper.recoveries > self.counts.recoveries:
             return ELSEWHERE
-        is_sparse = points < self._settings.matching.wide_share * self._geometry.beams
+        is_sparse = points < self.settings.matching.wide_share * self._geometry.beams
         if not match.information.any():
             return None if is_sparse else ODOMETRY_ALONE
         return None if self._path.mapper.explains else LITTLE
@@ -262,7 +264,7 @@ class Slam:
         self.counts.failures += 1
         self._failed += 1
         self._motion.velocity = np.zeros(3)
-        settings, path = self._settings.matching, self._path
+        settings, path = self.settings.matching, self._path
         if self._failed >= settings.lost_after:
             self.counts.restarts += 1
             covariance = np.diag([settings.lost_m**2, settings.lost_m**2, settings.lost_angle**2])

@@ -40,3 +40,10 @@ def test_a_goal_in_the_table_has_no_path_and_exit_code_3(room, capsys):
 def test_bad_points_are_refused(room, point, capsys):
     assert main(["plan", str(room / "maps" / "room.smap"), "--from", point, "--to", "1,1"]) == 2
     assert "--from is" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("point", ["100,1", "1,-3", "1,1,40"])
+def test_points_outside_the_map_are_refused(room, point, capsys):
+    assert main(["plan", str(room / "maps" / "room.smap"), "--from", "1,1", "--to", point]) == 2
+    assert "--to is" in (told := capsys.readouterr().err)
+    assert "want a point on the map: x from" in told

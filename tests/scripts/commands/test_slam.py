@@ -4,11 +4,13 @@ import json
 import numpy as np
 import pytest
 from driven_rooms import GEOMETRY, driven, odd_room
+from polygon_scans import distances_to
 
 from lidarium.mapping.files.laser_logs import LaserLog
 from lidarium.mapping.files.log_files import read_log
 from lidarium.mapping.files.map_files import read_ros_map
 from lidarium.mapping.files.npz_logs import write_npz_log
+from lidarium.mapping.files.spline_files import read_spline_map
 from lidarium.mapping.files.trajectories import read_tum, write_tum
 from lidarium.mapping.geometry.rigid import composed, relative
 from lidarium.mapping.localization.slam.following import run_slam
@@ -205,3 +207,75 @@ def test_bad_options_are_named(log, arguments, word, tmp_path, capsys):
     assert word in told.err
     assert "Traceback" not in told.err
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("localizer", ["splines", "splines_ekf"])
+def test_a_log_is_followed_on_walls_as_splines(run, log, tmp_path, capsys, localizer):
+    options = ["--localizer", localizer, "--reference", str(log.parent / "true.tum")]
+    assert main(["slam", str(log), "--out", str(tmp_path / "out"), "--json", *options]) == 0
+    result = json.loads(capsys.readouterr().out)
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == [*FILES[:3], "splines.npz", FILES[3]]
+    assert result["ate_m"] < 0.05
+    assert result["settings"]["localizer"] == localizer
+    walls = read_spline_map(tmp_path / "out" / "splines.npz")
+    assert len(walls.curves) == result["curves"]
+    room = odd_room() - [1.0, 1.0, 1.0, 1.0]  # as seen from where the robot begins
+    perimeter = np.hypot(*(room[:, 2:] - room[:, :2]).T).sum()
+    assert 0.7 * perimeter < walls.length < 1.2 * perimeter
+    assert np.quantile(distances_to(room, walls.sample()), 0.9) < 0.05
+    levels = read_ros_map(tmp_path / "out" / "map.yaml").levels
+    assert 80 < levels.shape[0] < 140
+
+
+def test_a_log_begins_with_the_spline_map_of_another_run(log, tmp_path, capsys):
+    first, second = tmp_path / "first", tmp_path / "second"
+    assert main(["slam", str(log), "--localizer", "splines", "--out", str(first)]) == 0
+    known = first / "splines.npz"
+    capsys.readouterr()
+    options = ["--localizer", "splines", "--start-map", str(known), "--reference", str(log.parent / "true.tum")]
+    assert main(["slam", str(log), "--out", str(second), "--json", *options]) == 0
+    result = json.loads(capsys.readouterr().out)
+    assert result["ate_m"] < 0.05
+    # The same walls again make no second ones.
+    assert result["wall_m"] == pytest.approx(read_spline_map(known).length, rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--start-map", "a.npz"], "--start-map is a.npz and the localizer slam; want --localizer splines"),
+        (["--localizer", "splines", "--ignore-odometry"], "want --localizer slam"),
+        (["--localizer", "splines", "--start-map", "missing.npz"], "there is no file missing.npz"),
+    ],
+)
+def test_options_that_do_not_fit_the_localizer_are_refused(log, tmp_path, options, message, capsys):
+    assert main(["slam", str(log), "--out", str(tmp_path / "out"), *options]) == 2
+    assert message in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_localizer_on_splines_refuses_a_log_without_odometry(log, tmp_path, capsys):
+    with np.load(log) as archive:
+        arrays = {name: array for name, array in archive.items() if name != "pose_odom"}
+    np.savez(tmp_path / "bare.npz", **arrays)
+    assert main(["slam", str(tmp_path / "bare.npz"), "--localizer", "splines", "--out", str(tmp_path / "out")]) == 2
+    assert "has no odometry, which splines needs" in capsys.readouterr().err
+
+
+def test_scans_too_far_apart_for_splines_make_the_result_doubtful(log, tmp_path, capsys):
+    with np.load(log) as archive:
+        arrays = dict(archive)
+    arrays["pose_odom"] = arrays["pose_odom"] * [20.0, 20.0, 1.0]
+    np.savez(
+        tmp_path / "wide.npz", **{name: _every_tenth(array, len(arrays["stamp"])) for name, array in arrays.items()}
+    )
+    out = tmp_path / "out"
+    assert main(["slam", str(tmp_path / "wide.npz"), "--localizer", "splines", "--out", str(out), "--json"]) == 4
+    told = capsys.readouterr()
+    (remark,) = json.loads(told.out)["remarks"]
+    assert "more than 0.3 m apart" in remark
+    assert remark in told.err
+
+
+def _every_tenth(array, count):
+    return array[::10] if array.shape[:1] == (count,) else array

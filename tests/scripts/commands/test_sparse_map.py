@@ -32,6 +32,13 @@ def test_frames_with_poses_make_one_map(room, tmp_path):
     assert (tmp_path / "map.txt").read_text().startswith("# sparse-map v1 ")
 
 
+def test_points_out_of_range_are_left_out(room, tmp_path):
+    path = tmp_path / "near.smap"
+    assert main(["sparse-map", str(room / "room.ply"), "--range", "2", "--out", str(path)]) == 0
+    near, _ = read_sparse_map(path)
+    assert np.hypot(*near.free[:, :2].T).max() <= 2.0 < np.hypot(*room_points(0.03)[:, :2].T).max()
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
@@ -41,6 +48,8 @@ def test_frames_with_poses_make_one_map(room, tmp_path):
         (["CLOUD", "--scale", "-1"], "scale"),
         (["CLOUD", "--intrinsics", "1,2"], "--intrinsics is '1,2'"),
         (["CLOUD", "--codes", "1"], "1"),
+        (["CLOUD", "--range", "-1"], "range_m of the mapper is -1.0"),
+        (["CLOUD", "--range", "nan"], "range_m of the mapper is nan"),
     ],
 )
 def test_bad_clouds_are_refused_and_nothing_is_written(room, tmp_path, arguments, message, capsys):

@@ -47,7 +47,10 @@ def line_of(place, missing=1, collide=0.0, seconds=5e-5):
         "graphs": {name: [300, 900] for name in PLANNERS[2:]},
         "tree": [60_000, 900_000, 10_000],
         "tops": {"laser": 0.9, "incremental": 1.0, "full": 1.0},
-        "noisy": {"answered": 2, "collide": 0, "occupied": 600},
+        "noisy": {
+            "all": {"answered": 1, "collide": 0, "occupied": 900},
+            "precise": {"answered": 2, "collide": 0, "occupied": 600},
+        },
     }
 
 

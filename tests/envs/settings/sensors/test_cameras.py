@@ -32,6 +32,19 @@ def test_any_noise_makes_a_camera_noisy():
     assert DepthCamera(disparity_step=0.01).is_noisy
 
 
+def test_depths_are_precise_up_to_where_noise_and_rounding_deviate_by_a_centimetre():
+    noisy = CAMERAS["xtion_noisy"]
+    depth = noisy.precise_m
+    noise, rounding = 0.0012 + 0.0019 * (depth - 0.4) ** 2, depth**2 / 345.0 / math.sqrt(12.0)
+    assert math.hypot(noise, rounding) == pytest.approx(0.01, abs=1e-4)
+    assert CAMERAS["xtion"].precise_m == 4.0
+    assert DepthCamera(noise_floor=0.0099).precise_m == 4.0
+
+
+def test_a_camera_without_precise_depths_is_used_as_it_is():
+    assert DepthCamera(noise_floor=0.02).precise_m == 4.0
+
+
 def test_a_camera_that_measures_nothing_is_refused():
     with pytest.raises(ValueError, match=r"depth_min of the camera is 4\.0 m; want less than depth_max, 4\.0 m"):
         DepthCamera(depth_min=4.0)

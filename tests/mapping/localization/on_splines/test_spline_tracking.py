@@ -9,10 +9,12 @@ from hypothesis import strategies as st
 from polygon_scans import biased_odometry
 from tracked_world import LASER, POSES, SCANS, follow, gap
 
+from lidarium.mapping.files.spline_files import write_spline_map
 from lidarium.mapping.geometry.rigid import Transform, composed
 from lidarium.mapping.localization.localizer import Localizer, Sensing
 from lidarium.mapping.localization.on_splines.spline_ekf import SplineEkf
-from lidarium.mapping.localization.on_splines.spline_filter import SplineFilter
+from lidarium.mapping.localization.on_splines.spline_filter import SplineFilter, SplineFilterSettings
+from lidarium.mapping.localization.on_splines.spline_matches import TrackingSettings
 from lidarium.mapping.localization.on_splines.spline_tracking import driven, steps_of
 
 KINDS = (SplineFilter, SplineEkf)
@@ -120,3 +122,28 @@ def test_steps_lead_where_the_motion_leads(x, y, turn, heading):
     # Motions of less than a millimetre have no direction.
     assert math.dist(found[:2], expected[:2]) < 2.1e-3
     assert abs(math.remainder(found[2] - expected[2], 2.0 * math.pi)) < 1e-9
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_map_of_an_earlier_run_corrects_a_wrong_start(kind, tmp_path):
+    odometry = biased_odometry(POSES, 0.0)
+    earlier = kind()
+    follow(earlier, odometry)
+    write_spline_map(tmp_path / "map.npz", earlier.map)
+    tracking = TrackingSettings(start_map=str(tmp_path / "map.npz"))
+    localizer = kind(kind.Settings(tracking=tracking, start_distance=0.05, start_turn=math.radians(1.0)))
+    assert localizer.map.length == pytest.approx(earlier.map.length, rel=0.05)
+    wrong = POSES[0] + [0.06, -0.04, 0.0]
+    localizer.reset(wrong, 0)
+    found = [localizer.localize(Sensing(0.1 * k, odometry[k], SCANS[k])) for k in range(20)]
+    assert gap(found[-1], POSES[19])[0] < 0.03
+    blank = kind(kind.Settings(start_distance=0.05, start_turn=math.radians(1.0)))
+    blank.reset(wrong, 0)
+    alone = [blank.localize(Sensing(0.1 * k, odometry[k], SCANS[k])) for k in range(20)]
+    assert gap(alone[-1], POSES[19])[0] > 0.05  # nothing says where it began
+
+
+def test_a_start_map_that_is_none_is_named(tmp_path):
+    (tmp_path / "map.npz").write_bytes(b"no map")
+    with pytest.raises(ValueError, match=r"map\.npz is not a spline map"):
+        SplineFilter(SplineFilterSettings(tracking=TrackingSettings(start_map=str(tmp_path / "map.npz"))))
