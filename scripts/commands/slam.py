@@ -111,6 +111,7 @@ def execute(command: _Slam) -> Answer:
     """Run SLAM over a log and write the results."""
     from lidarium.mapping.files.output import check_writable
     from lidarium.mapping.files.trajectories import read_tum
+    from lidarium.mapping.localization.slam.localizer import Slam
 
     if command.start_map is not None and command.localizer == "slam":
         raise ValueError(f"--start-map is {command.start_map} and the localizer slam; want --localizer splines")
@@ -130,7 +131,7 @@ def execute(command: _Slam) -> Answer:
         raise ValueError(
             f"{command.log} holds no scan with a return within {command.range} m; want a larger --range or another log"
         )
-    if command.localizer != "slam":
+    if not isinstance(followed.slam, Slam):
         doubt = _doubt(log, _tracking(command, log, followed.slam.settings.tracking))
     elif followed.reasons_to_doubt:
         doubt = f"this map is probably wrong: {'; '.join(followed.reasons_to_doubt)}"
