@@ -114,6 +114,8 @@ class Reference:
             assert space[cell], "a start is too near to a wall for this reference"
             if not centres[cell]:
                 centres |= reached(space, cell)
+        # Centres before a straight wall are rounded away from it; the disc still reaches the wall.
+        reach = max(reach, math.ceil(reach + 0.5 - 1e-9) - 1.0)
         disc = [(i, j) for i, j in around(reach) if i * i + j * j <= reach**2 + 1e-9]
         return pooled(grown(centres, disc) & ~self.body & ~self.laser, self.multiple, np.all)
 

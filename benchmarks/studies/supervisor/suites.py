@@ -40,16 +40,16 @@ They take the place of the usual settings where that is of interest.
 """
 
 GENERATED: Mapping[str, float] = {
-    "building:3000003": 72.0,
-    "building:3000004": 81.0,
-    "building:3000016": 86.0,
-    "building:3000013": 93.0,
-    "building:3000018": 112.0,
-    "building:3000012": 151.0,
-    "building:3000010": 173.0,
-    "building:3000007": 210.0,
-    "building:3000011": 380.0,
-    "building:3000009": 398.0,
+    "building:3000003": 77.0,
+    "building:3000004": 86.0,
+    "building:3000016": 90.0,
+    "building:3000013": 99.0,
+    "building:3000018": 117.0,
+    "building:3000012": 160.0,
+    "building:3000010": 183.0,
+    "building:3000007": 219.0,
+    "building:3000011": 402.0,
+    "building:3000009": 422.0,
 }
 """Floors of the set ``test`` by name, with what the robot sweeps of them [m2]."""
 

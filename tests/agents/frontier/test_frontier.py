@@ -82,6 +82,7 @@ def test_policies_read_beliefs_and_never_the_truth():
     belief = env.belief("robot_0")
     public = {name for name in dir(belief) if not name.startswith("_")}
     assert public == {
+        "frame",
         "pose",
         "velocity",
         "spread",

@@ -83,6 +83,7 @@ def test_no_client_is_left_and_memory_stays_flat_after_many_episodes():
     env.close()
     env.close()
     assert clients() == 0
+    env = lidarium.parallel_env(FLOOR, backend="bullet", robots=2, **PLAIN)
     env.reset(seed=1)
     assert clients() == 1
     del env
