@@ -237,7 +237,6 @@ MOVED: dict[str, str] = {
     "mapping.planning.touring.frontier_views": "mapping.planning.frontiers.views",
     "mapping.planning.touring.team_tours": "mapping.planning.touring.tours",
     "mapping.planning.tours": "mapping.planning.touring.tours",
-    "mapping.point_clouds.columns": "mapping.point_clouds.cloud_files",
     "mapping.point_clouds.depth_images": "mapping.point_clouds.cameras",
     "mapping.point_clouds.frames": "mapping.point_clouds.cameras",
     "mapping.point_clouds.intrinsics": "mapping.point_clouds.cameras",
