@@ -136,8 +136,7 @@ class Policy(ABC):
         Raises
         ------
         ValueError
-            If the environment's level of decision does not carry out the actions of the policy, or robots do not
-            observe what it reads.
+            If the environment's level cannot carry out the policy's actions, or robots lack an observation for it.
         """
 
     @abstractmethod

@@ -486,8 +486,8 @@ class _Outside(Policy):
 class SupervisedTeam(TeamWrapper):
     """A supervisor around the environment of a team: a learner or policy decides for robots that have no order.
 
-    Robots that the station directs do what it orders; an action for them is not carried out. In addition to those of
-    the environment below, ``infos[agent]["directed"]`` says whether that is so now; ``infos[agent]["order"]`` is the
+    Robots under an order of the station ignore the actions given for them. In addition to the infos of
+    the environment below, ``infos[agent]["directed"]`` is True for these robots; ``infos[agent]["order"]`` is the
     last order as always. With ``masks_orders`` the action mask of such a robot leaves the action to stay alone. Starts
     may be unknown.
 
@@ -510,7 +510,7 @@ class SupervisedTeam(TeamWrapper):
     Raises
     ------
     ValueError
-        If there is no team of one episode below, or ``masks_orders`` is set and there are no masks.
+        If the environment does not hold a single team, or ``masks_orders`` is set without action masks.
     """
 
     def __init__(
@@ -559,7 +559,7 @@ class SupervisedTeam(TeamWrapper):
 class SupervisedBatch(VectorWrapper[Any, Any, Any]):
     """A supervisor around each episode of a batch; see `SupervisedTeam`.
 
-    ``infos["directed"]`` (rows,) says which robots the station drives now.
+    ``infos["directed"]`` (rows,) bool is True for robots under an order of the station.
 
     Parameters
     ----------
