@@ -202,12 +202,7 @@ def _ratio(
     others = [theirs[planner][name] for name in names]
     if np.array_equal(values, others):
         return "1"
-    return _interval(values, others)
-
-
-def _interval(ours: Sequence[float], theirs: Sequence[float]) -> str:
-    found = paired_ratio(ours, theirs)
-    return f"{found.estimate:.3f} ({found.low:.3f} to {found.high:.3f})"
+    return f"{paired_ratio(values, others):.3f}"
 
 
 def _all_maps(ours: Ways) -> str:
@@ -219,7 +214,11 @@ def _all_maps(ours: Ways) -> str:
             [float(found[name]["t99_s"] or SETTINGS["horizon_s"]) for name in names] for found in (episodes, baseline)
         )
         reached = sum(episodes[name]["t99_s"] is not None for name in names)
-        ratios = ["1", "1"] if policy == POLICIES[0] else [_interval(ways, others), _interval(times, base)]
+        ratios = (
+            ["1", "1"]
+            if policy == POLICIES[0]
+            else [f"{paired_ratio(ways, others):.3f}", f"{paired_ratio(times, base):.3f}"]
+        )
         cells = f"{reached} of {len(names)} | {np.mean(ways):.0f} | {' | '.join(ratios)}"
         rows.append(f"| `{policy}` | {cells} |")
     return "\n".join(rows)
@@ -238,7 +237,7 @@ def _by_ariadne(ours: Ways) -> str:
     for policy, episodes in ours.items():
         ways, others = ([sum(found[name]["path_m"]) for name in episodes] for found in (episodes, baseline))
         ended = sum(STOP_REASON in each["ended_because"].values() for each in episodes.values())
-        ratio = "1" if policy == POLICIES[0] else _interval(ways, others)
+        ratio = "1" if policy == POLICIES[0] else f"{paired_ratio(ways, others):.3f}"
         on_own = np.mean([sum(episodes[name]["path_m"]) for name in own]) if own else np.nan
         rows.append(f"| `{policy}` | {ended} of {len(episodes)} | {np.mean(ways):.1f} | {ratio} | {on_own:.1f} |")
     return "\n".join(rows)

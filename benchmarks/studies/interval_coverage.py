@@ -219,7 +219,7 @@ def held(case: Case, size: int, trials: int) -> tuple[float, int]:
     return hits / max(trials - refused, 1), refused
 
 
-SIZES = (10, 20, 50, 100, 200)
+SIZES = (6, 8, 10, 20, 50, 100, 200)
 WANTED = (0.93, 0.97)
 TRIALS, RESAMPLES = 2000, 399
 CASES_FILE = "cases.jsonl"
@@ -269,7 +269,7 @@ def page(folder: Path) -> str:
         f"pairs; {seconds:.0f} s on one core. Its standard error is {100.0 * np.sqrt(0.95 * 0.05 / trials):.1f} at 95 "
         f"%. Intervals are made of {resamples:,} resamples here, of 10,000 in reports. Asked for are "
         f"{100 * WANTED[0]:.0f} to {100 * WANTED[1]:.0f} at {FEWEST_FOR_NOMINAL} and more on normal, skewed and 20 % "
-        "censored data; the figures at 10 and 20 are published, not asked for, and reports warn there. Rows marked as "
+        "censored data; those of smaller samples are published, not asked for, and reports warn there. Rows marked as "
         "beyond are harder than what is asked for, or discrete. What each interval is made of: "
         "[statistics](../reference/statistics.md).",
         "",

@@ -23,7 +23,6 @@ from lidarium.benchmarks.studies.shared.study import (
     real_floors,
 )
 from lidarium.envs.floors.catalogue.names import set_floors
-from lidarium.evaluation.statistics import Interval
 from lidarium.evaluation.statistics.estimates import median_interval, paired_ratio
 from lidarium.evaluation.suites.campaign import EPISODES_FILE
 from lidarium.evaluation.suites.episodes_file import KEY, read_episodes
@@ -89,20 +88,13 @@ def _row(episodes: Times, ours: str, theirs: str, robots: int) -> str:
         f"`{ours}`",
         f"`{theirs}`",
         len(pairs),
-        _with_interval(median),
-        _with_interval(mean),
+        f"{median:.3f}",
+        f"{mean:.3f}",
         f"{100 * np.mean(ratios < 1.0):.0f} %",
         f"{reached[0]}, {reached[1]}",
         f"{paths.estimate:.3f}",
     )
     return "| " + " | ".join(str(cell) for cell in cells) + " |"
-
-
-def _with_interval(found: Interval) -> str:
-    """Return an estimate with its interval, where so few pairs have one."""
-    is_bounded = np.isfinite(found.low) and np.isfinite(found.high)
-    interval = f"{found.low:.3f} to {found.high:.3f}" if is_bounded else "too few for an interval"
-    return f"{found.estimate:.3f} ({interval})"
 
 
 def senders_table(episodes: Mapping[str, Times]) -> str:

@@ -1,7 +1,7 @@
 """The figures of a report: of each policy, and of policies against a baseline, pair by pair."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -12,29 +12,53 @@ from lidarium.evaluation.analysis.groups import Group, paired, times_to
 from lidarium.evaluation.episodes.result import METRICS
 from lidarium.evaluation.metrics import Column
 from lidarium.evaluation.statistics import (
+    FEWEST_FOR_INTERVAL,
     Interval,
     PairedTest,
     holm,
     interquartile_mean_interval,
     mean_interval,
+    mean_share_interval,
     median_interval,
+    optimality_gap,
     paired_difference,
     paired_ratio,
+    probability_of_improvement,
     restricted_difference,
     restricted_mean,
     restricted_ratio,
-    share_interval,
     sign_test,
     wilcoxon_test,
 )
 
 
-def over_bound(rows: Sequence[Row], horizon_s: float) -> float | None:
-    """Return the median of the times to 99 % over their bounds."""
-    multiples = [
-        (horizon_s if row["t99_s"] is None else row["t99_s"]) / row["bound_s"] for row in rows if row.get("bound_s")
-    ]
-    return float(np.median(multiples)) if multiples else None
+@dataclass(frozen=True, slots=True)
+class OverBound:
+    """The times to 99 % beside their bounds, of the runs that have one.
+
+    Attributes
+    ----------
+    ratio : Interval
+        Median of the times over their bounds.
+    gap : Interval
+        Optimality gap: mean share of the time that is above the bound.
+    """
+
+    ratio: Interval
+    gap: Interval
+
+
+def over_bound(rows: Sequence[Row], horizon_s: float, seed: int = 0) -> OverBound | None:
+    """Return the times to 99 % beside their bounds; None if no run has one. Times not reached are the horizon."""
+    bounded = [row for row in rows if row.get("bound_s")]
+    if not bounded:
+        return None
+    times = np.array([horizon_s if row["t99_s"] is None else row["t99_s"] for row in bounded])
+    bounds = np.array([row["bound_s"] for row in bounded])
+    clusters = clusters_of(bounded)
+    return OverBound(
+        median_interval(times / bounds, clusters=clusters), optimality_gap(times, bounds, seed=seed, clusters=clusters)
+    )
 
 
 TIMES = {key: METRICS[key].title for key in ("t90_s", "t99_s")}
@@ -112,31 +136,53 @@ class Comparison:
         The policy and the figure.
     pairs : int
         Number of pairs.
+    values : (pairs, 2) nested tuples
+        The figures of policy and baseline, of the first `FEWEST_FOR_INTERVAL` pairs.
     difference, ratio : Interval or None
         Policy less baseline, policy over baseline; of times, of their restricted means. None if there is
         none.
+    improvement : Interval or None
+        Probability that a run of the policy is better than one of the baseline on the same floor, ties counted half;
+        None if neither direction of the figure is better.
     wilcoxon, sign : PairedTest
         Tests; less means that the policy has the smaller figure.
     p_holm : float
         Wilcoxon's p value, corrected for the number of comparisons of the table.
+    is_beyond_chance : bool
+        Whether both say that policy and baseline differ: ``p_holm`` is below 0.05 and the interval of the difference
+        excludes 0. Ranks weigh every pair alike, means weigh long times more; if only one says so, neither is sure.
     """
 
     policy: str
     key: str
     pairs: int
+    values: tuple[tuple[float, float], ...]
     difference: Interval | None
     ratio: Interval | None
+    improvement: Interval | None
     wilcoxon: PairedTest
     sign: PairedTest
     p_holm: float
+    is_beyond_chance: bool = False
+
+
+def clusters_of(rows: Sequence[Row]) -> list[str] | None:
+    """Return the floor of each run, the cluster that it belongs to; None if runs count as independent.
+
+    With `FEWEST_FOR_INTERVAL` floors or more, figures are about floors like these, on which runs are not independent.
+    With fewer they are about these floors alone.
+    """
+    floors = [str(row["floor"]) for row in rows]
+    return floors if FEWEST_FOR_INTERVAL <= len(set(floors)) < len(floors) else None
 
 
 def time_figure(rows: Sequence[Row], key: str, horizon_s: float, seed: int) -> TimeFigure:
     """Return the figures of a time to a share of the floor."""
+    clusters = clusters_of(rows)
     found = times_to(rows, key, horizon_s)
     reached = int(found.is_reached.sum())
     try:
-        mean = restricted_mean(found.times, found.is_reached, horizon_s, seed=seed)
+        mean = restricted_mean(found.times, found.is_reached, horizon_s, seed=seed, clusters=clusters)
     except ValueError:
         # None reached the share, or the longest run was cut before the horizon.
         mean = None
@@ -144,17 +190,22 @@ def time_figure(rows: Sequence[Row], key: str, horizon_s: float, seed: int) -> T
         reached,
         len(rows),
         found.cut,
-        share_interval(reached, len(rows)),
-        median_interval(found.or_never),
+        mean_share_interval(found.is_reached, clusters=clusters),
+        median_interval(found.or_never, clusters=clusters),
         mean,
     )
 
 
-def value_figure(values: Sequence[float], seed: int) -> ValueFigure:
+def value_figure(
+    values: Sequence[float],
+    seed: int,
+    clusters: Sequence[str] | None = None,
+    bounds: tuple[float, float] = (-np.inf, np.inf),
+) -> ValueFigure:
     """Return the figures of a value that every run has."""
     return ValueFigure(
-        median_interval(values),
-        mean_interval(values, seed=seed),
+        median_interval(values, clusters=clusters),
+        mean_interval(values, seed=seed, clusters=clusters, bounds=bounds),
         interquartile_mean_interval(values, seed=seed),
     )
 
@@ -171,7 +222,8 @@ def further_figure(rows: Sequence[Row], key: str) -> Interval:
 
     A time that was not reached is later than all others.
     """
-    return median_interval([np.inf if row[key] is None else float(row[key]) for row in rows])
+    values = [np.inf if row[key] is None else float(row[key]) for row in rows]
+    return median_interval(values, clusters=clusters_of(rows))
 
 
 def compared(group: Group, values: Sequence[Value], baseline: str, seed: int) -> list[Comparison]:
@@ -191,15 +243,10 @@ def compared(group: Group, values: Sequence[Value], baseline: str, seed: int) ->
         return []
     corrected = holm([each.wilcoxon.p_value for each in found])
     return [
-        Comparison(
-            each.policy,
-            each.key,
-            each.pairs,
-            each.difference,
-            each.ratio,
-            each.wilcoxon,
-            each.sign,
-            float(p_value),
+        replace(
+            each,
+            p_holm=float(p_value),
+            is_beyond_chance=bool(p_value < 0.05 and each.difference is not None and each.difference.excludes(0.0)),
         )
         for each, p_value in zip(found, corrected, strict=True)
     ]
@@ -210,20 +257,26 @@ def _compared_times(
 ) -> Comparison:
     a, b = times_to(ours, key, horizon_s), times_to(theirs, key, horizon_s)
     difference = ratio = None
+    clusters = clusters_of(ours)
     try:
-        difference = restricted_difference(a.censored, b.censored, seed=seed)
-        ratio = restricted_ratio(a.censored, b.censored, seed=seed)
+        difference = restricted_difference(a.censored, b.censored, seed=seed, clusters=clusters)
+        ratio = restricted_ratio(a.censored, b.censored, seed=seed, clusters=clusters)
     except ValueError:
         # As above: without restricted means there is nothing to subtract; the tests still tell which was
         # faster.
         pass
-    return _tested(policy, key, a.up_to_horizon, b.up_to_horizon, difference, ratio)
+    improvement = probability_of_improvement(a.or_never, b.or_never, clusters=clusters)
+    return _tested(policy, key, a.up_to_horizon, b.up_to_horizon, difference, ratio, improvement, clusters)
 
 
 def _compared_values(policy: str, value: Value, ours: Sequence[Row], theirs: Sequence[Row], seed: int) -> Comparison:
     a, b = (np.array([value.of(row) for row in rows]) for rows in (ours, theirs))
-    ratio = paired_ratio(a, b, seed=seed) if min(a.min(), b.min()) > 0.0 else None
-    return _tested(policy, value.column.key, a, b, paired_difference(a, b, seed=seed), ratio)
+    clusters = clusters_of(ours)
+    difference = paired_difference(a, b, seed=seed, clusters=clusters)
+    ratio = paired_ratio(a, b, seed=seed, clusters=clusters) if min(a.min(), b.min()) > 0.0 else None
+    sign = {"higher": -1.0, "lower": 1.0, None: 0.0}[value.column.direction]
+    improvement = probability_of_improvement(sign * a, sign * b, clusters=clusters) if sign else None
+    return _tested(policy, value.column.key, a, b, difference, ratio, improvement, clusters)
 
 
 def _tested(
@@ -233,8 +286,19 @@ def _tested(
     b: NDArray[np.float64],
     difference: Interval | None,
     ratio: Interval | None,
+    improvement: Interval | None,
+    clusters: Sequence[str] | None,
 ) -> Comparison:
-    return Comparison(policy, key, len(a), difference, ratio, wilcoxon_test(a, b), sign_test(a, b), 1.0)
+    values = tuple(zip(a[:FEWEST_FOR_INTERVAL].tolist(), b[:FEWEST_FOR_INTERVAL].tolist(), strict=True))
+    found = Comparison(
+        policy, key, len(a), values, difference, ratio, improvement, wilcoxon_test(a, b), sign_test(a, b), 1.0
+    )
+    if clusters is None:
+        return found
+    # A floor counts once in the tests, with the mean over its runs.
+    floors = np.array(clusters)
+    a, b = (np.array([each[floors == floor].mean() for floor in np.unique(floors)]) for each in (a, b))
+    return replace(found, wilcoxon=wilcoxon_test(a, b), sign=sign_test(a, b))
 
 
 def _is_figure(key: str, value: Any) -> bool:  # noqa: ANN401

@@ -3,6 +3,7 @@
 The format is in docs/reference/files.md.
 """
 
+import math
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 from functools import cached_property, partial
@@ -375,6 +376,7 @@ _add(
             of=lambda share: 100.0 * share,
             by_mean=True,
             is_compared=True,
+            bounds=(0.0, 100.0),
         ),
     ),
 )
@@ -415,7 +417,15 @@ _add(
     "m",
     "lower",
     columns=(
-        Column("path_m", "path of the team", "m", "lower", of=lambda paths: float(sum(paths)), is_compared=True),
+        Column(
+            "path_m",
+            "path of the team",
+            "m",
+            "lower",
+            of=lambda paths: float(sum(paths)),
+            is_compared=True,
+            bounds=(0.0, math.inf),
+        ),
         Column(
             "longest_path_m",
             "longest path of a robot",
@@ -423,6 +433,7 @@ _add(
             "lower",
             of=lambda paths: float(max(paths)),
             is_main=False,
+            bounds=(0.0, math.inf),
         ),
     ),
 )
@@ -437,7 +448,17 @@ _add(
     lambda data: round(overlap(data.env.score.masks), 9),
     "share of the sensed cells that two or more robots sensed",
     direction="lower",
-    columns=(Column("overlap_percent", "overlap", "%", "lower", of=lambda share: 100.0 * share, is_compared=True),),
+    columns=(
+        Column(
+            "overlap_percent",
+            "overlap",
+            "%",
+            "lower",
+            of=lambda share: 100.0 * share,
+            is_compared=True,
+            bounds=(0.0, 100.0),
+        ),
+    ),
 )
 _add(
     "overlap_eb",
@@ -467,7 +488,7 @@ _add(
     lambda data: data.collisions,
     "number of contacts that began",
     direction="lower",
-    columns=(Column("collisions", "collisions", "", "lower", 2, by_mean=True, is_main=False),),
+    columns=(Column("collisions", "collisions", "", "lower", 2, by_mean=True, is_main=False, bounds=(0.0, math.inf)),),
 )
 _add(
     "collisions_per_km",

@@ -4,6 +4,7 @@ A metric is a key of ``result.json``. It is registered once, with its unit, dire
 tables of reports, the report's page and docs/reference/metrics.md are made from the registry.
 """
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -34,6 +35,8 @@ class Column:
         Whether the leaderboard has the column.
     is_compared : bool
         Whether policies are compared with the baseline in it.
+    bounds : (float, float)
+        Least and greatest value that there can be; by default unbounded.
     """
 
     key: str
@@ -45,6 +48,7 @@ class Column:
     by_mean: bool = False
     is_main: bool = True
     is_compared: bool = False
+    bounds: tuple[float, float] = (-math.inf, math.inf)
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,7 +12,7 @@ from typing import Any
 from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.floors.floor import Floor
 from lidarium.evaluation.analysis.episodes import Row, pair_key_of, variant_of
-from lidarium.evaluation.analysis.figures import TIMES, Value, over_bound
+from lidarium.evaluation.analysis.figures import TIMES, Value
 from lidarium.evaluation.analysis.groups import Group
 from lidarium.evaluation.analysis.records import Entry, Key, record_key
 from lidarium.evaluation.drawing.films import FilmSettings
@@ -28,7 +28,7 @@ from lidarium.mapping.files.guarded_reading import printable
 from lidarium.mapping.files.output import write_text
 
 _DIGITS = 4
-_OF_GROUP = ("times", "values", "comparisons", "coverage_over_time", "profiles", "by_floor")
+_OF_GROUP = ("times", "over_bound", "values", "comparisons", "coverage_over_time", "profiles", "by_floor")
 
 
 def page_content(report: dict[str, Any], sections: Sequence[Section], replays: Sequence[Row]) -> dict[str, Any]:
@@ -73,7 +73,6 @@ def _group(section: Section) -> dict[str, Any]:
         "floor_set": group.floor_set,
         "floors": group.floors,
         "horizon_s": group.horizon_s,
-        "over_bound": {policy: over_bound(rows, group.horizon_s) for policy, rows in group.runs.items()},
         **{name: section.numbers[name] for name in _OF_GROUP},
     }
 

@@ -17,6 +17,7 @@ from lidarium.evaluation.analysis.figures import values_of
 from lidarium.evaluation.analysis.groups import grouped
 from lidarium.evaluation.analysis.records import FOLDER, Entry, Key, read_records, record_key
 from lidarium.evaluation.record import read_record
+from lidarium.evaluation.report.exports import latex_table, marl_eval
 from lidarium.evaluation.report.page import chosen_replays, page_content, rounded, write_page
 from lidarium.evaluation.report.replay_page import replay_of
 from lidarium.evaluation.report.sections import Section, describe_group
@@ -28,6 +29,8 @@ REPLAYS = 30
 
 PAGE = "report.html"
 """The page that a browser shows."""
+
+MARL_EVAL, TABLE = "marl_eval.json", "table.tex"
 
 Progress = Callable[[Sequence[Row]], Iterable[Row]]
 """Passes on episodes while their replays are made, and reports their number."""
@@ -41,7 +44,11 @@ def write_report(
     replays: int = REPLAYS,
     progress: Progress = iter,
 ) -> dict[str, Any]:
-    """Write ``report.html``, ``report.md``, ``report.json`` and plots of a directory's episodes."""
+    """Write the report of a directory's episodes.
+
+    That is ``report.html``, ``report.md``, ``report.json``, plots, and for papers ``table.tex`` and
+    ``marl_eval.json``, which the library marl-eval reads.
+    """
     if replays < 0:
         raise ValueError(f"--replays is {replays}; want zero or more")
     check_writable(out)
@@ -74,10 +81,12 @@ def write_report(
         json.dumps(numbers, allow_nan=False, ensure_ascii=False, separators=(",", ":")) + "\n",
     )
     write_text(out / "report.md", _page(result, sections))
+    write_text(out / MARL_EVAL, json.dumps(marl_eval(groups, values), allow_nan=False, ensure_ascii=False) + "\n")
+    write_text(out / TABLE, latex_table(groups, [section.numbers["times"]["t99_s"] for section in sections]))
     made = [replay_of(read_record(records[record_key(row)].path)) for row in progress(replayed)]
     write_page(out / PAGE, rounded(jsonable(page_content(result, sections, replayed))), made)
     pictures = [name for section in sections for name in section.numbers["pictures"]]
-    check_written(out, [PAGE, "report.json", "report.md", *pictures])
+    check_written(out, [PAGE, "report.json", "report.md", MARL_EVAL, TABLE, *pictures])
     return numbers
 
 
@@ -137,7 +146,7 @@ def _page(result: dict[str, Any], sections: Sequence[Section]) -> str:
         f"{code(result['baseline'])}. Times are simulated. In brackets stand 95 % intervals: medians by "
         "interpolated order statistics, "
         "shares by Wilson, means, differences and ratios by the studentised bootstrap (10,000 resamples, "
-        f"seed {result['seed']}). "
+        f"seed {result['seed']}), of six to ten by Student; fewer than six, and equal ones, have none. "
         "Differences and ratios of times are those of restricted means, in which a run that did not get "
         "there counts with the horizon; "
         "those of other figures are the mean difference and the geometric mean of the ratios. All numbers "

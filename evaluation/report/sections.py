@@ -16,9 +16,11 @@ from lidarium.evaluation.analysis.figures import (
     TIMES,
     TimeFigure,
     Value,
+    clusters_of,
     compared,
     further_figure,
     further_keys,
+    over_bound,
     time_figure,
     value_figure,
 )
@@ -34,7 +36,7 @@ from lidarium.evaluation.drawing.plots import (
 )
 from lidarium.evaluation.report import tables
 from lidarium.evaluation.report.tables import code, plain
-from lidarium.evaluation.statistics import FEWEST_FOR_NOMINAL, median_interval
+from lidarium.evaluation.statistics import FEWEST_FOR_INTERVAL, FEWEST_FOR_NOMINAL, median_interval
 
 _LONGEST_STEM = 60
 
@@ -95,6 +97,9 @@ def describe_group(
 def _describe_times(section: Section, seed: int) -> None:
     group = section.group
     section.numbers["times"] = {}
+    section.numbers["over_bound"] = {
+        policy: over_bound(rows, group.horizon_s, seed) for policy, rows in group.runs.items()
+    }
     for key, title in TIMES.items():
         figures = {policy: time_figure(rows, key, group.horizon_s, seed) for policy, rows in group.runs.items()}
         section.numbers["times"][key] = figures
@@ -102,9 +107,22 @@ def _describe_times(section: Section, seed: int) -> None:
             f"### {title[0].upper()}{title[1:]}",
             tables.times_table(figures, group.horizon_s),
         ]
+        if key == "t99_s" and any(section.numbers["over_bound"].values()):
+            section.markdown.append(tables.over_bound_table(section.numbers["over_bound"]))
         if missed := [_missed(policy, figure) for policy, figure in figures.items() if figure.reached < figure.size]:
             section.warnings.append(f"{title} was not reached in {', '.join(missed)}.")
-    few = [f"{code(policy)} ({len(rows)})" for policy, rows in group.runs.items() if len(rows) < FEWEST_FOR_NOMINAL]
+    # Runs, or floors if these are the clusters.
+    units = {policy: len(set(clusters_of(rows) or range(len(rows)))) for policy, rows in group.runs.items()}
+    few = [f"{code(policy)} ({number})" for policy, number in units.items() if number < FEWEST_FOR_NOMINAL]
+    if any(units[policy] < len(rows) for policy, rows in group.runs.items()):
+        section.markdown.append("Runs on one floor are not independent: intervals and tests are over floors.")
+    elif any(len(rows) > len(group.floors) for rows in group.runs.values()):
+        section.markdown.append(
+            f"Intervals and tests are over runs on the same {len(group.floors)} floors and say nothing about others; "
+            f"{FEWEST_FOR_INTERVAL} floors are the fewest for that."
+        )
+    if any(number < FEWEST_FOR_INTERVAL for number in units.values()):
+        section.markdown.append(f"A figure without brackets has no interval: of fewer than {FEWEST_FOR_INTERVAL}.")
     if again := [
         f"{repeats(rows)} of {len(rows)} of {code(policy)}" for policy, rows in group.runs.items() if repeats(rows)
     ]:
@@ -114,7 +132,7 @@ def _describe_times(section: Section, seed: int) -> None:
             "are no further evidence: intervals are too narrow and p values too small."
         )
     if few:
-        section.warnings.append(f"fewer than {FEWEST_FOR_NOMINAL} runs of {', '.join(few)}: {_OF_FEW}")
+        section.warnings.append(f"fewer than {FEWEST_FOR_NOMINAL} independent runs of {', '.join(few)}: {_OF_FEW}")
 
 
 def _missed(policy: str, figure: TimeFigure) -> str:
@@ -126,7 +144,12 @@ def _missed(policy: str, figure: TimeFigure) -> str:
 
 def _describe_values(section: Section, seed: int) -> None:
     figures = {
-        policy: {value.column.key: value_figure([value.of(row) for row in rows], seed) for value in section.values}
+        policy: {
+            value.column.key: value_figure(
+                [value.of(row) for row in rows], seed, clusters_of(rows), value.column.bounds
+            )
+            for value in section.values
+        }
         for policy, rows in section.group.runs.items()
     }
     section.numbers["values"] = figures
@@ -160,10 +183,11 @@ def _describe_comparisons(section: Section, baseline: str, seed: int) -> None:
             tables.comparisons_table(comparisons, section.values),
         ]
         section.markdown.append(
-            "Policy less baseline, policy over baseline. Wilcoxon's signed rank test and the sign test leave "
-            "out pairs that are the same; "
-            f"Holm's correction is for the {len(comparisons)} comparisons of this table, and what is beyond "
-            "chance at 5 % is in bold."
+            "Policy less baseline, policy over baseline. Wilcoxon's signed rank test and the sign test leave out pairs "
+            f"that are the same; Holm's correction is for the {len(comparisons)} comparisons of this table. A "
+            "difference in bold is beyond chance at 5 % by its p of Holm and by its interval; one with a dagger by its "
+            "p of Holm alone: most runs differ, but their mean may not, and neither is trusted. P(better) is the "
+            "probability that a run of the policy beats one of the baseline on the same floor."
         )
 
 

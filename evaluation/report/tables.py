@@ -4,10 +4,10 @@ import math
 import re
 from collections.abc import Iterable, Sequence
 
-from lidarium.evaluation.analysis.figures import TIMES, Comparison, TimeFigure, Value, ValueFigure
+from lidarium.evaluation.analysis.figures import TIMES, Comparison, OverBound, TimeFigure, Value, ValueFigure
 from lidarium.evaluation.analysis.groups import Group, times_to
 from lidarium.evaluation.episodes.result import METRICS
-from lidarium.evaluation.statistics import Interval, median_interval
+from lidarium.evaluation.statistics import FEWEST_FOR_INTERVAL, Interval, median_interval
 from lidarium.mapping.files.guarded_reading import printable
 
 _SPECIAL = re.compile(r"([\\`*\[\]<>|$~])")
@@ -53,10 +53,12 @@ def number(value: float, horizon_s: float | None = None, digits: int = 1) -> str
 def interval(found: Interval | None, horizon_s: float | None = None, scale: float = 1.0, digits: int = 1) -> str:
     """Return an estimate with its interval in brackets.
 
-    Unbounded ends of the interval are left open.
+    Unbounded ends of the interval are left open; without an interval there are no brackets.
     """
     if found is None:
         return NONE
+    if not found.is_known:
+        return number(scale * found.estimate, horizon_s, digits)
     estimate, low, high = (number(scale * end, horizon_s, digits) for end in (found.estimate, found.low, found.high))
     return f"{estimate} [{low}, {high}]"
 
@@ -81,6 +83,16 @@ def times_table(figures: dict[str, TimeFigure], horizon_s: float) -> str:
         for policy, figure in figures.items()
     ]
     return markdown_table(header, rows)
+
+
+def over_bound_table(figures: dict[str, OverBound | None]) -> str:
+    """Return the times beside their bounds by policy."""
+    rows = [
+        (code(policy), interval(figure.ratio, digits=2), interval(figure.gap, scale=100.0))
+        for policy, figure in figures.items()
+        if figure is not None
+    ]
+    return markdown_table(("policy", "time to 99 % over the bound, median", "optimality gap, mean [%]"), rows)
 
 
 def values_table(figures: dict[str, dict[str, ValueFigure]], values: Sequence[Value]) -> str:
@@ -127,6 +139,7 @@ def comparisons_table(comparisons: Sequence[Comparison], values: Sequence[Value]
         "pairs",
         "difference",
         "ratio",
+        "P(better)",
         "less / more / same",
         "Wilcoxon p",
         "p of Holm",
@@ -137,8 +150,9 @@ def comparisons_table(comparisons: Sequence[Comparison], values: Sequence[Value]
             code(each.policy),
             titles[each.key],
             str(each.pairs),
-            interval(each.difference),
+            _difference(each),
             interval(each.ratio, digits=2),
+            interval(each.improvement, digits=2),
             f"{each.wilcoxon.less} / {each.wilcoxon.greater} / {each.wilcoxon.ties}",
             p_value(each.wilcoxon.p_value),
             p_value(each.p_holm),
@@ -147,6 +161,14 @@ def comparisons_table(comparisons: Sequence[Comparison], values: Sequence[Value]
         for each in comparisons
     ]
     return markdown_table(header, rows)
+
+
+def _difference(comparison: Comparison) -> str:
+    """Return the difference, marked by what tests say; with the pairs if they are too few for an interval."""
+    text = interval(comparison.difference)
+    if comparison.pairs < FEWEST_FOR_INTERVAL:
+        return f"{text} ({', '.join(f'{number(a)} / {number(b)}' for a, b in comparison.values)})"
+    return f"**{text}**" if comparison.is_beyond_chance else f"{text} †" if comparison.p_holm < 0.05 else text
 
 
 def floors_table(group: Group, key: str) -> str:

@@ -9,11 +9,15 @@ docs/reference/statistics.md and docs/results/interval_coverage.md.
 from lidarium.evaluation.statistics.estimates import (
     interquartile_mean,
     interquartile_mean_interval,
+    mean_bands,
     mean_interval,
+    mean_share_interval,
     median_bands,
     median_interval,
+    optimality_gap,
     paired_difference,
     paired_ratio,
+    probability_of_improvement,
     share_interval,
 )
 from lidarium.evaluation.statistics.paired_tests import PairedTest, holm, sign_test, wilcoxon_test
@@ -25,9 +29,10 @@ from lidarium.evaluation.statistics.restricted import (
     restricted_mean,
     restricted_ratio,
 )
-from lidarium.evaluation.statistics.samples import FEWEST_FOR_NOMINAL, Interval
+from lidarium.evaluation.statistics.samples import FEWEST_FOR_INTERVAL, FEWEST_FOR_NOMINAL, Interval
 
 __all__ = [
+    "FEWEST_FOR_INTERVAL",
     "FEWEST_FOR_NOMINAL",
     "CensoredTimes",
     "Interval",
@@ -36,11 +41,15 @@ __all__ = [
     "interquartile_mean",
     "interquartile_mean_interval",
     "kaplan_meier",
+    "mean_bands",
     "mean_interval",
+    "mean_share_interval",
     "median_bands",
     "median_interval",
+    "optimality_gap",
     "paired_difference",
     "paired_ratio",
+    "probability_of_improvement",
     "ratio_profile",
     "restricted_difference",
     "restricted_mean",

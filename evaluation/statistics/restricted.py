@@ -1,8 +1,8 @@
 """Restricted means of censored times: the mean of min(T, horizon).
 
-Their intervals are studentised bootstrap intervals.
+Their intervals are studentised ones (`samples`).
 
-A time that was cut before the event is censored: the event comes later than thatat an unknown time. The
+A time that was cut before the event is censored: the event comes later than that, at an unknown time. The
 restricted mean is the area below the Kaplan-Meier curve S up to a horizon. If all times are known or cut
 at the horizon itself, it is the plain mean of min(T, horizon). Standard errors come from each run's influence
 on the area, which also gives those of differences and ratios of paired runs: there the influences of both
@@ -16,7 +16,6 @@ mean survival time, BMC Medical Research Methodology 13 (2013). Influence: Reid,
 """
 
 import math
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -29,6 +28,7 @@ from lidarium.evaluation.statistics.samples import (
     Interval,
     Values,
     checked_values,
+    cluster_indices,
     studentised_interval,
 )
 from lidarium.mapping.kernels.compilation import Array, kernel
@@ -110,10 +110,12 @@ def restricted_mean(
     confidence: float = 0.95,
     resamples: int = RESAMPLES,
     seed: int = 0,
+    clusters: ArrayLike | None = None,
 ) -> Interval:
     """Return the restricted mean of censored times [s] and its interval.
 
-    It is a studentised bootstrap interval.
+    It is a studentised interval, within 0 and the horizon. ``clusters`` (n,) name what runs have in common, such as
+    their floor; None by default.
     """
     sample = CensoredTimes(times, is_observed, horizon)
     if not sample.is_observed.any():
@@ -121,31 +123,54 @@ def restricted_mean(
             f"none of {len(sample)} times was observed up to the horizon of {horizon:g} s; want one at least"
         )
 
-    def replicates(counts: Counts) -> tuple[Values, Values]:
-        return _unzipped(_means_of(counts, sample.arrays))
+    indices, size = cluster_indices(clusters, len(sample))
 
-    found = studentised_interval(replicates, len(sample), confidence, resamples, seed)
-    # The truth lies between 0 and the horizon for any sample.
-    return replace(found, low=max(found.low, 0.0), high=min(found.high, sample.horizon))
+    def replicates(counts: Counts) -> tuple[Values, Values]:
+        return _unzipped(_means_of(counts, indices, sample.arrays))
+
+    return studentised_interval(
+        replicates, size, confidence, resamples, seed, scale=horizon, bounds=(0.0, sample.horizon)
+    )
 
 
 def restricted_difference(
-    a: CensoredTimes, b: CensoredTimes, confidence: float = 0.95, resamples: int = RESAMPLES, seed: int = 0
+    a: CensoredTimes,
+    b: CensoredTimes,
+    confidence: float = 0.95,
+    resamples: int = RESAMPLES,
+    seed: int = 0,
+    clusters: ArrayLike | None = None,
 ) -> Interval:
     """Return the restricted mean of ``a`` minus that of ``b`` [s] and its interval.
 
-    It is over paired runs, with a studentised bootstrap interval.
+    It is over paired runs, with a studentised interval within the horizon. ``clusters`` as in `restricted_mean`.
     """
     _check_partners(a, b)
 
-    def replicates(counts: Counts) -> tuple[Values, Values]:
-        return _unzipped(_differences_of(counts, a.arrays, b.arrays, False))
+    indices, size = cluster_indices(clusters, len(a))
 
-    return studentised_interval(replicates, len(a), confidence, resamples, seed, is_symmetric=True)
+    def replicates(counts: Counts) -> tuple[Values, Values]:
+        return _unzipped(_differences_of(counts, indices, a.arrays, b.arrays, False))
+
+    return studentised_interval(
+        replicates,
+        size,
+        confidence,
+        resamples,
+        seed,
+        scale=a.horizon,
+        is_symmetric=True,
+        bounds=(-a.horizon, a.horizon),
+    )
 
 
 def restricted_ratio(
-    a: CensoredTimes, b: CensoredTimes, confidence: float = 0.95, resamples: int = RESAMPLES, seed: int = 0
+    a: CensoredTimes,
+    b: CensoredTimes,
+    confidence: float = 0.95,
+    resamples: int = RESAMPLES,
+    seed: int = 0,
+    clusters: ArrayLike | None = None,
 ) -> Interval:
     """Return the restricted mean of ``a`` over that of ``b`` and its interval.
 
@@ -158,10 +183,14 @@ def restricted_ratio(
         if not sample.times.any():
             raise ValueError(f"all times of {name} are 0; want a positive one at least for a ratio")
 
-    def replicates(counts: Counts) -> tuple[Values, Values]:
-        return _unzipped(_differences_of(counts, a.arrays, b.arrays, True))
+    indices, size = cluster_indices(clusters, len(a))
 
-    return exponential(studentised_interval(replicates, len(a), confidence, resamples, seed, is_symmetric=True))
+    def replicates(counts: Counts) -> tuple[Values, Values]:
+        return _unzipped(_differences_of(counts, indices, a.arrays, b.arrays, True))
+
+    return exponential(
+        studentised_interval(replicates, size, confidence, resamples, seed, scale=1.0, is_symmetric=True)
+    )
 
 
 def _check_partners(a: CensoredTimes, b: CensoredTimes) -> None:
@@ -180,25 +209,26 @@ def _unzipped(pairs: Values) -> tuple[Values, Values]:
 
 
 @kernel
-def _means_of(counts: Array, sample: _Sample) -> Array:
+def _means_of(counts: Array, clusters: Array, sample: _Sample) -> Array:
     """Return restricted means and their standard errors, (resamples, 2).
 
-    They are of resamples (resamples, n) uint16.
+    They are of resamples (resamples, clusters) uint16.
     """
     size = sample.times.size
     found = np.empty((counts.shape[0], 2))
     influences, areas = np.empty(size), np.empty(size)
+    totals = np.empty(counts.shape[1])
     for k in range(counts.shape[0]):
-        found[k, 0] = _influences_on(counts[k], sample, areas, influences)
-        variance = 0.0
+        found[k, 0] = _influences_on(counts[k], clusters, sample, areas, influences)
+        totals[:] = 0.0
         for i in range(size):
-            variance += counts[k, i] * influences[i] ** 2
-        found[k, 1] = math.sqrt(variance)
+            totals[clusters[i]] += influences[i]
+        found[k, 1] = _error(counts[k], totals)
     return found
 
 
 @kernel
-def _differences_of(counts: Array, a: _Sample, b: _Sample, is_logarithmic: bool) -> Array:
+def _differences_of(counts: Array, clusters: Array, a: _Sample, b: _Sample, is_logarithmic: bool) -> Array:
     """Return differences of restricted means and their errors, (resamples, 2).
 
     The means may be taken as logarithms; the errors are standard errors.
@@ -206,47 +236,61 @@ def _differences_of(counts: Array, a: _Sample, b: _Sample, is_logarithmic: bool)
     size = a.times.size
     found = np.empty((counts.shape[0], 2))
     of_a, of_b, areas = np.empty(size), np.empty(size), np.empty(size)
+    totals = np.empty(counts.shape[1])
     for k in range(counts.shape[0]):
-        mean_a = _influences_on(counts[k], a, areas, of_a)
-        mean_b = _influences_on(counts[k], b, areas, of_b)
+        mean_a = _influences_on(counts[k], clusters, a, areas, of_a)
+        mean_b = _influences_on(counts[k], clusters, b, areas, of_b)
         scale_a = 1.0 / mean_a if is_logarithmic else 1.0
         scale_b = 1.0 / mean_b if is_logarithmic else 1.0
-        variance = 0.0
+        totals[:] = 0.0
         for i in range(size):
-            variance += counts[k, i] * (scale_a * of_a[i] - scale_b * of_b[i]) ** 2
+            totals[clusters[i]] += scale_a * of_a[i] - scale_b * of_b[i]
         found[k, 0] = math.log(mean_a / mean_b) if is_logarithmic else mean_a - mean_b
-        found[k, 1] = math.sqrt(variance)
+        found[k, 1] = _error(counts[k], totals)
     return found
 
 
 @kernel
-def _influences_on(counts: Array, sample: _Sample, areas: Array, influences: Array) -> float:
+def _error(counts: Array, totals: Array) -> float:
+    """Return the standard error from the sums of the influences of each cluster."""
+    variance = 0.0
+    for cluster in range(totals.size):
+        variance += counts[cluster] * totals[cluster] ** 2
+    return math.sqrt(variance)
+
+
+@kernel
+def _influences_on(counts: Array, clusters: Array, sample: _Sample, areas: Array, influences: Array) -> float:
     """Return the restricted mean of a resample.
 
-    Write the influence of each run on it; their squares sum to the variance.
+    Write the influence of each run on it; their squares, of independent runs, sum to the variance.
 
-    With c the counts, Y the runs at risk before a time and G the area right of it, the influence of run i is sum
-    over events k up to i of c_k G_k / (Y_k (Y_k - c_k)), less G_i / (Y_i - c_i) if i is an event: the derivative of
-    the area by the weight of the run. Of known times it is (T_i - mean) / n.
+    With c the counts, those of a run's cluster, Y the runs at risk before a time and G the area right of it, the
+    influence of run i is sum over events k up to i of c_k G_k / (Y_k (Y_k - c_k)), less G_i / (Y_i - c_i) if i is an
+    event: the derivative of the area by the weight of the run. Of known times it is (T_i - mean) / n.
     """
     times, is_observed, order, horizon = sample
     size = times.size
-    at_risk = float(size)
+    drawn = 0.0
+    for i in range(size):
+        drawn += counts[clusters[i]]
+    at_risk = drawn
     share, area, last = 1.0, 0.0, 0.0
     for rank in range(size):
         i = order[rank]
+        count = float(counts[clusters[i]])
         area += share * (times[i] - last)
         last = times[i]
         areas[rank] = area
-        if is_observed[i] and counts[i] > 0:
-            share *= (at_risk - counts[i]) / at_risk
-        at_risk -= counts[i]
+        if is_observed[i] and count > 0.0:
+            share *= (at_risk - count) / at_risk
+        at_risk -= count
     area += share * (horizon - last)
-    at_risk = float(size)
+    at_risk = drawn
     hazard = 0.0
     for rank in range(size):
         i = order[rank]
-        count = float(counts[i])
+        count = float(counts[clusters[i]])
         influences[i] = 0.0
         if count == 0.0:
             continue

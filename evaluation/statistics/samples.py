@@ -1,22 +1,31 @@
-"""Samples: checks, estimates with their intervals, and studentised bootstrap intervals.
+"""Samples: checks, estimates with their intervals, Student's and studentised bootstrap intervals.
+
+A sample of fewer than 6 values, or of equal ones, has no interval; one of 6 to 10 has Student's, larger ones have
+the studentised bootstrap's: with so few, too many resamples have hardly any error to divide by.
 
 A resample of n values is a row of counts that sum to n. Statistics are computed from the counts and the
-sample itself, which costs no copies, and the same rows serve every statistic of samples of one size.
+sample itself, which costs no copies, and the same rows serve every statistic of samples of one size. Values of one
+cluster, such as runs on one floor, are not independent: clusters are drawn whole, and the errors of their values
+are added before they are squared (Cameron, Gelbach and Miller 2008). The size of a sample is then the number of
+its clusters.
 
 References
 ----------
 Efron and Tibshirani, An Introduction to the Bootstrap (1993), section 12.5. Hall, Theoretical comparison of
 bootstrap confidence intervals, Annals of Statistics 16 (1988): with equal tails the studentised interval
 follows skewness. Hall, On symmetric bootstrap confidence intervals, Journal of the Royal Statistical Society
-B 50 (1988): the symmetric form suits nearly symmetric distributions.
+B 50 (1988): the symmetric form suits nearly symmetric distributions. Cameron, Gelbach and Miller, Bootstrap-based
+improvements for inference with clustered errors, Review of Economics and Statistics 90 (2008).
 """
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy import stats
 
 Values = NDArray[np.float64]
 
@@ -25,6 +34,12 @@ FEWEST_FOR_NOMINAL = 50
 
 See docs/results/interval_coverage.md.
 """
+
+FEWEST_FOR_INTERVAL = 6
+"""Sample size from which there is an interval."""
+
+FEWEST_FOR_BOOTSTRAP = 11
+"""Sample size from which intervals of means are the bootstrap's instead of Student's."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,11 +51,12 @@ class Interval:
     estimate : float
         The estimate.
     low, high : float
-        Ends of the interval, -inf or inf if the sample does not bound it.
+        Ends of the interval. Both are infinite if there is none: fewer than 6 values, or all of them equal; one is
+        if the sample does not bound it on that side.
     confidence : float
         Probability that such an interval holds the truth.
     size : int
-        Number of values, pairs or runs.
+        Number of values, pairs or runs, or of clusters of them.
     """
 
     estimate: float
@@ -56,6 +72,22 @@ class Interval:
         The interval then holds the truth with the stated probability.
         """
         return self.size >= FEWEST_FOR_NOMINAL
+
+    @property
+    def is_known(self) -> bool:
+        """Whether there is an interval."""
+        return math.isfinite(self.low) or math.isfinite(self.high)
+
+    def __format__(self, spec: str) -> str:
+        """Return the estimate and the ends of the interval, each by a format of numbers; inf is a dash."""
+        if not self.is_known:
+            return f"{format(self.estimate, spec)} (no interval)"
+        low, high = (format(end, spec) if math.isfinite(end) else "-" for end in (self.low, self.high))
+        return f"{format(self.estimate, spec)} ({low} to {high})"
+
+    def excludes(self, value: float) -> bool:
+        """Return whether the interval lies on one side of a value."""
+        return value < self.low or value > self.high
 
 
 def checked_values(values: ArrayLike, name: str = "values", allow_infinite: bool = False) -> Values:
@@ -81,6 +113,17 @@ def checked_pairs(a: ArrayLike, b: ArrayLike, names: tuple[str, str] = ("a", "b"
             f"{names[0]} has {len(first)} values and {names[1]} has {len(second)}; want as many, each with its partner"
         )
     return first, second
+
+
+def cluster_indices(clusters: ArrayLike | None, size: int) -> tuple[NDArray[np.int64], int]:
+    """Return the index of each value's cluster, (size,), and the number of clusters; by default each is its own."""
+    if clusters is None:
+        return np.arange(size), size
+    names = np.asarray(clusters)
+    if names.shape != (size,):
+        raise ValueError(f"clusters have shape {names.shape} for {size} values; want the name of one for each value")
+    found, indices = np.unique(names, return_inverse=True)
+    return indices, len(found)
 
 
 def checked_confidence(confidence: float) -> float:
@@ -144,36 +187,69 @@ def in_parts(replicates: Replicates) -> Replicates:
     return in_turn
 
 
+def no_interval(estimate: float, confidence: float, size: int) -> Interval:
+    """Return an estimate whose sample says nothing about its error."""
+    return Interval(estimate, -math.inf, math.inf, confidence, size)
+
+
 def studentised_interval(
     replicates: Replicates,
     size: int,
     confidence: float,
     resamples: int,
     seed: int,
+    *,
+    scale: float,
+    degrees: int | None = None,
     is_symmetric: bool = False,
+    bounds: tuple[float, float] = (-math.inf, math.inf),
 ) -> Interval:
     """Return an estimate and its studentised interval.
 
-    The interval is from the quantiles q of t = (estimate* - estimate) / error* over resamples.
+    The interval is from the quantiles q of t = (estimate* - estimate) / error* over resamples; from Student's
+    distribution if there are fewer than `FEWEST_FOR_BOOTSTRAP` values; none if there are fewer than
+    `FEWEST_FOR_INTERVAL`, or if the error is only rounding.
 
     With equal tails it goes from estimate - q_high error to estimate - q_low error; the symmetric form takes the
-    quantile of |t| on both sides. An error of 0, if all values are equal, gives an interval of no width.
+    quantile of |t| on both sides.
+
+    Parameters
+    ----------
+    scale : float
+        Size of the values: errors are rounding if they are much smaller.
+    degrees : int or None, default None
+        Degrees of freedom of Student's distribution; by default one less than there are values.
+    bounds : (float, float), default unbounded
+        Least and greatest value that the truth may have; ends beyond are moved there.
     """
     tail = 0.5 * (1.0 - checked_confidence(confidence))
-    counts = resample_counts(size, resamples, seed)
+    resample_counts(size, resamples, seed)  # checks the size and the number of resamples
     (estimate,), (error,) = (found.tolist() for found in replicates(np.ones((1, size), np.uint16)))
-    if error <= 0.0:
-        return Interval(estimate, estimate, estimate, confidence, size)
-    estimates, errors = replicates(counts)
-    shifts = estimates - estimate
-    # A resample of equal values has no error: it is as far off as can be, or not at all.
-    with np.errstate(divide="ignore", invalid="ignore"):
-        ratios = np.where(errors > 0.0, shifts / errors, np.where(shifts == 0.0, 0.0, np.copysign(np.inf, shifts)))
-    if is_symmetric:
-        reach = _ranked(np.abs(ratios), 1.0 - 2.0 * tail)
-        return Interval(estimate, estimate - reach * error, estimate + reach * error, confidence, size)
-    low, high = _ranked(ratios, tail), _ranked(ratios, 1.0 - tail)
-    return Interval(estimate, estimate - high * error, estimate - low * error, confidence, size)
+    negligible = _ROUNDING * scale
+    if size < FEWEST_FOR_INTERVAL or error <= negligible:
+        return no_interval(estimate, confidence, size)
+    if size < FEWEST_FOR_BOOTSTRAP:
+        # Errors are of n values; Student's are of n - 1.
+        reach = float(stats.t.ppf(1.0 - tail, degrees or size - 1)) * math.sqrt(size / (size - 1.0))
+        low, high = estimate - reach * error, estimate + reach * error
+    else:
+        estimates, errors = replicates(resample_counts(size, resamples, seed))
+        shifts = estimates - estimate
+        # A resample of equal values has no error: it is as far off as can be, or not at all.
+        far = np.where(np.abs(shifts) <= negligible, 0.0, np.copysign(np.inf, shifts))
+        ratios = np.where(errors > negligible, shifts / np.maximum(errors, negligible), far)
+        if is_symmetric:
+            reach = _ranked(np.abs(ratios), 1.0 - 2.0 * tail)
+            low, high = estimate - reach * error, estimate + reach * error
+        else:
+            low, high = estimate - _ranked(ratios, 1.0 - tail) * error, estimate - _ranked(ratios, tail) * error
+        if not (math.isfinite(low) and math.isfinite(high)):
+            return no_interval(estimate, confidence, size)
+    return Interval(estimate, max(low, bounds[0]), min(high, bounds[1]), confidence, size)
+
+
+_ROUNDING = 1e-9
+"""Errors below this share of the values are rounding: variances, their squares, have 16 digits."""
 
 
 def _ranked(ratios: Values, share: float) -> float:

@@ -48,8 +48,7 @@ Times = Mapping[tuple[str, int], float]
 def _ratio(first: Times, second: Times, keys: Sequence[tuple[str, int]]) -> str:
     if len(keys) < 2:
         return "-"
-    ratio = paired_ratio([first[key] for key in keys], [second[key] for key in keys])
-    return f"{ratio.estimate:.3f} ({ratio.low:.3f} to {ratio.high:.3f})"
+    return f"{paired_ratio([first[key] for key in keys], [second[key] for key in keys]):.3f}"
 
 
 def merges_text(episodes: Iterable[Episode]) -> str:

@@ -6,9 +6,6 @@ from typing import Any
 
 from lidarium.benchmarks.studies.leaderboard.worlds import WORLDS, World
 
-CHANCE = 0.05
-"""Least p value that is no evidence."""
-
 HEADER = (
     "| robots | world | policy | runs | reached 99 % | time to 99 % [s] | over the bound | less the baseline "
     "[s] | path of all [m] | overlap [%] |\n|---:|---|---|---:|---:|---:|---:|---:|---:|---:|"
@@ -92,7 +89,7 @@ def _interval(figure: Mapping[str, Any]) -> str:
         return "never" if value is None else f"{value:.0f}"
 
     if figure["low"] is None:
-        return f"{shown(figure['estimate'])} (too few for an interval)"
+        return f"{shown(figure['estimate'])} (no interval)"
     return f"{shown(figure['estimate'])} ({shown(figure['low'])} to {shown(figure['high'])})"
 
 
@@ -103,7 +100,7 @@ def _difference(policy: str, group: Mapping[str, Any]) -> str:
             bounds = [figure["low"], figure["high"]]
             # Of very few pairs there is an estimate alone.
             text = f"{figure['estimate']:+.0f}" + ("" if None in bounds else f" ({bounds[0]:+.0f} to {bounds[1]:+.0f})")
-            return f"**{text}**" if comparison["p_holm"] < CHANCE else text
+            return f"**{text}**" if comparison["is_beyond_chance"] else text
     return "-"
 
 

@@ -31,12 +31,12 @@ from lidarium.evaluation.statistics import Interval
 
 
 def shown(found: Interval | None, digits: int = 2) -> str:
-    """Return an estimate with its interval. An end that the sample does not bound is left out."""
+    """Return an estimate with its interval, if it has one."""
     if found is None:
         return "-"
     text = number(found.estimate, digits)
-    if not np.isfinite(found.low) and not np.isfinite(found.high):
-        return text
+    if not found.is_known:
+        return f"{text} (no interval)"
     return f"{text} ({number(found.low, digits)} to {number(found.high, digits)})"
 
 

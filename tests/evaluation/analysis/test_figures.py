@@ -44,7 +44,10 @@ def test_a_faster_policy_is_found_pair_by_pair(row):
     assert by_key["t90_s"].ratio.high < 1.0
     assert (by_key["t90_s"].wilcoxon.less, by_key["t90_s"].pairs) == (20, 20)
     assert by_key["t90_s"].wilcoxon.p_value < by_key["t90_s"].p_holm < 0.001
-    assert by_key["path_m"].difference.low == by_key["path_m"].difference.high == 0.0
+    assert by_key["t90_s"].is_beyond_chance
+    assert by_key["t90_s"].improvement.estimate == 1.0
+    assert by_key["path_m"].difference.estimate == 0.0
+    assert not by_key["path_m"].difference.is_known
     assert by_key["path_m"].p_holm == 1.0
 
 
@@ -78,9 +81,43 @@ def test_the_median_is_of_those_that_have_a_bound(row):
         row(t99_s=1.0),
         row(t99_s=1.0, bound_s=None),
     ]
-    assert over_bound(rows, 100.0) == pytest.approx(4.0)
+    found = over_bound(rows, 100.0)
+    assert found.ratio.estimate == pytest.approx(4.0)
+    assert found.gap.estimate == pytest.approx((1 / 3 + 3 / 4 + 4 / 5) / 3)
 
 
 def test_without_bounds_there_is_none(row):
     assert over_bound([row(t99_s=30.0)], 100.0) is None
     assert over_bound([], 100.0) is None
+
+
+def test_runs_on_one_floor_are_no_further_evidence(row):
+    """Twelve floors, on each of which three seeds end nearly alike."""
+    rows = [
+        row(
+            policy,
+            seed,
+            floor=f"office:{floor}",
+            t99_s=50.0 + 7.0 * (floor * 5 % 12) + seed - (policy == "b") * (floor % 4 - 1.2),
+        )
+        for policy in "ab"
+        for floor in range(12)
+        for seed in range(3)
+    ]
+    (group,) = grouped(rows)
+    figure = time_figure(group.runs["a"], "t99_s", group.horizon_s, 0)
+    assert figure.median.size == figure.restricted_mean.size == 12
+    (time,) = [each for each in compared(group, (), "a", seed=0) if each.key == "t99_s"]
+    assert (time.pairs, time.difference.size, time.wilcoxon.size) == (36, 12, 12)
+    few = time_figure(group.runs["a"][:9], "t99_s", group.horizon_s, 0)
+    assert few.restricted_mean.size == 9
+
+
+def test_ranks_that_differ_with_a_mean_that_may_not_are_not_beyond_chance(row):
+    slow = [row("slow", seed, t99_s=60.0 + seed) for seed in range(20)]
+    fast = [row("fast", seed, t99_s=(59.0 if seed else 99.0) + seed - 0.01 * seed) for seed in range(20)]
+    (group,) = grouped([*slow, *fast])
+    (time,) = [each for each in compared(group, (), "slow", seed=0) if each.key == "t99_s"]
+    assert time.p_holm < 0.05
+    assert not time.difference.excludes(0.0)
+    assert not time.is_beyond_chance

@@ -29,7 +29,7 @@ def test_a_report_has_tables_plots_and_all_their_numbers(episodes_folder, tmp_pa
         "visits",
     ]
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == sorted(
-        [*group["pictures"], "report.html", "report.json", "report.md"]
+        [*group["pictures"], "marl_eval.json", "report.html", "report.json", "report.md", "table.tex"]
     )
     for name in group["pictures"]:
         picture = cv2.imread(str(tmp_path / "out" / name))
@@ -52,7 +52,7 @@ def test_a_report_has_tables_plots_and_all_their_numbers(episodes_folder, tmp_pa
         later >= sooner for sooner, later in zip(curve["median_percent"], curve["median_percent"][1:], strict=False)
     )
     assert {each["policy"] for each in group["comparisons"]} == {"random_walk", "utility_frontier"}
-    assert any("fewer than 50 runs" in warning for warning in result["warnings"])
+    assert any("fewer than 50 independent runs" in warning for warning in result["warnings"])
     assert any("fewer than 50 pairs" in warning for warning in result["warnings"])
     assert any("repeat another one" in warning for warning in result["warnings"])
 

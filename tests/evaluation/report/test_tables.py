@@ -39,7 +39,8 @@ def test_what_is_later_than_the_horizon_says_so_and_0_has_no_sign():
 
 def test_an_interval_is_in_brackets_and_scaled():
     assert interval(Interval(0.5, 0.25, 1.0, 0.95, 8), scale=100.0) == "50.0 [25.0, 100.0]"
-    assert interval(Interval(40.0, -math.inf, math.inf, 0.95, 2), 90.0) == f"40.0 [{NONE}, > 90]"
+    assert interval(Interval(40.0, 30.0, math.inf, 0.95, 8), 90.0) == "40.0 [30.0, > 90]"
+    assert interval(Interval(40.0, -math.inf, math.inf, 0.95, 2), 90.0) == "40.0"
     assert interval(None) == NONE
 
 
@@ -75,8 +76,9 @@ def test_comparisons_say_how_many_pairs_are_less_more_and_the_same(row):
     (path,) = [line for line in lines if line[1] == "path of the team [m]"]
     assert path[0] == "`b`"
     assert path[2] == "4"
-    assert path[3].startswith("-0.8")
-    assert path[5] == "3 / 0 / 1"
+    assert path[3] == "-0.8 (10.0 / 10.0, 9.0 / 10.0, 9.0 / 10.0, 9.0 / 10.0)"
+    assert path[5] == "0.88 [0.40, 0.99]"
+    assert path[6] == "3 / 0 / 1"
 
 
 EVIL = '</script><img src=x onerror=alert(1)>"&amp; `a|b` \\*'

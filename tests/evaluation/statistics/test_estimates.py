@@ -9,11 +9,16 @@ from scipy import stats
 from lidarium.evaluation.statistics import (
     interquartile_mean,
     interquartile_mean_interval,
+    mean_bands,
     mean_interval,
+    mean_share_interval,
     median_bands,
     median_interval,
+    optimality_gap,
     paired_difference,
     paired_ratio,
+    probability_of_improvement,
+    share_interval,
 )
 from lidarium.evaluation.statistics.samples import resample_counts
 
@@ -133,10 +138,12 @@ def test_draws_come_from_the_seed():
     assert mean_interval(skewed, resamples=500, seed=1) != mean_interval(skewed, resamples=500)
 
 
-def test_equal_values_have_an_interval_of_no_width():
-    for interval in (mean_interval, interquartile_mean_interval):
-        found = interval([0.1] * 30)
-        assert (found.estimate, found.low, found.high) == pytest.approx((0.1, 0.1, 0.1))
+@pytest.mark.parametrize("interval", [mean_interval, interquartile_mean_interval, median_interval])
+def test_equal_values_have_no_interval(interval):
+    found = interval([0.1] * 30)
+    assert found.estimate == pytest.approx(0.1)
+    assert not found.is_known
+    assert not found.excludes(5.0)
 
 
 def test_two_values_bound_nothing():
@@ -202,3 +209,105 @@ def test_intervals_move_and_stretch_with_the_values(values, shift, scale):
 def test_bad_samples_are_refused(call, message):
     with pytest.raises(ValueError, match=message):
         call()
+
+
+@pytest.mark.parametrize("size", [6, 8, 10])
+def test_intervals_of_few_are_students(size):
+    values = skewed[:size]
+    expected = stats.ttest_1samp(values, 0.0).confidence_interval(0.95)
+    found = mean_interval(values)
+    assert (found.low, found.high) == pytest.approx((expected.low, expected.high))
+    assert mean_interval(values, bounds=(values.mean() - 0.01, np.inf)).low == pytest.approx(values.mean() - 0.01)
+
+
+def test_values_of_a_cluster_count_as_one_if_they_are_the_same():
+    clusters = np.repeat(np.arange(20), 3)
+    for interval in (mean_interval, paired):
+        alone, often = interval(skewed[:20]), interval(np.repeat(skewed[:20], 3), clusters=clusters)
+        assert (often.size, often.low, often.high) == (20, pytest.approx(alone.low), pytest.approx(alone.high))
+
+
+def paired(values, **options):
+    return paired_ratio(np.exp(values), np.ones(len(values)), **options)
+
+
+def test_clusters_of_one_change_nothing():
+    values = skewed[:40]
+    assert mean_interval(values, clusters=np.arange(40)) == mean_interval(values)
+    assert median_interval(values, clusters=np.arange(40)) == median_interval(values)
+
+
+def held_by(interval, trials=400):
+    """Return the share of trials in which the interval of clustered values holds their mean or median, 0."""
+    generator, hits = np.random.default_rng(3), 0
+    clusters = np.repeat(np.arange(25), 4)
+    for _ in range(trials):
+        values = np.repeat(generator.normal(size=25), 4) + generator.normal(size=100)
+        hits += not interval(values, clusters).excludes(0.0)
+    return hits / trials
+
+
+def test_intervals_over_clusters_hold_the_truth_as_often_as_they_say():
+    assert held_by(lambda values, clusters: mean_interval(values, clusters=clusters, resamples=400)) > 0.92
+    assert held_by(lambda values, clusters: median_interval(values, clusters=clusters)) > 0.92
+    assert held_by(lambda values, _: mean_interval(values, resamples=400)) < 0.85
+
+
+def test_shares_of_independent_runs_are_wilsons():
+    for successes, size in ((0, 12), (5, 12), (12, 12), (1, 1)):
+        found = mean_share_interval([1.0] * successes + [0.0] * (size - successes))
+        expected = share_interval(successes, size)
+        assert (found.estimate, found.low, found.high) == pytest.approx(
+            (expected.estimate, expected.low, expected.high)
+        )
+        ends = stats.binomtest(successes, size).proportion_ci(method="wilson")
+        assert (found.low, found.high) == pytest.approx((ends.low, ends.high))
+
+
+def test_shares_of_floors_on_which_all_runs_end_alike_are_those_of_floors():
+    floors = np.array([1.0, 0.0, 1.0, 1.0, 0.0, 1.0, 1.0])
+    found = mean_share_interval(np.repeat(floors, 5), clusters=np.repeat(np.arange(7), 5))
+    expected = share_interval(5, 7)
+    assert (found.low, found.high) == pytest.approx((expected.low, expected.high))
+
+
+def test_the_probability_of_improvement_is_that_of_mann_and_whitney():
+    generator = np.random.default_rng(7)
+    a, b = generator.integers(0, 9, 30).astype(float), generator.integers(2, 11, 30).astype(float)
+    found = probability_of_improvement(a, b, clusters=np.zeros(30, int))
+    assert found.estimate == pytest.approx(stats.mannwhitneyu(b, a).statistic / 900.0)
+    assert probability_of_improvement([1.0, 2.0, np.inf], [2.0, np.inf, np.inf]).estimate == pytest.approx(2.5 / 3.0)
+    never = probability_of_improvement([np.inf] * 8, [1.0] * 8)
+    assert never.estimate == 0.0
+    assert never.high > 0.2
+
+
+def test_the_optimality_gap_is_the_share_above_the_bound():
+    found = optimality_gap([10.0, 20.0, np.inf, 8.0, 40.0, 10.0], [10.0, 10.0, 10.0, 9.0, 10.0, 5.0])
+    assert found.estimate == pytest.approx((0.0 + 0.5 + 1.0 + 0.0 + 0.75 + 0.5) / 6.0)
+    assert 0.0 <= found.low < found.high <= 1.0
+    with pytest.raises(ValueError, match="the least bound 0; want more than 0"):
+        optimality_gap([1.0], [0.0])
+
+
+def test_bands_hold_whole_curves_more_often_than_intervals_at_each_point():
+    generator, inside, at_points = np.random.default_rng(11), 0, 0
+    for _ in range(200):
+        curves = generator.normal(size=(12, 20))
+        _, low, high = mean_bands(curves, resamples=400)
+        inside += bool(((low <= 0.0) & (high >= 0.0)).all())
+        reach = stats.t.ppf(0.975, 11) * curves.std(axis=0, ddof=1) / np.sqrt(12)
+        at_points += bool((np.abs(curves.mean(axis=0)) <= reach).all())
+    assert inside > 0.9 * 200
+    assert at_points < 0.6 * 200
+
+
+def test_few_curves_have_no_band():
+    mean, low, high = mean_bands(np.arange(12.0).reshape(3, 4))
+    assert mean.tolist() == [4.0, 5.0, 6.0, 7.0]
+    assert np.isinf([low, high]).all()
+
+
+def test_an_interval_is_written_with_its_ends_or_without():
+    assert f"{mean_interval(skewed[:30]):.1f}".count("to") == 1
+    assert f"{mean_interval([1.0, 2.0]):.1f}" == "1.5 (no interval)"

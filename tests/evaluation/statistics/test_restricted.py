@@ -75,7 +75,7 @@ def test_the_curve_is_scipys():
 def test_influences_are_the_change_by_a_little_more_of_a_run():
     sample = CensoredTimes(TIMES, OBSERVED, 150.0)
     counts, influences, areas = np.ones(80), np.empty(80), np.empty(80)
-    mean = _influences_on.py_func(counts, sample.arrays, areas, influences)
+    mean = _influences_on.py_func(counts, np.arange(80), sample.arrays, areas, influences)
     assert influences.sum() == pytest.approx(0.0, abs=1e-9)
     for run in (0, 17, 42, 79):
         more = counts.copy()
@@ -100,7 +100,7 @@ def _weighted_mean(weights, sample):
 def test_the_error_without_ties_is_greenwoods():
     sample = CensoredTimes(TIMES, OBSERVED, 150.0)
     influences, areas = np.empty(80), np.empty(80)
-    mean = _influences_on(np.ones(80), sample.arrays, areas, influences)
+    mean = _influences_on(np.ones(80), np.arange(80), sample.arrays, areas, influences)
     moments, shares = kaplan_meier(TIMES, OBSERVED & (TIMES <= 150.0))
     at_risk = np.array([(moment <= TIMES).sum() for moment in moments])
     ends = np.append(moments[1:], 150.0)
@@ -126,8 +126,9 @@ def test_differences_and_ratios_use_the_pairs():
 
 def test_a_policy_does_not_differ_from_itself():
     sample = CensoredTimes(TIMES, OBSERVED, 150.0)
-    assert restricted_difference(sample, sample).low == 0.0
-    assert restricted_ratio(sample, sample).high == 1.0
+    for found, same in ((restricted_difference(sample, sample), 0.0), (restricted_ratio(sample, sample), 1.0)):
+        assert found.estimate == same
+        assert not found.is_known
 
 
 @pytest.mark.parametrize(
@@ -165,3 +166,46 @@ def test_of_a_policy_that_never_gets_there_the_horizon_counts():
     assert restricted_difference(never, faster).estimate == pytest.approx(4.5)
     with pytest.raises(ValueError, match="neither in a nor in b"):
         restricted_difference(never, never)
+
+
+def test_four_pairs_have_a_difference_without_an_interval():
+    # The bootstrap divided by a standard error that was rounding, and made an interval of 4e16 s.
+    a, b = (CensoredTimes(times, [True] * 4, 200.0) for times in ([81.9, 47.1, 118.6, 85.7], [83.0, 48.2, 119.7, 61.4]))
+    difference = restricted_difference(a, b)
+    assert difference.estimate == pytest.approx(5.25)
+    assert not difference.is_known
+    assert not restricted_ratio(a, b).is_known
+
+
+@pytest.mark.parametrize("size", [6, 10, 11, 30])
+def test_differences_stay_within_the_horizon(size):
+    generator = np.random.default_rng(size)
+    for _ in range(50):
+        a, b = (
+            CensoredTimes(np.where(generator.random(size) < 0.5, 1.0, 200.0), np.ones(size, bool), 200.0)
+            for _ in range(2)
+        )
+        found = restricted_difference(a, b, resamples=200)
+        assert not found.is_known or -200.0 <= found.low < found.high <= 200.0
+
+
+def test_equal_differences_that_rounding_makes_unlike_have_no_interval():
+    times = 100.0 + np.arange(20) / 7.0
+    a, b = CensoredTimes(times, np.ones(20, bool), 200.0), CensoredTimes(times - 0.3, np.ones(20, bool), 200.0)
+    assert not restricted_difference(a, b).is_known
+
+
+def test_from_six_to_ten_pairs_the_interval_is_students():
+    generator = np.random.default_rng(0)
+    a, b = generator.uniform(50.0, 90.0, 8), generator.uniform(50.0, 90.0, 8)
+    found = restricted_difference(*(CensoredTimes(each, np.ones(8, bool), 200.0) for each in (a, b)))
+    expected = stats.ttest_rel(a, b).confidence_interval(0.95)
+    assert (found.low, found.high) == pytest.approx((expected.low, expected.high))
+
+
+def test_runs_of_a_cluster_count_as_one_if_they_are_the_same():
+    times = np.random.default_rng(1).uniform(10.0, 90.0, 15)
+    alone = restricted_mean(times, np.ones(15, bool), 200.0)
+    often = restricted_mean(np.repeat(times, 4), np.ones(60, bool), 200.0, clusters=np.repeat(np.arange(15), 4))
+    assert often.size == 15
+    assert (often.estimate, often.low, often.high) == pytest.approx((alone.estimate, alone.low, alone.high))

@@ -90,12 +90,12 @@ def test_parts_give_what_the_whole_gives():
 
 def test_the_symmetric_form_reaches_equally_far_to_both_sides():
     values = np.random.default_rng(1).exponential(3.0, 40)
-    even = studentised_interval(mean_of(values), 40, 0.9, 500, 0, is_symmetric=True)
-    tailed = studentised_interval(mean_of(values), 40, 0.9, 500, 0)
+    even = studentised_interval(mean_of(values), 40, 0.9, 500, 0, scale=1.0, is_symmetric=True)
+    tailed = studentised_interval(mean_of(values), 40, 0.9, 500, 0, scale=1.0)
     assert even.estimate == tailed.estimate == pytest.approx(values.mean())
     assert even.high - even.estimate == pytest.approx(even.estimate - even.low)
     assert tailed.high - tailed.estimate > tailed.estimate - tailed.low
-    wider = studentised_interval(mean_of(values), 40, 0.99, 500, 0)
+    wider = studentised_interval(mean_of(values), 40, 0.99, 500, 0, scale=1.0)
     assert wider.low < tailed.low < tailed.high < wider.high
 
 

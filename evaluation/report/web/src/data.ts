@@ -10,6 +10,7 @@ export type TimeFigure = {
 export type ValueFigure = { median: Interval; mean: Interval; interquartile_mean: Interval };
 export type Comparison = {
   policy: string; key: string; pairs: number; difference: Interval | null; ratio: Interval | null; p_holm: number;
+  is_beyond_chance: boolean;
 };
 export type Curve = {
   runs: number; times_s: number[];
@@ -24,7 +25,7 @@ export type OfFloor = { runs: number; coverage_percent: number } & Record<
 
 export type Group = {
   title: string; settings: string; robots: number; floor_set: string; floors: string[]; horizon_s: number;
-  over_bound: Record<string, number | null>;
+  over_bound: Record<string, { ratio: Interval; gap: Interval } | null>;
   times: Record<TimeKey, Record<string, TimeFigure>>;
   values: Record<string, Record<string, ValueFigure>>;
   comparisons: Comparison[];

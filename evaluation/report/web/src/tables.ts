@@ -60,7 +60,8 @@ export function leaderboard(report: Report): Shown {
     root: section("leaderboard", "Leaderboard", element("p", { class: "note" },
       "Times are medians with 95 % confidence intervals. Coverage is a mean, other columns are medians. "
       + "The difference to the baseline is that of the restricted mean of the last time, in bold if it is significant "
-      + "at 5 % (Holm). A single floor has no intervals."
+      + "at 5 % (Holm) and its interval excludes zero; † if ranks differ but the mean may not. "
+      + "A single floor and fewer than six runs have no intervals."
       + (isBounded(report) ? " \"Over the bound\" is the last time relative to a team that has the floor plan (median)." : "")),
       table.root),
     update: repainted(update),
@@ -205,7 +206,7 @@ const isBounded = (report: Report): boolean =>
   report.groups.some((group) => Object.values(group.over_bound).some((found) => found !== null));
 
 function multipleOf(line: Standing): number | null {
-  return line.floor !== null ? null : line.group.over_bound[line.policy] ?? null;
+  return line.floor !== null ? null : line.group.over_bound[line.policy]?.ratio.estimate ?? null;
 }
 
 function percent(found: Interval | null): string {
@@ -229,7 +230,8 @@ function differenceCell(found: Comparison | undefined, isBaseline: boolean): Chi
   if (found?.difference == null) return "–";
   const { estimate, low, high } = found.difference;
   const signed = (value: number | null): string => `${(value ?? 0) > 0 ? "+" : ""}${number(value)}`;
-  const text = element(found.p_holm < 0.05 ? "strong" : "span", {}, signed(estimate));
+  const text = found.is_beyond_chance ? element("strong", {}, signed(estimate))
+    : element("span", {}, signed(estimate) + (found.p_holm < 0.05 ? " †" : ""));
   return low === null || high === null ? text
     : element("span", { class: "interval" }, text, element("small", {}, `${signed(low)} to ${signed(high)}`));
 }
