@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.envs.floors.catalogue.names import GENERATORS, SETS, floor_names
+from lidarium.envs.floors.catalogue.real import COLLECTIONS
 from lidarium.evaluation.analysis.episodes import Row, pair_key_of, variant_of
 from lidarium.evaluation.statistics import CensoredTimes
 from lidarium.evaluation.suites.episodes_file import TIMINGS
@@ -130,9 +131,11 @@ def grouped(rows: Iterable[Row]) -> list[Group]:
 def floor_set_of(floor: str) -> str:
     """Name the set that a floor belongs to.
 
-    It is one of the catalogue's sets, other generated floors, drawn floors, or files.
+    It is one of the catalogue's sets or collections, other generated floors, drawn floors, or files.
     """
     kind, _, seed = floor.partition(":")
+    if kind in COLLECTIONS:
+        return f"set:{kind}"
     if kind not in GENERATORS or not seed.isdigit():
         return "drawn floors" if floor in floor_names() else "floors from files"
     # A building is named by its kind, however it was requested.

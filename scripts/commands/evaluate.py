@@ -85,7 +85,7 @@ def execute(command: _Evaluate) -> Answer:
         raise ValueError(f"--workers is {command.workers}; want 0 for as many as there are cores, or more")
     folder = command.out or DEFAULT_FOLDER
     check_writable(folder)
-    part = _shard(command.shard)
+    part = shard_of(command.shard)
     suite = _suite(command)
     campaign = Campaign(
         suite,
@@ -108,7 +108,7 @@ def execute(command: _Evaluate) -> Answer:
     return _answer(campaign, folder, is_interrupted)
 
 
-def _shard(text: str | None) -> slice:
+def shard_of(text: str | None) -> slice:
     """Return which of the trials a shard has."""
     if text is None:
         return slice(None)

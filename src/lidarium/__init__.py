@@ -216,3 +216,30 @@ for _name, _options in _IDS.items():
     for _version, _more in _VERSIONS.items():
         _sees = tuple(each for each in _options["observe"] if each not in _UNSEEN[_version])
         _register(_name, _version, {**_options, **_more, "observe": _sees})
+
+_TASKS = {
+    "Buildings": (1, 2, 4, 8),
+    "Homes": (2,),
+    "RobotMaps": (2,),
+    "Dungeons": (1,),
+    "Lab": (3,),
+    "UnknownStarts": (3,),
+    "BrokenRadio": (4,),
+    "DepthCamera": (1,),
+    "Bullet": (2,),
+}
+"""Tasks of lidarium-1 and their sizes of teams: ids such as ``lidarium/Buildings-2-v1``."""
+
+
+def _register_task(task: str, robots: int) -> None:
+    """Make a task known to PettingZoo, and to Gymnasium if it is for one robot, once."""
+    registered, maker = f"lidarium/{task}-v1", "lidarium.evaluation.benchmark.tasks"
+    if robots == 1 and registered not in gymnasium.registry:
+        gymnasium.register(id=registered, entry_point=f"{maker}:make_solo_task", kwargs={"task": task})
+    if hasattr(pettingzoo, "register"):
+        pettingzoo.register("parallel", registered, entry_point=f"{maker}:make_task", kwargs={"task": task})
+
+
+for _name, _teams in _TASKS.items():
+    for _robots in _teams:
+        _register_task(f"{_name}-{_robots}", _robots)

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from lidarium.envs.floors.areas import left_out
 from lidarium.envs.floors.catalogue.drawn import DATA, about_drawn, drawn_names, load_drawn
+from lidarium.envs.floors.catalogue.real import COLLECTIONS, load_real, real_floors
 from lidarium.envs.floors.catalogue.store import floor_store, hash_of_code
 from lidarium.envs.floors.floor import Floor, Solid
 from lidarium.envs.floors.free_space import measure_building
@@ -104,9 +105,10 @@ def load_floor(spec: str | Path | Floor | NDArray[Any], resolution: float | None
     Parameters
     ----------
     spec : str, Path or Floor
-        A name of `floor_names`; ``building:SEED``, ``apartment:SEED``, ``office:SEED`` or ``corridors:SEED``;
-        a path to a file of a format that the importers know; an array (rows, columns) of grey levels (above 127 is
-        free) or booleans (true is solid), row 0 at the top; or a floor, which is returned unchanged.
+        A name of `floor_names`; ``building:SEED``, ``apartment:SEED``, ``office:SEED`` or ``corridors:SEED``; a real
+        floor, such as ``home:17`` or ``robot_map:willow_garage_2010`` (``lidarium show floors``); a path to a file of
+        a format that the importers know; an array (rows, columns) of grey levels (above 127 is free) or booleans (true
+        is solid), row 0 at the top; or a floor, which is returned unchanged.
     resolution : float, optional
         Side of a cell [m] of arrays, and of files that do not state it.
 
@@ -171,7 +173,8 @@ def set_floors(name: str) -> tuple[str, ...]:
     Parameters
     ----------
     name : str
-        "train" (10,000 floors), "validation" or "test", with a count for the first ones: "test:40".
+        "train" (10,000 floors), "validation" or "test", or the real floors "home", "dungeon" or "robot_map"; with a
+        count for the first ones: "test:40".
 
     Returns
     -------
@@ -190,20 +193,23 @@ def set_floors(name: str) -> tuple[str, ...]:
     3
     """
     short, colon, wanted = name.removeprefix("set:").partition(":")
-    first, count = SETS[_set_name(short)]
+    _check_set(short)
+    first, count = SETS.get(short, (0, 0))
+    floors = real_floors(short) if short in COLLECTIONS else range(first, first + count)
     if colon:
-        if not (wanted.isascii() and wanted.isdigit() and 1 <= int(wanted) <= count):
+        if not (wanted.isascii() and wanted.isdigit() and 1 <= int(wanted) <= len(floors)):
             raise ValueError(
-                f"{name!r} wants {wanted!r} floors; the set {short} has {count}, as in set:{short}:{min(count, 40)}"
+                f"{name!r} wants {wanted!r} floors; the set {short} has {len(floors)}, as in "
+                f"set:{short}:{min(len(floors), 40)}"
             )
-        count = int(wanted)
-    return tuple(f"building:{seed}" for seed in range(first, first + count))
+        floors = floors[: int(wanted)]
+    return tuple(each if isinstance(each, str) else f"building:{each}" for each in floors)
 
 
 def _set_sha256(name: str) -> str:
     """Look up the kept hash of a set: `_hash_of_floors` of its first `HASHED_FLOORS`."""
     hashes = json.loads((DATA / "_sets.json").read_text(encoding="utf-8"))
-    return str(hashes[_set_name(name)])
+    return str(hashes[name.removeprefix("set:")])
 
 
 def _hash_of_floors(specs: Iterable[str]) -> str:
@@ -241,6 +247,8 @@ def _load_named(spec: str) -> Floor:
             f"{spec!r} is a set of many floors, not one; use set_floors({rest!r}) or one of them, such as "
             f"{_example(rest)!r}"
         )
+    if prefix in COLLECTIONS and colon:
+        return load_real(spec)
     if prefix in GENERATORS and colon:
         if not (rest.isascii() and rest.isdigit()):
             raise ValueError(
@@ -261,24 +269,23 @@ def _generated(kind: str, seed: int) -> Floor:
     return floor
 
 
-def _set_name(name: str) -> str:
-    short = name.removeprefix("set:")
-    if short not in SETS:
-        nearest = difflib.get_close_matches(short, SETS, n=1)
+def _check_set(short: str) -> None:
+    known = (*SETS, *COLLECTIONS)
+    if short not in known:
+        nearest = difflib.get_close_matches(short, known, n=1)
         raise ValueError(
             f"no set called {short!r}{f', did you mean {nearest[0]!r}?' if nearest else ''}; there are "
-            f"{', '.join(SETS)}"
+            f"{', '.join(known)}"
         )
-    return short
 
 
 def _example(name: str) -> str:
     first, _ = SETS.get(name, SETS["train"])
-    return f"building:{first}"
+    return real_floors(name)[0] if name in COLLECTIONS else f"building:{first}"
 
 
 def _unknown(name: str) -> str:
-    forms = [f"{generator}:SEED" for generator in GENERATORS]
+    forms = [f"{generator}:SEED" for generator in GENERATORS] + [f"{collection}:NAME" for collection in COLLECTIONS]
     nearest = difflib.get_close_matches(name[:100], [*drawn_names(), *forms], n=1, cutoff=0.5)
     guess = f", did you mean {nearest[0]!r}?" if nearest else ""
     return f"no floor called {shown(name)}{guess}; there are {', '.join([*drawn_names(), *forms])}, and paths to files"

@@ -1,0 +1,280 @@
+"""Results of a benchmark: the rows of reference policies and of a newcomer, their table, page and card."""
+
+import json
+import lzma
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import lidarium
+from lidarium.evaluation.analysis.episodes import Row, read_episodes
+from lidarium.evaluation.analysis.groups import times_to
+from lidarium.evaluation.benchmark.tasks import DATA, Benchmark, BenchmarkTask, Size, starts_hash
+from lidarium.evaluation.report.report import jsonable, write_report
+from lidarium.evaluation.report.tables import NONE, code, interval, markdown_table, plain
+from lidarium.evaluation.statistics import (
+    Interval,
+    mean_share_interval,
+    median_interval,
+    paired_ratio,
+    probability_of_improvement,
+)
+from lidarium.evaluation.suites.campaign import EPISODES_FILE
+from lidarium.evaluation.suites.episodes_file import KEY, TIMINGS
+from lidarium.mapping.files.output import write_text
+
+RESULTS, TABLE, CARD, ALL = "results.json", "table.md", "card.md", "all"
+_REACHED = "t99_s"
+
+
+@dataclass(frozen=True, slots=True)
+class Standing:
+    """A policy in a task.
+
+    Attributes
+    ----------
+    task, policy : str
+        Their names.
+    is_reference : bool
+        Whether its rows are those that the benchmark ships.
+    runs, asked : int
+        Episodes that there are, and that the size asks for.
+    success : Interval
+        Share of the runs that saw 99 %.
+    time_s : Interval
+        Median time to 99 % [s]; inf is later than the horizon.
+    ratio : Interval or None
+        Time over the baseline's on the same floors, geometric mean; times not reached are the horizon.
+    improvement : Interval or None
+        Probability that a run is sooner than the baseline's on the same floor.
+    """
+
+    task: str
+    policy: str
+    is_reference: bool
+    runs: int
+    asked: int
+    success: Interval
+    time_s: Interval
+    ratio: Interval | None
+    improvement: Interval | None
+
+
+@dataclass(frozen=True, slots=True)
+class BenchmarkResults:
+    """All that came out.
+
+    Attributes
+    ----------
+    standings : tuple of Standing
+        By task, the soonest first.
+    overall : dict
+        By policy: geometric mean of its ratios, and the number of tasks that it is over.
+    remarks : tuple of str
+        What a reader has to know.
+    """
+
+    benchmark: str
+    size: Size
+    version: str
+    standings: tuple[Standing, ...]
+    overall: Mapping[str, tuple[float, int]]
+    remarks: tuple[str, ...]
+
+
+def reference_rows(name: str) -> dict[str, list[Row]]:
+    """Return the shipped rows of reference policies by task; none for a benchmark without any."""
+    path = DATA / f"{name}.jsonl.xz"
+    if not path.is_file():
+        return {}
+    rows: dict[str, list[Row]] = {}
+    for line in lzma.decompress(path.read_bytes()).decode("utf-8").splitlines():
+        row = json.loads(line)
+        rows.setdefault(row["variant"], []).append(row)
+    return rows
+
+
+def packed(rows: Iterable[Row]) -> bytes:
+    """Return rows as the package ships them: without what differs between two runs of one episode."""
+    kept = [{key: value for key, value in row.items() if key not in (*TIMINGS, "record")} for row in rows]
+    lines = sorted(json.dumps(row, sort_keys=True, separators=(",", ":")) for row in kept)
+    return lzma.compress("\n".join(lines).encode("utf-8"), preset=9 | lzma.PRESET_EXTREME)
+
+
+def collect(
+    found: Benchmark, tasks: Sequence[BenchmarkTask], size: Size, folder: Path, failures: Mapping[tuple[str, str], str]
+) -> BenchmarkResults:
+    """Compare the episodes in a folder with those of the reference policies, and write table, page and card.
+
+    Parameters
+    ----------
+    failures : dict
+        By task and policy: why some of its episodes, or all of them, did not finish.
+    """
+    shipped, everything, standings, remarks = reference_rows(found.name), [], [], []
+    for task in tasks:
+        path = folder / task.name
+        own = list(read_episodes(path).rows) if (path / EPISODES_FILE).is_file() else []
+        own = [row for row in own if row["floor"] in task.floors_of(size)]
+        rows, wrong = _as_frozen(task, own)
+        remarks += wrong
+        theirs = [row for row in shipped.get(task.name, ()) if row["floor"] in task.floors_of(size)]
+        mine = {row["policy"] for row in rows}
+        standings += _standings(task, size, rows, [row for row in theirs if row["policy"] not in mine])
+        everything += [*rows, *(row for row in theirs if row["policy"] not in mine)]
+    remarks += [f"{task}, {policy}: {why}" for (task, policy), why in failures.items()]
+    versions = sorted({str(row["version"]) for row in everything})
+    if len(versions) > 1:
+        remarks.append(
+            f"Rows are of lidarium {' and '.join(versions)}. The tasks' floors, starts and settings are the same; "
+            "policies and SLAM may have changed."
+        )
+    short = [each for each in standings if each.runs < each.asked]
+    remarks += [f"{each.task}, {each.policy}: {each.runs} of {each.asked} runs." for each in short]
+    results = BenchmarkResults(
+        found.name, size, lidarium.__version__, tuple(standings), _overall(standings), tuple(remarks)
+    )
+    _write(found, tasks, results, everything, folder)
+    return results
+
+
+def _as_frozen(task: BenchmarkTask, rows: Sequence[Row]) -> tuple[list[Row], list[str]]:
+    """Return the rows whose settings, floor and starts are the benchmark's, and what is wrong with the others."""
+    if task.hashes is None:
+        return list(rows), []
+    frozen = dict(zip(task.floors, zip(task.hashes.floors, task.hashes.starts, strict=True), strict=True))
+    kept, wrong = [], []
+    for row in rows:
+        floor, starts = frozen[row["floor"]]
+        for what, now, before in (
+            ("settings", row["settings_sha256"][:16], task.hashes.settings),
+            (f"floor {row['floor']}", row["floor_sha256"][:16], floor),
+            (f"starts on {row['floor']}", starts_hash(row["starts"]), starts),
+        ):
+            if now != before:
+                wrong.append(
+                    f"{task.name}, {row['policy']}: left out, for its {what} have the hash {now} and the benchmark's "
+                    f"{before}."
+                )
+                break
+        else:
+            kept.append(row)
+    return kept, wrong
+
+
+def _standings(task: BenchmarkTask, size: Size, own: Sequence[Row], theirs: Sequence[Row]) -> list[Standing]:
+    by_policy: dict[str, list[Row]] = {}
+    for row in (*own, *theirs):
+        by_policy.setdefault(row["policy"], []).append(row)
+    mine = {row["policy"] for row in own}
+    horizon_s = float(task.settings["horizon_s"])
+    baseline = _times(by_policy.get(task.baseline, ()), horizon_s)
+    found = []
+    for policy, rows in by_policy.items():
+        times = _times(rows, horizon_s)
+        floors = sorted(set(times) & set(baseline))
+        a, b = [times[floor] for floor in floors], [baseline[floor] for floor in floors]
+        reached = times_to(rows, _REACHED, horizon_s)
+        is_compared = bool(floors) and policy != task.baseline
+        found.append(
+            Standing(
+                task.name,
+                policy,
+                policy not in mine,
+                len(rows),
+                len(task.floors_of(size)),
+                mean_share_interval(reached.is_reached),
+                median_interval(reached.or_never),
+                paired_ratio(a, b) if is_compared else None,
+                probability_of_improvement(a, b) if is_compared else None,
+            )
+        )
+    return sorted(found, key=lambda each: (1.0 if each.ratio is None else each.ratio.estimate, each.policy))
+
+
+def _times(rows: Iterable[Row], horizon_s: float) -> dict[str, float]:
+    """Return the time to 99 % on each floor, the horizon if it was not reached."""
+    return {row["floor"]: horizon_s if row[_REACHED] is None else row[_REACHED] for row in rows}
+
+
+def _overall(standings: Sequence[Standing]) -> dict[str, tuple[float, int]]:
+    ratios: dict[str, list[float]] = {}
+    for each in standings:
+        if each.ratio is not None:
+            ratios.setdefault(each.policy, []).append(each.ratio.estimate)
+    means = {policy: (math.exp(sum(map(math.log, found)) / len(found)), len(found)) for policy, found in ratios.items()}
+    return dict(sorted(means.items(), key=lambda item: item[1][0]))
+
+
+def _write(
+    found: Benchmark, tasks: Sequence[BenchmarkTask], results: BenchmarkResults, rows: Sequence[Row], folder: Path
+) -> None:
+    write_text(folder / TABLE, table_of(tasks, results))
+    write_text(folder / CARD, card_of(found, tasks, results))
+    write_text(folder / RESULTS, json.dumps(jsonable(asdict(results)), indent=1, allow_nan=False) + "\n")
+    if rows:
+        # The page's reader wants one version; which there were is among the remarks.
+        lines = [{KEY: row[KEY], **row, "version": lidarium.__version__, "record": None} for row in rows]
+        write_text(folder / ALL / EPISODES_FILE, "".join(json.dumps(line) + "\n" for line in lines))
+        write_report(folder / ALL, folder / "report")
+
+
+def table_of(tasks: Sequence[BenchmarkTask], results: BenchmarkResults) -> str:
+    """Return the table as markdown."""
+    header = ("task", "policy", "runs", "99 % [%]", "time to 99 % [s]", "time over the baseline's", "P(sooner)")
+    horizons = {task.name: float(task.settings["horizon_s"]) for task in tasks}
+    lines = []
+    for each in results.standings:
+        name = code(each.policy)
+        lines.append(
+            (
+                each.task,
+                name if each.is_reference else f"**{name}**",
+                str(each.runs) if each.runs == each.asked else f"{each.runs} of {each.asked}",
+                f"{100.0 * each.success.estimate:.0f}",
+                interval(each.time_s, horizons[each.task], digits=0),
+                "baseline" if each.ratio is None else interval(each.ratio, digits=3),
+                interval(each.improvement, digits=2),
+            )
+        )
+    overall = [(code(policy), f"{mean:.3f}", str(number)) for policy, (mean, number) in results.overall.items()]
+    parts = [
+        f"# {results.benchmark}, size {results.size}",
+        "In brackets 95 % intervals over floors. Policies in bold ran here; rows of the others are shipped. The time "
+        "over the baseline's is a geometric mean over floors with the same starts; a run that did not see 99 % counts "
+        "with the horizon.",
+        markdown_table(header, lines) if lines else "No rows.",
+        "## Over all tasks",
+        "Geometric mean of the ratios of the tasks that a policy ran in, each with the same weight.",
+        markdown_table(("policy", "time over the baselines'", "tasks"), overall) if overall else NONE,
+    ]
+    if results.remarks:
+        parts += ["## Remarks", "\n".join(f"- {plain(remark)}" for remark in results.remarks)]
+    return "\n\n".join(parts) + "\n"
+
+
+def card_of(found: Benchmark, tasks: Sequence[BenchmarkTask], results: BenchmarkResults) -> str:
+    """Return the card: tasks, rules, floors and licences, how to cite, and what ran."""
+    header = ("task", "what it asks", "robots", "floors, easy / full", "baseline", "settings")
+    rows = [
+        (
+            f"`{task.id}`",
+            task.about,
+            str(task.robots),
+            f"{task.easy} / {len(task.floors)}",
+            f"`{task.baseline}`",
+            "" if task.hashes is None else f"`{task.hashes.settings}`",
+        )
+        for task in tasks
+    ]
+    template = (DATA / f"{found.name}.md").read_text(encoding="utf-8")
+    ran = sorted({each.policy for each in results.standings if not each.is_reference})
+    text = template.format(
+        tasks=markdown_table(header, rows),
+        version=results.version,
+        size=results.size,
+        policies=", ".join(map(code, ran)) or "none",
+        remarks="\n".join(f"- {plain(remark)}" for remark in results.remarks),
+    )
+    return text.rstrip() + "\n"
