@@ -39,3 +39,25 @@ def shared_cases() -> Path:
     if not folder.is_dir():
         pytest.skip(f"no files of other programs at {folder}; set LIDARIUM_DATA to a folder beside it")
     return folder
+
+
+_LONGEST_FIRST = (
+    "test_golden_episodes.py",
+    "test_conformance.py",
+    "test_determinism.py",
+    "test_heavy.py",
+    "test_equality.py",
+    "test_frontier.py",
+    "test_browser.py",
+    "test_study.py",
+    "test_failing_disk.py",
+    "test_policy.py",
+    "test_signals.py",
+    "test_kills.py",
+    "test_wrappers.py",
+)
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Begin with the longest files: each runs in one process, which the others shall not have to wait for."""
+    items.sort(key=lambda item: item.path.name not in _LONGEST_FIRST)

@@ -144,23 +144,25 @@ def _as_frozen(task: BenchmarkTask, rows: Sequence[Row]) -> tuple[list[Row], lis
     if task.hashes is None:
         return list(rows), []
     frozen = dict(zip(task.floors, zip(task.hashes.floors, task.hashes.starts, strict=True), strict=True))
-    kept, wrong = [], []
+    kept: list[Row] = []
+    wrong: dict[tuple[str, str], list[str]] = {}
     for row in rows:
         floor, starts = frozen[row["floor"]]
         for what, now, before in (
             ("settings", row["settings_sha256"][:16], task.hashes.settings),
-            (f"floor {row['floor']}", row["floor_sha256"][:16], floor),
-            (f"starts on {row['floor']}", starts_hash(row["starts"]), starts),
+            ("floor", row["floor_sha256"][:16], floor),
+            ("starts", starts_hash(row["starts"]), starts),
         ):
             if now != before:
-                wrong.append(
-                    f"{task.name}, {row['policy']}: left out, for its {what} have the hash {now} and the benchmark's "
-                    f"{before}."
-                )
+                why = f"{row['floor']} ({now}, in the benchmark {before})"
+                wrong.setdefault((row["policy"], what), []).append(why)
                 break
         else:
             kept.append(row)
-    return kept, wrong
+    return kept, [
+        f"{task.name}, {policy}: {len(found)} runs left out, for their {what} have other hashes, first on {found[0]}."
+        for (policy, what), found in wrong.items()
+    ]
 
 
 def _standings(task: BenchmarkTask, size: Size, own: Sequence[Row], theirs: Sequence[Row]) -> list[Standing]:

@@ -1,5 +1,6 @@
 """`lidarium benchmark`: compare policies with the reference policies in the tasks of a benchmark."""
 
+import math
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -136,7 +137,7 @@ def _text(results: "BenchmarkResults", folder: Path) -> str:
             each.policy if each.is_reference else f"* {each.policy}",
             each.runs,
             f"{100.0 * each.success.estimate:.0f} %",
-            f"{each.time_s.estimate:.0f}",
+            "never" if math.isinf(each.time_s.estimate) else f"{each.time_s.estimate:.0f}",
             "baseline" if each.ratio is None else f"{each.ratio:.2f}",
         )
         for each in results.standings

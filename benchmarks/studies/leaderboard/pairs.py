@@ -48,7 +48,8 @@ Times = Mapping[tuple[str, int], float]
 def _ratio(first: Times, second: Times, keys: Sequence[tuple[str, int]]) -> str:
     if len(keys) < 2:
         return "-"
-    return f"{paired_ratio([first[key] for key in keys], [second[key] for key in keys]):.3f}"
+    times = ([each[key] for key in keys] for each in (first, second))
+    return f"{paired_ratio(*times, clusters=[floor for floor, _ in keys]):.3f}"
 
 
 def merges_text(episodes: Iterable[Episode]) -> str:

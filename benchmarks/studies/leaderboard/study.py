@@ -51,8 +51,9 @@ by the seed, the same for every policy.
 An entry of time is the median with its 95 % interval; runs that did not get there count as never. Multiples
 are of the time that a team needs that [knows the floor](../reference/bounds.md), medians over the floors that
 have a bound. The difference is that of the restricted means to the baseline of the world
-(`nearest_frontier`, or `independent` where starts are unknown), pair by pair, with its 95 % interval. It is
-bold where Wilcoxon's signed rank test says that it is beyond chance (5 %, Holm).
+(`nearest_frontier`, or `independent` where starts are unknown), pair by pair, with its 95 % interval; of fewer
+than six pairs there is none. It is bold where both Wilcoxon's signed rank test (5 %, Holm) and its interval say
+that it is beyond chance.
 {notes}
 ## Pairs
 

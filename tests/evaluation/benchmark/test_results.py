@@ -1,0 +1,126 @@
+"""A benchmark from the command to the table, the page and the card."""
+
+import json
+import lzma
+
+import pytest
+
+from lidarium.evaluation.analysis.episodes import read_episodes
+from lidarium.evaluation.benchmark import results
+from lidarium.evaluation.benchmark.results import packed, reference_rows
+from lidarium.evaluation.benchmark.tasks import benchmark
+from lidarium.scripts.main import main
+
+
+def change_hashes(folder, **changes):
+    """Let the benchmark have been frozen with other hashes."""
+    hashes = json.loads((folder / "tiny.json").read_text())
+    for name, change in changes.items():
+        hashes[name.replace("_", "-")].update(change)
+    (folder / "tiny.json").write_text(json.dumps(hashes))
+    benchmark.cache_clear()
+
+
+def answer(out, *options):
+    """Run the command; return its exit code and what it wrote."""
+    code = main(["benchmark", "tiny", "--workers", "1", "--out", str(out), *options])
+    return code, json.loads((out / "results.json").read_text())
+
+
+@pytest.fixture
+def without_page(monkeypatch):
+    """Leave out the report, which takes longer than the episodes."""
+    monkeypatch.setattr(results, "write_report", lambda *_: None)
+
+
+def by_name(written):
+    return {(each["task"], each["policy"]): each for each in written["standings"]}
+
+
+def test_only_the_newcomer_runs_and_stands_beside_the_reference_policies(tiny, tmp_path, capsys):
+    out = tmp_path / "mine"
+    code, written = answer(out, "--policies", "explore_lite", "--quick", "--tasks", "Homes-1")
+    assert code == 0
+    standings = by_name(written)
+    assert {policy for _, policy in standings} == {"explore_lite", "nearest_frontier", "random_walk"}
+    mine = standings["Homes-1", "explore_lite"]
+    assert (mine["is_reference"], mine["runs"], mine["asked"]) == (False, 6, 6)
+    assert standings["Homes-1", "nearest_frontier"]["ratio"] is None
+    assert standings["Homes-1", "random_walk"]["is_reference"]
+    assert 0.0 < mine["ratio"]["estimate"] < 10.0
+    assert written["overall"]["explore_lite"] == [pytest.approx(mine["ratio"]["estimate"]), 1]
+    assert written["remarks"] == []
+    assert len(read_episodes(out / "Homes-1").rows) == 6
+    table = (out / "table.md").read_text()
+    assert f"| {mine['ratio']['estimate']:.3f} [" in table
+    assert "| Homes-1 | **`explore_lite`** | 6 |" in table
+    assert "easy" in (out / "card.md").read_text()
+    assert (out / "report" / "report.html").is_file()
+    assert "* explore_lite" in capsys.readouterr().out
+
+
+@pytest.mark.usefixtures("without_page")
+def test_rows_are_the_shipped_ones_to_the_bit_with_any_number_of_workers(tiny, tmp_path):
+    out = tmp_path / "again"
+    answer(out, "--reference", "--quick", "--workers", "2")
+    rows = [row for task in ("Homes-1", "Seen-1") for row in read_episodes(out / task).rows]
+    shipped = [row for kept in reference_rows("tiny").values() for row in kept]
+    again = set(lines_of(packed(rows)))
+    assert again <= set(lines_of(packed(shipped)))
+    assert len(again) == 13
+
+
+def lines_of(content):
+    return lzma.decompress(content).decode().splitlines()
+
+
+@pytest.mark.usefixtures("without_page")
+def test_a_floor_or_a_setting_that_changed_is_left_out_and_named(tiny, tmp_path):
+    change_hashes(tiny, Homes_1={"floors": ["0" * 16] * 7}, Seen_1={"settings": "f" * 16})
+    code, written = answer(tmp_path / "mine", "--reference", "--quick")
+    assert code == 0
+    assert all(each["is_reference"] for each in written["standings"])
+    assert any(
+        remark.startswith("Homes-1, random_walk: 6 runs left out, for their floor have other hashes, first on home:00")
+        for remark in written["remarks"]
+    )
+    assert any(
+        remark.startswith("Seen-1, sparse_frontier: 1 runs left out, for their settings have")
+        for remark in written["remarks"]
+    )
+
+
+@pytest.mark.usefixtures("without_page")
+def test_a_policy_that_cannot_run_in_one_task_fails_there_alone(tiny, tmp_path, capsys):
+    code, written = answer(tmp_path / "mine", "--policies", "sparse_frontier", "nearest_frontier", "--quick")
+    assert code != 0
+    assert {("Homes-1", "nearest_frontier"), ("Seen-1", "sparse_frontier")} <= by_name(written).keys()
+    assert ("Homes-1", "sparse_frontier") not in by_name(written)
+    assert any(remark.startswith("Homes-1, sparse_frontier: ") for remark in written["remarks"])
+
+
+@pytest.mark.usefixtures("without_page")
+def test_rows_of_another_version_are_said_to_be(tiny, tmp_path):
+    rows = [{**row, "version": "0.0.9"} for kept in reference_rows("tiny").values() for row in kept]
+    (tiny / "tiny.jsonl.xz").write_bytes(packed(rows))
+    _, written = answer(tmp_path / "mine", "--policies", "explore_lite", "--tasks", "Homes-1", "--quick")
+    assert any("Rows are of lidarium 0.0.9 and" in remark for remark in written["remarks"])
+
+
+@pytest.mark.usefixtures("without_page")
+def test_fewer_runs_than_the_size_asks_for_are_said(tiny, tmp_path):
+    _, written = answer(tmp_path / "part", "--reference", "--tasks", "Homes-1", "--quick", "--shard", "1/3")
+    assert "Homes-1, nearest_frontier: 2 of 6 runs." in written["remarks"]
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--tasks", "Home-1"], "did you mean 'Homes-1'"),
+        (["--shard", "3/2", "--policies", "srt"], "--shard is '3/2'"),
+        (["--workers", "-1"], "--workers is -1"),
+    ],
+)
+def test_bad_options_are_answered_in_a_line(tiny, tmp_path, capsys, options, message):
+    assert main(["benchmark", "tiny", "--out", str(tmp_path / "x"), *options]) == 2
+    assert message in capsys.readouterr().err
