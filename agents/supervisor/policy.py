@@ -63,8 +63,9 @@ class _Errands:
         self._team = team
         self._errands: dict[str, _Errand] = {}
 
-    def __len__(self) -> int:
-        return len(self._errands)
+    def has_any(self, agents: Sequence[str]) -> bool:
+        """Whether any of some robots has an errand."""
+        return any(agent in self._errands for agent in agents)
 
     def begin(self, command: Command) -> None:
         """Send a robot to the target of a command, unless both that and its errand lead home."""
@@ -354,7 +355,8 @@ class Supervised(Policy):
         stops, standing = self._stops, self._supervisor.standing_by
         self._exploring.clear()
         self._exploring.update(self._free)
-        is_work_left = any(not isinstance(action, Stop) for action in actions.values()) or len(self._errands) > 0
+        # Errands of robots that others drive, or that have ended, are no work of these.
+        is_work_left = any(not isinstance(action, Stop) for action in actions.values()) or self._errands.has_any(agents)
         for agent in agents:
             if agent in stops:
                 actions[agent] = stops[agent]
