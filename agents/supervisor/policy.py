@@ -40,6 +40,9 @@ LOST_S = 2.0
 """An order that a robot has not taken after this long has not reached it [s]."""
 
 
+DONE_RULE = 5
+"""The rule that no frontier is left."""
+
 DIRECTED = "directed"
 """Info: whether the station drives a robot now, so that an action for it is not carried out."""
 
@@ -439,10 +442,12 @@ class Supervised(Policy):
     def _obey(self, command: Command, stops: dict[str, Action]) -> None:
         """Begin a robot's order."""
         agent = command.agent
+        if command.rule == DONE_RULE and "depth" in self.observes:
+            return  # no frontier is left for lasers, but cameras may have ground to see: the policy stops its robots
         if command.kind is OrderKind.STOP:
             self._errands.cancel(agent)
             if agent not in self._supervisor.standing_by or self.settings.is_stop_final:
-                stops[agent] = Order(OrderKind.STOP, reason="no_frontier" if command.rule == 5 else "stopped")
+                stops[agent] = Order(OrderKind.STOP, reason="no_frontier" if command.rule == DONE_RULE else "stopped")
         elif command.kind in (OrderKind.PAUSE, OrderKind.RESUME):
             stops[agent] = Order(command.kind, reason=f"rule {command.rule}: {command.why}")
             if command.kind is OrderKind.PAUSE:
