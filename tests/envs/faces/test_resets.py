@@ -14,7 +14,7 @@ def begun(env, seed, **options):
 
 
 def test_one_floor_has_fixed_starts_unless_drawn_ones_are_asked_for():
-    fixed = lidarium.parallel_env("apartment", **SMALL)
+    fixed = lidarium.parallel_env("apartment", **SMALL, starts="fixed")
     drawn = lidarium.parallel_env("apartment", starts="drawn", **SMALL)
     assert np.array_equal(begun(fixed, 0), begun(fixed, 1))
     assert not np.array_equal(begun(drawn, 0), begun(drawn, 1))
@@ -23,14 +23,14 @@ def test_one_floor_has_fixed_starts_unless_drawn_ones_are_asked_for():
 
 @pytest.mark.parametrize("floor", ["set:test:1", ["apartment"]])
 def test_floors_that_are_drawn_have_drawn_starts_unless_fixed_ones_are_asked_for(floor):
-    drawn = lidarium.parallel_env(floor, **SMALL)
+    drawn = lidarium.parallel_env(floor, **SMALL, starts="fixed")
     fixed = lidarium.parallel_env(floor, starts="fixed", **SMALL)
     assert not np.array_equal(begun(drawn, 0), begun(drawn, 1))
     assert np.array_equal(begun(fixed, 0)[0], begun(fixed, 1)[0])
 
 
 def test_an_option_of_a_reset_goes_before_the_setting():
-    env = lidarium.parallel_env("apartment", **SMALL)
+    env = lidarium.parallel_env("apartment", **SMALL, starts="fixed")
     fixed = begun(env, 0)
     drawn = begun(env, 0, starts="drawn")
     assert not np.array_equal(fixed, drawn)
@@ -63,7 +63,7 @@ def growing(number):
 
 
 def test_a_curriculum_chooses_by_the_number_of_the_episode():
-    env = lidarium.parallel_env("clinic", curriculum=growing, **SMALL)
+    env = lidarium.parallel_env("clinic", curriculum=growing, **SMALL, starts="fixed")
     names = []
     for _ in range(5):
         env.reset()
@@ -74,7 +74,7 @@ def test_a_curriculum_chooses_by_the_number_of_the_episode():
 
 
 def test_episodes_of_a_batch_are_counted_as_they_begin():
-    batch = lidarium.vector_env(2, "clinic", curriculum=growing, **SMALL)
+    batch = lidarium.vector_env(2, "clinic", curriculum=growing, **SMALL, starts="fixed")
     names = []
     for _ in range(2):
         batch.reset(seed=1)
@@ -83,6 +83,6 @@ def test_episodes_of_a_batch_are_counted_as_they_begin():
 
 
 def test_bad_options_of_a_curriculum_are_refused_with_the_number():
-    env = lidarium.parallel_env("clinic", curriculum=lambda number: {"start": number}, **SMALL)
+    env = lidarium.parallel_env("clinic", curriculum=lambda number: {"start": number}, **SMALL, starts="fixed")
     with pytest.raises(ValueError, match="the curriculum of episode 0: unknown reset option 'start'"):
         env.reset(seed=0)

@@ -28,6 +28,7 @@ def make(floor=ROOMS, **options):
         floor,
         level="frontier",
         **{"robots": 2, "stop_coverage": None, "horizon_s": None, "map_cells": 64, **options},
+        starts="fixed",
     )
 
 
