@@ -39,7 +39,15 @@ def options_for(name, **more):
     unknown = {"known_starts": False} if "supervised" in name else {}
     if name == "oracle_starts":
         unknown = {"known_starts": False, "reveals_starts": True}
-    return {"robots": 3, "horizon_s": HORIZON_S, "map_cells": 64, **unknown, **NEEDS.get(name, {}), **more}
+    return {
+        "robots": 3,
+        "horizon_s": HORIZON_S,
+        "starts": "fixed",
+        "map_cells": 64,
+        **unknown,
+        **NEEDS.get(name, {}),
+        **more,
+    }
 
 
 def run(env, policy, seed=3):
@@ -56,10 +64,10 @@ def run(env, policy, seed=3):
 @pytest.mark.parametrize("name", NAMES)
 def test_every_policy_runs_in_a_plain_loop_as_run_episode_runs_it(name):
     policy = lidarium.policy(name)
-    env = lidarium.parallel_env(TWO_ROOMS, level=policy.level, **options_for(name), starts="fixed")
+    env = lidarium.parallel_env(TWO_ROOMS, level=policy.level, **options_for(name))
     env.use_level(policy.level, policy.shares_map, policy.decision_period_s)
     poses = run(env, policy)
-    other = lidarium.parallel_env(TWO_ROOMS, **options_for(name), starts="fixed")
+    other = lidarium.parallel_env(TWO_ROOMS, **options_for(name))
     lidarium.run_episode(lidarium.policy(name), other, seed=3)
     assert len(poses) > 5
     assert np.array_equal(poses[-1], other.world.poses)
@@ -84,7 +92,7 @@ class BesideLearner:
 def test_every_policy_drives_one_robot_beside_a_learner_at_every_level_alone_and_in_each_row_of_a_batch(name, level):
     options = options_for(name, robots=2, horizon_s=4.0, resolution=0.1, map_cells=32)
     driven = ("robot_0", "robot_1")
-    batch = lidarium.vector_env(2, TWO_ROOMS, level=level, reports=True, **options, starts="fixed")
+    batch = lidarium.vector_env(2, TWO_ROOMS, level=level, reports=True, **options)
     batch.reset(seed=5)
     drivers = [BesideLearner(name, driven[k], copy.deepcopy(batch.single_action_space), 5 + k) for k in range(2)]
     for episode, driver in enumerate(drivers):
@@ -95,7 +103,7 @@ def test_every_policy_drives_one_robot_beside_a_learner_at_every_level_alone_and
         batch.step([driver.act(team.agents, team.observations) for driver, team in zip(drivers, teams, strict=True)])
         poses.append(batch.engine.world.poses.copy())
     for episode, agent in enumerate(driven):
-        env = lidarium.parallel_env(TWO_ROOMS, level=level, **options, starts="fixed")
+        env = lidarium.parallel_env(TWO_ROOMS, level=level, **options)
         driver = BesideLearner(name, agent, copy.deepcopy(env.action_space(agent)), 5 + episode)
         observations, _ = env.reset(seed=5 + episode)
         driver.policy.reset(env, seed=5 + episode)
@@ -113,9 +121,7 @@ def test_a_team_at_the_level_of_velocities_decides_and_drives_as_at_that_of_wayp
     ended = {}
     for level in ("velocity", "waypoint"):
         policy = lidarium.policy(name)
-        env = lidarium.parallel_env(
-            "apartment", level=level, **options_for(name, resolution=0.1, horizon_s=60.0), starts="fixed"
-        )
+        env = lidarium.parallel_env("apartment", level=level, **options_for(name, resolution=0.1, horizon_s=60.0))
         if level == "waypoint":
             env.use_level(policy.level, policy.shares_map, policy.decision_period_s)
         run(env, policy)
@@ -127,7 +133,7 @@ def test_a_team_at_the_level_of_velocities_decides_and_drives_as_at_that_of_wayp
 def test_every_policy_drives_an_episode_of_a_batch_as_it_drives_a_single_environment(name):
     options = options_for(name, robots=2, horizon_s=6.0, resolution=0.1, map_cells=32)
     level = lidarium.policy(name).level
-    batch = lidarium.vector_env(2, TWO_ROOMS, level=level, reports=True, **options, starts="fixed")
+    batch = lidarium.vector_env(2, TWO_ROOMS, level=level, reports=True, **options)
     policies = [lidarium.policy(name) for _ in range(2)]
     batch.reset(seed=5)
     for episode, policy in enumerate(policies):
@@ -139,14 +145,14 @@ def test_every_policy_drives_an_episode_of_a_batch_as_it_drives_a_single_environ
         poses.append(batch.engine.world.poses.copy())
     assert len(poses) >= 3
     for episode in range(2):
-        env = lidarium.parallel_env(TWO_ROOMS, level=level, **options, starts="fixed")
+        env = lidarium.parallel_env(TWO_ROOMS, level=level, **options)
         alone = run(env, lidarium.policy(name), seed=5 + episode)
         rows = slice(2 * episode, 2 * episode + 2)
         assert all(np.array_equal(a, b[rows]) for a, b in zip(alone, poses, strict=False))
 
 
 def test_an_episode_of_a_batch_that_began_again_takes_a_policy_that_began_again():
-    batch = lidarium.vector_env(2, "apartment", level="waypoint", robots=1, horizon_s=3.0, map_cells=64, starts="fixed")
+    batch = lidarium.vector_env(2, "apartment", level="waypoint", robots=1, horizon_s=3.0, map_cells=64)
     policies = [lidarium.policy("nearest_frontier") for _ in range(2)]
     batch.reset(seed=0)
     begun = 0
@@ -161,7 +167,7 @@ def test_an_episode_of_a_batch_that_began_again_takes_a_policy_that_began_again(
 
 def test_stops_and_orders_are_actions_of_step_at_every_level():
     for level in ("velocity", "waypoint", "frontier"):
-        env = lidarium.parallel_env("apartment", level=level, robots=2, map_cells=64, starts="fixed")
+        env = lidarium.parallel_env("apartment", level=level, robots=2, map_cells=64)
         env.reset(seed=0)
         space = env.action_space("robot_1")
         x, y, theta = env.belief("robot_1").pose.tolist()
@@ -180,7 +186,7 @@ def test_stops_and_orders_are_actions_of_step_at_every_level():
 
 def test_policies_work_in_wrappers():
     env = lidarium.MergedMaps(
-        lidarium.parallel_env("apartment", level="waypoint", **options_for("", known_starts=False), starts="fixed")
+        lidarium.parallel_env("apartment", level="waypoint", **options_for("", known_starts=False))
     )
     assert len(run(env, lidarium.policy("nearest_frontier"))) > 3
 
@@ -193,20 +199,20 @@ def test_policies_work_in_wrappers():
     ],
 )
 def test_a_policy_at_a_level_that_does_not_carry_it_out_is_refused(name, level, said):
-    env = lidarium.parallel_env("apartment", level=level, robots=1, starts="fixed")
+    env = lidarium.parallel_env("apartment", level=level, robots=1)
     env.reset(seed=0)
     with pytest.raises(ValueError, match=said):
         lidarium.policy(name).reset(env, seed=0)
 
 
 def test_agents_of_another_team_and_teams_of_another_batch_are_refused():
-    env = lidarium.parallel_env("apartment", level="waypoint", robots=1, map_cells=64, starts="fixed")
+    env = lidarium.parallel_env("apartment", level="waypoint", robots=1, map_cells=64)
     observations, _ = env.reset(seed=0)
     policy = lidarium.policy("nearest_frontier")
     policy.reset(env)
     with pytest.raises(ValueError, match=r"no observation of 'robot_7'; want agents among \['robot_0'\]"):
         policy.act(observations, agents=["robot_7"])
-    batch = lidarium.vector_env(2, "apartment", level="waypoint", robots=1, map_cells=64, starts="fixed")
+    batch = lidarium.vector_env(2, "apartment", level="waypoint", robots=1, map_cells=64)
     batch.reset(seed=0)
     with pytest.raises(ValueError, match="actions are of 1 teams; want a dict for each of 2 episodes"):
         batch.step([policy.act(observations)])
@@ -217,7 +223,7 @@ def test_agents_of_another_team_and_teams_of_another_batch_are_refused():
 
 
 def test_a_policy_that_reads_depth_is_refused_without_a_camera():
-    env = lidarium.parallel_env("apartment", level="waypoint", robots=1, starts="fixed")
+    env = lidarium.parallel_env("apartment", level="waypoint", robots=1)
     env.reset(seed=0)
     with pytest.raises(ValueError, match="camera='xtion_tilted'"):
         lidarium.policy("sparse_frontier").reset(env)

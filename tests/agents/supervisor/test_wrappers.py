@@ -68,10 +68,10 @@ def test_robots_that_are_directed_follow_their_orders_and_masks_say_so():
 def test_a_batch_is_supervised_as_its_episodes_are_alone(level):
     options = {"level": level, "horizon_s": 24.0, **UNKNOWN}
     batch = lidarium.Supervised(
-        lidarium.vector_env(2, "apartment", reports=True, **options, starts="fixed"), period_s=4.0
+        lidarium.vector_env(2, "apartment", reports=True, **{"starts": "fixed", **options}), period_s=4.0
     )
     alone = [
-        lidarium.Supervised(lidarium.parallel_env("apartment", **options, starts="fixed"), period_s=4.0)
+        lidarium.Supervised(lidarium.parallel_env("apartment", **{"starts": "fixed", **options}), period_s=4.0)
         for _ in range(2)
     ]
     observations, infos = batch.reset(seed=7)

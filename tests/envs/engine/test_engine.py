@@ -52,12 +52,12 @@ def test_a_batch_takes_orders_as_single_environments_do(radio):
 
 def test_a_batch_reports_to_stations_as_single_environments_do():
     options = {**SMALL, "localization": "odometry", "odometry": "typical", "radio": "line_of_sight"}
-    batch = lidarium.vector_env(3, TWO_ROOMS, level="waypoint", reports=True, **options, starts="fixed")
+    batch = lidarium.vector_env(3, TWO_ROOMS, level="waypoint", reports=True, **{"starts": "fixed", **options})
     batch.reset(seed=3)
     for _ in range(4):
         batch.step(np.full((6, 2), 0.3, np.float32))
     for k in range(3):
-        env = lidarium.parallel_env(TWO_ROOMS, level="waypoint", **options, starts="fixed")
+        env = lidarium.parallel_env(TWO_ROOMS, level="waypoint", **{"starts": "fixed", **options})
         env.reset(seed=3 + k)
         for _ in range(4):
             env.step(dict.fromkeys(env.agents, np.full(2, 0.3, np.float32)))

@@ -240,7 +240,7 @@ def test_turn_based_teams_keep_the_contract_and_do_what_parallel_ones_do(level, 
     options = options_of(level, backend, name)
     env = parallel_to_aec(team_of(TWO_ROOMS, level, **options))
     if "merging" not in options:
-        assert type(lidarium.env(TWO_ROOMS, level=level, **options, starts="fixed")) is type(env)
+        assert type(lidarium.env(TWO_ROOMS, level=level, **options)) is type(env)
     api_test(env, num_cycles=3)
     assert "Passed" in capsys.readouterr().out
     moments, counts = alone(level, backend, name), Counter()
@@ -285,7 +285,7 @@ def test_one_robot_keeps_the_contract_of_gymnasium_and_is_a_team_of_one(level, b
 @cases(OPTIONS)
 def test_rows_of_a_batch_are_the_robots_of_single_environments(level, backend, name):
     options = options_of(level, backend, name)
-    batch = lidarium.vector_env(2, TWO_ROOMS, level=level, threads=1, **options, starts="fixed")
+    batch = lidarium.vector_env(2, TWO_ROOMS, level=level, threads=1, **options)
     assert batch.num_envs == 2 * batch.batch.robots
     episodes = [alone(level, backend, name, SEED + episode) for episode in range(2)]
     assert assert_rows(batch, episodes, SEED, before=stop_one) >= 2
@@ -297,7 +297,7 @@ def test_rows_of_a_batch_are_the_robots_of_single_environments(level, backend, n
 def test_a_batch_of_one_equals_the_single_environment_by_construction(level, backend):
     options = options_of(level, backend, "plain")
     env = team_of(TWO_ROOMS, level, **options)
-    batch = lidarium.vector_env(1, TWO_ROOMS, level=level, **options, starts="fixed")
+    batch = lidarium.vector_env(1, TWO_ROOMS, level=level, **options)
     assert type(env.engine) is type(batch.engine) is Engine
     assert env.engine.episodes == batch.engine.episodes == 1
     assert type(env.engine.level) is type(batch.engine.level)
@@ -310,7 +310,7 @@ def test_a_batch_of_one_equals_the_single_environment_by_construction(level, bac
 def test_rows_for_learners_are_those_robots_and_begin_again_in_the_step_that_ends(level, backend, name):
     pytest.importorskip("stable_baselines3")
     options = options_of(level, backend, name)
-    rows = lidarium.sb3_vec_env(2, TWO_ROOMS, level=level, threads=1, **options, starts="fixed")
+    rows = lidarium.sb3_vec_env(2, TWO_ROOMS, level=level, threads=1, **options)
     agents, places = rows.settings.agents, [0, 0]
     episodes = [alone(level, backend, name, SEED + episode) for episode in range(2)]
     rows.seed(SEED)
@@ -376,10 +376,8 @@ FACES = {
     "parallel": team_of,
     "merged": functools.partial(team_of, merging=MergingSettings()),
     "drawn": functools.partial(team_of, randomize={"reward.time": (0.0, 1.0)}),
-    "turn_based": lambda floor, level, **options: lidarium.env(floor, level=level, **options, starts="fixed"),
-    "gymnasium": lambda floor, level, **options: SoloExploration(
-        floor, level, **{**options, "robots": 1}, starts="fixed"
-    ),
+    "turn_based": lambda floor, level, **options: lidarium.env(floor, level=level, **options),
+    "gymnasium": lambda floor, level, **options: SoloExploration(floor, level, **{**options, "robots": 1}),
     "vector": functools.partial(lidarium.vector_env, 2),
     "learners": functools.partial(lidarium.sb3_vec_env, 2),
 }

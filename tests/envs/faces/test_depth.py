@@ -22,7 +22,7 @@ SMALL = {**OPTIONS, "noise": "none", "map_cells": 64, "lidar": "lidar_360_6m", "
 @pytest.mark.parametrize("backend", BACKENDS)
 def test_equal_seeds_give_equal_noisy_images(backend):
     options = {**SMALL, "camera": "xtion_noisy"}
-    parallel_seed_test(lambda: lidarium.parallel_env(backend=backend, **options, starts="fixed"), num_cycles=5)
+    parallel_seed_test(lambda: lidarium.parallel_env(backend=backend, **{"starts": "fixed", **options}), num_cycles=5)
 
 
 @pytest.mark.parametrize("backend", BACKENDS)

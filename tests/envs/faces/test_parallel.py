@@ -24,7 +24,7 @@ def box(width=5.0, height=4.0, solids=(), starts=((1.0, 1.0, 0.0), (1.0, 3.0, 0.
 
 def make(floor=None, **options):
     options = {"robots": 2, "stop_coverage": None, "map_cells": 64, "observe": ALL, **options}
-    return lidarium.parallel_env(box() if floor is None else floor, **options, starts="fixed")
+    return lidarium.parallel_env(box() if floor is None else floor, **{"starts": "fixed", **options})
 
 
 def step_all(env, action=STAY):

@@ -29,7 +29,7 @@ def no_display(monkeypatch):
 @pytest.mark.parametrize("level", lidarium.registry("level"))
 @pytest.mark.usefixtures("no_display")
 def test_all_render_modes_render(level):
-    render_test(lambda **options: lidarium.env("scene_room", level=level, **SMALL, **options, starts="fixed"))
+    render_test(lambda **options: lidarium.env("scene_room", level=level, **SMALL, **{"starts": "fixed", **options}))
 
 
 @pytest.mark.usefixtures("no_display")
@@ -41,8 +41,8 @@ def test_gymnasiums_checker_finds_nothing_in_pictures():
 @pytest.mark.parametrize("level", lidarium.registry("level"))
 def test_pictures_follow_each_other_as_simulated_time_goes_alone_and_in_batches(level):
     options = {"robots": 1, "time_step": 0.05, "decision_period_s": 0.5}
-    alone = lidarium.parallel_env(level=level, **options, starts="fixed")
-    batch = lidarium.vector_env(1, level=level, **options, starts="fixed")
+    alone = lidarium.parallel_env(level=level, **{"starts": "fixed", **options})
+    batch = lidarium.vector_env(1, level=level, **{"starts": "fixed", **options})
     for env in (alone, batch):
         assert env.metadata["render_fps"] == pytest.approx(20 if level == "velocity" else 2)
     assert type(batch).metadata["render_fps"] == 10

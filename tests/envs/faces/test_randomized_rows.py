@@ -18,7 +18,7 @@ NOISE = {"lidar.noise_floor": (0.0, 0.05), "reward.time": (0.0, 1.0)}
 
 
 def make(episodes, **options):
-    return lidarium.vector_env(episodes, "scene_room", randomize=NOISE, **{**SMALL, **options}, starts="fixed")
+    return lidarium.vector_env(episodes, "scene_room", randomize=NOISE, **{"starts": "fixed", **SMALL, **options})
 
 
 def test_spaces_infos_and_states_are_those_of_a_plain_batch():

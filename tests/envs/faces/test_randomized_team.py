@@ -125,7 +125,7 @@ def test_draws_that_change_the_spaces_are_refused():
 
 def test_the_size_of_the_team_is_drawn_for_each_episode():
     options = {**SMALL, "observe": ["bumper", "teammates"], "horizon_s": 3.0}
-    env = lidarium.parallel_env("scene_room", randomize={"robots": (2, 4)}, **options, starts="fixed")
+    env = lidarium.parallel_env("scene_room", randomize={"robots": (2, 4)}, **{"starts": "fixed", **options})
     assert env.possible_agents == ["robot_0", "robot_1", "robot_2", "robot_3"]
     sizes = set()
     for seed in range(8):

@@ -146,7 +146,7 @@ def test_a_policy_of_the_laser_explores_along_sparse_routes(backend):
 
 def test_a_batch_drives_along_the_routes_of_single_environments():
     options = {"robots": 1, "camera": "xtion_tilted", "resolution": 0.05, "stop_coverage": None, "map_cells": 64}
-    batch = lidarium.vector_env(2, LOW_TABLE, level="waypoint", plans_sparsely=True, **options, starts="fixed")
+    batch = lidarium.vector_env(2, LOW_TABLE, level="waypoint", plans_sparsely=True, **{"starts": "fixed", **options})
     single = SparsePlanning(made())
     batch.reset(seed=0)
     single.reset(seed=0)

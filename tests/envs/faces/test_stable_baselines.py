@@ -234,7 +234,7 @@ def test_teams_train_on_an_egocentric_map_and_normalised_rewards():
         "egocentric_cells": 36,
         "stop_on_contact": True,
     }
-    env = VecNormalize(VecMonitor(lidarium.sb3_vec_env(2, ROOM, **options, starts="fixed")), norm_obs=False)
+    env = VecNormalize(VecMonitor(lidarium.sb3_vec_env(2, ROOM, **{"starts": "fixed", **options})), norm_obs=False)
     assert_trains(stable_baselines3.PPO, env, 256, n_steps=64, batch_size=128, n_epochs=1)
 
 

@@ -111,7 +111,7 @@ def masked_run():
     """A robot that runs into the wall ahead of it beside one that stands still, until the horizon and a
     step beyond."""
     options = {**FEW, "robots": 2, "stop_on_contact": True, "horizon_s": 3.0, "stop_coverage": None}
-    batch = lidarium.vector_env(2, ROOM, **options, starts="fixed")
+    batch = lidarium.vector_env(2, ROOM, **{"starts": "fixed", **options})
     near, far = (4.2, 3.0, 0.0), (1.0, 1.0, math.pi / 2)
     batch.reset(seed=0, options={"starts": [[near, far], [far, near]]})
     return batch, [batch.step(np.array([AHEAD, STAY, STAY, STAY])) for _ in range(31)]

@@ -32,8 +32,15 @@ def driven(steps=15, floor="building:5", **options):
     """An environment in mid-episode, and its last observations."""
     env = lidarium.parallel_env(
         floor,
-        **{"robots": 3, "stop_coverage": None, "noise": "datasheet", "observe": ALL, **SMALL, **options},
-        starts="fixed",
+        **{
+            "starts": "fixed",
+            "robots": 3,
+            "stop_coverage": None,
+            "noise": "datasheet",
+            "observe": ALL,
+            **SMALL,
+            **options,
+        },
     )
     observations, _ = env.reset(seed=2)
     generator = np.random.default_rng(0)
@@ -57,11 +64,11 @@ OFFSETS = np.zeros((9, 2))
 @pytest.mark.parametrize("options", [{}, {"noise": "datasheet"}, {"level": "waypoint"}])
 def test_who_names_nothing_sees_all_but_the_pose_and_the_egocentric_map(options):
     names = ["scan", "velocity", "bumper", "map"]
-    env = lidarium.parallel_env("scene_room", robots=2, **options, starts="fixed")
+    env = lidarium.parallel_env("scene_room", robots=2, **{"starts": "fixed", **options})
     observations, _ = env.reset(seed=0)
     assert list(observations["robot_0"]) == names
     assert set(env.observation_space("robot_0").spaces) == set(names)
-    batch = lidarium.vector_env(1, "scene_room", robots=2, **options, starts="fixed")
+    batch = lidarium.vector_env(1, "scene_room", robots=2, **{"starts": "fixed", **options})
     assert list(batch.reset(seed=0)[0]) == names
 
 

@@ -15,7 +15,7 @@ SIMPLE = Battery(capacity_j=1000.0, idle_w=2.0, per_metre_j=5.0, per_radian_j=3.
 
 def hall(robots=1, **options):
     env = lidarium.parallel_env(
-        HALL, robots=robots, lidar="lidar_360_6m", **{"stop_coverage": None, **options}, starts="fixed"
+        HALL, robots=robots, lidar="lidar_360_6m", **{"starts": "fixed", "stop_coverage": None, **options}
     )
     env.reset(seed=1, options={"starts": [[3.0, 3.0 + 3.0 * robot, 0.0] for robot in range(robots)]})
     return env

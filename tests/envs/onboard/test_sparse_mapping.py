@@ -35,8 +35,7 @@ HALL = Floor(
 def made(floor=HALL, **options):
     env = lidarium.parallel_env(
         floor,
-        **{"robots": 1, "camera": "xtion_tilted", "stop_coverage": None, "map_cells": 32, **options},
-        starts="fixed",
+        **{"starts": "fixed", "robots": 1, "camera": "xtion_tilted", "stop_coverage": None, "map_cells": 32, **options},
     )
     env.reset(seed=0)
     return env

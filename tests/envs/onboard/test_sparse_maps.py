@@ -16,7 +16,7 @@ CAMERA = {"columns": 32, "rows": 24, "pitch": 0.35}
 
 def team(floor=HALL, **options):
     env = lidarium.parallel_env(
-        floor, **{"robots": 2, "camera": CAMERA, "stop_coverage": None, "map_cells": 32, **options}, starts="fixed"
+        floor, **{"starts": "fixed", "robots": 2, "camera": CAMERA, "stop_coverage": None, "map_cells": 32, **options}
     )
     env.reset(seed=0)
     return env, env.perception.sparse_maps

@@ -225,8 +225,7 @@ def driven(floor, targets, decisions=60, robots=2, **options):
         horizon_s=None,
         map_cells=32,
         lidar="lidar_360_6m",
-        **options,
-        starts="fixed",
+        **{"starts": "fixed", **options},
     )
     env.reset(seed=0)
     base = env.unwrapped

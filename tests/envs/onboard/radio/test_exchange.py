@@ -12,7 +12,7 @@ from lidarium.evaluation.episodes.runner import run_episode
 
 def started(robots=3, seed=1, **options):
     env = lidarium.parallel_env(
-        "apartment", robots=robots, lidar="lidar_360_6m", stop_coverage=None, **options, starts="fixed"
+        "apartment", robots=robots, lidar="lidar_360_6m", stop_coverage=None, **{"starts": "fixed", **options}
     )
     env.reset(seed=seed)
     return env

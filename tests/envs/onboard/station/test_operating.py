@@ -24,7 +24,7 @@ def go_to(x, y):
 def hall(level="waypoint", starts=((3.0, 3.0, 0.0), (3.0, 9.0, 0.0)), **options):
     """Return a team in an empty hall, whose robots' map frames begin at their starts, all but the turn."""
     options = {"lidar": "lidar_360_6m", "stop_coverage": None, "known_starts": False, **options}
-    env = lidarium.parallel_env(HALL, level=level, robots=len(starts), **options, starts="fixed")
+    env = lidarium.parallel_env(HALL, level=level, robots=len(starts), **options)
     env.reset(seed=1, options={"starts": [list(start) for start in starts]})
     return env
 

@@ -24,7 +24,7 @@ AHEAD = np.array([0.4, 0.0], np.float32)
 
 def team(starts, floor=HALL, level="velocity", **options):
     options = {"lidar": "lidar_360_6m", "stop_coverage": None, "known_starts": False, **options}
-    env = lidarium.parallel_env(floor, level=level, robots=len(starts), **options, starts="fixed")
+    env = lidarium.parallel_env(floor, level=level, robots=len(starts), **options)
     env.reset(seed=1, options={"starts": [list(start) for start in starts]})
     return env
 

@@ -22,7 +22,7 @@ ALL = ["robot_0", "robot_1", "robot_2"]
 def team(floor=HALL, robots=3, turns=0, **options):
     """Robots that do not know where the others start, and how their frames truly lie."""
     env = lidarium.parallel_env(
-        floor, robots=robots, known_starts=False, map_cells=32, **{"resolution": 0.05, **options}, starts="fixed"
+        floor, robots=robots, known_starts=False, map_cells=32, **{"resolution": 0.05, **options}
     )
     env.reset(seed=0, options={"starts": STARTS[:robots]})
     for _ in range(turns):

@@ -18,7 +18,7 @@ PLACES = np.array([[10.0, 10.0], [12.0, 10.0]])
 def run(*faults, steps=30, action=(0.4, 0.0), robots=2, **options):
     """Drive straight ahead with faults; return the environment and what every step returned."""
     env = lidarium.parallel_env(
-        HALL, robots=robots, faults=FaultSettings(schedule=faults), stop_coverage=None, **options, starts="fixed"
+        HALL, robots=robots, faults=FaultSettings(schedule=faults), stop_coverage=None, **{"starts": "fixed", **options}
     )
     env.reset(seed=1, options={"starts": [[4.0, 4.0 + 4.0 * k, 0.0] for k in range(robots)]})
     outcomes = [

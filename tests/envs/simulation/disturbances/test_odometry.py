@@ -18,7 +18,7 @@ FORWARD, TURNING = (0.4, 0.0), (0.0, 0.3)
 def drive(action, steps=40, robots=1, seed=1, **options):
     """Drive the same way from the middle of a free floor; return the world."""
     options = {"localization": "odometry", "stop_coverage": None, "lidar": "lidar_360_6m", **options}
-    env = lidarium.parallel_env(HALL, robots=robots, **options, starts="fixed")
+    env = lidarium.parallel_env(HALL, robots=robots, **{"starts": "fixed", **options})
     env.reset(seed=seed, options={"starts": [[4.0, 4.0 + 2.0 * k, 0.0] for k in range(robots)]})
     for _ in range(steps):
         env.step({agent: np.array(action, np.float32) for agent in env.agents})
