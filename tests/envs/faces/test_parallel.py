@@ -415,8 +415,8 @@ def test_state_is_the_truth_of_the_whole_team():
 
 
 def test_default_settings_are_a_team_of_three_for_ten_minutes():
-    env = lidarium.parallel_env(starts="fixed")
-    assert env.settings == ExplorationSettings(observe=("scan", "velocity", "bumper", "map"))
+    env = lidarium.parallel_env()
+    assert env.settings == ExplorationSettings(observe=("scan", "velocity", "bumper", "map"), starts="drawn")
     assert len(env.possible_agents) == 3
     env.reset(seed=0)
     assert env.floor.name == "apartment"

@@ -1,5 +1,6 @@
-"""Where robots start: at the floor's starts, or anywhere; alone, in batches, and by options of a reset."""
+"""Where robots start: drawn by the seed, at the floor's starts, or where a reset says; alone and in batches."""
 
+import gymnasium
 import numpy as np
 import pytest
 
@@ -13,20 +14,46 @@ def begun(env, seed, **options):
     return env.unwrapped.world.starts.copy()
 
 
-def test_one_floor_has_fixed_starts_unless_drawn_ones_are_asked_for():
-    fixed = lidarium.parallel_env("apartment", **SMALL, starts="fixed")
-    drawn = lidarium.parallel_env("apartment", starts="drawn", **SMALL)
-    assert np.array_equal(begun(fixed, 0), begun(fixed, 1))
-    assert not np.array_equal(begun(drawn, 0), begun(drawn, 1))
-    assert np.array_equal(begun(drawn, 0), begun(drawn, 0))
-
-
-@pytest.mark.parametrize("floor", ["set:test:1", ["apartment"]])
-def test_floors_that_are_drawn_have_drawn_starts_unless_fixed_ones_are_asked_for(floor):
-    drawn = lidarium.parallel_env(floor, **SMALL, starts="fixed")
+@pytest.mark.parametrize("floor", ["apartment", "set:test:1", ["apartment"]])
+def test_makers_draw_starts_by_the_seed_unless_fixed_ones_are_asked_for(floor):
+    drawn = lidarium.parallel_env(floor, **SMALL)
     fixed = lidarium.parallel_env(floor, starts="fixed", **SMALL)
-    assert not np.array_equal(begun(drawn, 0), begun(drawn, 1))
+    assert np.abs(begun(drawn, 0) - begun(drawn, 1)).max() > 0.1
+    assert np.array_equal(begun(drawn, 0), begun(drawn, 0))
     assert np.array_equal(begun(fixed, 0)[0], begun(fixed, 1)[0])
+
+
+def test_every_face_draws_the_same_starts_for_a_seed():
+    alone = [begun(lidarium.parallel_env(**SMALL), seed) for seed in (3, 4, 5)]
+    batch = lidarium.vector_env(3, **SMALL)
+    batch.reset(seed=3)
+    assert np.array_equal(batch.engine.world.starts.reshape(3, 2, 3), alone)
+    assert np.array_equal(begun(lidarium.env(**SMALL), 3), alone[0])
+    one = {**SMALL, "robots": 1}
+    solo = gymnasium.make("lidarium/Exploration-v1", **one).unwrapped.parallel
+    assert np.array_equal(begun(solo, 3), begun(lidarium.parallel_env(**one), 3))
+
+
+def test_rows_for_learners_draw_the_same_starts():
+    pytest.importorskip("stable_baselines3")
+    batch = lidarium.sb3_vec_env(3, **SMALL)
+    batch.seed(3)
+    batch.reset()
+    alone = [begun(lidarium.parallel_env(**SMALL), seed) for seed in (3, 4, 5)]
+    assert np.array_equal(batch.engine.world.starts.reshape(3, 2, 3), alone)
+    assert repr(batch) == "<ExplorationVecEnv: 6 rows = 3 episodes x 2 robots>"
+
+
+def test_settings_that_name_no_starts_leave_the_default_and_others_hold():
+    env = lidarium.parallel_env(settings=lidarium.make_settings(robots=2))
+    assert np.abs(begun(env, 3) - begun(env, 4)).max() > 0.1
+    env = lidarium.parallel_env(settings=lidarium.make_settings(robots=2, starts="fixed"))
+    assert begun(env, 3) == pytest.approx(lidarium.load_floor("apartment").starts[:2])
+
+
+def test_a_run_of_one_floor_takes_its_starts():
+    env = lidarium.ExplorationEnv("apartment", lidarium.make_settings(robots=2))
+    assert begun(env, 3) == pytest.approx(lidarium.load_floor("apartment").starts[:2])
 
 
 def test_an_option_of_a_reset_goes_before_the_setting():
