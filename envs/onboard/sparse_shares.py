@@ -86,11 +86,13 @@ def bytes_to_send(held: SparseShare | None, copy: SparseShare | None) -> int:
     """Return the bytes that bring an older copy of a map up to date: what is new, and the numbers of what is gone."""
     if held is None or held is copy or (copy is not None and held.version == copy.version):
         return 0
-    parts = [(BOX_BYTES, held.boxes, copy and copy.boxes)]
-    parts += [(NODE_BYTES, held.trail, copy and copy.trail), (NODE_BYTES, held.free, copy and copy.free)]
+    rows = (
+        _bytes_of_rows(BOX_BYTES, held.boxes, None if copy is None else copy.boxes)
+        + _bytes_of_rows(NODE_BYTES, held.trail, None if copy is None else copy.trail)
+        + _bytes_of_rows(NODE_BYTES, held.free, None if copy is None else copy.free)
+    )
     blocks = np.setxor1d(_seen(held), np.zeros(0, np.int64) if copy is None else _seen(copy)) // GROUND_BLOCK
-    ground = GROUND_BLOCK_BYTES * len(np.unique(blocks))
-    return ground + sum(_bytes_of_rows(*each) for each in parts)
+    return rows + GROUND_BLOCK_BYTES * len(np.unique(blocks))
 
 
 def _bytes_of_rows(size: int, held: NDArray[np.float64], copy: NDArray[np.float64] | None) -> int:
