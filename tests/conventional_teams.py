@@ -11,7 +11,7 @@ AHEAD = np.array([1.0, 0.2], np.float32)
 
 
 def make(floor="scene_room", **options):
-    return lidarium.parallel_env(floor, **{**OPTIONS, **options})
+    return lidarium.parallel_env(floor, **{"starts": "fixed", **OPTIONS, **options})
 
 
 def step(env, action=AHEAD):

@@ -6,7 +6,9 @@ import lidarium
 
 
 def driven(steps=30, **options):
-    env = lidarium.parallel_env("building:5", **{"robots": 3, "stop_coverage": None, "map_cells": 64, **options})
+    env = lidarium.parallel_env(
+        "building:5", **{"starts": "fixed", "robots": 3, "stop_coverage": None, "map_cells": 64, **options}
+    )
     env.reset(seed=2)
     generator = np.random.default_rng(0)
     for _ in range(steps):

@@ -40,6 +40,9 @@ LOST_S = 2.0
 """An order that a robot has not taken after this long has not reached it [s]."""
 
 
+DONE_RULE = 5
+"""The rule that no frontier is left."""
+
 DIRECTED = "directed"
 """Info: whether the station drives a robot now, so that an action for it is not carried out."""
 
@@ -63,8 +66,9 @@ class _Errands:
         self._team = team
         self._errands: dict[str, _Errand] = {}
 
-    def __len__(self) -> int:
-        return len(self._errands)
+    def has_any(self, agents: Sequence[str]) -> bool:
+        """Whether any of some robots has an errand."""
+        return any(agent in self._errands for agent in agents)
 
     def begin(self, command: Command) -> None:
         """Send a robot to the target of a command, unless both that and its errand lead home."""
@@ -354,7 +358,8 @@ class Supervised(Policy):
         stops, standing = self._stops, self._supervisor.standing_by
         self._exploring.clear()
         self._exploring.update(self._free)
-        is_work_left = any(not isinstance(action, Stop) for action in actions.values()) or len(self._errands) > 0
+        # Errands of robots that others drive, or that have ended, are no work of these.
+        is_work_left = any(not isinstance(action, Stop) for action in actions.values()) or self._errands.has_any(agents)
         for agent in agents:
             if agent in stops:
                 actions[agent] = stops[agent]
@@ -437,10 +442,12 @@ class Supervised(Policy):
     def _obey(self, command: Command, stops: dict[str, Action]) -> None:
         """Begin a robot's order."""
         agent = command.agent
+        if command.rule == DONE_RULE and "depth" in self.observes:
+            return  # no frontier is left for lasers, but cameras may have ground to see: the policy stops its robots
         if command.kind is OrderKind.STOP:
             self._errands.cancel(agent)
             if agent not in self._supervisor.standing_by or self.settings.is_stop_final:
-                stops[agent] = Order(OrderKind.STOP, reason="no_frontier" if command.rule == 5 else "stopped")
+                stops[agent] = Order(OrderKind.STOP, reason="no_frontier" if command.rule == DONE_RULE else "stopped")
         elif command.kind in (OrderKind.PAUSE, OrderKind.RESUME):
             stops[agent] = Order(command.kind, reason=f"rule {command.rule}: {command.why}")
             if command.kind is OrderKind.PAUSE:

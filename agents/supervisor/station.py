@@ -2,6 +2,7 @@
 
 from collections import deque
 from collections.abc import Mapping
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
@@ -247,7 +248,7 @@ class MergeStation:
             return None
         maps = [self._map_without_bodies(agent) for agent in frames]
         positions = [frame @ placed(one.origin) for one, frame in zip(maps, frames.values(), strict=True)]
-        return fuse([one.levels for one in maps], positions, self.resolution)
+        return replace(fuse([one.levels for one in maps], positions, self.resolution), frames=frames)
 
     def team_maps(self) -> TeamMaps:
         """Return how the maps of all robots lie, with the merged map of each group."""

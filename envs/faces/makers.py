@@ -27,6 +27,8 @@ def parallel_env(
 ) -> "ExplorationEnv":
     """Make the environment of a team (PettingZoo parallel API).
 
+    Robots start at poses drawn by the seed, by default; ``starts="fixed"`` takes the starts of the floor.
+
     Parameters
     ----------
     floor : str, Path, Floor, sequence, mapping or callable, optional
@@ -95,6 +97,8 @@ def vector_env(
 ) -> "ExplorationVectorEnv":
     """Make many episodes as one Gymnasium vector environment, stepped by one kernel call.
 
+    Each episode draws its start poses by default, as `parallel_env` does.
+
     Parameters
     ----------
     episodes : int
@@ -129,10 +133,10 @@ def sb3_vec_env(
     floor: Floors = "apartment",
     **options: Any,  # noqa: ANN401
 ) -> "ExplorationVecEnv":
-    """Make the rows of `vector_env` for stable-baselines3; it needs ``lidarium[rl]``.
+    """Make many episodes for stable-baselines3, with a row for each robot; it needs ``lidarium[rl]``.
 
-    A row is a robot of an episode: ``num_envs`` is episodes x robots, 48 for 16 episodes of the default team of three.
-    An episode begins again in the step that ends it.
+    ``num_envs`` is episodes x robots: ``sb3_vec_env(16)`` has 48 rows, 16 episodes of the default team of three.
+    An episode begins again in the step that ends it. Each draws its start poses by default.
 
     Raises
     ------

@@ -14,7 +14,7 @@ from lidarium.envs.faces.randomized import RandomizedRows
 from lidarium.envs.faces.requests import options_of, seeds_of
 from lidarium.envs.faces.team_rows import ACTIVE
 from lidarium.envs.faces.teams import make_rows
-from lidarium.envs.faces.vector_env import check_render_mode
+from lidarium.envs.faces.vector_env import batch_text, check_render_mode
 from lidarium.envs.floors.floor_choice import Floors
 from lidarium.envs.settings.reset_options import Curriculum, ResetOptions, read_options
 
@@ -71,6 +71,9 @@ class ExplorationVecEnv(VecEnv):
         self._chosen: dict[int, ResetOptions] = {}
         self._is_closed = False
         super().__init__(self.batch.rows, self.batch.space, self.batch.action_space)
+
+    def __repr__(self) -> str:
+        return batch_text(self)
 
     def reset(self) -> Any:  # noqa: ANN401
         """Begin all episodes.

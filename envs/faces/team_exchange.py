@@ -180,6 +180,9 @@ class TeamExchange:
         self._due = steps - steps % self._steps + self._steps
         time_s, truth = self.time_s, frames_of(self._perception, self._episode)
         joined = self.team.exchange(self._clusters(time_s), time_s, truth if self._merging.known_starts else None)
+        for (a, b), (a_from_b, *_) in joined.items():
+            self._exchange_sparse(a, b, a_from_b)
+            self._exchange_sparse(b, a, a_from_b.inverse())
         news = []
         for (a, b), (found, at, is_direct) in joined.items():
             if (a, b) in self._joined:
@@ -191,6 +194,16 @@ class TeamExchange:
         self.events += news
         self._joined = set(joined)
         return news
+
+    def _exchange_sparse(self, to: str, other: str, own_from_other: Transform) -> None:
+        """Give a robot the sparse map of another, as it has come by radio, or at once if all hear each other."""
+        perception = self._perception
+        robot, source = self._agents.index(to), self._agents.index(other)
+        if perception.exchanges:
+            share = perception.exchanges[self._episode].sparse[robot][source]
+        else:
+            share = perception.sparse_maps.share(self._first + source)
+        perception.sparse_maps.receive(self._first + robot, self._first + source, share, own_from_other)
 
     def _clusters(self, time_s: float) -> list[list[str]]:
         """Return the robots that reach each other, some through others."""

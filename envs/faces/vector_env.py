@@ -99,6 +99,9 @@ class ExplorationVectorEnv(VectorEnv[Any, NDArray[Any], NDArray[Any]]):
         self.action_space = batch_space(self.batch.action_space, self.num_envs)
         self.closed = False
 
+    def __repr__(self) -> str:
+        return batch_text(self)
+
     def _period_s(self, level: str) -> float:
         return self.settings.time_step if level == "velocity" else self.settings.decision_period_s
 
@@ -224,6 +227,12 @@ def _mode(mode: AutoresetMode | str) -> AutoresetMode:
     if found is AutoresetMode.DISABLED:
         raise ValueError(f"autoreset_mode is {mode!r}; want NextStep or SameStep")
     return found
+
+
+def batch_text(env: Any) -> str:  # noqa: ANN401
+    """Return the representation of a batch: its rows as episodes x robots."""
+    batch = env.batch
+    return f"<{type(env).__name__}: {batch.rows} rows = {batch.episodes} episodes x {batch.robots} robots>"
 
 
 def check_render_mode(render_mode: str | None) -> None:

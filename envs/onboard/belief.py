@@ -96,9 +96,9 @@ class Belief:
 
     @property
     def shared_sparse_map(self) -> SparseBelief:
-        """The sparse maps of the team if they reach this robot at once, otherwise its own map.
+        """The own sparse map and those of others as they have reached this robot; all robots make maps from now on.
 
-        They do not with unknown starts or if the radio is not ideal.
+        With known starts the radio brings them; with unknown starts they come when the maps of robots are joined.
         """
         return self._perception.sparse_maps.belief(self._row)
 

@@ -89,7 +89,7 @@ class Perception:
         self.poses = KnownPoses(simulation, settings, offsets, self.exchanges)
         self.received = ReceivedMaps(simulation, settings, self.poses, self.exchanges)
         self.trails = ForgottenTrails(simulation, settings, self.poses, self._fresh_at)
-        self.sparse_maps = SparseMaps(simulation, settings, self.poses)
+        self.sparse_maps = SparseMaps(simulation, settings, self.poses, self.exchanges)
         self.meters: Meters | None = None
 
     @property

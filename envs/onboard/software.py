@@ -113,7 +113,7 @@ class Software:
             self._settings,
             self._perception.exchanges[episode],
         )
-        exchange.step()
+        exchange.step(self._perception.sparse_maps.shares(episode))
         if not settings.known_starts:
             return
         rows = slice(episode * settings.robots, (episode + 1) * settings.robots)

@@ -1,14 +1,16 @@
 """The sparse maps of the robots of all episodes, made from when they are first asked for."""
 
 import math
-from collections.abc import Iterable
+from collections.abc import Hashable, Iterable
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.envs.onboard.known_poses import KnownPoses
+from lidarium.envs.onboard.radio.exchange import Exchange
 from lidarium.envs.onboard.sparse_belief import SparseBelief
+from lidarium.envs.onboard.sparse_shares import SparseShare
 from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.simulation.depth.point_cloud import camera_pose
 from lidarium.envs.simulation.kernels.arrays import ENDED
@@ -120,12 +122,29 @@ class SparseMapper:
         # At which steps images were coded, and showed new ground.
         self._coded: list[int] = []
         self._viewed: list[int] = []
+        self._share: SparseShare | None = None
         self.axes, self.version, self.corrections = axes, 0, 0
 
     @property
     def map(self) -> SparseMap | None:
         """The map; None before the first image that shows anything."""
         return self._mapper.map if self._coded else None
+
+    def share(self) -> SparseShare:
+        """Return the map as it is now, to be sent or combined; it stays as it is."""
+        if self._share is None or self._share.version != self.version:
+            made, ground = self.map, self.ground
+            self._share = SparseShare(
+                boxes=np.empty((0, 2, 3)) if made is None else made.boxes,
+                trail=self.trail,
+                free=np.empty((0, 3)) if made is None else made.free,
+                cells=ground.cells.copy(),
+                low=ground.low.copy(),
+                cell_m=ground.cell_m,
+                axes=self.axes or 0.0,
+                version=self.version,
+            )
+        return self._share
 
     @property
     def trail(self) -> NDArray[np.float64]:
@@ -247,6 +266,11 @@ class SparseMapper:
         return np.asarray(points[~is_body])
 
 
+def _now(mapper: SparseMapper) -> SparseShare:
+    """Return a robot's map with its trail up to now."""
+    return replace(mapper.share(), trail=mapper.trail)
+
+
 def _sparse_body(settings: ExplorationSettings) -> SweptBody:
     """Return the body by which a robot plans on sparse maps."""
     return SweptBody(radius=settings.robot.radius, height=settings.robot.height + BODY_HEIGHT_MARGIN_M)
@@ -262,7 +286,8 @@ HEARD_MARGIN_M = 0.4
 class SparseMaps:
     """Sparse maps by row = episode * robots + robot.
 
-    Robots that know each other's starts, and hear each other at once, plan on their combined map.
+    Robots that know each other's starts combine their maps as the radio brings them; robots that do not are given the
+    maps of those with whom they were joined, with the transform that was found.
 
     Parameters
     ----------
@@ -272,20 +297,26 @@ class SparseMaps:
         The team of every episode.
     poses : KnownPoses
         Poses of the robots and others as known to the robots.
+    exchanges : list of Exchange
+        The radio traffic of each episode; none if the radio is ideal.
     """
 
-    def __init__(self, simulation: Simulation, settings: ExplorationSettings, poses: KnownPoses) -> None:
-        self._simulation, self._settings, self._known_poses = simulation, settings, poses
+    def __init__(
+        self, simulation: Simulation, settings: ExplorationSettings, poses: KnownPoses, exchanges: list[Exchange]
+    ) -> None:
+        self._simulation, self._settings, self._known_poses, self._exchanges = simulation, settings, poses, exchanges
         self._mappers: dict[int, SparseMapper] = {}
-        self._made: dict[tuple[int, int], tuple[tuple[int, ...], SparseNavigation]] = {}
-        self._shares = settings.known_starts and settings.robots > 1 and settings.radio.is_ideal
+        self._received: dict[int, dict[int, tuple[SparseShare, Transform]]] = {}
+        self._made: dict[tuple[int, bool], tuple[Hashable, SparseNavigation]] = {}
+        self._is_common = settings.known_starts and settings.robots > 1 and settings.radio.is_ideal
 
     def start(self, rows: Iterable[int]) -> None:
         """Begin the episode of some rows; no maps are requested yet."""
         for row in rows:
             self._mappers.pop(row, None)
-            for count in (1, self._settings.robots):
-                self._made.pop((row, count), None)
+            self._received.pop(row, None)
+            for shares_map in (False, True):
+                self._made.pop((row, shares_map), None)
 
     @property
     def made(self) -> dict[int, SparseMapper]:
@@ -300,25 +331,63 @@ class SparseMaps:
         """Return the mapper of a robot; the first call creates it."""
         mapper = self._mappers.get(row)
         if mapper is None:
-            # Robots that share their maps have common axes.
-            shared = [self._mappers[each].axes for each in self._sharing(row, True) if each in self._mappers]
-            mapper = self._mappers[row] = SparseMapper(self._settings, shared[0] if shared else None)
+            # Robots that have one map have common axes.
+            team = self._team(row) if self._is_common else ()
+            common = [self._mappers[each].axes for each in team if each in self._mappers]
+            mapper = self._mappers[row] = SparseMapper(self._settings, common[0] if common else None)
             self._sense(row, mapper)
         return mapper
 
     def belief(self, row: int, shares_map: bool = True) -> SparseBelief:
-        """Return the belief of a robot, in its map frame, up to date."""
+        """Return the belief of a robot, in its map frame, up to date; with others' maps if the team shares its maps.
+
+        The first call lets the robot make a map, with ``shares_map`` all robots of its team.
+        """
         own = self.of(row)
-        sharing = self._sharing(row, shares_map)
-        mappers = [self.of(each) for each in sharing]
-        versions = tuple(mapper.version for mapper in mappers)
-        key = (sharing.start, len(sharing))
-        made = self._made.get(key)
-        if made is None or made[0] != versions:
-            made = self._made[key] = (versions, self._navigation(mappers))
+        mappers = [self.of(each) for each in self._team(row)] if shares_map else [own]
+        if shares_map and self._is_common:
+            # The team has one map, in the order of its robots.
+            shares, place = [(_now(mapper), Transform()) for mapper in mappers], self._team(row).start
+        else:
+            shares, place = [(_now(own), Transform()), *(self._others(row) if shares_map else ())], row
+        axes = own.axes or 0.0
+        key = (axes, tuple((share.version, share.axes, transform) for share, transform in shares))
+        made = self._made.get((place, shares_map))
+        if made is None or made[0] != key:
+            onto = Transform(0.0, 0.0, -axes)
+            moved = [share.moved(onto @ transform @ Transform(0.0, 0.0, share.axes)) for share, transform in shares]
+            made = self._made[place, shares_map] = (key, self._navigation(moved, own.trail))
         x, y = self._known_poses.offset(row)
-        frame = Transform(-float(x), -float(y)) @ Transform(0.0, 0.0, own.axes or 0.0)
+        frame = Transform(-float(x), -float(y)) @ Transform(0.0, 0.0, axes)
         return SparseBelief(replace(made[1], trail=own.trail), frame, own.ground.camera, own.corrections)
+
+    def share(self, row: int) -> SparseShare | None:
+        """Return the map that a robot has made so far; None if it makes none."""
+        return self._mappers[row].share() if row in self._mappers else None
+
+    def shares(self, episode: int) -> list[SparseShare | None]:
+        """Return the maps of the robots of an episode; empty if nobody makes one."""
+        team = self._team(episode * self._settings.robots)
+        return [self.share(row) for row in team] if any(row in self._mappers for row in team) else []
+
+    def receive(self, row: int, other: int, share: SparseShare | None, own_from_other: Transform) -> None:
+        """Give a robot the map of another, and how the other's map frame lies in its own."""
+        if share is not None and other != row:
+            self._received.setdefault(row, {})[other] = (share, own_from_other)
+
+    def forget_others(self, row: int) -> None:
+        """Let a robot forget the maps that it was given."""
+        self._received.pop(row, None)
+
+    def _others(self, row: int) -> list[tuple[SparseShare, Transform]]:
+        """Return the maps of others that have reached a robot, and how their believed poses lie in its own."""
+        if not self._settings.known_starts:
+            return [given for _, given in sorted(self._received.get(row, {}).items())]
+        if not self._exchanges:
+            return []
+        episode, robot = divmod(row, self._settings.robots)
+        copies = self._exchanges[episode].sparse[robot]
+        return [(share, Transform()) for other, share in enumerate(copies) if other != robot and share is not None]
 
     def sense(self, runs: NDArray[np.bool_] | None = None) -> None:
         """Process the last step, of all episodes or of those with ``runs`` (episodes,)."""
@@ -332,10 +401,11 @@ class SparseMaps:
         if row in self._mappers:
             self._mappers[row].correct(scans)
 
-    def _sharing(self, row: int, shares_map: bool) -> range:
+    def _team(self, row: int) -> range:
+        """Return the rows of a robot's team."""
         robots = self._settings.robots
         first = row // robots * robots
-        return range(first, first + robots) if shares_map and self._shares else range(row, row + 1)
+        return range(first, first + robots)
 
     def _sense(self, row: int, mapper: SparseMapper) -> None:
         camera = self._simulation.camera
@@ -360,14 +430,13 @@ class SparseMaps:
             ]
         ).reshape(-1, 3)
 
-    def _navigation(self, mappers: list[SparseMapper]) -> SparseNavigation:
-        """Return the combined map of some robots, along the axes that they share."""
-        maps = [mapper.map for mapper in mappers if mapper.map is not None]
-        boxes = np.concatenate([np.empty((0, 2, 3)), *(each.boxes for each in maps)])
+    def _navigation(self, shares: list[SparseShare], trail: NDArray[np.float64]) -> SparseNavigation:
+        """Return the combined map of some robots, along the same axes."""
+        boxes = np.concatenate([share.boxes for share in shares])
         # A robot can drive along its trail.
-        nodes = np.concatenate([*(mapper.trail for mapper in mappers), *(each.free for each in maps)])
+        nodes = np.concatenate([*(share.trail for share in shares), *(share.free for share in shares)])
         body, sparse = _sparse_body(self._settings), self._settings.sparse_map
-        cells, low = joined_ground([mapper.ground for mapper in mappers])
+        cells, low = joined_ground(shares)
         x, y = (low * sparse.cell_m).tolist()
         ground = ground_map(cells, (x, y), sparse.cell_m, boxes, body)
-        return sparse_navigation(nodes, boxes, ground, mappers[0].trail, body, sparse.margin_m)
+        return sparse_navigation(nodes, boxes, ground, trail, body, sparse.margin_m)

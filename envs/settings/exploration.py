@@ -118,8 +118,8 @@ class ExplorationSettings:
     known_starts : bool
         Whether the robots know their start poses; otherwise each believes to start at (0, 0, 0).
     starts : str or None
-        Start poses: ``fixed`` uses the starts of the floor as far as it has some; ``drawn`` random ones. None draws
-        them if each episode draws its floor, and uses the fixed ones otherwise.
+        Start poses: ``fixed`` uses the starts of the floor as far as it has some; ``drawn`` draws them by the seed.
+        None is ``drawn`` for the makers of environments and if each episode draws its floor, else ``fixed``.
     reveals_starts : bool
         Whether reports include the true starts of robots with unknown starts, as a bound for the results of map
         merging.

@@ -132,10 +132,11 @@ def make_settings(settings: ExplorationSettings | None = None, **options: Any) -
 def makers_settings(settings: ExplorationSettings | None, options: Mapping[str, Any]) -> ExplorationSettings:
     """Fill settings as ``make_settings``, for makers of training environments.
 
-    By default, robots observe ``LEARNERS_SEE`` if neither settings nor ``observe`` are given.
+    By default start poses are drawn, and robots observe ``LEARNERS_SEE`` if neither settings nor ``observe`` are given.
     """
     observe = {} if settings is not None or "observe" in options else {"observe": LEARNERS_SEE}
-    return make_settings(settings, **observe, **options)
+    made = make_settings(settings, **observe, **options)
+    return replace(made, starts="drawn") if made.starts is None else made
 
 
 def _horizon(max_cycles: Any, options: Mapping[str, Any], base: ExplorationSettings) -> float:  # noqa: ANN401

@@ -4,8 +4,8 @@ It holds the sum of their log-odds in a common frame, and which maps know each c
 """
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,6 +40,8 @@ class FusedMap:
         Lower left corner of cell (0, 0) in the common frame [m], a whole number of cells.
     resolution : float
         Side of a cell [m].
+    frames : mapping of str to Transform
+        By the names of the robots whose maps are in it, if these are known: map their frames into the common one.
     """
 
     levels: NDArray[np.uint8]
@@ -47,6 +49,7 @@ class FusedMap:
     sources: NDArray[np.uint64]
     origin: tuple[float, float]
     resolution: float
+    frames: Mapping[str, Transform] = field(default_factory=dict)
 
 
 def fuse(maps: Sequence[NDArray[np.uint8]], common_from_map: Sequence[Transform], resolution: float) -> FusedMap:

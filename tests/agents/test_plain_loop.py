@@ -1,25 +1,53 @@
 """Policies in a plain loop: a team, some of its robots, every level that carries them out, rows of a batch."""
 
+import copy
 import math
 
 import numpy as np
 import pytest
 
 import lidarium
+from lidarium import Floor, Solid, registry
 from lidarium.agents import policy_names
 
 HORIZON_S = 12.0
-CAMERA = {"camera": "xtion_tilted", "observe": ("scan", "pose", "depth")}
+CAMERA = {"camera": {"columns": 80, "rows": 60, "pitch": 0.35}, "observe": ("scan", "pose", "depth")}
 NEEDS = {"sparse_frontier": CAMERA, "random_walk": {"observe": ("scan", "pose", "bumper")}}
 NAMES = sorted(policy_names())
-OF_WAYPOINTS = [name for name in NAMES if lidarium.policy(name).level == "waypoint"]
+LEVELS = ("velocity", "waypoint", "frontier")
+CARRIED = [
+    (name, level)
+    for name in NAMES
+    for level, own in ((level, lidarium.policy(name).level) for level in LEVELS)
+    if level == own or own in registry("level")[level].carries
+]
+
+
+def _block(x, y, width, depth):
+    return Solid(np.array([[x, y], [x + width, y], [x + width, y + depth], [x, y + depth]]), 0.0, 2.0)
+
+
+TWO_ROOMS = Floor(
+    "two_rooms",
+    (0.0, 0.0, 7.0, 4.5),
+    (_block(3.4, 0.0, 0.2, 1.6), _block(3.4, 2.6, 0.2, 1.9), _block(5.0, 2.0, 0.6, 0.6)),
+    starts=np.array([[1.0, 1.0, 0.5], [1.0, 3.0, -0.5], [2.5, 2.0, 0.3]]),
+)
 
 
 def options_for(name, **more):
     unknown = {"known_starts": False} if "supervised" in name else {}
     if name == "oracle_starts":
         unknown = {"known_starts": False, "reveals_starts": True}
-    return {"robots": 3, "horizon_s": HORIZON_S, "map_cells": 64, **unknown, **NEEDS.get(name, {}), **more}
+    return {
+        "robots": 3,
+        "horizon_s": HORIZON_S,
+        "starts": "fixed",
+        "map_cells": 64,
+        **unknown,
+        **NEEDS.get(name, {}),
+        **more,
+    }
 
 
 def run(env, policy, seed=3):
@@ -36,10 +64,10 @@ def run(env, policy, seed=3):
 @pytest.mark.parametrize("name", NAMES)
 def test_every_policy_runs_in_a_plain_loop_as_run_episode_runs_it(name):
     policy = lidarium.policy(name)
-    env = lidarium.parallel_env("apartment", level=policy.level, **options_for(name))
+    env = lidarium.parallel_env(TWO_ROOMS, level=policy.level, **options_for(name))
     env.use_level(policy.level, policy.shares_map, policy.decision_period_s)
     poses = run(env, policy)
-    other = lidarium.parallel_env("apartment", **options_for(name))
+    other = lidarium.parallel_env(TWO_ROOMS, **options_for(name))
     lidarium.run_episode(lidarium.policy(name), other, seed=3)
     assert len(poses) > 5
     assert np.array_equal(poses[-1], other.world.poses)
@@ -47,25 +75,45 @@ def test_every_policy_runs_in_a_plain_loop_as_run_episode_runs_it(name):
     assert env.scorer.ended_because == other.scorer.ended_because
 
 
-@pytest.mark.parametrize("level", ["velocity", "waypoint", "frontier"])
-@pytest.mark.parametrize("name", ["nearest_frontier", "tour_frontier", "learned", "supervised"])
-def test_a_policy_of_waypoints_drives_one_robot_among_others_at_every_level(name, level):
-    env = lidarium.parallel_env("apartment", level=level, **options_for(name))
-    policy = lidarium.policy(name)
-    observations, _ = env.reset(seed=1)
-    policy.reset(env, seed=1)
-    start = env.world.poses[0, :2].copy()
-    others = {agent: env.action_space(agent) for agent in env.agents[1:]}
-    for agent, space in others.items():
-        space.seed(env.possible_agents.index(agent))
-    while env.agents:
-        actions = policy.act(observations, agents=["robot_0"]) if "robot_0" in env.agents else {}
-        assert set(actions) <= {"robot_0"}
-        actions |= {agent: space.sample() for agent, space in others.items() if agent in env.agents}
-        observations, *_ = env.step(actions)
-        observations = {agent: observations[agent] for agent in env.agents}
-    assert np.linalg.norm(env.world.poses[0, :2] - start) > 1.0
-    assert env.world.collisions[0] == 0
+class BesideLearner:
+    """A policy that drives one robot beside a learner, which draws the actions of the others."""
+
+    def __init__(self, name, agent, space, seed):
+        self.policy, self._agent, self._space = lidarium.policy(name), agent, space
+        self._space.seed(seed)
+
+    def act(self, agents, observations):
+        actions = self.policy.act(observations, agents=[self._agent]) if self._agent in agents else {}
+        assert set(actions) <= {self._agent}
+        return {**{agent: self._space.sample() for agent in agents}, **actions}
+
+
+@pytest.mark.parametrize(("name", "level"), CARRIED)
+def test_every_policy_drives_one_robot_beside_a_learner_at_every_level_alone_and_in_each_row_of_a_batch(name, level):
+    options = options_for(name, robots=2, horizon_s=4.0, resolution=0.1, map_cells=32)
+    driven = ("robot_0", "robot_1")
+    batch = lidarium.vector_env(2, TWO_ROOMS, level=level, reports=True, **options)
+    batch.reset(seed=5)
+    drivers = [BesideLearner(name, driven[k], copy.deepcopy(batch.single_action_space), 5 + k) for k in range(2)]
+    for episode, driver in enumerate(drivers):
+        driver.policy.reset(batch.team(episode), seed=5 + episode)
+    poses = []
+    while not any(batch.batch.is_over):
+        teams = [batch.team(episode) for episode in range(2)]
+        batch.step([driver.act(team.agents, team.observations) for driver, team in zip(drivers, teams, strict=True)])
+        poses.append(batch.engine.world.poses.copy())
+    for episode, agent in enumerate(driven):
+        env = lidarium.parallel_env(TWO_ROOMS, level=level, **options)
+        driver = BesideLearner(name, agent, copy.deepcopy(env.action_space(agent)), 5 + episode)
+        observations, _ = env.reset(seed=5 + episode)
+        driver.policy.reset(env, seed=5 + episode)
+        robot = env.possible_agents.index(agent)
+        start = env.world.poses[robot].copy()
+        for in_batch in poses:
+            observations, *_ = env.step(driver.act(env.agents, observations))
+            assert np.array_equal(env.world.poses, in_batch[2 * episode : 2 * episode + 2])
+        assert np.abs(env.world.poses[robot] - start).max() > 0.1
+        assert env.world.collisions[robot] == 0
 
 
 @pytest.mark.parametrize("name", ["nearest_frontier", "tour_frontier", "supervised"])
@@ -81,11 +129,11 @@ def test_a_team_at_the_level_of_velocities_decides_and_drives_as_at_that_of_wayp
     assert ended["velocity"] == pytest.approx(ended["waypoint"], rel=0.05)
 
 
-@pytest.mark.parametrize("name", ["tour_frontier", "supervised", "srt"])
-def test_a_policy_drives_an_episode_of_a_batch_as_it_drives_a_single_environment(name):
-    options = options_for(name)
+@pytest.mark.parametrize("name", NAMES)
+def test_every_policy_drives_an_episode_of_a_batch_as_it_drives_a_single_environment(name):
+    options = options_for(name, robots=2, horizon_s=6.0, resolution=0.1, map_cells=32)
     level = lidarium.policy(name).level
-    batch = lidarium.vector_env(2, "apartment", level=level, reports=True, **options)
+    batch = lidarium.vector_env(2, TWO_ROOMS, level=level, reports=True, **options)
     policies = [lidarium.policy(name) for _ in range(2)]
     batch.reset(seed=5)
     for episode, policy in enumerate(policies):
@@ -95,10 +143,11 @@ def test_a_policy_drives_an_episode_of_a_batch_as_it_drives_a_single_environment
         teams = [batch.team(episode) for episode in range(2)]
         batch.step([policy.act(team.observations) for policy, team in zip(policies, teams, strict=True)])
         poses.append(batch.engine.world.poses.copy())
+    assert len(poses) >= 3
     for episode in range(2):
-        env = lidarium.parallel_env("apartment", level=level, **options)
+        env = lidarium.parallel_env(TWO_ROOMS, level=level, **options)
         alone = run(env, lidarium.policy(name), seed=5 + episode)
-        rows = slice(3 * episode, 3 * episode + 3)
+        rows = slice(2 * episode, 2 * episode + 2)
         assert all(np.array_equal(a, b[rows]) for a, b in zip(alone, poses, strict=False))
 
 

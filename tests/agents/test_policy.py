@@ -28,7 +28,7 @@ REASONS = {"covered", "no_frontier", "frontier_unreachable"}
 def finished(name, robots, seed=1, floor="apartment"):
     """A finished episode; a random walk gets a horizon, the others none."""
     horizon = 20.0 if name == "random_walk" else None
-    env = lidarium.parallel_env(floor, robots=robots, horizon_s=horizon, map_cells=32, observe=ALL)
+    env = lidarium.parallel_env(floor, robots=robots, horizon_s=horizon, map_cells=32, observe=ALL, starts="fixed")
     return run_episode(lidarium.policy(name), env, seed)
 
 
@@ -72,7 +72,7 @@ def test_another_seed_gives_another_random_walk():
 def test_a_policy_object_is_used_again_as_if_new():
     policy = lidarium.policy("utility_frontier")
     runs = [
-        run_episode(policy, lidarium.parallel_env("apartment", robots=2, map_cells=32, observe=ALL), 5)
+        run_episode(policy, lidarium.parallel_env("apartment", robots=2, map_cells=32, observe=ALL, starts="fixed"), 5)
         for _ in range(2)
     ]
     assert np.array_equal(runs[0].env.world.poses, runs[1].env.world.poses)
@@ -117,7 +117,7 @@ def test_a_decentralised_policy_has_one_instance_a_robot_that_sees_its_own_robot
         made.append(Recorder())
         return made[-1]
 
-    env = lidarium.parallel_env("scene_room", robots=3, map_cells=32, observe=ALL)
+    env = lidarium.parallel_env("scene_room", robots=3, map_cells=32, observe=ALL, starts="fixed")
     episode = run_episode(PerRobot(factory), env, 3)
     instances = made[1:]
     assert [list(instance.calls[0]) for instance in instances] == [["robot_0"], ["robot_1"], ["robot_2"]]
@@ -131,7 +131,12 @@ def test_a_decentralised_policy_has_one_instance_a_robot_that_sees_its_own_robot
 @pytest.mark.parametrize("name", ["nearest_frontier", "random_walk"])
 def test_decentralised_explorers_finish_as_well(name):
     env = lidarium.parallel_env(
-        "apartment", robots=2, horizon_s=None if name != "random_walk" else 10.0, map_cells=32, observe=ALL
+        "apartment",
+        robots=2,
+        horizon_s=None if name != "random_walk" else 10.0,
+        map_cells=32,
+        observe=ALL,
+        starts="fixed",
     )
     run_episode(PerRobot(lambda: lidarium.policy(name)), env, 1)
     assert env.scorer.ended_because.keys() == set(env.possible_agents)
@@ -154,7 +159,9 @@ class StopsOne(Recorder):
 def test_a_robot_that_stops_is_terminated_at_that_step_and_shown_no_more():
     policy, env = (
         StopsOne(),
-        lidarium.parallel_env("scene_room", robots=2, horizon_s=10.0, stop_coverage=None, map_cells=32, observe=ALL),
+        lidarium.parallel_env(
+            "scene_room", robots=2, horizon_s=10.0, stop_coverage=None, map_cells=32, observe=ALL, starts="fixed"
+        ),
     )
     run_episode(policy, env, 3)
     assert policy.calls[0] == ["robot_0", "robot_1"]
@@ -165,7 +172,9 @@ def test_a_robot_that_stops_is_terminated_at_that_step_and_shown_no_more():
 
 def test_the_runner_tells_of_every_decision_and_refuses_an_unknown_level():
     times = []
-    env = lidarium.parallel_env("scene_room", robots=1, horizon_s=10.0, stop_coverage=None, map_cells=32, observe=ALL)
+    env = lidarium.parallel_env(
+        "scene_room", robots=1, horizon_s=10.0, stop_coverage=None, map_cells=32, observe=ALL, starts="fixed"
+    )
     episode = run_episode(Recorder(), env, 3, on_decision=lambda each: times.append(each.scorer.time))
     assert times[0] == 0.0
     assert times == sorted(times)
@@ -211,7 +220,7 @@ def interrupts_handled_by(handler):
 
 
 def test_a_first_interrupt_waits_for_the_end_of_the_step_and_a_second_does_not():
-    env = lidarium.parallel_env("scene_room", robots=1, stop_coverage=None, map_cells=32, observe=ALL)
+    env = lidarium.parallel_env("scene_room", robots=1, stop_coverage=None, map_cells=32, observe=ALL, starts="fixed")
     policy = PressesControlC(1)
     with interrupts_handled_by(signal.default_int_handler):
         episode = run_episode(policy, env, 1, raise_interrupt=False)
@@ -225,7 +234,9 @@ def test_a_first_interrupt_waits_for_the_end_of_the_step_and_a_second_does_not()
 @pytest.mark.parametrize("is_ignored", [False, True])
 def test_an_application_that_handles_or_ignores_interrupts_keeps_doing_so(is_ignored):
     noted = []
-    env = lidarium.parallel_env("scene_room", robots=1, horizon_s=10.0, stop_coverage=None, map_cells=32, observe=ALL)
+    env = lidarium.parallel_env(
+        "scene_room", robots=1, horizon_s=10.0, stop_coverage=None, map_cells=32, observe=ALL, starts="fixed"
+    )
     with interrupts_handled_by(signal.SIG_IGN if is_ignored else lambda number, _: noted.append(number)):
         episode = run_episode(PressesControlC(1), env, 1, raise_interrupt=False)
     assert bool(noted) != is_ignored
@@ -233,7 +244,7 @@ def test_an_application_that_handles_or_ignores_interrupts_keeps_doing_so(is_ign
 
 
 def test_an_interrupted_episode_is_passed_on_or_kept_as_far_as_it_came():
-    env = lidarium.parallel_env("scene_room", robots=1, stop_coverage=None, map_cells=32, observe=ALL)
+    env = lidarium.parallel_env("scene_room", robots=1, stop_coverage=None, map_cells=32, observe=ALL, starts="fixed")
     with pytest.raises(KeyboardInterrupt):
         run_episode(Interrupts(), env, 1)
     episode = run_episode(Interrupts(), env, 1, raise_interrupt=False)

@@ -15,7 +15,9 @@ def test_the_supervisor_of_the_thesis_merges_by_its_rules_every_second_and_stops
         10.0,
         True,
     )
-    env = lidarium.parallel_env("apartment", robots=2, known_starts=False, horizon_s=15.0, resolution=0.05)
+    env = lidarium.parallel_env(
+        "apartment", robots=2, known_starts=False, horizon_s=15.0, resolution=0.05, starts="fixed"
+    )
     policy = lidarium.policy("supervised:thesis")
     lidarium.run_episode(policy, env, seed=0)
     station = policy._supervisor.station
@@ -32,7 +34,9 @@ def test_the_tree_of_the_thesis_has_its_settings_and_own_ones_come_first():
 
 def test_a_supervised_tree_explores_on_the_map_that_the_station_has_merged():
     policy = lidarium.Supervised(lidarium.policy("srt"), period_s=5.0)
-    env = lidarium.parallel_env("apartment", robots=2, known_starts=False, resolution=0.05, stop_coverage=0.97)
+    env = lidarium.parallel_env(
+        "apartment", robots=2, known_starts=False, resolution=0.05, stop_coverage=0.97, starts="fixed"
+    )
     lidarium.run_episode(policy, env, seed=1)
     assert env.scorer.coverage >= 0.97
     assert policy.joins

@@ -25,7 +25,7 @@ import lidarium
 LEARNED, UNTRAINED = "trained networks", "untrained networks"
 CLASSIC = ("random_walk", "nearest_frontier", "utility_frontier", "explore_lite", "tour_frontier", "learned")
 STARTS = {"starts": "fixed"}
-"""Starts of all that are compared; without it a batch takes each floor's own, and a policy's run draws them."""
+"""Starts of all that are compared; without it a batch draws them, and a policy's run takes those of the floor."""
 
 SEEDS_APART = 1000
 """Episodes of a batch have seeds that follow each other; those of networks share none."""

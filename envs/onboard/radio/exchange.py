@@ -4,20 +4,21 @@ The module also keeps track of the data that each robot has received.
 
 In every step each robot sends its pose. Once a period it sends, over each link, the parts that the receiver lacks of
 all maps that it holds: its own, and copies received from others. Maps thus spread through robots that meet later. A
-message carries blocks of 64 cells.
+message carries blocks of 64 cells, and what has changed in the robot's sparse map if it makes one.
 
 If robots report, a station listens at the start position of the first robot. Each map is sent with the status that
 its robot reported at that time. The station receives both over the same links, from the robots themselves or from
 robots that hold copies.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.envs.onboard.radio.messages import Status
+from lidarium.envs.onboard.sparse_shares import SparseShare, bytes_to_send
 from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.simulation.backend import World
 from lidarium.envs.simulation.disturbances.faults import DEAD_RADIO, has_fault
@@ -175,6 +176,8 @@ class _Message:
         Blocks of the source's map.
     status : Status or None
         The status that the source reported with its map.
+    sparse : SparseShare or None
+        The source's sparse map, None if it makes none.
     """
 
     arrives: int
@@ -186,6 +189,7 @@ class _Message:
     blocks: NDArray[np.int64]
     cells: NDArray[np.int8]
     status: Status | None = None
+    sparse: SparseShare | None = None
 
 
 NO_BLOCKS, NO_CELLS = np.zeros(0, np.int64), np.zeros((0, BLOCK), np.int8)
@@ -240,6 +244,8 @@ class Exchange:
         The step at which each copy was true.
     statuses : list of list of Status or None
         Last status of each robot with its map, as held by each robot and, last, the station (receiver, source).
+    sparse : list of list of SparseShare or None
+        Copy of each sparse map, in the same order; None if none has come. A robot's own is as of the last exchange.
     report_of : callable or None
         Takes the number of a robot and returns its status; if None, robots do not report and there is no station.
     windows : (robots, 4) int64
@@ -291,6 +297,7 @@ class Exchange:
         ]
         self.copied_at = np.full((robots + 1, robots), NEVER, np.int64)
         self.statuses: list[list[Status | None]] = [[None] * robots for _ in range(robots + 1)]
+        self.sparse: list[list[SparseShare | None]] = [[None] * robots for _ in range(robots + 1)]
         self.windows = np.zeros((robots, 4), np.int64)
         for robot in range(robots):
             self._forget_changes(robot)
@@ -309,10 +316,15 @@ class Exchange:
         rows, columns = self._beliefs.log_odds[self._first + robot].shape
         self.windows[robot] = (rows, 0, columns, 0)
 
-    def step(self) -> None:
+    def step(self, sparse: Sequence[SparseShare | None] = ()) -> None:
         """Let the robots talk, after they have sensed.
 
         Called once in every step of the episode and at its start.
+
+        Parameters
+        ----------
+        sparse : sequence of SparseShare or None
+            The sparse map of each robot that makes one; empty if nobody does.
         """
         step = int(self._world.steps[self._episode])
         is_time = step % self._period == 0
@@ -321,6 +333,8 @@ class Exchange:
             self._radio.find_station(draws=True)
         self._send_poses(step)
         if is_time:
+            for robot, share in enumerate(sparse):
+                self.sparse[robot][robot] = share
             self._send_maps(step)
         due = [message for message in self._in_transit if message.arrives <= step]
         self._in_transit = [message for message in self._in_transit if message.arrives > step]
@@ -369,7 +383,8 @@ class Exchange:
             if sender is not None
         ]
         for sender, message in messages:
-            size = HEADER_BYTES + BLOCK_BYTES * len(message.blocks)
+            copy = self.sparse[message.receiver][message.source]
+            size = HEADER_BYTES + BLOCK_BYTES * len(message.blocks) + bytes_to_send(message.sparse, copy)
             is_to_station = message.receiver == robots
             self.bytes_sent[sender] += 0 if is_to_station else size
             self.bytes_reported[sender] += (size if is_to_station else 0) + (
@@ -399,7 +414,8 @@ class Exchange:
         true_at, status = int(self.copied_at[sender, source]), self.statuses[sender][source]
         arrives = step + self._latency
         blocks, cells = differing_blocks(held, copy)
-        return _Message(arrives, receiver, source, true_at, None, False, blocks, cells, status)
+        sparse = self.sparse[sender][source]
+        return _Message(arrives, receiver, source, true_at, None, False, blocks, cells, status, sparse)
 
     def _copy_of(self, receiver: int, source: int) -> NDArray[np.int8]:
         """Return a robot's copy of another's map, blank at first."""
@@ -419,6 +435,7 @@ class Exchange:
         copy = self._copy_of(receiver, source)
         copy.reshape(-1, BLOCK)[message.blocks] = message.cells
         self.copied_at[receiver, source], self.statuses[receiver][source] = message.step, message.status
+        self.sparse[receiver][source] = message.sparse
         if len(message.blocks) and receiver < self._settings.robots:
             rows, words = np.divmod(message.blocks, copy.shape[1] // BLOCK)
             window = self.windows[receiver]

@@ -4,7 +4,7 @@ With the ideal radio the station always has the current state. With any other ra
 robot and has only received data (`Exchange`); its orders reach a robot as long as the links work.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
 from functools import partial
 from weakref import WeakMethod
@@ -146,7 +146,17 @@ class Station:
         if order_delay(self._perception, row) is None:
             return False
         self._perception.received.receive(row, others)
+        self._send_sparse(robot, {} if others is None else others.frames)
         return True
+
+    def _send_sparse(self, robot: int, frames: Mapping[str, Transform]) -> None:
+        """Send a robot the sparse maps of others, as the station has them; their frames are in the robot's."""
+        sparse_maps, exchange = self._perception.sparse_maps, self._exchange
+        sparse_maps.forget_others(self._first + robot)
+        for other, agent in enumerate(self._perception.settings.agents):
+            if agent in frames:
+                share = sparse_maps.share(self._first + other) if exchange is None else exchange.sparse[-1][other]
+                sparse_maps.receive(self._first + robot, self._first + other, share, frames[agent])
 
     def forget_walls(self, robot: int, trail: NDArray[np.float64]) -> bool:
         """Let a robot forget the walls along a trail (`ForgottenTrails`); return whether the links to it work."""

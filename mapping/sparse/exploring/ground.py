@@ -2,8 +2,9 @@
 
 import itertools
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Annotated, NamedTuple
+from typing import Annotated, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -300,7 +301,19 @@ class SeenGround:
         self.cells, self.low = _placed(self.cells, self.low, low, high), low
 
 
-def joined_ground(parts: list[SeenGround]) -> tuple[NDArray[np.bool_], NDArray[np.int64]]:
+class GroundCells(Protocol):
+    """Seen cells, as `SeenGround` has them."""
+
+    @property
+    def cells(self) -> NDArray[np.bool_]:
+        """Which cells are seen, (rows, columns)."""
+
+    @property
+    def low(self) -> NDArray[np.int64]:
+        """Number of the first cell along x and y, (2,)."""
+
+
+def joined_ground(parts: Sequence[GroundCells]) -> tuple[NDArray[np.bool_], NDArray[np.int64]]:
     """Return the cells that any of several has seen, and the number of the first one, as `SeenGround` has.
 
     All have cells of the same size and the same frame.

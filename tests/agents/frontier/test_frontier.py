@@ -33,7 +33,9 @@ def with_a_crack(crack):
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("robots", [1, 2])
 def test_an_unreachable_room_is_named_and_does_not_count(name, robots):
-    env = lidarium.parallel_env(with_a_crack(0.2), robots=robots, horizon_s=None, stop_coverage=None, map_cells=32)
+    env = lidarium.parallel_env(
+        with_a_crack(0.2), robots=robots, horizon_s=None, stop_coverage=None, map_cells=32, starts="fixed"
+    )
     episode = run_episode(lidarium.policy(name), env, 1)
     assert env.scorer.coverage == 1.0
     assert set(env.scorer.ended_because.values()) <= {"no_frontier", "frontier_unreachable"}
@@ -50,7 +52,9 @@ def test_an_unreachable_room_is_named_and_does_not_count(name, robots):
 
 @pytest.mark.parametrize("name", NAMES)
 def test_a_door_that_just_fits_is_driven_through(name):
-    env = lidarium.parallel_env(with_a_crack(0.5), robots=1, horizon_s=None, stop_coverage=None, map_cells=32)
+    env = lidarium.parallel_env(
+        with_a_crack(0.5), robots=1, horizon_s=None, stop_coverage=None, map_cells=32, starts="fixed"
+    )
     run_episode(lidarium.policy(name), env, 1)
     assert env.scorer.coverage == 1.0
     assert env.world.poses[0, 0] > 3.2 or env.world.travelled[0] > 2.5
@@ -60,14 +64,14 @@ def test_a_door_that_just_fits_is_driven_through(name):
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("noise", ["datasheet", "thesis"])
 def test_a_noisy_laser_still_ends_with_nearly_all_seen(name, noise):
-    env = lidarium.parallel_env(TWO_ROOMS, robots=2, noise=noise, horizon_s=300.0, map_cells=32)
+    env = lidarium.parallel_env(TWO_ROOMS, robots=2, noise=noise, horizon_s=300.0, map_cells=32, starts="fixed")
     run_episode(lidarium.policy(name), env, 1)
     assert env.scorer.coverage >= 0.95
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_unknown_starts_mean_that_each_robot_explores_alone(name):
-    env = lidarium.parallel_env(TWO_ROOMS, robots=2, known_starts=False, horizon_s=300.0, map_cells=32)
+    env = lidarium.parallel_env(TWO_ROOMS, robots=2, known_starts=False, horizon_s=300.0, map_cells=32, starts="fixed")
     run_episode(lidarium.policy(name), env, 1)
     assert env.scorer.coverage >= 0.99 or set(env.scorer.ended_because.values()) <= {
         "no_frontier",
@@ -77,7 +81,7 @@ def test_unknown_starts_mean_that_each_robot_explores_alone(name):
 
 def test_policies_read_beliefs_and_never_the_truth():
     """With noise in the map, what a policy may ask for is the believed pose and the noisy map."""
-    env = lidarium.parallel_env(TWO_ROOMS, robots=2, noise="thesis", map_cells=32)
+    env = lidarium.parallel_env(TWO_ROOMS, robots=2, noise="thesis", map_cells=32, starts="fixed")
     env.reset(seed=0)
     belief = env.belief("robot_0")
     public = {name for name in dir(belief) if not name.startswith("_")}
@@ -101,7 +105,7 @@ def test_policies_read_beliefs_and_never_the_truth():
 
 
 def test_names_of_what_was_given_up_lie_on_the_floor_in_the_robots_frame():
-    env = lidarium.parallel_env("apartment", robots=1, horizon_s=None, stop_coverage=None, map_cells=32)
+    env = lidarium.parallel_env("apartment", robots=1, horizon_s=None, stop_coverage=None, map_cells=32, starts="fixed")
     episode = run_episode(NearestFrontier(), env, 1)
     x_min, y_min, x_max, y_max = env.floor.bounds
     for entry in episode.given_up:

@@ -19,7 +19,13 @@ def test_frontiers_far_away_are_left_out_only_where_they_change_no_choice(robots
     def choices(first_slack):
         monkeypatch.setattr("lidarium.agents.frontier.policies.FIRST_SLACK", first_slack)
         env = lidarium.parallel_env(
-            "building:4", robots=robots, horizon_s=120.0, stop_coverage=None, map_cells=32, resolution=0.05
+            "building:4",
+            robots=robots,
+            horizon_s=120.0,
+            stop_coverage=None,
+            map_cells=32,
+            resolution=0.05,
+            starts="fixed",
         )
         run_episode(UtilityFrontier(cost_weight=cost_weight), env, 3)
         return env.world.poses

@@ -18,7 +18,7 @@ from lidarium.evaluation.episodes.runner import run_episode
 @lru_cache
 def finished(floor, robots=1, mode="default", seed=1, robot="pioneer", horizon_s=900.0, **chosen):
     env = lidarium.parallel_env(
-        floor, robots=robots, robot=robot, horizon_s=horizon_s, stop_coverage=None, map_cells=32
+        floor, robots=robots, robot=robot, horizon_s=horizon_s, stop_coverage=None, map_cells=32, starts="fixed"
     )
     return run_episode(SensorBasedRandomTree(mode, **chosen), env, seed)
 
@@ -124,7 +124,7 @@ def test_no_edge_of_the_tree_crosses_what_stands_there():
 
 def test_a_goal_in_sight_of_the_first_node_is_reached_in_one_move():
     env = lidarium.parallel_env(
-        "srt_cluttered", robots=1, robot="pioneer", horizon_s=60.0, stop_coverage=None, map_cells=32
+        "srt_cluttered", robots=1, robot="pioneer", horizon_s=60.0, stop_coverage=None, map_cells=32, starts="fixed"
     )
     tree = run_episode(SensorBasedRandomTree(), env, 1, {"goal": (0.9, 0.6)}).policy.tree
     assert env.scorer.ended_because == {"robot_0": "reached"}
@@ -149,7 +149,7 @@ def test_a_team_shares_one_graph_and_all_come_home():
 
 def test_robots_that_do_not_know_their_starts_keep_graphs_of_their_own():
     env = lidarium.parallel_env(
-        "scene_room", robots=2, known_starts=False, horizon_s=15.0, stop_coverage=None, map_cells=32
+        "scene_room", robots=2, known_starts=False, horizon_s=15.0, stop_coverage=None, map_cells=32, starts="fixed"
     )
     tree = run_episode(SensorBasedRandomTree(), env, 2).policy.tree
     assert all(tree.nodes[other].agent == node.agent for node in tree.nodes for other in node.neighbours)
@@ -172,13 +172,15 @@ def test_the_same_seed_gives_the_same_run():
 def test_only_explorers_that_choose_the_least_cost_plan_tours(chosen, monkeypatch):
     planned = []
     monkeypatch.setattr("lidarium.agents.srt.choice._first_on_tour", lambda *_: planned.append(1))
-    env = lidarium.parallel_env("apartment", robots=1, robot="pioneer", horizon_s=30.0)
+    env = lidarium.parallel_env("apartment", robots=1, robot="pioneer", horizon_s=30.0, starts="fixed")
     run_episode(SensorBasedRandomTree(**chosen), env, 0)
     assert bool(planned) == (not chosen)
 
 
 def test_a_robot_that_teammates_keep_from_their_goal_ends_as_blocked_and_makes_room():
-    env = lidarium.parallel_env("srt_lab", robots=3, localization="splines", horizon_s=400.0, stop_coverage=None)
+    env = lidarium.parallel_env(
+        "srt_lab", robots=3, localization="splines", horizon_s=400.0, stop_coverage=None, starts="fixed"
+    )
     run_episode(SensorBasedRandomTree(), env, 0)
     assert sorted(env.scorer.ended_because.values()) == ["blocked", "reached", "reached"]
     assert env.scorer.time < 200.0
@@ -209,7 +211,9 @@ def every_third_below_the_minimum(scan):
 
 @pytest.mark.parametrize("value", [math.nan, 0.0, 0.01])
 def test_a_robot_whose_laser_tells_nothing_ends_as_blind(value):
-    env = lidarium.parallel_env("scene_room", robots=1, horizon_s=60.0, stop_coverage=None, map_cells=32)
+    env = lidarium.parallel_env(
+        "scene_room", robots=1, horizon_s=60.0, stop_coverage=None, map_cells=32, starts="fixed"
+    )
     run_episode(Seen(all_beams(value)), env, 1)
     assert env.scorer.ended_because == {"robot_0": "blind"}
     assert env.world.travelled[0] < 1e-6
@@ -217,13 +221,17 @@ def test_a_robot_whose_laser_tells_nothing_ends_as_blind(value):
 
 @pytest.mark.parametrize("value", [5.6, math.inf])
 def test_scans_without_any_return_are_survived(value):
-    env = lidarium.parallel_env("scene_room", robots=1, horizon_s=20.0, stop_coverage=None, map_cells=32)
+    env = lidarium.parallel_env(
+        "scene_room", robots=1, horizon_s=20.0, stop_coverage=None, map_cells=32, starts="fixed"
+    )
     run_episode(Seen(all_beams(value)), env, 1)
     assert set(env.scorer.ended_because.values()) <= {"horizon", "explored"}
 
 
 def test_ranges_below_the_minimum_do_not_keep_a_robot_from_its_goal():
-    env = lidarium.parallel_env("srt_lab", robots=1, robot="pioneer", horizon_s=200.0, stop_coverage=None, map_cells=32)
+    env = lidarium.parallel_env(
+        "srt_lab", robots=1, robot="pioneer", horizon_s=200.0, stop_coverage=None, map_cells=32, starts="fixed"
+    )
     run_episode(Seen(every_third_below_the_minimum), env, 1)
     assert env.scorer.ended_because == {"robot_0": "reached"}
 
@@ -232,7 +240,7 @@ def test_ranges_below_the_minimum_do_not_keep_a_robot_from_its_goal():
 def test_a_laser_of_one_beam_is_no_reason_to_fail(mode):
     one_beam = Lidar(beams=1, field_of_view=0.01, range_max=5.6)
     env = lidarium.parallel_env(
-        "scene_room", robots=1, lidar=one_beam, horizon_s=20.0, stop_coverage=None, map_cells=32
+        "scene_room", robots=1, lidar=one_beam, horizon_s=20.0, stop_coverage=None, map_cells=32, starts="fixed"
     )
     run_episode(SensorBasedRandomTree(mode), env, 1)
     assert set(env.scorer.ended_because.values()) <= {"horizon", "explored"}
@@ -262,7 +270,9 @@ class HeldFarAway(Held):
 
 @pytest.mark.parametrize(("budget", "ending"), [({}, "horizon"), ({"time_s": 30.0}, "budget")])
 def test_a_robot_that_something_holds_ends_with_a_reason(budget, ending):
-    env = lidarium.parallel_env("srt_lab", robots=1, robot="pioneer", horizon_s=90.0, stop_coverage=None, map_cells=32)
+    env = lidarium.parallel_env(
+        "srt_lab", robots=1, robot="pioneer", horizon_s=90.0, stop_coverage=None, map_cells=32, starts="fixed"
+    )
     run_episode(Held(**budget), env, 1)
     assert env.scorer.ended_because == {"robot_0": ending}
 
@@ -281,7 +291,9 @@ def test_what_stops_a_robot_on_its_way_is_not_held_against_a_target_far_away_at_
 
     monkeypatch.setattr(Explorer, "_settle_block", noted)
     monkeypatch.setattr(MapMemory, "give_up", counted)
-    env = lidarium.parallel_env("office:44", robots=1, robot="pioneer", horizon_s=150.0, stop_coverage=None)
+    env = lidarium.parallel_env(
+        "office:44", robots=1, robot="pioneer", horizon_s=150.0, stop_coverage=None, starts="fixed"
+    )
     run_episode(HeldFarAway(), env, 1)
     held = np.array([[legs, given_up] for time_s, legs, given_up in blocks if time_s > 60.0])
     legs, given_up = held.T
@@ -294,7 +306,7 @@ def test_what_stops_a_robot_on_its_way_is_not_held_against_a_target_far_away_at_
 
 def test_a_robot_that_is_pushed_aside_still_reaches_its_goal():
     env = lidarium.parallel_env(
-        "srt_l_room", robots=1, robot="pioneer", horizon_s=200.0, stop_coverage=None, map_cells=32
+        "srt_l_room", robots=1, robot="pioneer", horizon_s=200.0, stop_coverage=None, map_cells=32, starts="fixed"
     )
     policy = Pushed(env)
     run_episode(policy, env, 1)
@@ -318,12 +330,12 @@ class Pushed(SensorBasedRandomTree):
 
 @pytest.mark.parametrize(("goal", "told"), [((1.5, 0.0), "inside a wall"), ((60.0, 0.0), "outside of the floor")])
 def test_a_goal_in_a_wall_or_outside_is_refused_before_the_run(goal, told):
-    env = lidarium.parallel_env("srt_cluttered", robots=1)
+    env = lidarium.parallel_env("srt_cluttered", robots=1, starts="fixed")
     with pytest.raises(ValueError, match=told):
         run_episode(SensorBasedRandomTree(), env, 1, {"goal": goal})
 
 
 def test_a_tree_without_a_scan_is_refused():
-    env = lidarium.parallel_env("scene_room", robots=1, observe=["pose"])
+    env = lidarium.parallel_env("scene_room", robots=1, observe=["pose"], starts="fixed")
     with pytest.raises(ValueError, match="needs scan"):
         run_episode(SensorBasedRandomTree(), env, 1)

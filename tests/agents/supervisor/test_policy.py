@@ -37,7 +37,13 @@ class FirstFrontier(Policy):
 @lru_cache
 def finished(name, robots=2, horizon_s=400.0, **settings):
     env = lidarium.parallel_env(
-        "apartment", robots=robots, known_starts=False, horizon_s=horizon_s, stop_coverage=None, **settings
+        "apartment",
+        robots=robots,
+        known_starts=False,
+        horizon_s=horizon_s,
+        stop_coverage=None,
+        **settings,
+        starts="fixed",
     )
     return run_episode(lidarium.policy(name), env, seed=0)
 
@@ -81,7 +87,7 @@ def test_the_same_seed_gives_the_same_decisions():
 def test_a_robot_that_dies_is_left_out_and_the_other_goes_on():
     faults = FaultSettings(schedule=(Fault(kind="dead_robot", robot=1, at_s=55.0),))
     env = lidarium.parallel_env(
-        "apartment", robots=2, known_starts=False, horizon_s=90.0, stop_coverage=None, faults=faults
+        "apartment", robots=2, known_starts=False, horizon_s=90.0, stop_coverage=None, faults=faults, starts="fixed"
     )
     policy = supervised()
     run_episode(policy, env, seed=0)
@@ -96,7 +102,9 @@ def test_a_robot_that_dies_is_left_out_and_the_other_goes_on():
 
 
 def test_a_supervisor_leads_policies_that_choose_among_frontiers_too():
-    env = lidarium.parallel_env("apartment", robots=2, known_starts=False, horizon_s=90.0, stop_coverage=None)
+    env = lidarium.parallel_env(
+        "apartment", robots=2, known_starts=False, horizon_s=90.0, stop_coverage=None, starts="fixed"
+    )
     policy = Supervised(FirstFrontier(), period_s=4.0, assignment="utility")
     run_episode(policy, env, seed=0)
     assert env.unwrapped.scorer.coverage > 0.8
@@ -113,6 +121,7 @@ def test_robots_that_touch_something_go_on_by_order_alone(resumes):
         horizon_s=60.0,
         stop_coverage=None,
         pauses_when_blocked=True,
+        starts="fixed",
     )
     env.reset(seed=0)
     policy = supervised(resumes_paused=resumes, period_s=4.0)
@@ -140,7 +149,9 @@ def test_robots_that_touch_something_go_on_by_order_alone(resumes):
 
 @pytest.mark.parametrize("assignment", ["pairs", "hungarian"])
 def test_robots_without_a_goal_are_paused_and_resume_to_go_to_one(assignment):
-    env = lidarium.parallel_env("clinic", robots=3, known_starts=False, horizon_s=300.0, stop_coverage=None)
+    env = lidarium.parallel_env(
+        "clinic", robots=3, known_starts=False, horizon_s=300.0, stop_coverage=None, starts="fixed"
+    )
     policy = supervised(pauses_idle=True, assignment=assignment)
     run_episode(policy, env, seed=0)
     figures = policy.report().supervision.figures
@@ -161,14 +172,14 @@ def test_robots_without_a_goal_are_paused_and_resume_to_go_to_one(assignment):
 
 
 def test_with_known_starts_there_is_nothing_to_search_for():
-    env = lidarium.parallel_env("apartment", robots=2, horizon_s=20.0)
+    env = lidarium.parallel_env("apartment", robots=2, horizon_s=20.0, starts="fixed")
     policy = supervised()
     run_episode(policy, env, seed=0)
     assert [(join.time_s, join.is_used) for join in policy.joins] == [(0.0, True)]
 
 
 def test_the_station_knows_only_what_the_radio_brought():
-    env = lidarium.parallel_env("apartment", robots=2, known_starts=False, horizon_s=30.0, radio="none")
+    env = lidarium.parallel_env("apartment", robots=2, known_starts=False, horizon_s=30.0, radio="none", starts="fixed")
     policy = supervised()
     run_episode(policy, env, seed=0)
     # The station stands where the first robot started, and hears nobody.
@@ -182,7 +193,7 @@ def test_settings_given_twice_are_refused():
 
 
 def test_starts_that_are_not_revealed_join_nobody():
-    env = lidarium.parallel_env("apartment", robots=2, known_starts=False, horizon_s=20.0)
+    env = lidarium.parallel_env("apartment", robots=2, known_starts=False, horizon_s=20.0, starts="fixed")
     with pytest.raises(ValueError, match="reveals_starts"):
         run_episode(lidarium.policy("oracle_starts"), env, seed=0)
 

@@ -16,20 +16,24 @@ def greedy(env, observations, agents):
 
 
 def test_the_wrapper_has_the_parallel_api():
-    parallel_api_test(lidarium.Supervised(lidarium.parallel_env("apartment", level="frontier", **UNKNOWN)), 30)
+    parallel_api_test(
+        lidarium.Supervised(lidarium.parallel_env("apartment", level="frontier", **UNKNOWN, starts="fixed")), 30
+    )
 
 
 def test_a_policy_inside_the_wrapper_explores_as_the_supervised_policy():
     ended = []
     inner = lidarium.policy("nearest_frontier")
-    wrapped = lidarium.Supervised(lidarium.parallel_env("apartment", level="waypoint", horizon_s=60.0, **UNKNOWN))
+    wrapped = lidarium.Supervised(
+        lidarium.parallel_env("apartment", level="waypoint", horizon_s=60.0, **UNKNOWN, starts="fixed")
+    )
     observations, _ = wrapped.reset(seed=4)
     inner.reset(wrapped, seed=4)
     while wrapped.agents:
         observations, *_ = wrapped.step(inner.act(observations))
         observations = {agent: observations[agent] for agent in wrapped.agents}
     ended.append(wrapped.unwrapped)
-    other = lidarium.parallel_env("apartment", horizon_s=60.0, **UNKNOWN)
+    other = lidarium.parallel_env("apartment", horizon_s=60.0, **UNKNOWN, starts="fixed")
     supervised = lidarium.Supervised(lidarium.policy("nearest_frontier"))
     lidarium.run_episode(supervised, other, seed=4)
     assert wrapped.supervisor.joins
@@ -39,7 +43,7 @@ def test_a_policy_inside_the_wrapper_explores_as_the_supervised_policy():
 
 def test_robots_that_are_directed_follow_their_orders_and_masks_say_so():
     env = lidarium.Supervised(
-        lidarium.parallel_env("apartment", level="frontier", resolution=0.05, **UNKNOWN),
+        lidarium.parallel_env("apartment", level="frontier", resolution=0.05, **UNKNOWN, starts="fixed"),
         masks_orders=True,
         period_s=4.0,
     )
@@ -63,8 +67,13 @@ def test_robots_that_are_directed_follow_their_orders_and_masks_say_so():
 @pytest.mark.parametrize("level", ["velocity", "waypoint", "frontier"])
 def test_a_batch_is_supervised_as_its_episodes_are_alone(level):
     options = {"level": level, "horizon_s": 24.0, **UNKNOWN}
-    batch = lidarium.Supervised(lidarium.vector_env(2, "apartment", reports=True, **options), period_s=4.0)
-    alone = [lidarium.Supervised(lidarium.parallel_env("apartment", **options), period_s=4.0) for _ in range(2)]
+    batch = lidarium.Supervised(
+        lidarium.vector_env(2, "apartment", reports=True, **{"starts": "fixed", **options}), period_s=4.0
+    )
+    alone = [
+        lidarium.Supervised(lidarium.parallel_env("apartment", **{"starts": "fixed", **options}), period_s=4.0)
+        for _ in range(2)
+    ]
     observations, infos = batch.reset(seed=7)
     for episode, env in enumerate(alone):
         env.reset(seed=7 + episode)
@@ -88,7 +97,7 @@ def test_a_batch_is_supervised_as_its_episodes_are_alone(level):
 
 def test_episodes_of_a_batch_that_begin_again_are_supervised_anew():
     batch = lidarium.Supervised(
-        lidarium.vector_env(2, "apartment", level="frontier", reports=True, horizon_s=6.0, **UNKNOWN)
+        lidarium.vector_env(2, "apartment", level="frontier", reports=True, horizon_s=6.0, **UNKNOWN, starts="fixed")
     )
     observations, _ = batch.reset(seed=0)
     for _ in range(12):

@@ -16,7 +16,7 @@ def wall(x, y, width, height):
 
 def finished(policy, floor, **settings):
     chosen = {"resolution": 0.05, "map_cells": 32, "horizon_s": 900.0, "stop_coverage": 0.99, **settings}
-    env = lidarium.parallel_env(floor, **chosen)
+    env = lidarium.parallel_env(floor, **chosen, starts="fixed")
     return run_episode(policy, env, 0)
 
 

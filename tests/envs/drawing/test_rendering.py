@@ -101,7 +101,7 @@ def test_an_environment_that_was_drawn_can_be_pickled():
 
 
 def test_levels_of_decision_render_too():
-    env = lidarium.parallel_env(small_floor(), level="waypoint", render_mode="rgb_array", robots=1)
+    env = lidarium.parallel_env(small_floor(), level="waypoint", render_mode="rgb_array", robots=1, starts="fixed")
     env.reset(seed=1)
     assert env.render().ndim == 3
     env.close()

@@ -27,7 +27,7 @@ def test_a_batch_empties_batteries_as_single_environments_do(level):
 def test_a_batch_pauses_robots_as_single_environments_do(level):
     stepped({"pauses_when_blocked": True}, level, 60 if level == "velocity" else 10)
     if level == "velocity":
-        batch = lidarium.vector_env(3, TWO_ROOMS, pauses_when_blocked=True, **SMALL)
+        batch = lidarium.vector_env(3, TWO_ROOMS, pauses_when_blocked=True, **SMALL, starts="fixed")
         batch.reset(seed=3)
         ahead = np.tile(np.array([1.0, 0.0], np.float32), (batch.num_envs, 1))
         assert any("paused" in batch.step(ahead)[4]["state"] for _ in range(200))
@@ -52,12 +52,12 @@ def test_a_batch_takes_orders_as_single_environments_do(radio):
 
 def test_a_batch_reports_to_stations_as_single_environments_do():
     options = {**SMALL, "localization": "odometry", "odometry": "typical", "radio": "line_of_sight"}
-    batch = lidarium.vector_env(3, TWO_ROOMS, level="waypoint", reports=True, **options)
+    batch = lidarium.vector_env(3, TWO_ROOMS, level="waypoint", reports=True, **{"starts": "fixed", **options})
     batch.reset(seed=3)
     for _ in range(4):
         batch.step(np.full((6, 2), 0.3, np.float32))
     for k in range(3):
-        env = lidarium.parallel_env(TWO_ROOMS, level="waypoint", **options)
+        env = lidarium.parallel_env(TWO_ROOMS, level="waypoint", **{"starts": "fixed", **options})
         env.reset(seed=3 + k)
         for _ in range(4):
             env.step(dict.fromkeys(env.agents, np.full(2, 0.3, np.float32)))
@@ -88,8 +88,8 @@ def test_step_by_step_comes_to_what_the_kernel_does():
 
 
 def test_waypoints_of_a_batch_may_be_targets_in_an_array_of_objects():
-    batch = lidarium.vector_env(1, TWO_ROOMS, level="waypoint", **SMALL)
-    alone = lidarium.parallel_env(TWO_ROOMS, level="waypoint", **SMALL)
+    batch = lidarium.vector_env(1, TWO_ROOMS, level="waypoint", **SMALL, starts="fixed")
+    alone = lidarium.parallel_env(TWO_ROOMS, level="waypoint", **SMALL, starts="fixed")
     batch.reset(seed=0)
     alone.reset(seed=0)
     actions = np.array([lidarium.Target(0.6, 0.3), None], object)

@@ -56,7 +56,7 @@ def test_an_episode_leaves_nothing_behind(no_collection, policy, settings):
 @pytest.mark.parametrize("level", ["velocity", "waypoint", "frontier"])
 def test_a_batch_leaves_nothing_behind(no_collection, level):
     def made():
-        env = lidarium.vector_env(2, "apartment", level=level, robots=2)
+        env = lidarium.vector_env(2, "apartment", level=level, robots=2, starts="fixed")
         env.reset(seed=0)
         return [weakref.ref(part) for part in (env.batch, env.engine.perception, env.engine.world)]
 

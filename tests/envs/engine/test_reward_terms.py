@@ -37,7 +37,7 @@ def run(env, steps=8):
 
 
 def test_terms_make_up_the_reward_and_have_the_signs_of_their_names():
-    for rewards, infos in run(lidarium.parallel_env("scene_room", robots=2)):
+    for rewards, infos in run(lidarium.parallel_env("scene_room", robots=2, starts="fixed")):
         for agent, reward in rewards.items():
             terms = infos[agent]["reward_terms"]
             assert list(terms) == list(TERMS)
@@ -49,8 +49,14 @@ def test_terms_make_up_the_reward_and_have_the_signs_of_their_names():
 
 @pytest.mark.usefixtures("steps")
 def test_a_registered_term_is_weighed_and_reported():
-    plain = [rewards for rewards, _ in run(lidarium.parallel_env("scene_room", robots=2))]
-    more = list(run(lidarium.parallel_env("scene_room", robots=2, reward={"more": {"steps": 10.0, "turning": -1.0}})))
+    plain = [rewards for rewards, _ in run(lidarium.parallel_env("scene_room", robots=2, starts="fixed"))]
+    more = list(
+        run(
+            lidarium.parallel_env(
+                "scene_room", robots=2, reward={"more": {"steps": 10.0, "turning": -1.0}}, starts="fixed"
+            )
+        )
+    )
     for number, (before, (rewards, infos)) in enumerate(zip(plain, more, strict=True), 1):
         for agent in rewards:
             terms = infos[agent]["reward_terms"]
@@ -79,7 +85,7 @@ def crowding():
 
 @pytest.mark.usefixtures("crowding")
 def test_a_plain_function_is_a_term():
-    env = lidarium.parallel_env("apartment", robots=3, reward={"more": {"crowding": -0.05}})
+    env = lidarium.parallel_env("apartment", robots=3, reward={"more": {"crowding": -0.05}}, starts="fixed")
     for rewards, infos in run(env):
         places = env.world.poses[:, :2]
         for row, agent in enumerate(rewards):
@@ -93,7 +99,7 @@ def test_a_function_of_another_shape_is_refused_by_name():
 
     reward_term("odd", "for tests")(odd)
     try:
-        env = lidarium.parallel_env("scene_room", robots=2, reward={"more": {"odd": 1.0}})
+        env = lidarium.parallel_env("scene_room", robots=2, reward={"more": {"odd": 1.0}}, starts="fixed")
         env.reset(seed=0)
         with pytest.raises(ValueError, match=r"the reward term 'odd' has shape \(7,\); want \(2,\)"):
             env.step(dict.fromkeys(env.agents, DRIVE))
@@ -103,7 +109,7 @@ def test_a_function_of_another_shape_is_refused_by_name():
 
 def test_shares_of_the_floor_add_up_to_what_the_team_has_seen():
     env = lidarium.parallel_env(
-        "scene_room", robots=2, stop_coverage=None, reward={"area": 0.0, "more": {"floor_share": 1.0}}
+        "scene_room", robots=2, stop_coverage=None, reward={"area": 0.0, "more": {"floor_share": 1.0}}, starts="fixed"
     )
     total = 0.0
     for number, (_, infos) in enumerate(run(env, 60)):
@@ -120,6 +126,7 @@ def test_completion_is_paid_once_and_the_first_view_in_the_first_step():
         robots=2,
         stop_coverage=0.02,
         reward={"more": {"completion": 5.0, "first_view": 1.0}},
+        starts="fixed",
     )
     env.reset(seed=2)
     seen = env.score.seen.copy() * env.settings.occupancy.resolution**2

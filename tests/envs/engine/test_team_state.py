@@ -19,7 +19,7 @@ def drive(env, steps=40):
 
 
 def test_numbers_of_the_state_are_the_truth():
-    env = drive(lidarium.parallel_env("apartment", horizon_s=100.0, **OPTIONS))
+    env = drive(lidarium.parallel_env("apartment", horizon_s=100.0, **OPTIONS, starts="fixed"))
     state, robots = env.state(), env.state()[: HEAD - 3].reshape(2, -1)
     side = 100.0 * state[HEAD - 3]
     corner = env.simulation.frames[0, :2]
@@ -31,7 +31,7 @@ def test_numbers_of_the_state_are_the_truth():
 
 
 def test_pictures_of_the_state_show_what_counts_and_what_was_seen():
-    env = drive(lidarium.parallel_env("apartment", **OPTIONS))
+    env = drive(lidarium.parallel_env("apartment", **OPTIONS, starts="fixed"))
     counted, seen = env.state()[HEAD:].reshape(2, 24, 24)
     assert (seen <= counted).all()
     cells = unpack_bits(env.score.team_masks[0], env.score.team_masks[0].shape[1] * 64)
@@ -43,14 +43,14 @@ def test_pictures_of_the_state_show_what_counts_and_what_was_seen():
 
 
 def test_a_robot_that_has_ended_is_not_live():
-    env = drive(lidarium.parallel_env("apartment", **OPTIONS), 1)
+    env = drive(lidarium.parallel_env("apartment", **OPTIONS, starts="fixed"), 1)
     env.stop("robot_0", "enough")
     env.step(dict.fromkeys(env.agents, np.zeros(2, np.float32)))
     assert env.state()[: HEAD - 3].reshape(2, -1)[:, 6].tolist() == [0.0, 1.0]
 
 
 def test_wrappers_pass_the_state_on():
-    env = lidarium.parallel_env("scene_room", level="frontier", infos="flat", **OPTIONS)
+    env = lidarium.parallel_env("scene_room", level="frontier", infos="flat", **OPTIONS, starts="fixed")
     env.reset(seed=0)
     assert env.state_space.contains(env.state())
     assert np.array_equal(env.state(), env.unwrapped.state())

@@ -20,7 +20,7 @@ SMALL = {"map_cells": 32, "lidar": "lidar_360_6m", "stop_coverage": None}
 
 
 def test_an_episode_ends_once_and_has_to_be_reset():
-    env = SoloExploration(TWO_ROOMS, horizon_s=0.2, **SMALL)
+    env = SoloExploration(TWO_ROOMS, horizon_s=0.2, **SMALL, starts="fixed")
     with pytest.raises(RuntimeError, match=r"over or was not started; call reset\(\) before step\(\)"):
         env.step([0.0, 0.0])
     env.reset(seed=0)
@@ -36,7 +36,7 @@ def test_an_episode_ends_once_and_has_to_be_reset():
 
 
 def test_actions_of_frontiers_have_masks_and_others_have_none():
-    env = SoloExploration(TWO_ROOMS, "frontier", observation="flat", **SMALL)
+    env = SoloExploration(TWO_ROOMS, "frontier", observation="flat", **SMALL, starts="fixed")
     env.reset(seed=0)
     masks = env.action_masks()
     assert masks.dtype == np.bool_
@@ -48,7 +48,7 @@ def test_actions_of_frontiers_have_masks_and_others_have_none():
 
 
 def test_the_robot_takes_orders_and_is_drawn():
-    env = SoloExploration(TWO_ROOMS, render_mode="rgb_array", time_step=0.05, **SMALL)
+    env = SoloExploration(TWO_ROOMS, render_mode="rgb_array", time_step=0.05, **SMALL, starts="fixed")
     env.reset(seed=0)
     env.order(Order(OrderKind.PAUSE))
     assert env.step([1.0, 0.0])[4]["state"] == "paused"
@@ -72,7 +72,7 @@ def test_the_performance_benchmark_runs(monkeypatch, capsys):
             return now[0]
 
     monkeypatch.setattr(module, "time", Clock)
-    performance_benchmark(lidarium.env(robots=2, horizon_s=3.0, map_cells=64))
+    performance_benchmark(lidarium.env(robots=2, horizon_s=3.0, map_cells=64, starts="fixed"))
     assert "cycles per second" in capsys.readouterr().out
 
 
@@ -105,7 +105,7 @@ def test_importing_twice_registers_once():
 
 @pytest.mark.parametrize("level", lidarium.registry("level"))
 def test_agents_have_action_spaces_of_their_own_and_metadata_is_complete(level):
-    env = lidarium.parallel_env(level=level, robots=2)
+    env = lidarium.parallel_env(level=level, robots=2, starts="fixed")
     assert env.action_space("robot_0") is not env.action_space("robot_1")
     assert set(env.metadata) >= {"name", "render_modes", "render_fps", "is_parallelizable"}
     assert env.metadata["render_modes"] == ["human", "rgb_array"]
@@ -118,7 +118,9 @@ def test_the_solo_form_has_one_robot_and_says_what_to_use_for_more():
 
 
 def test_random_actions_never_break_the_bounds_of_velocity_and_heading():
-    env = lidarium.parallel_env("scene_corner", robots=2, map_cells=32, observe=["scan", "pose", "velocity"])
+    env = lidarium.parallel_env(
+        "scene_corner", robots=2, map_cells=32, observe=["scan", "pose", "velocity"], starts="fixed"
+    )
     env.reset(seed=0)
     generator = np.random.default_rng(1)
     for _ in range(300):

@@ -10,7 +10,7 @@ from lidarium.envs.settings.radio import RadioSettings
 
 @pytest.mark.parametrize("level", ["velocity", "waypoint"])
 def test_everybody_hears_everybody_over_the_ideal_radio(level):
-    env = lidarium.parallel_env("apartment", level=level, comm=2, **OPTIONS)
+    env = lidarium.parallel_env("apartment", level=level, comm=2, **OPTIONS, starts="fixed")
     observations, _ = env.reset(seed=0)
     assert env.action_space("robot_0").shape == (4,)
     assert not any(observation["messages"].any() for observation in observations.values())
@@ -26,7 +26,7 @@ def test_everybody_hears_everybody_over_the_ideal_radio(level):
 
 
 def test_nobody_hears_anything_without_a_radio():
-    env = lidarium.parallel_env("apartment", comm=2, radio="none", **OPTIONS)
+    env = lidarium.parallel_env("apartment", comm=2, radio="none", **OPTIONS, starts="fixed")
     env.reset(seed=0)
     draws = drawn(env)
     for _ in range(5):
@@ -36,7 +36,7 @@ def test_nobody_hears_anything_without_a_radio():
 
 def test_what_was_heard_ages_where_the_radio_fails():
     radio = RadioSettings(kind="range", reach=50.0, loss=0.6)
-    env = lidarium.parallel_env("apartment", comm=1, radio=radio, **OPTIONS)
+    env = lidarium.parallel_env("apartment", comm=1, radio=radio, **OPTIONS, starts="fixed")
     env.reset(seed=0)
     draws, ages = drawn(env), set()
     for _ in range(30):
@@ -52,7 +52,7 @@ def test_what_was_heard_ages_where_the_radio_fails():
 
 def test_messages_arrive_late_where_the_radio_has_latency():
     radio = RadioSettings(kind="range", reach=50.0, latency_s=0.3)
-    env = lidarium.parallel_env("apartment", comm=1, radio=radio, **OPTIONS)
+    env = lidarium.parallel_env("apartment", comm=1, radio=radio, **OPTIONS, starts="fixed")
     env.reset(seed=0)
     draws, log = drawn(env), []
     for step in range(10):

@@ -23,7 +23,9 @@ def test_a_reward_that_is_not_finite_is_an_error_that_names_the_robot(registered
         return np.where(np.arange(len(rows.poses)) == 1, value, 0.0)
 
     registered.append(("reward_term", "broken_reward"))
-    env = lidarium.parallel_env("scene_room", robots=2, reward={"more": {"broken_reward": 1.0}}, map_cells=64)
+    env = lidarium.parallel_env(
+        "scene_room", robots=2, reward={"more": {"broken_reward": 1.0}}, map_cells=64, starts="fixed"
+    )
     env.reset(seed=0)
     with pytest.raises(ValueError, match=r"reward term 'broken_reward' of robot_1, episode 0, is (nan|inf)"):
         env.step({agent: env.action_space(agent).sample() for agent in env.agents})
@@ -37,7 +39,7 @@ def test_an_observable_that_is_nan_is_an_error_and_infinity_is_clipped(registere
         return values
 
     registered.append(("observable", "broken_view"))
-    env = lidarium.parallel_env("scene_room", robots=2, observe=("broken_view",), map_cells=64)
+    env = lidarium.parallel_env("scene_room", robots=2, observe=("broken_view",), map_cells=64, starts="fixed")
     values[0] = np.inf
     observations, _ = env.reset(seed=0)
     assert observations["robot_0"]["broken_view"] == 1.0
@@ -69,7 +71,10 @@ def test_a_cell_of_a_notebook_can_be_run_again(registered):
 
 @pytest.mark.parametrize(("name", "value"), [("horizon_s", 5), ("robots", 1), ("lidar", "urg")])
 def test_a_setting_among_the_options_of_reset_is_told_to_belong_to_the_maker(name, value):
-    for env in (lidarium.parallel_env("scene_room", robots=1), lidarium.vector_env(1, "scene_room", robots=1)):
+    for env in (
+        lidarium.parallel_env("scene_room", robots=1, starts="fixed"),
+        lidarium.vector_env(1, "scene_room", robots=1, starts="fixed"),
+    ):
         with pytest.raises(ValueError, match=f"{name} is no option of reset, but a setting of the environment"):
             env.reset(options={name: value})
 

@@ -24,7 +24,7 @@ def box(width=5.0, height=4.0, solids=(), starts=((1.0, 1.0, 0.0), (1.0, 3.0, 0.
 
 def make(floor=None, **options):
     options = {"robots": 2, "stop_coverage": None, "map_cells": 64, "observe": ALL, **options}
-    return lidarium.parallel_env(box() if floor is None else floor, **options)
+    return lidarium.parallel_env(box() if floor is None else floor, **{"starts": "fixed", **options})
 
 
 def step_all(env, action=STAY):
@@ -416,7 +416,7 @@ def test_state_is_the_truth_of_the_whole_team():
 
 def test_default_settings_are_a_team_of_three_for_ten_minutes():
     env = lidarium.parallel_env()
-    assert env.settings == ExplorationSettings(observe=("scan", "velocity", "bumper", "map"))
+    assert env.settings == ExplorationSettings(observe=("scan", "velocity", "bumper", "map"), starts="drawn")
     assert len(env.possible_agents) == 3
     env.reset(seed=0)
     assert env.floor.name == "apartment"

@@ -29,7 +29,7 @@ def no_display(monkeypatch):
 @pytest.mark.parametrize("level", lidarium.registry("level"))
 @pytest.mark.usefixtures("no_display")
 def test_all_render_modes_render(level):
-    render_test(lambda **options: lidarium.env("scene_room", level=level, **SMALL, **options))
+    render_test(lambda **options: lidarium.env("scene_room", level=level, **SMALL, **{"starts": "fixed", **options}))
 
 
 @pytest.mark.usefixtures("no_display")
@@ -41,8 +41,8 @@ def test_gymnasiums_checker_finds_nothing_in_pictures():
 @pytest.mark.parametrize("level", lidarium.registry("level"))
 def test_pictures_follow_each_other_as_simulated_time_goes_alone_and_in_batches(level):
     options = {"robots": 1, "time_step": 0.05, "decision_period_s": 0.5}
-    alone = lidarium.parallel_env(level=level, **options)
-    batch = lidarium.vector_env(1, level=level, **options)
+    alone = lidarium.parallel_env(level=level, **{"starts": "fixed", **options})
+    batch = lidarium.vector_env(1, level=level, **{"starts": "fixed", **options})
     for env in (alone, batch):
         assert env.metadata["render_fps"] == pytest.approx(20 if level == "velocity" else 2)
     assert type(batch).metadata["render_fps"] == 10
@@ -50,7 +50,7 @@ def test_pictures_follow_each_other_as_simulated_time_goes_alone_and_in_batches(
 
 @pytest.mark.usefixtures("no_display")
 def test_frames_are_images_that_change_as_robots_drive():
-    env = lidarium.parallel_env("scene_room", render_mode="rgb_array", **SMALL)
+    env = lidarium.parallel_env("scene_room", render_mode="rgb_array", **SMALL, starts="fixed")
     env.reset(seed=0)
     first = env.render()
     for _ in range(20):
@@ -64,7 +64,7 @@ def test_frames_are_images_that_change_as_robots_drive():
 
 
 def test_no_mode_renders_nothing_and_rendering_needs_a_reset():
-    env = lidarium.parallel_env("scene_room", robots=1)
+    env = lidarium.parallel_env("scene_room", robots=1, starts="fixed")
     env.reset(seed=0)
     assert env.render() is None
     with pytest.raises(RuntimeError, match="reset"):
@@ -86,7 +86,7 @@ def test_each_row_has_the_picture_of_its_episode():
 
 
 def test_pictures_of_a_batch_show_the_floor_and_the_robots_of_each_episode():
-    batch = lidarium.vector_env(2, "scene_room", render_mode="rgb_array", **SMALL)
+    batch = lidarium.vector_env(2, "scene_room", render_mode="rgb_array", **SMALL, starts="fixed")
     batch.reset(seed=4, options={"starts": "drawn"})
     first, second = batch.render()[0], batch.render()[2]
     assert (first != second).any()
@@ -95,7 +95,7 @@ def test_pictures_of_a_batch_show_the_floor_and_the_robots_of_each_episode():
 
 
 def test_a_batch_without_a_mode_draws_nothing_but_its_picture():
-    env = lidarium.vector_env(5, "scene_room", **SMALL)
+    env = lidarium.vector_env(5, "scene_room", **SMALL, starts="fixed")
     with pytest.raises(RuntimeError, match="not reset; call reset"):
         env.picture()
     env.reset(seed=0)
@@ -112,7 +112,7 @@ def test_other_modes_are_refused():
 
 def test_rows_for_stable_baselines_are_drawn_as_tiles():
     pytest.importorskip("stable_baselines3")
-    env = lidarium.sb3_vec_env(4, "scene_room", render_mode="rgb_array", **SMALL)
+    env = lidarium.sb3_vec_env(4, "scene_room", render_mode="rgb_array", **SMALL, starts="fixed")
     env.seed(0)
     env.reset()
     frame = env.get_images()[0]

@@ -18,13 +18,13 @@ NOISE = {"lidar.noise_floor": (0.0, 0.05), "reward.time": (0.0, 1.0)}
 
 
 def make(episodes, **options):
-    return lidarium.vector_env(episodes, "scene_room", randomize=NOISE, **{**SMALL, **options})
+    return lidarium.vector_env(episodes, "scene_room", randomize=NOISE, **{"starts": "fixed", **SMALL, **options})
 
 
 def test_spaces_infos_and_states_are_those_of_a_plain_batch():
     rows, plain = (
         make(3, observation="flat", comm=2),
-        lidarium.vector_env(3, "scene_room", observation="flat", comm=2, **SMALL),
+        lidarium.vector_env(3, "scene_room", observation="flat", comm=2, **SMALL, starts="fixed"),
     )
     assert rows.metadata["autoreset_mode"] == AutoresetMode.NEXT_STEP
     assert rows.observation_space == plain.observation_space
@@ -50,7 +50,9 @@ def test_options_and_curricula_reach_the_episodes():
 
 
 def test_what_cannot_be_drawn_in_batches_is_refused():
-    rows = lidarium.vector_env(2, "scene_room", randomize={"map_cells": [32, 64]}, **{**SMALL, "observe": ["map"]})
+    rows = lidarium.vector_env(
+        2, "scene_room", randomize={"map_cells": [32, 64]}, **{**SMALL, "observe": ["map"]}, starts="fixed"
+    )
     with pytest.raises(ValueError, match="want some that leave the spaces"):
         [rows.reset(seed=seed) for seed in range(10)]
     with pytest.raises(RuntimeError, match="was not reset"):

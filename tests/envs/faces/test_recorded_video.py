@@ -20,7 +20,7 @@ def films_in(folder):
 @pytest.mark.parametrize("kind", ["vector_env", "make_vec"])
 def test_each_episode_of_a_batch_is_filmed(kind, tmp_path):
     if kind == "vector_env":
-        env = lidarium.vector_env(2, "scene_room", robots=2, **SMALL)
+        env = lidarium.vector_env(2, "scene_room", robots=2, **SMALL, starts="fixed")
     else:
         env = gymnasium.make_vec("lidarium/Exploration-v1", 2, floor="scene_room", **SMALL)
     filmed = gymnasium.wrappers.vector.RecordVideo(env, str(tmp_path), episode_trigger=lambda _: True)
@@ -45,7 +45,7 @@ def test_rows_of_stable_baselines_are_filmed_as_tiles(tmp_path):
     pytest.importorskip("stable_baselines3")
     from stable_baselines3.common.vec_env import VecVideoRecorder
 
-    env = lidarium.sb3_vec_env(4, "scene_room", robots=1, **SMALL)
+    env = lidarium.sb3_vec_env(4, "scene_room", robots=1, **SMALL, starts="fixed")
     filmed = VecVideoRecorder(env, str(tmp_path), lambda step: step == 0, video_length=6)
     filmed.reset()
     for _ in range(8):

@@ -1,5 +1,6 @@
-"""Where robots start: at the floor's starts, or anywhere; alone, in batches, and by options of a reset."""
+"""Where robots start: drawn by the seed, at the floor's starts, or where a reset says; alone and in batches."""
 
+import gymnasium
 import numpy as np
 import pytest
 
@@ -13,24 +14,50 @@ def begun(env, seed, **options):
     return env.unwrapped.world.starts.copy()
 
 
-def test_one_floor_has_fixed_starts_unless_drawn_ones_are_asked_for():
-    fixed = lidarium.parallel_env("apartment", **SMALL)
-    drawn = lidarium.parallel_env("apartment", starts="drawn", **SMALL)
-    assert np.array_equal(begun(fixed, 0), begun(fixed, 1))
-    assert not np.array_equal(begun(drawn, 0), begun(drawn, 1))
-    assert np.array_equal(begun(drawn, 0), begun(drawn, 0))
-
-
-@pytest.mark.parametrize("floor", ["set:test:1", ["apartment"]])
-def test_floors_that_are_drawn_have_drawn_starts_unless_fixed_ones_are_asked_for(floor):
+@pytest.mark.parametrize("floor", ["apartment", "set:test:1", ["apartment"]])
+def test_makers_draw_starts_by_the_seed_unless_fixed_ones_are_asked_for(floor):
     drawn = lidarium.parallel_env(floor, **SMALL)
     fixed = lidarium.parallel_env(floor, starts="fixed", **SMALL)
-    assert not np.array_equal(begun(drawn, 0), begun(drawn, 1))
+    assert np.abs(begun(drawn, 0) - begun(drawn, 1)).max() > 0.1
+    assert np.array_equal(begun(drawn, 0), begun(drawn, 0))
     assert np.array_equal(begun(fixed, 0)[0], begun(fixed, 1)[0])
 
 
+def test_every_face_draws_the_same_starts_for_a_seed():
+    alone = [begun(lidarium.parallel_env(**SMALL), seed) for seed in (3, 4, 5)]
+    batch = lidarium.vector_env(3, **SMALL)
+    batch.reset(seed=3)
+    assert np.array_equal(batch.engine.world.starts.reshape(3, 2, 3), alone)
+    assert np.array_equal(begun(lidarium.env(**SMALL), 3), alone[0])
+    one = {**SMALL, "robots": 1}
+    solo = gymnasium.make("lidarium/Exploration-v1", **one).unwrapped.parallel
+    assert np.array_equal(begun(solo, 3), begun(lidarium.parallel_env(**one), 3))
+
+
+def test_rows_for_learners_draw_the_same_starts():
+    pytest.importorskip("stable_baselines3")
+    batch = lidarium.sb3_vec_env(3, **SMALL)
+    batch.seed(3)
+    batch.reset()
+    alone = [begun(lidarium.parallel_env(**SMALL), seed) for seed in (3, 4, 5)]
+    assert np.array_equal(batch.engine.world.starts.reshape(3, 2, 3), alone)
+    assert repr(batch) == "<ExplorationVecEnv: 6 rows = 3 episodes x 2 robots>"
+
+
+def test_settings_that_name_no_starts_leave_the_default_and_others_hold():
+    env = lidarium.parallel_env(settings=lidarium.make_settings(robots=2))
+    assert np.abs(begun(env, 3) - begun(env, 4)).max() > 0.1
+    env = lidarium.parallel_env(settings=lidarium.make_settings(robots=2, starts="fixed"))
+    assert begun(env, 3) == pytest.approx(lidarium.load_floor("apartment").starts[:2])
+
+
+def test_a_run_of_one_floor_takes_its_starts():
+    env = lidarium.ExplorationEnv("apartment", lidarium.make_settings(robots=2))
+    assert begun(env, 3) == pytest.approx(lidarium.load_floor("apartment").starts[:2])
+
+
 def test_an_option_of_a_reset_goes_before_the_setting():
-    env = lidarium.parallel_env("apartment", **SMALL)
+    env = lidarium.parallel_env("apartment", **SMALL, starts="fixed")
     fixed = begun(env, 0)
     drawn = begun(env, 0, starts="drawn")
     assert not np.array_equal(fixed, drawn)
@@ -63,7 +90,7 @@ def growing(number):
 
 
 def test_a_curriculum_chooses_by_the_number_of_the_episode():
-    env = lidarium.parallel_env("clinic", curriculum=growing, **SMALL)
+    env = lidarium.parallel_env("clinic", curriculum=growing, **SMALL, starts="fixed")
     names = []
     for _ in range(5):
         env.reset()
@@ -74,7 +101,7 @@ def test_a_curriculum_chooses_by_the_number_of_the_episode():
 
 
 def test_episodes_of_a_batch_are_counted_as_they_begin():
-    batch = lidarium.vector_env(2, "clinic", curriculum=growing, **SMALL)
+    batch = lidarium.vector_env(2, "clinic", curriculum=growing, **SMALL, starts="fixed")
     names = []
     for _ in range(2):
         batch.reset(seed=1)
@@ -83,6 +110,6 @@ def test_episodes_of_a_batch_are_counted_as_they_begin():
 
 
 def test_bad_options_of_a_curriculum_are_refused_with_the_number():
-    env = lidarium.parallel_env("clinic", curriculum=lambda number: {"start": number}, **SMALL)
+    env = lidarium.parallel_env("clinic", curriculum=lambda number: {"start": number}, **SMALL, starts="fixed")
     with pytest.raises(ValueError, match="the curriculum of episode 0: unknown reset option 'start'"):
         env.reset(seed=0)

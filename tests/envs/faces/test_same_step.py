@@ -10,8 +10,8 @@ OPTIONS = {"robots": 2, "horizon_s": 0.5, "map_cells": 64, "observe": ("scan", "
 
 
 def test_final_observations_and_infos_are_those_that_the_next_step_mode_returns():
-    same = lidarium.vector_env(3, "scene_room", autoreset_mode=AutoresetMode.SAME_STEP, **OPTIONS)
-    later = lidarium.vector_env(3, "scene_room", **OPTIONS)
+    same = lidarium.vector_env(3, "scene_room", autoreset_mode=AutoresetMode.SAME_STEP, **OPTIONS, starts="fixed")
+    later = lidarium.vector_env(3, "scene_room", **OPTIONS, starts="fixed")
     assert same.metadata["autoreset_mode"] is AutoresetMode.SAME_STEP
     for one, other in zip(same.reset(seed=1)[0].values(), later.reset(seed=1)[0].values(), strict=True):
         assert np.array_equal(one, other)
@@ -41,21 +41,24 @@ def test_other_modes_are_refused():
 
 def test_rows_for_learners_have_the_state_of_each_team():
     pytest.importorskip("stable_baselines3")
-    learners = lidarium.sb3_vec_env(2, "scene_room", **OPTIONS)
+    learners = lidarium.sb3_vec_env(2, "scene_room", **OPTIONS, starts="fixed")
     learners.reset()
     assert learners.num_envs == 4
-    assert learners.state().shape == (2, lidarium.vector_env(2, "scene_room", **OPTIONS).state_space.shape[0])
+    assert learners.state().shape == (
+        2,
+        lidarium.vector_env(2, "scene_room", **OPTIONS, starts="fixed").state_space.shape[0],
+    )
 
 
 def test_an_array_is_a_floor():
     solid = np.zeros((60, 80), bool)
     solid[[0, -1]] = solid[:, [0, -1]] = True
     solid[20, :50] = True
-    env = lidarium.parallel_env(solid, image_resolution=0.05, robots=1, map_cells=64)
+    env = lidarium.parallel_env(solid, image_resolution=0.05, robots=1, map_cells=64, starts="fixed")
     env.reset(seed=0)
     grey = np.where(solid, 0, 255).astype(np.uint8)
     assert lidarium.load_floor(grey, 0.05).sha256 == env.floor.sha256
-    batch = lidarium.vector_env(2, solid, image_resolution=0.05, robots=1, map_cells=64)
+    batch = lidarium.vector_env(2, solid, image_resolution=0.05, robots=1, map_cells=64, starts="fixed")
     assert batch.reset(seed=0)[0]["scan"].shape[0] == 2
     with pytest.raises(ValueError, match="array is an array without a scale; want image_resolution"):
         lidarium.parallel_env(solid, robots=1)

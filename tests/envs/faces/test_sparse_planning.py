@@ -110,7 +110,9 @@ def test_orders_of_a_station_are_driven_along_routes_too():
 def test_robots_without_cameras_or_without_goals_are_refused():
     with pytest.raises(ValueError, match=r"no depth camera.*camera='xtion'"):
         SparsePlanning(made(camera=None))
-    env = lidarium.parallel_env("apartment", robots=1, camera="xtion_tilted", observe=["scan", "pose", "bumper"])
+    env = lidarium.parallel_env(
+        "apartment", robots=1, camera="xtion_tilted", observe=["scan", "pose", "bumper"], starts="fixed"
+    )
     with pytest.raises(ValueError, match="the policy decides speeds; want waypoints or frontiers"):
         run_episode(lidarium.policy("random_walk"), env, 0, plans_sparsely=True)
 
@@ -134,6 +136,7 @@ def test_a_policy_of_the_laser_explores_along_sparse_routes(backend):
         resolution=0.05,
         horizon_s=60.0,
         map_cells=32,
+        starts="fixed",
     )
     run_episode(lidarium.policy("nearest_frontier"), env, seed=0, plans_sparsely=True)
     assert env.scorer.coverage > 0.7
@@ -143,7 +146,7 @@ def test_a_policy_of_the_laser_explores_along_sparse_routes(backend):
 
 def test_a_batch_drives_along_the_routes_of_single_environments():
     options = {"robots": 1, "camera": "xtion_tilted", "resolution": 0.05, "stop_coverage": None, "map_cells": 64}
-    batch = lidarium.vector_env(2, LOW_TABLE, level="waypoint", plans_sparsely=True, **options)
+    batch = lidarium.vector_env(2, LOW_TABLE, level="waypoint", plans_sparsely=True, **{"starts": "fixed", **options})
     single = SparsePlanning(made())
     batch.reset(seed=0)
     single.reset(seed=0)

@@ -47,8 +47,8 @@ def assert_row(observations, row, wanted):
 
 
 def test_the_terminal_observation_is_the_last_of_the_episode_that_ended():
-    envs = lidarium.sb3_vec_env(2, ROOM, **{**FEW, "horizon_s": 1.0, "stop_coverage": None})
-    alone = lidarium.parallel_env(ROOM, **{**FEW, "horizon_s": 1.0, "stop_coverage": None})
+    envs = lidarium.sb3_vec_env(2, ROOM, **{**FEW, "horizon_s": 1.0, "stop_coverage": None}, starts="fixed")
+    alone = lidarium.parallel_env(ROOM, **{**FEW, "horizon_s": 1.0, "stop_coverage": None}, starts="fixed")
     envs.seed(4)
     envs.reset()
     alone.reset(seed=5)
@@ -68,12 +68,12 @@ def test_the_terminal_observation_is_the_last_of_the_episode_that_ended():
 
 
 def test_the_horizon_truncates_and_an_ending_does_not():
-    covered = lidarium.sb3_vec_env(1, ROOM, **{**FEW, "stop_coverage": 0.01})
+    covered = lidarium.sb3_vec_env(1, ROOM, **{**FEW, "stop_coverage": 0.01}, starts="fixed")
     covered.reset()
     _, _, dones, infos = covered.step(np.zeros((1, 2)))
     assert dones[0]
     assert (infos[0]["ended_because"], infos[0]["TimeLimit.truncated"]) == ("covered", False)
-    cut = lidarium.sb3_vec_env(1, ROOM, **{**FEW, "horizon_s": 0.2, "stop_coverage": None})
+    cut = lidarium.sb3_vec_env(1, ROOM, **{**FEW, "horizon_s": 0.2, "stop_coverage": None}, starts="fixed")
     cut.reset()
     _, _, dones, infos = cut.step(np.zeros((1, 2)))
     assert (dones[0], infos[0]["TimeLimit.truncated"], "terminal_observation" in infos[0]) == (
@@ -88,7 +88,10 @@ def test_the_horizon_truncates_and_an_ending_does_not():
 
 def test_a_robot_that_ends_early_is_done_and_then_masked_until_its_episode_begins_anew():
     envs = lidarium.sb3_vec_env(
-        1, ROOM, **{**FEW, "robots": 2, "stop_on_contact": True, "horizon_s": 3.0, "stop_coverage": None}
+        1,
+        ROOM,
+        **{**FEW, "robots": 2, "stop_on_contact": True, "horizon_s": 3.0, "stop_coverage": None},
+        starts="fixed",
     )
     envs.set_options({"starts": [(4.2, 3.0, 0.0), (1.0, 1.0, math.pi / 2)]})
     envs.reset()
@@ -126,10 +129,10 @@ def test_a_robot_that_ends_early_is_done_and_then_masked_until_its_episode_begin
 
 
 def test_seeds_count_by_episode_and_hold_for_one_reset():
-    envs = lidarium.sb3_vec_env(3, ROOM, **{**FEW, "robots": 2})
+    envs = lidarium.sb3_vec_env(3, ROOM, **{**FEW, "robots": 2}, starts="fixed")
     assert envs.seed(8) == [8, 8, 9, 9, 10, 10]
     poses = envs.reset()["pose"].copy(), envs.reset()["pose"].copy()
-    wanted, _ = (oracle := lidarium.vector_env(3, ROOM, **{**FEW, "robots": 2})).reset(seed=8)
+    wanted, _ = (oracle := lidarium.vector_env(3, ROOM, **{**FEW, "robots": 2}, starts="fixed")).reset(seed=8)
     assert np.array_equal(poses[0], wanted["pose"])
     assert np.array_equal(poses[1], oracle.reset()[0]["pose"])
     assert len(set(envs.seed())) == 3
@@ -138,7 +141,7 @@ def test_seeds_count_by_episode_and_hold_for_one_reset():
 
 
 def test_options_are_for_all_episodes_for_each_or_for_each_row():
-    envs = lidarium.sb3_vec_env(2, ROOM, **{**FEW, "robots": 2})
+    envs = lidarium.sb3_vec_env(2, ROOM, **{**FEW, "robots": 2}, starts="fixed")
     envs.set_options({"floor": ["clinic", "apartment"]})
     envs.reset()
     assert [floor.name for floor in envs.engine.floors] == ["clinic", "apartment"]
@@ -154,7 +157,7 @@ def test_options_are_for_all_episodes_for_each_or_for_each_row():
 
 
 def test_attributes_are_shared_and_rows_have_no_methods_of_their_own():
-    envs = lidarium.sb3_vec_env(2, ROOM, **{**FEW, "robots": 2})
+    envs = lidarium.sb3_vec_env(2, ROOM, **{**FEW, "robots": 2}, starts="fixed")
     assert envs.num_envs == 4
     assert envs.get_attr("settings", [0, 3]) == [envs.settings] * 2
     assert envs.get_attr("render_mode") == [None] * 4
@@ -169,7 +172,7 @@ def test_attributes_are_shared_and_rows_have_no_methods_of_their_own():
 
 
 def test_steps_out_of_turn_say_what_to_do():
-    envs = lidarium.sb3_vec_env(2, ROOM, **FEW)
+    envs = lidarium.sb3_vec_env(2, ROOM, **FEW, starts="fixed")
     with pytest.raises(RuntimeError, match="not reset; call reset"):
         envs.step(np.zeros((2, 2)))
     envs.reset()
@@ -190,14 +193,14 @@ def test_steps_out_of_turn_say_what_to_do():
 
 
 def test_the_level_of_frontiers_has_masks_of_actions():
-    envs = lidarium.sb3_vec_env(2, ROOM, level="frontier", **FEW)
+    envs = lidarium.sb3_vec_env(2, ROOM, level="frontier", **FEW, starts="fixed")
     observations = envs.reset()
     assert is_masking_supported(envs)
     assert get_action_masks(envs).dtype == np.bool_
     assert np.array_equal(get_action_masks(envs), observations["action_mask"] == 1)
     assert np.array_equal(envs.env_method("action_masks", indices=1)[0], observations["action_mask"][1] == 1)
     for level in ("velocity", "waypoint"):
-        assert not is_masking_supported(lidarium.sb3_vec_env(1, ROOM, level=level, **FEW))
+        assert not is_masking_supported(lidarium.sb3_vec_env(1, ROOM, level=level, **FEW, starts="fixed"))
 
 
 PPO_FEW = {"n_steps": 250, "batch_size": 250, "n_epochs": 2}
@@ -216,7 +219,7 @@ def assert_trains(algorithm, env, steps=500, **options):
 @pytest.mark.parametrize("is_batch", [True, False])
 def test_stable_baselines_algorithms_train(algorithm, options, is_batch):
     env = (
-        VecMonitor(lidarium.sb3_vec_env(4, ROOM, **FEW))
+        VecMonitor(lidarium.sb3_vec_env(4, ROOM, **FEW, starts="fixed"))
         if is_batch
         else gymnasium.make("lidarium/Exploration-v1", floor=ROOM, **FEW)
     )
@@ -231,10 +234,10 @@ def test_teams_train_on_an_egocentric_map_and_normalised_rewards():
         "egocentric_cells": 36,
         "stop_on_contact": True,
     }
-    env = VecNormalize(VecMonitor(lidarium.sb3_vec_env(2, ROOM, **options)), norm_obs=False)
+    env = VecNormalize(VecMonitor(lidarium.sb3_vec_env(2, ROOM, **{"starts": "fixed", **options})), norm_obs=False)
     assert_trains(stable_baselines3.PPO, env, 256, n_steps=64, batch_size=128, n_epochs=1)
 
 
 def test_maskable_ppo_trains_on_frontiers():
-    env = VecMonitor(lidarium.sb3_vec_env(4, ROOM, level="frontier", **{**FEW, "horizon_s": 20.0}))
+    env = VecMonitor(lidarium.sb3_vec_env(4, ROOM, level="frontier", **{**FEW, "horizon_s": 20.0}, starts="fixed"))
     assert_trains(sb3_contrib.MaskablePPO, env, **PPO_FEW)

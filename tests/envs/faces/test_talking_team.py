@@ -8,7 +8,7 @@ import lidarium
 
 
 def test_messages_do_not_change_how_robots_drive():
-    env, mute = (lidarium.parallel_env("apartment", comm=floats, **OPTIONS) for floats in (3, 0))
+    env, mute = (lidarium.parallel_env("apartment", comm=floats, **OPTIONS, starts="fixed") for floats in (3, 0))
     env.reset(seed=0)
     mute.reset(seed=0)
     draws = drawn(env)
@@ -20,7 +20,7 @@ def test_messages_do_not_change_how_robots_drive():
 
 
 def test_choices_of_frontiers_have_messages_beside():
-    env = lidarium.parallel_env("apartment", level="frontier", comm=1, **OPTIONS)
+    env = lidarium.parallel_env("apartment", level="frontier", comm=1, **OPTIONS, starts="fixed")
     env.reset(seed=0)
     action = {"action": 0, "message": [0.5]}
     observations = env.step(dict.fromkeys(env.agents, action))[0]
@@ -31,7 +31,7 @@ def test_choices_of_frontiers_have_messages_beside():
 
 @pytest.mark.parametrize("action", [None, [0.1, 0.2], "hello", [0.1, 0.2, float("nan")]])
 def test_actions_without_a_message_are_refused_by_name(action):
-    env = lidarium.parallel_env("apartment", comm=1, **{**OPTIONS, "robots": 2})
+    env = lidarium.parallel_env("apartment", comm=1, **{**OPTIONS, "robots": 2}, starts="fixed")
     env.reset(seed=0)
     good = np.zeros(3, np.float32)
     with pytest.raises(ValueError, match="robot_1"):

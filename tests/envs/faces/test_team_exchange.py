@@ -24,7 +24,7 @@ KNOWN = MergingSettings(period_s=0.5, known_starts=True)
 
 def team(robots=2, **options):
     options = {"known_starts": False, "map_cells": 32, "resolution": 0.05, **options}
-    env = lidarium.parallel_env(HALL, robots=robots, **options)
+    env = lidarium.parallel_env(HALL, robots=robots, **{"starts": "fixed", **options})
     env.reset(seed=0, options={"starts": STARTS[:robots]})
     return env
 

@@ -11,7 +11,7 @@ SMALL = {"robots": 2, "map_cells": 32, "lidar": "lidar_360_6m"}
 
 
 def test_agents_are_those_that_are_left():
-    wrapped = TeamWrapper(lidarium.parallel_env("apartment", **SMALL))
+    wrapped = TeamWrapper(lidarium.parallel_env("apartment", **SMALL, starts="fixed"))
     wrapped.reset(seed=0)
     wrapped.stop("robot_0", "enough")
     wrapped.order("robot_1", Order("pause"))

@@ -94,8 +94,8 @@ def test_one_robot_an_episode_is_as_in_gymnasiums_own_vector_environment(level):
 
 
 def test_later_episodes_draw_from_the_generator_of_their_episode():
-    batch = lidarium.vector_env(2, ROOM, horizon_s=0.2, **FEW)
-    alone = lidarium.parallel_env(ROOM, horizon_s=0.2, **FEW)
+    batch = lidarium.vector_env(2, ROOM, horizon_s=0.2, **FEW, starts="fixed")
+    alone = lidarium.parallel_env(ROOM, horizon_s=0.2, **FEW, starts="fixed")
     firsts = [batch.reset(seed=20)[0]["pose"][1]]
     wanted = [alone.reset(seed=21)[0]["robot_0"]["pose"]]
     for _ in range(3):
@@ -111,7 +111,7 @@ def masked_run():
     """A robot that runs into the wall ahead of it beside one that stands still, until the horizon and a
     step beyond."""
     options = {**FEW, "robots": 2, "stop_on_contact": True, "horizon_s": 3.0, "stop_coverage": None}
-    batch = lidarium.vector_env(2, ROOM, **options)
+    batch = lidarium.vector_env(2, ROOM, **{"starts": "fixed", **options})
     near, far = (4.2, 3.0, 0.0), (1.0, 1.0, math.pi / 2)
     batch.reset(seed=0, options={"starts": [[near, far], [far, near]]})
     return batch, [batch.step(np.array([AHEAD, STAY, STAY, STAY])) for _ in range(31)]
@@ -155,7 +155,7 @@ def test_the_body_of_a_masked_robot_stays_on_the_floor():
 
 @pytest.mark.parametrize("level", ["velocity", "frontier"])
 def test_some_episodes_are_reset_and_the_others_wait(level):
-    batch = lidarium.vector_env(3, ROOM, level=level, **FEW)
+    batch = lidarium.vector_env(3, ROOM, level=level, **FEW, starts="fixed")
     observations, _ = batch.reset(seed=[5, 6, 7])
     actions = np.ones((3, 2)) if level == "velocity" else np.zeros(3, np.int64)
     for _ in range(2):
@@ -171,7 +171,7 @@ def test_some_episodes_are_reset_and_the_others_wait(level):
 
 
 def test_what_waits_is_not_told_of_twice():
-    batch = lidarium.vector_env(2, ROOM, level="frontier", **FEW)
+    batch = lidarium.vector_env(2, ROOM, level="frontier", **FEW, starts="fixed")
     batch.reset(seed=1)
     for _ in range(60):
         *_, infos = batch.step(np.zeros(2, np.int64))
@@ -185,7 +185,7 @@ def test_what_waits_is_not_told_of_twice():
 def test_what_waits_goes_on_as_if_nothing_had_been_reset():
     runs = []
     for is_disturbed in (False, True):
-        batch = lidarium.vector_env(2, ROOM, level="frontier", **FEW)
+        batch = lidarium.vector_env(2, ROOM, level="frontier", **FEW, starts="fixed")
         batch.reset(seed=1)
         for k in range(12):
             if is_disturbed and k in (3, 4, 8):
@@ -199,14 +199,14 @@ def test_what_waits_goes_on_as_if_nothing_had_been_reset():
 
 
 def test_options_of_a_reset_are_for_all_or_for_each_episode():
-    batch = lidarium.vector_env(2, ROOM, **FEW)
+    batch = lidarium.vector_env(2, ROOM, **FEW, starts="fixed")
     places = np.array([[[1.0, 1.0, 0.5]], [[4.0, 3.0, -0.5]]])
     _, infos = batch.reset(options={"starts": places[0]})
     assert np.allclose(infos["truth"]["pose"], places[0])
     _, infos = batch.reset(options={"starts": places, "colour": "ignored"})
     assert np.allclose(infos["truth"]["pose"], places[:, 0])
     _, infos = batch.reset(seed=3, options={"starts": [None, places[0]]})
-    drawn = lidarium.vector_env(1, ROOM, **FEW).reset(seed=3)[1]["truth"]["pose"][0]
+    drawn = lidarium.vector_env(1, ROOM, **FEW, starts="fixed").reset(seed=3)[1]["truth"]["pose"][0]
     assert np.array_equal(infos["truth"]["pose"][0], drawn)
     assert np.allclose(infos["truth"]["pose"][1], places[0])
     batch.reset(options={"floor": "apartment"})
@@ -219,7 +219,7 @@ def test_options_of_a_reset_are_for_all_or_for_each_episode():
 
 def test_goals_are_for_all_or_for_each_episode():
     floor = dataclasses.replace(ROOM, goal=(1.0, 1.0))
-    batch = lidarium.vector_env(2, floor, **FEW)
+    batch = lidarium.vector_env(2, floor, **FEW, starts="fixed")
     assert "goal" in batch.single_observation_space.spaces
     start = np.array([[1.5, 1.5, 0.0]])
     one, another = (2.0, 3.0), (3.0, 2.0)
@@ -241,7 +241,7 @@ def test_floors_of_different_sizes_and_of_cells_of_different_sizes_are_in_one_ba
     names = [ROOM, "clinic", "building:3"]
     coarse = load_floor("apartment").raster(0.04, 0.3, 0.3)
     image = dataclasses.replace(load_floor("apartment"), name="image", solids=(), cells=coarse)
-    batch = lidarium.vector_env(4, **FEW)
+    batch = lidarium.vector_env(4, **FEW, starts="fixed")
     batch.reset(seed=0, options={"floor": [*names, image]})
     shapes = {grid.shape for grid in batch.engine.simulation.beliefs.log_odds}
     assert len(shapes) == 4
@@ -270,20 +270,20 @@ def test_of_a_set_each_beginning_draws_a_floor(monkeypatch):
 
 
 def test_a_list_has_a_seed_for_each_episode():
-    batch = lidarium.vector_env(3, ROOM, **FEW)
+    batch = lidarium.vector_env(3, ROOM, **FEW, starts="fixed")
     poses = batch.reset(seed=[9, 4, 9])[1]["truth"]["pose"]
     assert np.array_equal(poses[0], poses[2])
     assert not np.array_equal(poses[0], poses[1])
     assert np.array_equal(batch.reset(seed=np.array([4, 5, 6]))[1]["truth"]["pose"][0], poses[1])
     assert np.array_equal(batch.reset(seed=4)[1]["truth"]["pose"][0], poses[1])
     # Noise depends on the seed, never on the row.
-    noisy = lidarium.vector_env(2, ROOM, noise="datasheet", **FEW)
+    noisy = lidarium.vector_env(2, ROOM, noise="datasheet", **FEW, starts="fixed")
     scans = noisy.reset(seed=[3, 3])[0]["scan"]
     assert np.array_equal(scans[0], scans[1])
 
 
 def test_observations_are_new_arrays_or_two_sets_that_take_turns():
-    fresh = lidarium.vector_env(2, ROOM, **FEW)
+    fresh = lidarium.vector_env(2, ROOM, **FEW, starts="fixed")
     first, _ = fresh.reset(seed=0)
     kept = {name: array.copy() for name, array in first.items()}
     returned = [first] + [fresh.step(np.ones((2, 2)))[0] for _ in range(4)]
@@ -291,7 +291,7 @@ def test_observations_are_new_arrays_or_two_sets_that_take_turns():
     assert not any(
         np.shares_memory(one["scan"], other["scan"]) for k, one in enumerate(returned) for other in returned[:k]
     )
-    turning = lidarium.vector_env(2, ROOM, copy=False, **FEW)
+    turning = lidarium.vector_env(2, ROOM, copy=False, **FEW, starts="fixed")
     reused = [turning.reset(seed=0)[0]]
     last = {name: array.copy() for name, array in reused[0].items()}
     for k in range(1, 5):
@@ -304,7 +304,7 @@ def test_observations_are_new_arrays_or_two_sets_that_take_turns():
 
 @pytest.mark.parametrize("duplicate", [copy.deepcopy, lambda env: pickle.loads(pickle.dumps(env))])
 def test_copies_in_mid_episode_go_on_alike(duplicate):
-    batch = lidarium.vector_env(2, ROOM, level="frontier", **{**FEW, "robots": 2})
+    batch = lidarium.vector_env(2, ROOM, level="frontier", **{**FEW, "robots": 2}, starts="fixed")
     batch.reset(seed=0)
     for _ in range(3):
         batch.step(np.zeros(4, np.int64))
@@ -317,7 +317,7 @@ def test_copies_in_mid_episode_go_on_alike(duplicate):
 
 def test_gymnasiums_wrappers_of_vector_environments_work_on_it():
     batch = DictInfoToList(
-        RecordEpisodeStatistics(lidarium.vector_env(2, ROOM, level="waypoint", horizon_s=2.0, **FEW))
+        RecordEpisodeStatistics(lidarium.vector_env(2, ROOM, level="waypoint", horizon_s=2.0, **FEW, starts="fixed"))
     )
     _, infos = batch.reset(seed=0)
     total = np.zeros(2)
@@ -332,13 +332,13 @@ def test_gymnasiums_wrappers_of_vector_environments_work_on_it():
 
 
 def test_threads_are_those_of_the_machine_unless_named():
-    assert lidarium.vector_env(1).settings.threads == available_threads()
-    assert lidarium.vector_env(1, threads=1).settings.threads == 1
-    assert lidarium.vector_env(1, settings=make_settings(threads=3, robots=2)).settings.threads == 3
+    assert lidarium.vector_env(1, starts="fixed").settings.threads == available_threads()
+    assert lidarium.vector_env(1, threads=1, starts="fixed").settings.threads == 1
+    assert lidarium.vector_env(1, settings=make_settings(threads=3, robots=2), starts="fixed").settings.threads == 3
 
 
 def test_a_closed_environment_and_one_without_reset_say_what_to_do():
-    batch = lidarium.vector_env(2, **FEW)
+    batch = lidarium.vector_env(2, **FEW, starts="fixed")
     with pytest.raises(RuntimeError, match="not reset; call reset"):
         batch.step(np.zeros((2, 2)))
     batch.reset(options={"episodes": [True, False]})
@@ -410,7 +410,7 @@ def test_make_vec_refuses_teams_and_none():
     ],
 )
 def test_resets_that_cannot_be_are_refused_and_change_nothing(seed, options, words):
-    batch = lidarium.vector_env(3, ROOM, **FEW)
+    batch = lidarium.vector_env(3, ROOM, **FEW, starts="fixed")
     before = batch.reset(seed=1)[1]["truth"]["pose"]
     with pytest.raises(ValueError, match=words):
         batch.reset(seed=seed, options=options)
@@ -444,7 +444,7 @@ def test_resets_that_cannot_be_are_refused_and_change_nothing(seed, options, wor
     ],
 )
 def test_actions_that_cannot_be_are_refused_and_change_nothing(level, actions, words):
-    batch = lidarium.vector_env(3, ROOM, level=level, **FEW)
+    batch = lidarium.vector_env(3, ROOM, level=level, **FEW, starts="fixed")
     before = batch.reset(seed=1)[1]["truth"]["pose"]
     with pytest.raises(ValueError, match=words):
         batch.step(actions)
@@ -453,7 +453,7 @@ def test_actions_that_cannot_be_are_refused_and_change_nothing(level, actions, w
 
 
 def test_actions_of_rows_that_do_not_act_are_ignored():
-    batch = lidarium.vector_env(2, ROOM, horizon_s=0.1, **FEW)
+    batch = lidarium.vector_env(2, ROOM, horizon_s=0.1, **FEW, starts="fixed")
     batch.reset(seed=0)
     assert batch.step(np.zeros((2, 2)))[3].all()
     observations, *_ = batch.step(np.full((2, 2), np.nan))
@@ -470,6 +470,7 @@ def test_scans_of_as_many_beams_as_there_may_be_find_room_on_the_stacks_of_all_t
         observe=["scan", "egocentric_map"],
         egocentric_cells=1024,
         threads=threads,
+        starts="fixed",
     )
     batch.reset(seed=0)
     for _ in range(2):

@@ -27,7 +27,7 @@ def make(floor=ROOMS, **options):
     return lidarium.parallel_env(
         floor,
         level="frontier",
-        **{"robots": 2, "stop_coverage": None, "horizon_s": None, "map_cells": 64, **options},
+        **{"starts": "fixed", "robots": 2, "stop_coverage": None, "horizon_s": None, "map_cells": 64, **options},
     )
 
 

@@ -42,7 +42,7 @@ def test_an_unknown_disc_is_seen_whole():
 
 
 def test_gains_are_observed_beside_the_frontiers():
-    env = lidarium.parallel_env("apartment", observe=OBSERVE, **OPTIONS)
+    env = lidarium.parallel_env("apartment", observe=OBSERVE, **OPTIONS, starts="fixed")
     observations, _ = env.reset(seed=1)
     for _ in range(4):
         for agent, observation in observations.items():
@@ -60,7 +60,7 @@ def test_rows_of_a_batch_expect_the_same():
 
 
 def test_frontiers_can_be_had_alone():
-    env = lidarium.parallel_env("apartment", observe=["frontiers"], observation="flat", **OPTIONS)
+    env = lidarium.parallel_env("apartment", observe=["frontiers"], observation="flat", **OPTIONS, starts="fixed")
     assert env.observation_space("robot_0").shape == (33 + 32 * 4,)
     assert env.reset(seed=0)[0]["robot_0"].shape == (33 + 32 * 4,)
 

@@ -30,8 +30,8 @@ def compass():
 
 def test_a_single_environment_and_a_batch_take_the_level():
     options = {"robots": 2, "map_cells": 32, "lidar": "lidar_360_6m", "observe": ["scan", "pose"]}
-    env = lidarium.parallel_env(TWO_ROOMS, level="compass", **options)
-    rows = lidarium.vector_env(2, TWO_ROOMS, level="compass", **options)
+    env = lidarium.parallel_env(TWO_ROOMS, level="compass", **{"starts": "fixed", **options})
+    rows = lidarium.vector_env(2, TWO_ROOMS, level="compass", **{"starts": "fixed", **options})
     assert env.action_space("robot_0") == rows.single_action_space == spaces.Discrete(5)
     observations, _ = env.reset(seed=1)
     rows.reset(seed=1)

@@ -14,7 +14,7 @@ HALL = Floor("hall", (0.0, 0.0, 8.0, 4.0), starts=np.array([[1.0, 2.0, 0.0], [7.
 
 def made(floor=HALL, **options):
     env = lidarium.parallel_env(
-        floor, level="waypoint", **{"robots": 1, "stop_coverage": None, "map_cells": 64, **options}
+        floor, level="waypoint", **{"starts": "fixed", "robots": 1, "stop_coverage": None, "map_cells": 64, **options}
     )
     env.reset(seed=0)
     return env

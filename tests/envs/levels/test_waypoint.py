@@ -16,7 +16,7 @@ HALL = Floor("hall", (0.0, 0.0, 6.0, 4.0), starts=np.array([[1.0, 2.0, 0.0], [1.
 
 def make(floor=HALL, **options):
     return lidarium.parallel_env(
-        floor, level="waypoint", **{"robots": 1, "stop_coverage": None, "map_cells": 64, **options}
+        floor, level="waypoint", **{"starts": "fixed", "robots": 1, "stop_coverage": None, "map_cells": 64, **options}
     )
 
 

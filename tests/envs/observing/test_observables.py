@@ -37,7 +37,7 @@ def nearest():
 
 @pytest.mark.parametrize("name", NEW)
 def test_each_observable_can_be_had_alone(name):
-    env = lidarium.parallel_env("scene_room", **SMALL, observe=[name])
+    env = lidarium.parallel_env("scene_room", **SMALL, observe=[name], starts="fixed")
     for observations in run(env, 3):
         for agent, observation in observations.items():
             assert set(observation) == {name}
@@ -45,17 +45,17 @@ def test_each_observable_can_be_had_alone(name):
 
 
 def test_time_left_and_coverage_are_those_of_the_episode():
-    env = lidarium.parallel_env("scene_room", **SMALL, observe=["time_left", "coverage"], horizon_s=2.0)
+    env = lidarium.parallel_env("scene_room", **SMALL, observe=["time_left", "coverage"], horizon_s=2.0, starts="fixed")
     for step, observations in enumerate(run(env, 10)):
         for observation in observations.values():
             assert observation["time_left"] == np.float32(1.0 - step / 20)
             assert observation["coverage"] == np.float32(env.scorer.coverage)
-    endless = lidarium.parallel_env("scene_room", **SMALL, observe=["time_left"], horizon_s=None)
+    endless = lidarium.parallel_env("scene_room", **SMALL, observe=["time_left"], horizon_s=None, starts="fixed")
     assert all(each["robot_0"]["time_left"] == 1.0 for each in run(endless, 3))
 
 
 def test_teammates_are_where_they_are_seen_from_each_robot():
-    env = lidarium.parallel_env("apartment", **SMALL, observe=["teammates"])
+    env = lidarium.parallel_env("apartment", **SMALL, observe=["teammates"], starts="fixed")
     for observations in run(env, 5):
         poses = env.world.poses
         for row, agent in enumerate(env.possible_agents):
@@ -69,7 +69,7 @@ def test_teammates_are_where_they_are_seen_from_each_robot():
 
 
 def test_goals_of_teammates_are_what_they_drive_to():
-    env = lidarium.parallel_env("apartment", level="waypoint", **SMALL, observe=["teammates"])
+    env = lidarium.parallel_env("apartment", level="waypoint", **SMALL, observe=["teammates"], starts="fixed")
     env.reset(seed=3)
     action = {agent: np.array([0.05 * k, -0.1], np.float32) for k, agent in enumerate(env.possible_agents, 1)}
     observations = env.step(action)[0]
@@ -84,15 +84,15 @@ def test_goals_of_teammates_are_what_they_drive_to():
 
 
 def test_teammates_that_nobody_heard_are_zeros():
-    unknown = lidarium.parallel_env("apartment", **SMALL, observe=["teammates"], known_starts=False)
+    unknown = lidarium.parallel_env("apartment", **SMALL, observe=["teammates"], known_starts=False, starts="fixed")
     assert not any(each["robot_0"]["teammates"].any() for each in run(unknown, 3))
-    silent = lidarium.parallel_env("apartment", **SMALL, observe=["teammates"], radio="none")
+    silent = lidarium.parallel_env("apartment", **SMALL, observe=["teammates"], radio="none", starts="fixed")
     assert not any(each["robot_0"]["teammates"].any() for each in run(silent, 3))
 
 
 def test_news_of_teammates_age_where_the_radio_loses_them():
     radio = RadioSettings(kind="range", reach=50.0, loss=0.7)
-    env = lidarium.parallel_env("apartment", **SMALL, observe=["teammates"], radio=radio)
+    env = lidarium.parallel_env("apartment", **SMALL, observe=["teammates"], radio=radio, starts="fixed")
     ages = set()
     for observations in run(env, 30):
         for agent, observation in observations.items():
@@ -114,7 +114,7 @@ def test_a_team_of_one_has_no_teammates_to_observe():
 
 @pytest.mark.usefixtures("nearest")
 def test_a_function_of_ones_own_is_observed_and_clipped():
-    env = lidarium.parallel_env("apartment", **SMALL, observe=["pose", "nearest"])
+    env = lidarium.parallel_env("apartment", **SMALL, observe=["pose", "nearest"], starts="fixed")
     for observations in run(env, 5):
         for agent, observation in observations.items():
             assert env.observation_space(agent).contains(observation)
@@ -133,7 +133,7 @@ def test_rows_of_a_batch_observe_the_same_to_the_bit(level):
 def test_a_function_of_another_shape_is_refused_by_name():
     observable("odd", 0.0, 1.0, (2,))(lambda rows: np.zeros(3))
     try:
-        env = lidarium.parallel_env("scene_room", **SMALL, observe=["odd"])
+        env = lidarium.parallel_env("scene_room", **SMALL, observe=["odd"], starts="fixed")
         with pytest.raises(ValueError, match=r"observable 'odd' has shape \(3,\); want \(3, 2\)"):
             env.reset(seed=0)
     finally:

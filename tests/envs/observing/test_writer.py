@@ -32,7 +32,15 @@ def driven(steps=15, floor="building:5", **options):
     """An environment in mid-episode, and its last observations."""
     env = lidarium.parallel_env(
         floor,
-        **{"robots": 3, "stop_coverage": None, "noise": "datasheet", "observe": ALL, **SMALL, **options},
+        **{
+            "starts": "fixed",
+            "robots": 3,
+            "stop_coverage": None,
+            "noise": "datasheet",
+            "observe": ALL,
+            **SMALL,
+            **options,
+        },
     )
     observations, _ = env.reset(seed=2)
     generator = np.random.default_rng(0)
@@ -56,18 +64,18 @@ OFFSETS = np.zeros((9, 2))
 @pytest.mark.parametrize("options", [{}, {"noise": "datasheet"}, {"level": "waypoint"}])
 def test_who_names_nothing_sees_all_but_the_pose_and_the_egocentric_map(options):
     names = ["scan", "velocity", "bumper", "map"]
-    env = lidarium.parallel_env("scene_room", robots=2, **options)
+    env = lidarium.parallel_env("scene_room", robots=2, **{"starts": "fixed", **options})
     observations, _ = env.reset(seed=0)
     assert list(observations["robot_0"]) == names
     assert set(env.observation_space("robot_0").spaces) == set(names)
-    batch = lidarium.vector_env(1, "scene_room", robots=2, **options)
+    batch = lidarium.vector_env(1, "scene_room", robots=2, **{"starts": "fixed", **options})
     assert list(batch.reset(seed=0)[0]) == names
 
 
 def test_settings_that_are_given_whole_show_what_they_name():
-    env = lidarium.parallel_env("scene_room", settings=make_settings(robots=1))
+    env = lidarium.parallel_env("scene_room", settings=make_settings(robots=1), starts="fixed")
     assert list(env.reset(seed=0)[0]["robot_0"]) == list(ALL)
-    batch = lidarium.vector_env(1, "scene_room", settings=make_settings(robots=1, observe=["pose"]))
+    batch = lidarium.vector_env(1, "scene_room", settings=make_settings(robots=1, observe=["pose"]), starts="fixed")
     assert list(batch.reset(seed=0)[0]) == ["pose"]
 
 
@@ -86,7 +94,9 @@ def test_what_is_observed_does_not_depend_on_what_else_is(names):
 @pytest.mark.parametrize("observe", [["egocentric_map"], ["map", "scan"], ["bumper", "egocentric_map", "pose"]])
 @pytest.mark.parametrize("floor", ["scene_room", GOAL_FLOOR])
 def test_any_choice_is_observed_at_every_level_and_lies_in_its_space(level, observe, floor):
-    env = lidarium.parallel_env(floor, level=level, robots=2, observe=observe, stop_coverage=None, **SMALL)
+    env = lidarium.parallel_env(
+        floor, level=level, robots=2, observe=observe, stop_coverage=None, **SMALL, starts="fixed"
+    )
     added = {"frontiers", "action_mask"} if level == "frontier" else set()
     goal = {"goal"} if isinstance(floor, Floor) else set()
     observations, _ = env.reset(seed=1)
@@ -131,7 +141,7 @@ def test_the_egocentric_map_does_not_tell_the_heading_on_the_floor():
     for quarter in range(4):
         room = Floor("room", (0.0, 0.0, 4.0, 4.0), (), starts=np.array([[2.0, 2.0, quarter * math.pi / 2.0]]))
         env = lidarium.parallel_env(
-            room, robots=1, lidar="lidar_360_6m", stop_coverage=None, observe=["egocentric_map"]
+            room, robots=1, lidar="lidar_360_6m", stop_coverage=None, observe=["egocentric_map"], starts="fixed"
         )
         crops.append(env.reset(seed=0)[0]["robot_0"]["egocentric_map"])
     for crop in crops[1:]:

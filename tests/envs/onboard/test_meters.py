@@ -14,7 +14,9 @@ SIMPLE = Battery(capacity_j=1000.0, idle_w=2.0, per_metre_j=5.0, per_radian_j=3.
 
 
 def hall(robots=1, **options):
-    env = lidarium.parallel_env(HALL, robots=robots, lidar="lidar_360_6m", **{"stop_coverage": None, **options})
+    env = lidarium.parallel_env(
+        HALL, robots=robots, lidar="lidar_360_6m", **{"starts": "fixed", "stop_coverage": None, **options}
+    )
     env.reset(seed=1, options={"starts": [[3.0, 3.0 + 3.0 * robot, 0.0] for robot in range(robots)]})
     return env
 
@@ -71,7 +73,9 @@ def test_an_empty_battery_ends_its_robot_and_no_other():
 
 
 def test_a_decision_ends_when_a_battery_is_empty():
-    env = lidarium.parallel_env("apartment", level="waypoint", robots=1, battery=Battery(capacity_j=10.0, idle_w=10.0))
+    env = lidarium.parallel_env(
+        "apartment", level="waypoint", robots=1, battery=Battery(capacity_j=10.0, idle_w=10.0), starts="fixed"
+    )
     env.reset(seed=1)
     env.step({"robot_0": None})
     assert env.agents == []

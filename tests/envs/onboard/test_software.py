@@ -62,7 +62,9 @@ def localizers():
 
 
 def explored(steps=150, seed=2, **options):
-    env = lidarium.parallel_env("apartment", robots=2, lidar="lidar_360_6m", stop_coverage=None, **options)
+    env = lidarium.parallel_env(
+        "apartment", robots=2, lidar="lidar_360_6m", stop_coverage=None, **{"starts": "fixed", **options}
+    )
     env.reset(seed=seed)
     generator = np.random.default_rng(seed)
     for step in range(steps):

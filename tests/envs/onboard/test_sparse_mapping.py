@@ -35,7 +35,7 @@ HALL = Floor(
 def made(floor=HALL, **options):
     env = lidarium.parallel_env(
         floor,
-        **{"robots": 1, "camera": "xtion_tilted", "stop_coverage": None, "map_cells": 32, **options},
+        **{"starts": "fixed", "robots": 1, "camera": "xtion_tilted", "stop_coverage": None, "map_cells": 32, **options},
     )
     env.reset(seed=0)
     return env
@@ -85,7 +85,7 @@ def test_a_path_on_the_map_leads_round_what_the_laser_does_not_see():
 
 
 def test_a_robot_without_a_camera_has_no_sparse_map():
-    env = lidarium.parallel_env(HALL, robots=1)
+    env = lidarium.parallel_env(HALL, robots=1, starts="fixed")
     env.reset(seed=0)
     with pytest.raises(ValueError, match=r"no depth camera.*camera='xtion'"):
         _ = env.belief("robot_0").sparse_map
@@ -274,7 +274,7 @@ def test_parts_of_the_past_move_by_themselves_and_again():
 
 def test_slam_says_of_when_its_scans_are_and_where_they_were_believed():
     env = lidarium.parallel_env(
-        "apartment", robots=1, camera="depth_64x48", realism="lab", stop_coverage=None, map_cells=32
+        "apartment", robots=1, camera="depth_64x48", realism="lab", stop_coverage=None, map_cells=32, starts="fixed"
     )
     env.reset(seed=0)
     mapper = env.perception.sparse_maps.of(0)

@@ -49,7 +49,7 @@ def test_bad_kinds_are_refused(kinds, message):
 
 
 def test_each_robot_drives_within_limits_of_its_own():
-    env = lidarium.parallel_env("scene_room", **MIXED)
+    env = lidarium.parallel_env("scene_room", **MIXED, starts="fixed")
     env.reset(seed=3)
     fastest = np.zeros(3)
     for _ in range(15):
@@ -62,7 +62,7 @@ def test_each_robot_drives_within_limits_of_its_own():
 
 
 def test_bodies_that_touch_have_radii_of_their_own():
-    env = lidarium.parallel_env("scene_room", **{**MIXED, "robots": 2})
+    env = lidarium.parallel_env("scene_room", **{**MIXED, "robots": 2}, starts="fixed")
     x, y = 15.0, 20.0
     starts = np.array([(x, y, 0.0), (x + 1.0, y, 0.0)])
     env.reset(seed=0, options={"starts": starts})

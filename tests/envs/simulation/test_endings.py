@@ -32,6 +32,7 @@ def test_the_first_rule_that_holds_is_the_reason(seed):
         stop_on_contact=bool(generator.integers(2)),
         stop_coverage=None if generator.random() < 0.5 else 0.5,
         horizon_s=None if generator.random() < 0.5 else 2.0,
+        starts="fixed",
     )
     env.reset(seed=0)
     rules = make_rules(env.simulation, env.settings)

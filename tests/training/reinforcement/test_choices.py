@@ -15,7 +15,7 @@ SETTINGS = {"resolution": 0.1, "stop_coverage": 0.9}
 def test_a_policy_and_a_training_see_the_same_to_the_bit():
     """What is decided in a training is what a policy decides in the environment that users make."""
     team = TrainingSettings(settings=SETTINGS).team(2)
-    env = lidarium.parallel_env("apartment:7", robots=2, horizon_s=team.horizon_s, **SETTINGS)
+    env = lidarium.parallel_env("apartment:7", robots=2, horizon_s=team.horizon_s, **SETTINGS, starts="fixed")
     seen = []
 
     def choose(decision):

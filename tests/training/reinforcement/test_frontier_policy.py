@@ -17,7 +17,7 @@ TEAM = {"level": "frontier", "observe": ALL, "robots": 3, "horizon_s": 60.0, "de
 @pytest.fixture(scope="module")
 def decisions():
     """The space and 60 observations of robots that choose at random."""
-    env = lidarium.sb3_vec_env(4, "apartment:7", **TEAM)
+    env = lidarium.sb3_vec_env(4, "apartment:7", **TEAM, starts="fixed")
     seen, rows, generator = env.reset(), [], np.random.default_rng(0)
     for _ in range(5):
         rows.append({name: array.copy() for name, array in seen.items()})
@@ -84,7 +84,7 @@ def test_decisions_do_not_depend_on_those_beside_them(decisions, ranking):
 def test_it_learns_and_opens_again(tmp_path):
     def learned():
         options = {"level": "frontier", "observe": ["frontiers", "time_left"], "robots": 1, "horizon_s": 20.0}
-        env = lidarium.sb3_vec_env(4, "apartment:7", **options)
+        env = lidarium.sb3_vec_env(4, "apartment:7", **{"starts": "fixed", **options})
         model = sb3_contrib.MaskablePPO(FrontierPolicy, env, n_steps=8, batch_size=16, n_epochs=2, seed=0)
         before = [parameter.detach().clone() for parameter in model.policy.parameters()]
         model.learn(64)

@@ -225,7 +225,7 @@ def driven(floor, targets, decisions=60, robots=2, **options):
         horizon_s=None,
         map_cells=32,
         lidar="lidar_360_6m",
-        **options,
+        **{"starts": "fixed", **options},
     )
     env.reset(seed=0)
     base = env.unwrapped
@@ -307,7 +307,7 @@ def test_three_robots_through_one_door_all_arrive():
 def test_a_robot_that_has_ended_is_driven_round():
     floor = Floor("hall", (0.0, 0.0, 6.0, 3.0), starts=np.array([[1.0, 1.5, 0.0], [3.0, 1.5, 0.0]]))
     env = lidarium.parallel_env(
-        floor, level="waypoint", robots=2, stop_coverage=None, map_cells=32, lidar="lidar_360_6m"
+        floor, level="waypoint", robots=2, stop_coverage=None, map_cells=32, lidar="lidar_360_6m", starts="fixed"
     )
     env.reset(seed=0)
     env.stop("robot_1", "stopped")

@@ -11,7 +11,9 @@ from lidarium.evaluation.episodes.runner import run_episode
 
 
 def started(robots=3, seed=1, **options):
-    env = lidarium.parallel_env("apartment", robots=robots, lidar="lidar_360_6m", stop_coverage=None, **options)
+    env = lidarium.parallel_env(
+        "apartment", robots=robots, lidar="lidar_360_6m", stop_coverage=None, **{"starts": "fixed", **options}
+    )
     env.reset(seed=seed)
     return env
 
@@ -150,7 +152,9 @@ def test_the_map_that_reached_a_robot_is_the_sum_of_what_it_holds_at_every_step(
 @pytest.mark.parametrize("policy", ["nearest_frontier", "utility_frontier"])
 @pytest.mark.parametrize("radio", ["none", "range", "signal"])
 def test_teams_explore_whatever_reaches_them(policy, radio):
-    env = lidarium.parallel_env("apartment", robots=3, radio=RadioSettings(kind=radio, reach=3.0), horizon_s=400.0)
+    env = lidarium.parallel_env(
+        "apartment", robots=3, radio=RadioSettings(kind=radio, reach=3.0), horizon_s=400.0, starts="fixed"
+    )
     run_episode(lidarium.policy(policy), env, seed=5)
     assert env.unwrapped.scorer.coverage >= 0.97
     assert env.unwrapped.world.collisions.sum() <= 3

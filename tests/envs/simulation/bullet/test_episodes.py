@@ -48,13 +48,13 @@ def test_equal_seeds_give_equal_runs_in_fresh_clients_and_after_a_reset():
 
 
 def test_the_rows_of_a_batch_are_lone_environments_to_the_bit():
-    batch = lidarium.vector_env(8, floor=FLOOR, backend="bullet", robots=2, **PLAIN)
+    batch = lidarium.vector_env(8, floor=FLOOR, backend="bullet", robots=2, **PLAIN, starts="fixed")
     batch.reset(seed=[7] * 7 + [8])
     for _ in range(4):
         batch.step(np.full((16, 2), 0.5, np.float32))
     poses = batch.engine.world.poses.reshape(8, 2, 3)
     assert (poses[:7] == poses[0]).all()
-    env = lidarium.parallel_env(FLOOR, backend="bullet", robots=2, **PLAIN)
+    env = lidarium.parallel_env(FLOOR, backend="bullet", robots=2, **PLAIN, starts="fixed")
     env.reset(seed=7)
     for _ in range(4):
         env.step(dict.fromkeys(env.agents, np.full(2, 0.5, np.float32)))
@@ -83,7 +83,7 @@ def test_no_client_is_left_and_memory_stays_flat_after_many_episodes():
     env.close()
     env.close()
     assert clients() == 0
-    env = lidarium.parallel_env(FLOOR, backend="bullet", robots=2, **PLAIN)
+    env = lidarium.parallel_env(FLOOR, backend="bullet", robots=2, **PLAIN, starts="fixed")
     env.reset(seed=1)
     assert clients() == 1
     del env

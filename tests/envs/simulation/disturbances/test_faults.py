@@ -18,7 +18,7 @@ PLACES = np.array([[10.0, 10.0], [12.0, 10.0]])
 def run(*faults, steps=30, action=(0.4, 0.0), robots=2, **options):
     """Drive straight ahead with faults; return the environment and what every step returned."""
     env = lidarium.parallel_env(
-        HALL, robots=robots, faults=FaultSettings(schedule=faults), stop_coverage=None, **options
+        HALL, robots=robots, faults=FaultSettings(schedule=faults), stop_coverage=None, **{"starts": "fixed", **options}
     )
     env.reset(seed=1, options={"starts": [[4.0, 4.0 + 4.0 * k, 0.0] for k in range(robots)]})
     outcomes = [
@@ -52,7 +52,7 @@ def test_a_laser_that_drops_out_has_no_valid_beam_for_its_time_and_sees_nothing(
 
 def test_a_blind_sector_takes_its_beams_and_no_others():
     _, outcomes = run(Fault(kind="blind_sector", bearing=math.radians(30.0), width=math.radians(20.0)))
-    env = lidarium.parallel_env(HALL, robots=2)
+    env = lidarium.parallel_env(HALL, robots=2, starts="fixed")
     angles = env.settings.lidar.angles
     is_blind = (scans(outcomes) == 0.0).all(axis=0)
     wanted = np.abs(angles - math.radians(30.0)) <= math.radians(10.0)
@@ -99,7 +99,7 @@ def test_a_kidnapped_robot_is_never_put_into_another():
 
 def test_places_of_kidnapping_are_drawn_where_robots_fit_and_can_get_to():
     env = lidarium.parallel_env(
-        "apartment", robots=2, faults=FaultSettings(schedule=(Fault(kind="kidnapping", at_s=0.2),))
+        "apartment", robots=2, faults=FaultSettings(schedule=(Fault(kind="kidnapping", at_s=0.2),)), starts="fixed"
     )
     for seed in range(5):
         env.reset(seed=seed)
@@ -121,7 +121,7 @@ def test_a_dead_robot_stands_and_ends_as_failed_and_the_others_go_on():
 
 def test_teams_finish_without_a_robot_that_died():
     fault = Fault(kind="dead_robot", robot=1, at_s=20.0)
-    env = lidarium.parallel_env("apartment", robots=3, faults=FaultSettings(schedule=(fault,)))
+    env = lidarium.parallel_env("apartment", robots=3, faults=FaultSettings(schedule=(fault,)), starts="fixed")
     run_episode(lidarium.policy("nearest_frontier"), env, seed=4)
     scorer = env.unwrapped.scorer
     assert scorer.ended_because["robot_1"] == "failed"
@@ -132,7 +132,7 @@ def test_teams_finish_without_a_robot_that_died():
 def test_every_kind_comes_at_its_rate_and_is_survived(kind):
     settings = FaultSettings(**{kind: 300.0}, lasts_s=2.0)
     env = lidarium.parallel_env(
-        "apartment", robots=2, faults=settings, localization="odometry", radio="range", horizon_s=60.0
+        "apartment", robots=2, faults=settings, localization="odometry", radio="range", horizon_s=60.0, starts="fixed"
     )
     run_episode(lidarium.policy("nearest_frontier"), env, seed=2)
     assert set(env.unwrapped.scorer.ended_because) == {"robot_0", "robot_1"}
@@ -155,7 +155,7 @@ def test_the_same_seed_draws_the_same_faults():
 
 
 def test_who_takes_himself_to_be_beyond_his_map_fails():
-    env = lidarium.parallel_env("apartment", robots=1, localization="odometry", stop_coverage=None)
+    env = lidarium.parallel_env("apartment", robots=1, localization="odometry", stop_coverage=None, starts="fixed")
     env.reset(seed=1)
     env.simulation.odometry[0, :2] = 1000.0
     _, _, terminated, _, infos = env.step({"robot_0": np.zeros(2, np.float32)})
