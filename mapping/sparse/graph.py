@@ -8,7 +8,7 @@ Sparse mapper, section 5.3; an edge is there if either end lists the other among
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
@@ -17,6 +17,7 @@ from scipy.spatial import cKDTree
 
 from lidarium.mapping.geometry.bounds import above, check_settings, within
 from lidarium.mapping.kernels.compilation import Array, kernel
+from lidarium.mapping.sparse.seen_floor import SeenFloor, Support
 from lidarium.mapping.sparse.swept_body import (
     HIGH,
     LOW,
@@ -373,9 +374,11 @@ class TopologicalGraph:
     weights : (E,) float64
         Cost of each edge, at least its length [m].
     index : BoxIndex
-        Obstacles.
+        Obstacles, and rims of the floor that bears the body.
     body : SweptBody
         The body that drives.
+    support : Support or None
+        Cells of floor that bear the body; None if that is not known.
     """
 
     grid: NodeGrid
@@ -384,11 +387,18 @@ class TopologicalGraph:
     weights: NDArray[np.float64]
     index: BoxIndex
     body: SweptBody
+    support: Support | None = None
 
     @property
     def nodes(self) -> NDArray[np.float64]:
         """The nodes, (N, 3) [m]."""
         return self.grid.nodes
+
+    @property
+    def boxes(self) -> NDArray[np.float64]:
+        """Boxes of the obstacles, without rims of the floor, (M, 2, 3) [m]."""
+        boxes = self.index.boxes
+        return boxes[np.isfinite(boxes[:, 2])].reshape(-1, 2, 3)
 
     @property
     def edges(self) -> NDArray[np.int64]:
@@ -402,6 +412,7 @@ def build_graph(
     occupied: NDArray[np.float64],
     body: SweptBody,
     settings: GraphSettings | None = None,
+    floor: SeenFloor | None = None,
 ) -> TopologicalGraph:
     """Build the graph that a body can be driven along, from a sparse map or any nodes and boxes.
 
@@ -415,6 +426,9 @@ def build_graph(
         The body that drives.
     settings : GraphSettings, optional
         Settings; defaults if None.
+    floor : SeenFloor, optional
+        The floor that was seen, `seen_floor` of a sparse map: the body keeps its whole footprint on it, and off
+        steps higher than its clearance. By default all floor counts as seen.
 
     Returns
     -------
@@ -440,15 +454,21 @@ def build_graph(
     free = np.ascontiguousarray(free, np.float64).reshape(-1, 3)
     if len(free) == 0:
         raise ValueError("the map has no free nodes; want a cloud with floor in it, or another floor height")
-    index = index_boxes(occupied)
+    boxes, support = np.reshape(occupied, (-1, 2, 3)), None
+    if floor is not None:
+        support = floor.supports(body.clearance)
+        boxes = np.concatenate([boxes, support.rims()])
+    index = index_boxes(boxes)
     nodes = reduced_nodes(free, settings.merge_radius)
     nodes = _nodes_with_room(nodes, index, body, settings.merge_radius)
+    if support is not None:
+        nodes = nodes[[support.bears(node) for node in nodes]]
     if len(nodes) == 0:
         raise ValueError(
             f"a body of radius {body.radius} m and height {body.height} m can stand at none of {len(free)} "
-            "free nodes; want a smaller one"
+            f"free nodes; want a smaller one{', or a map with more seen floor' if support is not None else ''}"
         )
-    return graph_of_nodes(nodes, index, body, settings)
+    return replace(graph_of_nodes(nodes, index, body, settings), support=support)
 
 
 def graph_of_nodes(
