@@ -88,7 +88,7 @@ def find_floor(points: NDArray[np.float64], settings: FloorSettings | None = Non
         raise ValueError(
             f"no floor: the best plane within {math.degrees(settings.most_tilt):.3g} degrees of level has "
             f"{share:.1%} of {len(points):,} points; want {settings.least_share:.1%}, "
-            "another way up, or a floor that is given"
+            "another way up, a smaller share (--floor-share), or a floor that is given"
         )
     return _refined(points, best, up, settings.distance_m)
 

@@ -454,14 +454,16 @@ def build_graph(
     free = np.ascontiguousarray(free, np.float64).reshape(-1, 3)
     if len(free) == 0:
         raise ValueError("the map has no free nodes; want a cloud with floor in it, or another floor height")
-    boxes, support = np.reshape(occupied, (-1, 2, 3)), None
+    boxes, rims, support = np.reshape(occupied, (-1, 2, 3)), np.empty((0, 2, 3)), None
     if floor is not None:
         support = floor.supports(body.clearance)
-        boxes = np.concatenate([boxes, support.rims()])
+        rims = support.rims()
+        boxes = np.concatenate([boxes, rims])
     index = index_boxes(boxes)
     nodes = reduced_nodes(free, settings.merge_radius)
     nodes = _nodes_with_room(nodes, index, body, settings.merge_radius)
     if support is not None:
+        nodes = np.concatenate([nodes, _nodes_beside(rims, free, index, body)])
         nodes = nodes[[support.bears(node) for node in nodes]]
     if len(nodes) == 0:
         raise ValueError(
@@ -469,6 +471,30 @@ def build_graph(
             f"free nodes; want a smaller one{', or a map with more seen floor' if support is not None else ''}"
         )
     return replace(graph_of_nodes(nodes, index, body, settings), support=support)
+
+
+RIM_MARGIN_M = 0.02
+"""By how much a node beside a rim is farther from it than the body's radius [m]."""
+
+RIM_MERGE_M = 0.1
+"""Nodes beside rims that are nearer to each other than this are merged [m]."""
+
+
+def _nodes_beside(
+    rims: NDArray[np.float64], free: NDArray[np.float64], index: BoxIndex, body: SweptBody
+) -> NDArray[np.float64]:
+    """Return nodes (N, 3) at the corners of rims (M, 2, 3), where paths turn around holes in the floor."""
+    if len(rims) == 0:
+        return np.empty((0, 3))
+    found, away = [], body.radius + RIM_MARGIN_M
+    for x, y in ((0, 0), (0, 1), (1, 0), (1, 1)):
+        corners = np.stack([rims[:, x, 0], rims[:, y, 1]], axis=1)
+        outward = np.array([2.0 * x - 1.0, 2.0 * y - 1.0])
+        found += [corners + outward * away * share for share in ((1.0, 0.0), (0.0, 1.0), (math.sqrt(0.5),) * 2)]
+    places = np.concatenate(found)
+    nodes = np.column_stack([places, free[cKDTree(free[:, :2]).query(places)[1], 2]])
+    nodes = reduced_nodes(nodes[standing_nodes(nodes, index, body)], RIM_MERGE_M)
+    return nodes[standing_nodes(nodes, index, body)]
 
 
 def graph_of_nodes(

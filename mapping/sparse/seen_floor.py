@@ -29,10 +29,16 @@ LEAST_STEP_CM = 3
 
 MAX_STEP_CM = 100
 
-_FINE = 2
+_FINE = 4
 """Cells of points along a cell."""
 
 _NO_HEIGHT = 1e6
+
+_CORNER = 0.6
+"""Distance of a corner from the largest disc in it, as a share of the disc's radius, and some more."""
+
+_NARROW = 1.5
+"""Reach of the narrow closing, in mean distances of cells with points."""
 
 _STANDS_M = 0.05
 """A box whose bottom is not higher than this above the points of the floor stands on it [m]."""
@@ -216,11 +222,15 @@ class FloorPoints:
         beside = cv2.dilate(stands, np.ones((3, 3), np.uint8)) > 0
         own = (counts > 0.0) & ~_finer(beside)
         known = ((counts > 0.0) | _finer(stands > 0)).astype(np.uint8)
-        offsets = np.arange(-reach, reach + 1)
-        disc = (np.hypot(offsets[:, None], offsets) <= reach).astype(np.uint8)
-        # The border is unseen, and closing does not reach it.
-        closed = cv2.morphologyEx(known, cv2.MORPH_CLOSE, disc, borderType=cv2.BORDER_CONSTANT, borderValue=0) > 0
-        is_seen = (closed | (known > 0)).reshape(rows, _FINE, columns, _FINE).all(axis=(1, 3))
+        # A wide closing rounds the corners of holes: beside these a narrow one decides.
+        holes = ~_closed(known, reach)
+        beside_holes = cv2.dilate(holes.astype(np.uint8), _disc(_CORNER * reach)) > 0
+        # Points that are far apart leave wide gaps in the floor.
+        density = np.count_nonzero(known) / max(np.count_nonzero(~holes), 1)
+        narrow = min(math.ceil(_NARROW / math.sqrt(max(density, 1e-6))), reach)
+        is_seen = (
+            (~holes & (_closed(known, narrow) | ~beside_holes)).reshape(rows, _FINE, columns, _FINE).all(axis=(1, 3))
+        )
         steps = np.full((rows, columns), UNSEEN, np.uint8)
         if own.any():
             nearest = ndimage.distance_transform_edt(~own, return_distances=False, return_indices=True)
@@ -235,6 +245,17 @@ class FloorPoints:
             steps[is_seen] = 0
             steps[is_plain] = np.minimum(ranges, MAX_STEP_CM).astype(np.uint8)
         return _trimmed(SeenFloor(steps, low // _FINE, side))
+
+
+def _disc(radius: float) -> NDArray[np.uint8]:
+    offsets = np.arange(-math.floor(radius), math.floor(radius) + 1)
+    return (np.hypot(offsets[:, None], offsets) <= radius).astype(np.uint8)
+
+
+def _closed(known: NDArray[np.uint8], radius: float) -> NDArray[np.bool_]:
+    """Return known cells, and those between them in which no disc of a radius finds room; the border has room."""
+    closed = cv2.morphologyEx(known, cv2.MORPH_CLOSE, _disc(radius), borderType=cv2.BORDER_CONSTANT, borderValue=(0.0,))
+    return (closed > 0) | (known > 0)
 
 
 def _finer(cells: NDArray[np.bool_]) -> NDArray[np.bool_]:

@@ -92,7 +92,7 @@ class MapperSettings:
         How far from points of the floor it counts as seen between them [m]: holes wider than twice this stay holes.
         0 for a map that does not know what of its floor was seen.
     fits_boxes : bool
-        Whether boxes are compared with all points: those that are mostly empty are divided.
+        Whether boxes are compared with all points, if they merge: those that are mostly empty are divided.
     floor : FloorSettings
         How the floor is found.
     """

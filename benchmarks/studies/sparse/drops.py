@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from lidarium.benchmarks.studies.shared.study import Progress, Task, do_missing
 from lidarium.benchmarks.studies.sparse.maps import FRAME_CODES, FULL_CODES, RANGE_M, cloud_of

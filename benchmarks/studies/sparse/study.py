@@ -66,9 +66,9 @@ laser lets a robot stand at {laser}.
 
 ## Holes, stairs and pallets
 
-{areas} holes, as many stairwells and pallets of {pallet:.0f} cm are put on the floor of each place, of {low} to {high} m a side. {requests}
-requests a place have a path by the truth, both ends {clear:.0f} cm clear. A path leads over an area if the robot's
-circle reaches more than a cell of the raster into it.
+{areas} holes, as many stairwells and pallets of {pallet:.0f} cm are put on the floor of each place, of
+{low} to {high} m a side. {requests} requests a place have a path by the truth, both ends {clear:.0f} cm clear. A path
+leads over an area if the robot's circle reaches more than a cell of the raster into it.
 
 {drops}
 

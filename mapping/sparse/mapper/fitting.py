@@ -8,11 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from lidarium.mapping.sparse.mapper.frame_coding import split_points
 from lidarium.mapping.sparse.mapper.merging import are_covered
-from lidarium.mapping.sparse.sparse_map import OccupiedCodes, occupied_codes
+from lidarium.mapping.sparse.sparse_map import OccupiedCodes, SparseMap, occupied_codes
 
 NEAR_M = 0.10
-"""Farther from all points, a place in a box is empty [m]."""
+"""Farther from all points, a place in a box is empty [m]; twice the distance of most points if that is more."""
+
+_MOST_POINTS = 0.9
+_SOME_POINTS = 5000
 
 MOST_EMPTY = 0.25
 """Largest share of a box that may be empty."""
@@ -56,13 +60,13 @@ class SeenPoints:
         return (cells - (1 << (_BITS - 1)) + 0.5) * CELL_M
 
 
-def empty_shares(boxes: NDArray[np.float64], points: cKDTree) -> NDArray[np.float64]:
-    """Return the share of each box (M, 2, 3) that is farther than ``NEAR_M`` from all points, (M,)."""
+def empty_shares(boxes: NDArray[np.float64], points: cKDTree, near: float) -> NDArray[np.float64]:
+    """Return the share of each box (M, 2, 3) that is farther than a distance [m] from all points, (M,)."""
     sizes = boxes[:, 1] - boxes[:, 0]
     counts = np.maximum(np.ceil(sizes / _SAMPLE_M).astype(np.int64), 1)
     found = np.zeros(len(boxes))
     # A box that is nowhere wider than this has a point near to all of it.
-    order = np.flatnonzero((sizes > NEAR_M).any(axis=1))
+    order = np.flatnonzero((sizes > near).any(axis=1))
     start = 0
     while start < len(order):
         totals = np.cumsum(counts[order[start:]].prod(axis=1))
@@ -75,10 +79,18 @@ def empty_shares(boxes: NDArray[np.float64], points: cKDTree) -> NDArray[np.floa
         x, rest = ranks // (shape[:, 1] * shape[:, 2]), ranks % (shape[:, 1] * shape[:, 2])
         places = np.stack([x, rest // shape[:, 2], rest % shape[:, 2]], axis=1)
         samples = boxes[part, 0][owners] + (places + 0.5) / shape * sizes[part][owners]
-        gaps = points.query(samples, distance_upper_bound=NEAR_M)[0]
+        gaps = points.query(samples, distance_upper_bound=near)[0]
         found[part] = np.bincount(owners, np.isinf(gaps), len(part)) / numbers
         start = stop
     return found
+
+
+def near_distance(points: cKDTree) -> float:
+    """Return how far from all points a place is empty [m]."""
+    some = points.data[:: max(points.n // _SOME_POINTS, 1)]
+    if points.n < 2:
+        return NEAR_M
+    return max(NEAR_M, 2.0 * float(np.quantile(points.query(some, 2)[0][:, 1], _MOST_POINTS)))
 
 
 def fitted_codes(codes: OccupiedCodes, points: NDArray[np.float64], frame: int = 0) -> OccupiedCodes:
@@ -94,16 +106,31 @@ def fitted_codes(codes: OccupiedCodes, points: NDArray[np.float64], frame: int =
     if len(points) == 0:
         return codes
     tree, half = cKDTree(points), 0.5 * CELL_M
-    is_empty = empty_shares(codes.boxes, tree) > MOST_EMPTY
+    near = near_distance(tree)
+    is_empty = empty_shares(codes.boxes, tree, near) > MOST_EMPTY
     kept = codes.taken(~is_empty)
     parts = []
     for low, high in codes.boxes[is_empty]:
         within = points[((points >= low - half) & (points <= high + half)).all(axis=1)]
-        parts.append(_divided(within, tree))
+        parts.append(_divided(within, tree, near))
     boxes = np.concatenate([kept.boxes, *parts])
     missed = points[~are_covered(points, boxes + np.array([[-half], [half]]))]
-    parts += [_divided(group, tree) for group in _groups(missed)]
+    parts += [_divided(group, tree, near) for group in _groups(missed)]
     return kept.joined(occupied_codes(np.concatenate([np.empty((0, 2, 3)), *parts]), frame))
+
+
+def unlike_points(sparse_map: SparseMap, points: NDArray[np.float64]) -> dict[str, int]:
+    """Count cells of obstacles (N, 3) in no box of a map, and boxes that are mostly farther than 10 cm from all."""
+    obstacles = split_points(points, sparse_map.floor, sparse_map.settings)[0]
+    if len(obstacles) == 0:
+        return {"points": 0, "boxes": len(sparse_map.boxes)}
+    # Cells beside the borders of heights hold points of both sides.
+    is_inner = split_points(obstacles - CELL_M * sparse_map.floor.normal, sparse_map.floor, sparse_map.settings)[0]
+    wide = sparse_map.boxes + np.array([[-CELL_M], [CELL_M]])
+    missed = ~are_covered(is_inner + CELL_M * sparse_map.floor.normal, wide)
+    tree = cKDTree(obstacles)
+    shares = empty_shares(sparse_map.boxes, tree, near_distance(tree))
+    return {"points": int(np.count_nonzero(missed)), "boxes": int(np.count_nonzero(shares > MOST_EMPTY + 0.05))}
 
 
 def _groups(points: NDArray[np.float64]) -> list[NDArray[np.float64]]:
@@ -115,28 +142,28 @@ def _groups(points: NDArray[np.float64]) -> list[NDArray[np.float64]]:
     return np.split(points[order], np.flatnonzero(np.diff(labels[order])) + 1)
 
 
-def _divided(points: NDArray[np.float64], tree: cKDTree) -> NDArray[np.float64]:
+def _divided(points: NDArray[np.float64], tree: cKDTree, near: float) -> NDArray[np.float64]:
     """Return the boxes around cells (N, 3), divided until none is mostly empty, (M, 2, 3)."""
     waiting, found = [points] if len(points) else [], []
     while waiting:
         own = waiting.pop()
         box = np.stack([own.min(axis=0) - 0.5 * CELL_M, own.max(axis=0) + 0.5 * CELL_M])
-        if len(own) == 1 or empty_shares(box[None], tree)[0] <= MOST_EMPTY:
+        if len(own) == 1 or empty_shares(box[None], tree, near)[0] <= MOST_EMPTY:
             found.append(box)
             continue
-        axis, plane = _widest_gap(own)
+        axis, plane = _widest_gap(own, near)
         is_low = own[:, axis] < plane
         waiting += [own[is_low], own[~is_low]]
     return np.array(found).reshape(-1, 2, 3)
 
 
-def _widest_gap(points: NDArray[np.float64]) -> tuple[int, float]:
+def _widest_gap(points: NDArray[np.float64], near: float) -> tuple[int, float]:
     """Return axis and place of the widest gap between points; the middle of the longest side if all are narrow."""
     ranked = np.sort(points, axis=0)
     gaps = np.diff(ranked, axis=0)
     axis = int(gaps.max(axis=0).argmax())
     place = int(gaps[:, axis].argmax())
-    if gaps[place, axis] > NEAR_M:
+    if gaps[place, axis] > near:
         return axis, float(ranked[place : place + 2, axis].mean())
     axis = int(np.ptp(points, axis=0).argmax())
     return axis, float(ranked[[0, -1], axis].mean())

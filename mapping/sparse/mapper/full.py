@@ -45,7 +45,8 @@ def map_cloud(
     points : (N, 3) float
         The cloud [m].
     k : int
-        Number of codes, of floor and obstacles together; merging leaves fewer.
+        Number of codes, of floor and obstacles together; merging leaves fewer, and boxes that would be mostly empty
+        become several.
     settings : MapperSettings, optional
         Settings; defaults if None.
     pose : (4, 4) float64, optional
@@ -85,7 +86,7 @@ def map_cloud(
         obstacles, ground_points = split_points(cloud, floor, settings)
         ground = coded_floor(ground_points, on_floor, settings)
         occupied = _merged_obstacles(obstacles, on_obstacles, ground.centres, settings)
-        if settings.fits_boxes:
+        if settings.fits_boxes and settings.merges:
             cells = SeenPoints()
             cells.add(obstacles)
             occupied = fitted_codes(occupied, cells.middles)

@@ -58,7 +58,8 @@ class IncrementalMapper:
         self._map: SparseMap | None = None
         keeps_floor = self.settings.floor_gap_m > 0.0 and self.settings.mode != "thesis"
         self._floor_points = FloorPoints(self.settings.floor_gap_m) if keeps_floor else None
-        self._cells = SeenPoints() if self.settings.fits_boxes and self.settings.mode != "thesis" else None
+        fits = self.settings.fits_boxes and self.settings.merges and self.settings.mode != "thesis"
+        self._cells = SeenPoints() if fits else None
         self._is_fitted = True
 
     @property
