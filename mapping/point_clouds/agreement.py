@@ -97,9 +97,9 @@ def _view_of(points: NDArray[np.float64], pose: NDArray[np.float64]) -> _View:
     order = np.argsort(ranges)
     nearest, farthest = np.full(ROWS * COLUMNS, np.inf), np.zeros(ROWS * COLUMNS)
     nearest[places[order[::-1]]], farthest[places[order]] = ranges[order[::-1]], ranges[order]
-    nearest, farthest = nearest.reshape(ROWS, COLUMNS), farthest.reshape(ROWS, COLUMNS)
-    is_seen = np.isfinite(nearest)
+    near_image, far_image = nearest.reshape(ROWS, COLUMNS), farthest.reshape(ROWS, COLUMNS)
+    is_seen = np.isfinite(near_image)
     # Directions beside an edge, or beside none, do not tell.
     inner = ndimage.minimum_filter(is_seen, 3, mode="constant")
-    low, high = ndimage.minimum_filter(nearest, 3), ndimage.maximum_filter(farthest, 3)
+    low, high = ndimage.minimum_filter(near_image, 3), ndimage.maximum_filter(far_image, 3)
     return _View(np.where(inner, low, np.inf), np.where(inner, high, 0.0), inverse_of(pose))

@@ -58,7 +58,7 @@ def _tum(folder: Path) -> Sequence:
         raise ValueError(
             f"no image of {folder / DEPTHS} has a pose in {TRUTH} within {APART_S} s; want times of the same clock"
         )
-    remarks = ()
+    remarks: tuple[str, ...] = ()
     if not has_pose.all():
         remarks = (f"{folder}: {np.count_nonzero(~has_pose)} of {len(times)} images have no pose and are left out",)
     files = tuple(folder / name for name, is_taken in zip(names, has_pose, strict=True) if is_taken)

@@ -70,7 +70,7 @@ class SeenFloor:
     def supports(self, max_step: float) -> "Support":
         """Return the cells that bear a robot which climbs steps up to a height [m]."""
         is_borne = np.pad((self.steps != UNSEEN) & (self.steps <= 100.0 * max_step + 1e-9), 1)
-        return Support(is_borne, (self.low - 1) * self.cell_m, self.cell_m)
+        return Support(is_borne, np.asarray((self.low - 1) * self.cell_m, np.float64), self.cell_m)
 
     def cleared(self, box: NDArray[np.float64]) -> "SeenFloor":
         """Return the floor with the unseen cells wholly within a box (2, 3) [m] taken for level floor."""
@@ -226,8 +226,8 @@ class FloorPoints:
         holes = ~_closed(known, reach)
         beside_holes = cv2.dilate(holes.astype(np.uint8), _disc(_CORNER * reach)) > 0
         # Points that are far apart leave wide gaps in the floor.
-        density = np.count_nonzero(known) / max(np.count_nonzero(~holes), 1)
-        narrow = min(math.ceil(_NARROW / math.sqrt(max(density, 1e-6))), reach)
+        density = (np.count_nonzero(known) + 1.0) / (np.count_nonzero(~holes) + 1.0)
+        narrow = min(math.ceil(_NARROW / math.sqrt(density)), reach)
         is_seen = (
             (~holes & (_closed(known, narrow) | ~beside_holes)).reshape(rows, _FINE, columns, _FINE).all(axis=(1, 3))
         )
