@@ -131,7 +131,7 @@ class Support:
         return 0 <= row < self.cells.shape[0] and 0 <= column < self.cells.shape[1] and bool(self.cells[row, column])
 
     def rims(self) -> NDArray[np.float64]:
-        """Return boxes of any height over the cells beside those that bear a robot, (M, 2, 3) [m]."""
+        """Return boxes of any height over the cells beside those that bear a robot, a little larger, (M, 2, 3) [m]."""
         around = cv2.dilate(self.cells.astype(np.uint8), np.ones((3, 3), np.uint8)).astype(np.bool_)
         is_rim = np.pad(around & ~self.cells, ((0, 0), (1, 1)))
         turns = np.diff(is_rim.astype(np.int8), axis=1)
@@ -146,6 +146,9 @@ class Support:
         boxes = np.empty((len(first), 2, 3))
         boxes[:, 0, 0], boxes[:, 1, 0] = starts[first], ends[first]
         boxes[:, 0, 1], boxes[:, 1, 1] = rows[first], rows[last] + 1
+        # A point at its border lets the whole of a cell of points count as seen.
+        boxes[:, 0, :2] -= 1.0 / _FINE
+        boxes[:, 1, :2] += 1.0 / _FINE
         boxes[:, :, :2] = boxes[:, :, :2] * self.cell_m + self.origin
         boxes[:, 0, 2], boxes[:, 1, 2] = -np.inf, np.inf
         return boxes

@@ -90,7 +90,8 @@ def near_distance(points: cKDTree) -> float:
     some = points.data[:: max(points.n // _SOME_POINTS, 1)]
     if points.n < 2:
         return NEAR_M
-    return max(NEAR_M, 2.0 * float(np.quantile(points.query(some, 2)[0][:, 1], _MOST_POINTS)))
+    gaps = np.asarray(points.query(some, 2)[0])[:, 1]
+    return max(NEAR_M, 2.0 * float(np.quantile(gaps, _MOST_POINTS)))
 
 
 def fitted_codes(codes: OccupiedCodes, points: NDArray[np.float64], frame: int = 0) -> OccupiedCodes:
