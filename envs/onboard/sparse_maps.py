@@ -105,6 +105,9 @@ class SparseMapper:
             least_motion_m=sparse.least_motion_m,
             least_turn=sparse.least_turn,
             merge_radius_m=MERGE_RADIUS_M,
+            # On board, the seen ground tells of the floor, and boxes that are seen through are removed.
+            floor_gap_m=0.0,
+            fits_boxes=False,
         )
         # The camera is fixed to its robot, and the robot is on the floor.
         self._mapper = IncrementalMapper(sparse.codes, mapping, floor=FloorPlane())

@@ -1,9 +1,9 @@
-"""Point clouds as files: PCD, PLY, OBJ, XYZ, arrays and depth images, recognised by name and content."""
+"""Point clouds as files: PCD, PLY, OBJ, XYZ, arrays, scans and depth images, recognised by name and content."""
 
 import itertools
 import re
 import struct
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -24,6 +24,7 @@ from lidarium.mapping.point_clouds.columns import POINTS, Content, cloud_of_colu
 from lidarium.mapping.point_clouds.faces import SPACING_M, sampled, triangles_of
 from lidarium.mapping.point_clouds.ply_files import MAX_HEADER, parse_ply
 from lidarium.mapping.point_clouds.point_cloud import PointCloud
+from lidarium.mapping.point_clouds.survey_files import read_e57, read_las
 
 _VERTICES = re.compile(rb"^[ \t]*v[ \t]([^\r\n]*)", re.MULTILINE)
 _FACES = re.compile(rb"^[ \t]*f[ \t]([^\r\n]*)", re.MULTILINE)
@@ -51,6 +52,7 @@ def _parse_obj(content: bytes) -> Content:
 
 def _parse_xyz(content: bytes) -> Content:
     """Return the points of lines of x, y and z, apart by blanks, commas or semicolons."""
+    content, places = _without_header(content)
     content = content.replace(b"//", b"#").replace(b";", b" ")
     remarks: tuple[str, ...] = ()
     if b"," in content:
@@ -65,7 +67,33 @@ def _parse_xyz(content: bytes) -> Content:
             raise ValueError("its commas part numbers such as 05, as those after a decimal comma; want decimal points")
         else:
             content = content.replace(b",", b" ")
-    return Content(text_columns(content, (0, 1, 2)), remarks=remarks)
+    return Content(text_columns(content, places), remarks=remarks)
+
+
+def _without_header(content: bytes) -> tuple[bytes, Sequence[int]]:
+    """Return lines of numbers without a header, and the places of x, y and z in them.
+
+    A header names columns, as CloudCompare's (``//X Y Z R G B``), or counts the points, as in PTS files.
+    """
+    places: Sequence[int] = (0, 1, 2)
+    for _ in range(2):
+        line, _, rest = content.lstrip().partition(b"\n")
+        words = re.split(rb"[\s,;]+", line.strip().lstrip(b"/# ").lower())
+        if all(name in words for name in (b"x", b"y", b"z")):
+            content, places = rest, [words.index(name) for name in (b"x", b"y", b"z")]
+        elif len(words) == 1 and words[0].isdigit() and rest.strip():
+            count, lines = int(words[0]), sum(1 for each in rest.splitlines() if each.strip())
+            if count != lines:
+                raise ValueError(f"its first line claims {count:,} points, and {lines:,} lines follow: truncated?")
+            content = rest
+    return content, places
+
+
+def _parse_bin(content: bytes) -> Content:
+    """Return the points of a laser scan of KITTI: x, y, z and intensity, single precision."""
+    if len(content) % 16:
+        raise ValueError(f"it has {len(content):,} bytes; want a multiple of 16: x, y, z and intensity of each point")
+    return Content(np.frombuffer(content, "<f4").reshape(-1, 4)[:, :3].astype(np.float32))
 
 
 MAX_RATIO = 88
@@ -280,7 +308,15 @@ KINDS = {
     ".obj": "OBJ",
     ".xyz": "XYZ",
     ".txt": "XYZ",
+    ".asc": "XYZ",
+    ".csv": "XYZ",
+    ".pts": "XYZ",
     ".npz": "NPZ",
+    ".npy": "NPZ",
+    ".bin": "BIN",
+    ".las": "LAS",
+    ".laz": "LAS",
+    ".e57": "E57",
     ".pgm": "PGM",
     ".png": "PNG",
 }
@@ -291,7 +327,9 @@ _PARSERS: dict[str, Callable[[bytes], Content]] = {
     "PLY": parse_ply,
     "OBJ": _parse_obj,
     "XYZ": _parse_xyz,
+    "BIN": _parse_bin,
 }
+_READERS: dict[str, Callable[[Path], Content]] = {"LAS": read_las, "E57": read_e57}
 _BEGINNINGS = {
     b"# .PCD": "PCD",
     b"VERSION": "PCD",
@@ -299,6 +337,9 @@ _BEGINNINGS = {
     b"P5": "PGM",
     b"\x89PNG": "PNG",
     b"PK": "NPZ",
+    b"\x93NUMPY": "NPZ",
+    b"LASF": "LAS",
+    b"ASTM-E57": "E57",
 }
 _COORDINATES = "xyz"
 
@@ -314,7 +355,8 @@ def read_cloud(
     Parameters
     ----------
     path : Path or str
-        A PCD, PLY, OBJ, XYZ or NPZ file (an array ``xyz``), or a depth image (PGM, PNG).
+        A PCD, PLY, OBJ, XYZ, PTS, NPY or NPZ file (an array ``xyz``), a scan of KITTI (``.bin``), a LAS, LAZ or E57
+        file (extra ``clouds``), or a depth image (PGM, PNG).
     scale : float, optional
         Length of a unit of the file [m]; by default 1, and 0.001 for depth images.
     intrinsics : Intrinsics or (float, float, float, float), optional
@@ -355,6 +397,8 @@ def read_cloud(
         return _checked_cloud(read_depth_image(path, camera, scale or MILLIMETRES, pose))
     if kind == "NPZ":
         content = _read_npz(path)
+    elif kind in _READERS:
+        content = _READERS[kind](path)
     else:
         with reading(path, f"a whole {kind} file"):
             content = _PARSERS[kind](read_bytes(path))
@@ -440,12 +484,13 @@ def _checked_cloud(cloud: PointCloud) -> PointCloud:
 
 
 def _read_npz(path: Path) -> Content:
-    """Read the array ``xyz`` of an NPZ file."""
-    arrays = read_arrays(path, "a whole NPZ file")
-    if not isinstance(arrays, dict) or _COORDINATES not in arrays:
+    """Read the array ``xyz`` of an NPZ file, or that of an NPY file, whose first columns are x, y and z."""
+    arrays = read_arrays(path, f"a whole {'NPY' if path.suffix.lower() == '.npy' else 'NPZ'} file")
+    if isinstance(arrays, dict) and _COORDINATES not in arrays:
         raise ValueError(f"{path} holds no array {_COORDINATES}; want points of shape (N, 3)")
     with reading(path, "a cloud"):
-        points = arrays[_COORDINATES]
-        if points.ndim != 2 or points.shape[1] != 3:
+        points = arrays[_COORDINATES] if isinstance(arrays, dict) else arrays
+        if points.ndim != 2 or points.shape[1] < 3 or (isinstance(arrays, dict) and points.shape[1] != 3):
             raise ValueError(f"its {_COORDINATES} have shape {points.shape}; want (N, 3)")
+        points = points[:, :3]
         return Content(points.astype(np.float32 if points.dtype in (np.float16, np.float32) else np.float64))

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from lidarium.mapping.sparse.mapper.merging import are_near, merged_codes
 from lidarium.mapping.sparse.rigid_motions import checked_poses
+from lidarium.mapping.sparse.seen_floor import SeenFloor
 from lidarium.mapping.sparse.sparse_map import FreeCodes, OccupiedCodes, SparseMap, occupied_codes
 
 
@@ -25,15 +26,18 @@ def edited(
     add_boxes : (A, 2, 3) float64 or None
         Low and high corners of further obstacles [m].
     remove_boxes : (R, 2, 3) float64 or None
-        Low and high corners of the space that is free [m].
+        Low and high corners of the space that is free [m]; unseen floor within one that reaches below the floor
+        counts as seen, too.
     """
-    codes = sparse_map.current
+    codes, seen = sparse_map.current, sparse_map.seen_floor
     for box in _checked_boxes(remove_boxes, "remove_boxes"):
         codes = _without(codes, box)
+        if seen is not None and sparse_map.floor.heights(np.append(box.mean(axis=0)[:2], box[0, 2])) <= 0.0:
+            seen = seen.cleared(box)
     frame = max(len(sparse_map.poses) - 1, 0)
     codes = codes.joined(occupied_codes(_checked_boxes(add_boxes, "add_boxes"), frame))
     ground = replace(sparse_map.ground, centres=sparse_map.free)
-    return replace(sparse_map, occupied=codes, ground=ground, recorded=sparse_map.poses)
+    return replace(sparse_map, occupied=codes, ground=ground, recorded=sparse_map.poses, seen_floor=seen)
 
 
 def join_maps(first: SparseMap, second: SparseMap, transform: NDArray[np.float64]) -> SparseMap:
@@ -45,6 +49,9 @@ def join_maps(first: SparseMap, second: SparseMap, transform: NDArray[np.float64
         Maps points of the second into the first.
     """
     motion = checked_poses(transform)
+    seen: SeenFloor | None = None
+    if first.seen_floor is not None and second.seen_floor is not None:
+        seen = first.seen_floor.joined(second.seen_floor, motion)
     second = second.moved(motion @ second.poses)
     shift = len(first.poses)
     added = second.current
@@ -56,7 +63,7 @@ def join_maps(first: SparseMap, second: SparseMap, transform: NDArray[np.float64
     if first.settings.mode != "thesis":
         codes, _ = merged_codes(codes, ground.centres, first.settings)
     poses = np.concatenate([first.poses, second.poses])
-    return replace(first, occupied=codes, ground=ground, poses=poses, recorded=poses)
+    return replace(first, occupied=codes, ground=ground, poses=poses, recorded=poses, seen_floor=seen)
 
 
 def _checked_boxes(boxes: NDArray[np.float64] | None, whose: str) -> NDArray[np.float64]:

@@ -63,6 +63,7 @@ _MAX_POINTS = 4000
 _REFINEMENTS = 4
 _BLOCK = 64
 _BANDS = 50
+_BELOW_SHARE = 0.25
 
 
 def find_floor(points: NDArray[np.float64], settings: FloorSettings | None = None, seed: int = 0) -> FloorPlane:
@@ -78,20 +79,31 @@ def find_floor(points: NDArray[np.float64], settings: FloorSettings | None = Non
     up /= np.linalg.norm(up)
     rng = np.random.default_rng(seed)
     some = points if len(points) <= _MAX_POINTS else points[rng.choice(len(points), _MAX_POINTS, replace=False)]
+    least = max(settings.least_share, 3.0 / max(len(some), 3))
     best, share = _best_plane(some, up, settings, rng)
-    if best is None or share < max(settings.least_share, 3.0 / max(len(some), 3)):
+    if share < least:
+        # Stairs that lead down have points below the floor, but fewer than the floor.
+        best, share = _best_plane(some, up, settings, rng, _BELOW_SHARE)
+    if best is None or share < least:
         raise ValueError(
             f"no floor: the best plane within {math.degrees(settings.most_tilt):.3g} degrees of level has "
             f"{share:.1%} of {len(points):,} points; want {settings.least_share:.1%}, "
-            "another way up, or a floor that is given"
+            "another way up, a smaller share (--floor-share), or a floor that is given"
         )
     return _refined(points, best, up, settings.distance_m)
 
 
 def _best_plane(
-    points: NDArray[np.float64], up: NDArray[np.float64], settings: FloorSettings, rng: np.random.Generator
+    points: NDArray[np.float64],
+    up: NDArray[np.float64],
+    settings: FloorSettings,
+    rng: np.random.Generator,
+    below_share: float = 0.0,
 ) -> tuple[FloorPlane | None, float]:
-    """Return the drawn plane with the most points, and its share of them."""
+    """Return the drawn plane with the most points, and its share of them.
+
+    Below it are at most ``settings.most_below`` of all points, or ``below_share`` times as many as on it.
+    """
     if len(points) < 3:
         return None, 0.0
     corners = points[_drawn(points @ up, settings.trials, rng)]
@@ -108,7 +120,8 @@ def _best_plane(
         part = slice(start, start + _BLOCK)
         heights = points @ normals[part].T + offsets[part]
         shares = (np.abs(heights) <= settings.distance_m).mean(axis=0)
-        shares[(heights < -2.0 * settings.distance_m).mean(axis=0) > settings.most_below] = 0.0
+        below = (heights < -2.0 * settings.distance_m).mean(axis=0)
+        shares[below > np.maximum(settings.most_below, below_share * shares)] = 0.0
         place = int(np.argmax(shares))
         if shares[place] > maximum:
             best, maximum = _plane(normals[start + place], offsets[start + place]), float(shares[place])

@@ -8,7 +8,7 @@ Sparse mapper, section 5.3; an edge is there if either end lists the other among
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
@@ -17,6 +17,7 @@ from scipy.spatial import cKDTree
 
 from lidarium.mapping.geometry.bounds import above, check_settings, within
 from lidarium.mapping.kernels.compilation import Array, kernel
+from lidarium.mapping.sparse.seen_floor import SeenFloor, Support
 from lidarium.mapping.sparse.swept_body import (
     HIGH,
     LOW,
@@ -373,9 +374,11 @@ class TopologicalGraph:
     weights : (E,) float64
         Cost of each edge, at least its length [m].
     index : BoxIndex
-        Obstacles.
+        Obstacles, and rims of the floor that bears the body.
     body : SweptBody
         The body that drives.
+    support : Support or None
+        Cells of floor that bear the body; None if that is not known.
     """
 
     grid: NodeGrid
@@ -384,11 +387,18 @@ class TopologicalGraph:
     weights: NDArray[np.float64]
     index: BoxIndex
     body: SweptBody
+    support: Support | None = None
 
     @property
     def nodes(self) -> NDArray[np.float64]:
         """The nodes, (N, 3) [m]."""
         return self.grid.nodes
+
+    @property
+    def boxes(self) -> NDArray[np.float64]:
+        """Boxes of the obstacles, without rims of the floor, (M, 2, 3) [m]."""
+        boxes = self.index.boxes
+        return boxes[np.isfinite(boxes[:, 2])].reshape(-1, 2, 3)
 
     @property
     def edges(self) -> NDArray[np.int64]:
@@ -402,6 +412,7 @@ def build_graph(
     occupied: NDArray[np.float64],
     body: SweptBody,
     settings: GraphSettings | None = None,
+    floor: SeenFloor | None = None,
 ) -> TopologicalGraph:
     """Build the graph that a body can be driven along, from a sparse map or any nodes and boxes.
 
@@ -415,6 +426,9 @@ def build_graph(
         The body that drives.
     settings : GraphSettings, optional
         Settings; defaults if None.
+    floor : SeenFloor, optional
+        The floor that was seen, `seen_floor` of a sparse map: the body keeps its whole footprint on it, and off
+        steps higher than its clearance. By default all floor counts as seen.
 
     Returns
     -------
@@ -440,15 +454,47 @@ def build_graph(
     free = np.ascontiguousarray(free, np.float64).reshape(-1, 3)
     if len(free) == 0:
         raise ValueError("the map has no free nodes; want a cloud with floor in it, or another floor height")
-    index = index_boxes(occupied)
+    boxes, rims, support = np.reshape(occupied, (-1, 2, 3)), np.empty((0, 2, 3)), None
+    if floor is not None:
+        support = floor.supports(body.clearance)
+        rims = support.rims()
+        boxes = np.concatenate([boxes, rims])
+    index = index_boxes(boxes)
     nodes = reduced_nodes(free, settings.merge_radius)
     nodes = _nodes_with_room(nodes, index, body, settings.merge_radius)
+    if support is not None:
+        nodes = np.concatenate([nodes, _nodes_beside(rims, free, index, body)])
+        nodes = nodes[[support.bears(node) for node in nodes]]
     if len(nodes) == 0:
         raise ValueError(
             f"a body of radius {body.radius} m and height {body.height} m can stand at none of {len(free)} "
-            "free nodes; want a smaller one"
+            f"free nodes; want a smaller one{', or a map with more seen floor' if support is not None else ''}"
         )
-    return graph_of_nodes(nodes, index, body, settings)
+    return replace(graph_of_nodes(nodes, index, body, settings), support=support)
+
+
+RIM_MARGIN_M = 0.02
+"""By how much a node beside a rim is farther from it than the body's radius [m]."""
+
+RIM_MERGE_M = 0.1
+"""Nodes beside rims that are nearer to each other than this are merged [m]."""
+
+
+def _nodes_beside(
+    rims: NDArray[np.float64], free: NDArray[np.float64], index: BoxIndex, body: SweptBody
+) -> NDArray[np.float64]:
+    """Return nodes (N, 3) at the corners of rims (M, 2, 3), where paths turn around holes in the floor."""
+    if len(rims) == 0:
+        return np.empty((0, 3))
+    found, away = [], body.radius + RIM_MARGIN_M
+    for x, y in ((0, 0), (0, 1), (1, 0), (1, 1)):
+        corners = np.stack([rims[:, x, 0], rims[:, y, 1]], axis=1)
+        outward = np.array([2.0 * x - 1.0, 2.0 * y - 1.0])
+        found += [corners + outward * away * share for share in ((1.0, 0.0), (0.0, 1.0), (math.sqrt(0.5),) * 2)]
+    places = np.concatenate(found)
+    nodes = np.column_stack([places, free[cKDTree(free[:, :2]).query(places)[1], 2]])
+    nodes = reduced_nodes(nodes[standing_nodes(nodes, index, body)], RIM_MERGE_M)
+    return nodes[standing_nodes(nodes, index, body)]
 
 
 def graph_of_nodes(

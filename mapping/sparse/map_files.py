@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from lidarium.mapping.files.guarded_reading import open_guarded, read_bytes, read_text, reading
 from lidarium.mapping.files.output import write_whole
 from lidarium.mapping.sparse.floor_plane import FloorPlane
+from lidarium.mapping.sparse.seen_floor import MAX_CELLS, MAX_STEP_CM, UNSEEN, SeenFloor
 from lidarium.mapping.sparse.settings import FloorSettings, MapperSettings
 from lidarium.mapping.sparse.sparse_map import SparseMap, free_codes, occupied_codes
 
@@ -130,6 +131,9 @@ MAGIC = b"LIDSPMAP"
 VERSION = 2
 """Files of it are read."""
 
+HAS_FLOOR = 1
+"""Flag of files with the cells of the floor that was seen; others do not know them."""
+
 STEPS_A_METRE = 100
 FARTHEST_M = 1e6
 """Largest coordinate [m]."""
@@ -140,6 +144,9 @@ MAX_BODY_BYTES = 32 << 20
 
 MIN_BODY_BYTES, BODY_RATIO = 4 << 20, 64
 """Longest body of any file, and its length for each packed byte: maps of rooms have 5 to 16."""
+
+MIN_CELL_M = 0.01
+"""Smallest cell of a floor [m]."""
 
 _HEADER = struct.Struct("<8sHHIIIIIII")
 _WIDTHS = (COLUMNS + 3, COLUMNS, COLUMNS, 2)
@@ -183,10 +190,14 @@ def binary_content(sparse_map: SparseMap, graph: _GraphEdges | None = None) -> b
         _coded_edges(edges),
     ]
     about = json.dumps(_about(sparse_map, origin), separators=(",", ":")).encode()
-    blocks = [struct.pack("<I", len(about)) + about, *_column_blocks(lists)]
+    seen = sparse_map.seen_floor
+    blocks = [struct.pack("<I", len(about)) + about, *_column_blocks(lists), *([_row_changes(seen)] if seen else [])]
     length, packed = sum(map(len, blocks)), _deflated(blocks)
     counts = [len(each) for each in lists]
-    return _HEADER.pack(MAGIC, VERSION, 0, *counts, length, len(packed), zlib.crc32(packed)) + packed
+    return (
+        _HEADER.pack(MAGIC, VERSION, HAS_FLOOR if seen else 0, *counts, length, len(packed), zlib.crc32(packed))
+        + packed
+    )
 
 
 def _read_binary(path: Path) -> tuple[SparseMap, _GraphEdges | None]:
@@ -198,20 +209,25 @@ def _read_binary(path: Path) -> tuple[SparseMap, _GraphEdges | None]:
 
 def _parsed_binary(content: bytes) -> tuple[SparseMap, _GraphEdges | None]:
     """Return the map, and the graph or None, of the bytes of a binary form."""
-    counts, body = _unpacked(content)
+    flags, counts, body = _unpacked(content)
     (length,) = struct.unpack_from("<I", body)
     start = 4 + length
-    if start + _bytes_of(counts) != len(body):
+    end = start + _bytes_of(counts)
+    if end > len(body):
         raise ValueError("its counts do not fit its length")
     about = json.loads(body[4:start])
     floor, settings = _from_about(about)
-    lists = _lists(body[start:], counts, np.array(about["origin"], np.int64).reshape(3))
+    seen = _seen_floor(about["cells"], body[end:]) if flags == HAS_FLOOR else None
+    if seen is None and end != len(body):
+        raise ValueError("its counts do not fit its length")
+    lists = _lists(body[start:end], counts, np.array(about["origin"], np.int64).reshape(3))
     low, sizes = lists.boxes[:, :3], lists.boxes[:, 3:]
     sparse_map = SparseMap(
         occupied=occupied_codes(_checked(np.stack([low, low + sizes], axis=1) / STEPS_A_METRE)),
         ground=free_codes(_checked(lists.free / STEPS_A_METRE)),
         floor=floor,
         settings=settings,
+        seen_floor=seen,
     )
     if len(lists.nodes) == 0:
         return sparse_map, None
@@ -236,15 +252,37 @@ def _bytes_of(counts: Sequence[int]) -> int:
     return BYTES * sum(count * width for count, width in zip(counts, _WIDTHS, strict=True))
 
 
-def _unpacked(content: bytes) -> tuple[list[int], bytes]:
-    """Return the counts of the header, and the body that it claims."""
+def _row_changes(seen: SeenFloor) -> bytes:
+    """Return the cells of a floor as their differences from the row before: most are zero."""
+    return np.diff(seen.steps, axis=0, prepend=np.uint8(0)).tobytes()
+
+
+def _seen_floor(about: list[Any], content: bytes) -> SeenFloor:
+    """Return the floor whose cells `_row_changes` gave, by first column and row, rows, columns and side of a cell."""
+    if len(about) != 5 or not all(isinstance(number, int) for number in about[:4]):
+        raise ValueError(f"the cells of its floor are {about}; want four whole numbers and their side")
+    low, (rows, columns), cell = about[:2], about[2:4], float(about[4])
+    if not (rows >= 1 and columns >= 1 and rows * columns <= MAX_CELLS and rows * columns == len(content)):
+        raise ValueError(f"its floor has {rows} x {columns} cells in {len(content):,} bytes; want as many of both")
+    first = _checked(np.array(low, np.float64) * cell)
+    _checked(first + np.array([columns, rows]) * cell)
+    if not MIN_CELL_M <= cell <= FARTHEST_M:
+        raise ValueError(f"its floor has cells of {cell} m; want at least {MIN_CELL_M} m")
+    steps = np.cumsum(np.frombuffer(content, np.uint8).reshape(rows, columns), axis=0, dtype=np.uint8)
+    if not ((steps <= MAX_STEP_CM) | (steps == UNSEEN)).all():
+        raise ValueError(f"its floor has steps of more than {MAX_STEP_CM} cm: it is damaged")
+    return SeenFloor(steps, np.array(low, np.int64), cell)
+
+
+def _unpacked(content: bytes) -> tuple[int, list[int], bytes]:
+    """Return the flags and counts of the header, and the body that it claims."""
     if content[: len(MAGIC)] != MAGIC:
         raise ValueError(f"it begins with {content[: len(MAGIC)]!r}; want {MAGIC!r}")
     if len(content) < _HEADER.size:
         raise ValueError(f"it has {len(content)} bytes; want a header of {_HEADER.size}")
     _, version, flags, *counts, length, packed_length, checksum = _HEADER.unpack_from(content)
-    if version != VERSION or flags != 0:
-        raise ValueError(f"it is of version {version}, flags {flags}; want version {VERSION}, flags 0")
+    if version != VERSION or flags not in (0, HAS_FLOOR):
+        raise ValueError(f"it is of version {version}, flags {flags}; want version {VERSION}, flags 0 or {HAS_FLOOR}")
     packed = content[_HEADER.size :]
     if len(packed) != packed_length:
         raise ValueError(f"it claims {packed_length:,} bytes after the header; there are {len(packed):,}")
@@ -258,7 +296,7 @@ def _unpacked(content: bytes) -> tuple[list[int], bytes]:
     body = unpacking.decompress(packed, length + 1)
     if len(body) != length or not unpacking.eof:
         raise ValueError(f"it does not unpack to the {length:,} bytes that it claims")
-    return counts, body
+    return flags, counts, body
 
 
 def _checked(places: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -304,6 +342,9 @@ def _about(sparse_map: SparseMap, origin: NDArray[np.int64]) -> dict[str, Any]:
         "origin": origin.tolist(),
         "floor": [floor.x, floor.y, floor.z, floor.offset],
     }
+    seen = sparse_map.seen_floor
+    if seen is not None:
+        about["cells"] = [*seen.low.tolist(), *seen.steps.shape, seen.cell_m]
     about["settings"] = {name: value for name, value in settings.items() if value != plain[name]}
     return about
 

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.sparse.graph import NodeGrid, TopologicalGraph, nearest_nodes
-from lidarium.mapping.sparse.swept_body import BoxIndex, is_free
+from lidarium.mapping.sparse.swept_body import BoxIndex, index_boxes, is_free
 
 NO_NODE = -1
 
@@ -224,9 +224,16 @@ def _path_length(path: Array) -> float:
 CONNECTORS = 10
 """Nearest nodes to which a start and a goal are connected."""
 
-FOUND, START_IN_COLLISION, GOAL_IN_COLLISION, NO_PATH = range(4)
+FOUND, START_IN_COLLISION, GOAL_IN_COLLISION, NO_PATH, START_WITHOUT_FLOOR, GOAL_WITHOUT_FLOOR = range(6)
 
-REASONS = ("", "start in collision", "goal in collision", "no path")
+REASONS = (
+    "",
+    "start in collision",
+    "goal in collision",
+    "no path",
+    "start without floor",
+    "goal without floor",
+)
 """Why there is no path, by number; empty if there is one."""
 
 
@@ -239,7 +246,8 @@ class Plan:
     path : (P, 3) float64
         Points from the start to the goal [m]; empty if there is no path.
     reason : str
-        Why there is none: ``start in collision``, ``goal in collision`` or ``no path``; else empty.
+        Why there is none: ``start in collision``, ``start without floor`` (the same of the goal) or ``no path``;
+        else empty.
     nodes : int
         Points of the path on the graph, before it was shortened.
     """
@@ -337,7 +345,28 @@ def plan(
         graph.body.numbers,
         shortens,
     )
+    if graph.support is not None and reason in (START_IN_COLLISION, GOAL_IN_COLLISION):
+        point = ends[reason - START_IN_COLLISION]
+        if is_free(index_boxes(graph.boxes), point, point, graph.body.numbers):  # it touches a rim alone
+            reason += START_WITHOUT_FLOOR - START_IN_COLLISION
+    elif graph.support is not None:
+        for point, without_floor in zip(ends, (START_WITHOUT_FLOOR, GOAL_WITHOUT_FLOOR), strict=True):
+            if not _stands_on_floor(graph, point):
+                return Plan(np.empty((0, 3)), REASONS[without_floor], 0)
     return Plan(path, REASONS[reason], nodes)
+
+
+OFF_FLOOR_M = 0.25
+"""A start or goal farther above or below the nearest node is not on the floor [m]."""
+
+
+def _stands_on_floor(graph: TopologicalGraph, point: NDArray[np.float64]) -> bool:
+    """Whether a point (3,) is on the floor, above a cell that bears the body."""
+    if graph.support is None or not graph.support.bears(point):
+        return graph.support is None
+    found, gaps = np.full(1, -1), np.full(1, np.inf)
+    nearest_nodes(graph.grid, point, found, gaps, -1)
+    return bool(abs(graph.nodes[found[0], 2] - point[2]) <= OFF_FLOOR_M)
 
 
 def _terminal(graph: TopologicalGraph, name: str, point: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -88,6 +88,11 @@ class MapperSettings:
         A frame is taken if the robot has moved or turned by so much since the last one [m, rad].
     seed : int
         Of all random draws.
+    floor_gap_m : float
+        How far from points of the floor it counts as seen between them [m]: holes wider than twice this stay holes.
+        0 for a map that does not know what of its floor was seen.
+    fits_boxes : bool
+        Whether boxes are compared with all points, if they merge: those that are mostly empty are divided.
     floor : FloorSettings
         How the floor is found.
     """
@@ -109,6 +114,8 @@ class MapperSettings:
     least_motion_m: Annotated[float, within(0.0, 1e3)] = 0.5
     least_turn: Annotated[float, within(0.0, 2.0 * math.pi)] = math.radians(45.0)
     seed: Annotated[int, within(0, 2**32 - 1)] = 0
+    fits_boxes: bool = True
+    floor_gap_m: Annotated[float, within(0.0, 1.0)] = 0.10
     floor: FloorSettings = field(default_factory=FloorSettings)
 
     def __post_init__(self) -> None:

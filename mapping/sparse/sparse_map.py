@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from lidarium.mapping.sparse.floor_plane import FloorPlane
 from lidarium.mapping.sparse.rigid_motions import checked_poses, inverse_of, moved_boxes, moved_points, turned
+from lidarium.mapping.sparse.seen_floor import SeenFloor
 from lidarium.mapping.sparse.settings import MapperSettings
 
 FLAT_SHARE = 0.25
@@ -148,6 +149,8 @@ class SparseMap:
         The floor in the map.
     settings : MapperSettings
         How the map was made.
+    seen_floor : SeenFloor or None
+        Cells in which floor was seen; None if that is not known.
     """
 
     occupied: OccupiedCodes
@@ -156,6 +159,7 @@ class SparseMap:
     recorded: NDArray[np.float64] = field(default_factory=lambda: np.eye(4)[None])
     floor: FloorPlane = field(default_factory=FloorPlane)
     settings: MapperSettings = field(default_factory=MapperSettings)
+    seen_floor: SeenFloor | None = None
 
     def __post_init__(self) -> None:
         if checked_poses(self.poses).shape != checked_poses(self.recorded).shape or self.poses.ndim != 3:
@@ -199,8 +203,8 @@ class SparseMap:
         return self._placed(self.ground.centres, self.ground.frames)
 
     def moved(self, poses: NDArray[np.float64]) -> "SparseMap":
-        """Return the map with other poses (F, 4, 4) of its frames."""
-        return replace(self, poses=np.array(poses, np.float64))
+        """Return the map with other poses (F, 4, 4) of its frames; the cells of its floor are not known there."""
+        return replace(self, poses=np.array(poses, np.float64), seen_floor=None)
 
     @property
     def current(self) -> OccupiedCodes:

@@ -44,12 +44,14 @@ class FloorFound:
     doubt: str = ""
 
 
-def check_up(points: NDArray[np.floating], up: tuple[float, float, float], seed: int = 0) -> FloorFound:
+def check_up(
+    points: NDArray[np.floating], up: tuple[float, float, float], seed: int = 0, least_share: float = 0.03
+) -> FloorFound:
     """Find the floor of a cloud (N, 3) [m] by its way up, and compare it with level surfaces along other axes."""
     some = np.asarray(points, np.float64)
     if len(some) > _MAX_POINTS:
         some = some[np.random.default_rng(seed).choice(len(some), _MAX_POINTS, replace=False)]
-    plane, area = _level_surface(some, up, seed)
+    plane, area = _level_surface(some, up, seed, least_share)
     share = 0.0 if plane is None else float((np.abs(plane.heights(some)) <= _ON_PLANE_M).mean())
     given = np.array(up) / np.linalg.norm(up)
     if given[2] > 0.9 and _is_in_camera_frame(some):
@@ -78,11 +80,12 @@ def _is_in_camera_frame(points: NDArray[np.float64]) -> bool:
 
 
 def _level_surface(
-    points: NDArray[np.float64], up: tuple[float, float, float], seed: int
+    points: NDArray[np.float64], up: tuple[float, float, float], seed: int, least_share: float = 0.03
 ) -> tuple[FloorPlane | None, float]:
     """Return the plane of the floor by a way up, and its area [m2]."""
     try:
-        plane = find_floor(points, FloorSettings(up_x=up[0], up_y=up[1], up_z=up[2]), seed)
+        settings = FloorSettings(up_x=up[0], up_y=up[1], up_z=up[2], least_share=least_share)
+        plane = find_floor(points, settings, seed)
     except ValueError:
         return None, 0.0
     on_plane = points[np.abs(plane.heights(points)) <= _ON_PLANE_M]

@@ -3,12 +3,16 @@
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
-from typing import Annotated, ClassVar
+from typing import TYPE_CHECKING, Annotated, ClassVar, Protocol
 
 from tyro.conf import Positional, arg
 
 from lidarium.scripts.commands.sparse_map import numbers_of
-from lidarium.scripts.common import DONE, NO, Answer, Command, table
+from lidarium.scripts.common import DONE, NO, Answer, Command, notify, table
+
+if TYPE_CHECKING:
+    from lidarium.mapping.sparse.graph import TopologicalGraph
+    from lidarium.mapping.sparse.sparse_map import SparseMap
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -30,8 +34,41 @@ class _Plan(Command):
     """radius of the robot [m]"""
     height: float = 1.2
     """height of the robot [m]"""
+    max_step: float = 0.05
+    """highest step of the floor, up or down, that the robot climbs [m]"""
     clearance_weight: float = 0.0
     """additional cost of paths near obstacles, as a share"""
+
+
+class _Driven(Protocol):
+    """A command that plans for a robot."""
+
+    @property
+    def map(self) -> Path: ...
+    @property
+    def radius(self) -> float: ...
+    @property
+    def height(self) -> float: ...
+    @property
+    def max_step(self) -> float: ...
+    @property
+    def clearance_weight(self) -> float: ...
+
+
+def graph_for(command: _Driven, sparse_map: "SparseMap") -> "tuple[TopologicalGraph, list[str]]":
+    """Return the graph of a map for a command's robot, with remarks."""
+    from lidarium.mapping.sparse.graph import GraphSettings, build_graph
+    from lidarium.mapping.sparse.swept_body import SweptBody
+
+    body = SweptBody(radius=command.radius, height=command.height, clearance=command.max_step)
+    settings = GraphSettings(clearance_weight=command.clearance_weight)
+    graph = build_graph(sparse_map.free, sparse_map.boxes, body, settings, sparse_map.seen_floor)
+    if sparse_map.seen_floor is not None:
+        return graph, []
+    return graph, [
+        f"{command.map} does not know which floor was seen: paths may lead over holes and steps; make it again by "
+        "lidarium sparse-map"
+    ]
 
 
 def execute(command: _Plan) -> Answer:
@@ -40,10 +77,8 @@ def execute(command: _Plan) -> Answer:
 
     from lidarium.evaluation.drawing.sparse_picture import save_sparse_pictures
     from lidarium.mapping.files.output import check_writable, write_json
-    from lidarium.mapping.sparse.graph import GraphSettings, build_graph
     from lidarium.mapping.sparse.map_files import read_sparse_map
     from lidarium.mapping.sparse.planning import check_on_map, map_bounds, plan
-    from lidarium.mapping.sparse.swept_body import SweptBody
 
     if command.out is not None:
         check_writable(command.out)
@@ -51,9 +86,9 @@ def execute(command: _Plan) -> Answer:
         np.array(numbers_of(name, text, (2, 3))) for name, text in (("--from", command.start), ("--to", command.goal))
     )
     sparse_map, _ = read_sparse_map(command.map)
-    body = SweptBody(radius=command.radius, height=command.height)
-    settings = GraphSettings(clearance_weight=command.clearance_weight)
-    graph = build_graph(sparse_map.free, sparse_map.boxes, body, settings)
+    graph, remarks = graph_for(command, sparse_map)
+    for remark in remarks:
+        notify(remark)
     for name, point in (("--from", start), ("--to", goal)):
         check_on_map(map_bounds(graph), name, point)
     plan(graph, start, goal)  # compiles
@@ -65,6 +100,7 @@ def execute(command: _Plan) -> Answer:
         **answer.result,
         "graph": {"nodes": len(graph.nodes), "edges": len(graph.edges)},
         "seconds": round(seconds, 6),
+        "remarks": remarks,
     }
     files = []
     if command.out is not None:

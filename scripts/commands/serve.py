@@ -9,6 +9,7 @@ from tyro.conf import Positional
 
 from lidarium.mapping.sparse.path_client import HOST
 from lidarium.mapping.sparse.path_client import PathClient as PathClient
+from lidarium.scripts.commands.plan import graph_for
 from lidarium.scripts.common import Answer, Command, notify
 
 
@@ -30,24 +31,25 @@ class _Serve(Command):
     """radius of the robot [m]"""
     height: float = 1.2
     """height of the robot [m]"""
+    max_step: float = 0.05
+    """highest step of the floor, up or down, that the robot climbs [m]"""
     clearance_weight: float = 0.0
     """additional cost of paths near obstacles, as a share"""
 
 
 def execute(command: _Serve) -> Answer:
     """Serve until the end of the input, or Ctrl-C."""
-    from lidarium.mapping.sparse.graph import GraphSettings, build_graph
     from lidarium.mapping.sparse.map_files import read_sparse_map
     from lidarium.mapping.sparse.path_server import PathServer, check_port, serve_streams
     from lidarium.mapping.sparse.path_service import PathService
-    from lidarium.mapping.sparse.swept_body import SweptBody
 
     if command.port is not None:
         check_port(command.port)
     sparse_map, _ = read_sparse_map(command.map)
-    body = SweptBody(radius=command.radius, height=command.height)
-    settings = GraphSettings(clearance_weight=command.clearance_weight)
-    service = PathService(build_graph(sparse_map.free, sparse_map.boxes, body, settings), command.map)
+    graph, remarks = graph_for(command, sparse_map)
+    for remark in remarks:
+        notify(remark)
+    service = PathService(graph, command.map)
     if command.port is None:
         notify(f"{command.map} is served: requests come by standard input, a line each")
         serve_streams(service, sys.stdin.buffer, sys.stdout.buffer)

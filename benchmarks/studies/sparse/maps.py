@@ -71,7 +71,7 @@ def survey(place: Place) -> Survey:
     for frame in frames:
         octomap.add(frame)
         mapper.add(frame.points, frame.pose)
-    cloud, thesis = _cloud(frames), THESIS[place.name]
+    cloud, thesis = cloud_of(frames), THESIS[place.name]
     few = [frames[k] for k in np.linspace(0, len(frames) - 1, thesis.frames).astype(int)]
     by_codes = MapperSettings(range_m=RANGE_M, mode="thesis", robot_height_m=thesis.height)
     thesis_mapper = IncrementalMapper(THESIS_FRAME_CODES, by_codes)
@@ -106,7 +106,7 @@ def _kept_frames(place: Place) -> list[Frame]:
     return [replace(frame, points=frame.points.astype(np.float32)) for frame in frames_of(place)]
 
 
-def _cloud(frames: list[Frame]) -> NDArray[np.float32]:
+def cloud_of(frames: list[Frame]) -> NDArray[np.float32]:
     """Return the cloud of a whole place: some pixels of every frame, (N, 3) [m]."""
     generator, parts = np.random.default_rng(1), []
     for frame in frames:

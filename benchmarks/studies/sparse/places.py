@@ -68,7 +68,11 @@ class Place:
 
 def load_place(name: str) -> Place:
     """Load a place."""
-    floor = load_floor(name)
+    return place_of(name, load_floor(name))
+
+
+def place_of(name: str, floor: Floor) -> Place:
+    """Return a floor as a place."""
     raster = floor.raster(CELL_M, BODY.clearance, BODY.height)
     gaps = ndimage.distance_transform_edt(raster.solid == 0) * CELL_M
     labels, _ = ndimage.label(gaps > BODY.radius)

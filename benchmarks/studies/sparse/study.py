@@ -8,7 +8,7 @@ import numpy as np
 
 from lidarium.benchmarks.results_page import in_file
 from lidarium.benchmarks.studies.shared.study import Progress, Study, kept_lines
-from lidarium.benchmarks.studies.sparse import paths, quantisation
+from lidarium.benchmarks.studies.sparse import drops, paths, quantisation
 from lidarium.benchmarks.studies.sparse.figures import figure_table
 from lidarium.benchmarks.studies.sparse.pictures import draw_errors, draw_paths
 from lidarium.benchmarks.studies.sparse.places import CELL_M, CLEAR_M, REQUESTS, SPACING_M, TURNS
@@ -64,6 +64,14 @@ Boxes of the maps: {boxes_all} of all points, {boxes_precise} of precise ones.
 Table tops and seats: of places that only they take up, and no laser's plane shows, the inflated grid of the
 laser lets a robot stand at {laser}.
 
+## Holes, stairs and pallets
+
+{areas} holes, as many stairwells and pallets of {pallet:.0f} cm are put on the floor of each place, of
+{low} to {high} m a side. {requests} requests a place have a path by the truth, both ends {clear:.0f} cm clear. A path
+leads over an area if the robot's circle reaches more than a cell of the raster into it.
+
+{drops}
+
 ## Paths
 
 Means and standard deviations over the requests that both the grid and the sparse map answer. Turning and
@@ -111,6 +119,7 @@ compare; K-means++ there labels on a GPU. {gpu}
 def work(folder: Path, data: Path | None, every: int, _workers: int) -> Progress:
     """Measure every N-th place and cloud in this process, as times are taken."""
     yield from paths.work(folder, every)
+    yield from drops.work(folder, every)
     yield from quantisation.work(folder, data, every)
 
 
@@ -135,6 +144,11 @@ def page(folder: Path) -> str:
         boxes_precise=_boxes(lines, "precise"),
         precise=CAMERAS["xtion_noisy"].precise_m,
         laser=", ".join(f"{100.0 * (1.0 - line['tops']['laser']):.1f} % ({line['place']})" for line in lines),
+        areas=drops.AREAS_A_KIND,
+        pallet=100.0 * drops.PALLET_M,
+        low=drops.SIDES_M[0],
+        high=drops.SIDES_M[1],
+        drops=drops.drops_table(kept_lines(folder / drops.DROPS_FILE)),
         measures="\n\n".join(measures),
         failures=failure_table(lines),
         thesis_failures=thesis_failure_table(lines),

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.mapping.sparse.floor_plane import FloorPlane, find_floor
+from lidarium.mapping.sparse.mapper.fitting import SeenPoints, fitted_codes
 from lidarium.mapping.sparse.mapper.frame_coding import (
     code_counts,
     coded_as_points,
@@ -22,6 +23,7 @@ from lidarium.mapping.sparse.mapper.frame_coding import (
 )
 from lidarium.mapping.sparse.mapper.merging import merged_codes
 from lidarium.mapping.sparse.rigid_motions import checked_poses, moved_points
+from lidarium.mapping.sparse.seen_floor import FloorPoints, SeenFloor
 from lidarium.mapping.sparse.settings import MapperSettings
 from lidarium.mapping.sparse.sparse_map import OccupiedCodes, SparseMap, occupied_codes
 
@@ -43,7 +45,8 @@ def map_cloud(
     points : (N, 3) float
         The cloud [m].
     k : int
-        Number of codes, of floor and obstacles together; merging leaves fewer.
+        Number of codes, of floor and obstacles together; merging leaves fewer, and boxes that would be mostly empty
+        become several.
     settings : MapperSettings, optional
         Settings; defaults if None.
     pose : (4, 4) float64, optional
@@ -76,12 +79,21 @@ def map_cloud(
     cloud = moved_points(usable_points(points, settings.range_m), pose)
     if floor is None:
         floor = find_floor(voxels_of(cloud, max(settings.voxel_m, 0.02)).means, settings.floor, settings.seed)
+    seen: SeenFloor | None = None
     if settings.mode == "thesis":
         occupied, ground = coded_as_points(cloud, k, floor, settings)
     else:
         obstacles, ground_points = split_points(cloud, floor, settings)
         ground = coded_floor(ground_points, on_floor, settings)
         occupied = _merged_obstacles(obstacles, on_obstacles, ground.centres, settings)
+        if settings.fits_boxes and settings.merges:
+            cells = SeenPoints()
+            cells.add(obstacles)
+            occupied = fitted_codes(occupied, cells.middles)
+        if settings.floor_gap_m > 0.0:
+            floor_points = FloorPoints(settings.floor_gap_m)
+            floor_points.add(ground_points, floor)
+            seen = floor_points.seen(occupied.boxes, floor, settings.floor_height_m)
     return SparseMap(
         occupied=occupied,
         ground=ground,
@@ -89,6 +101,7 @@ def map_cloud(
         recorded=pose[None].copy(),
         floor=floor,
         settings=settings,
+        seen_floor=seen,
     )
 
 

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.mapping.sparse.floor_plane import FloorPlane, find_floor
+from lidarium.mapping.sparse.mapper.fitting import SeenPoints, fitted_codes
 from lidarium.mapping.sparse.mapper.frame_coding import (
     code_counts,
     coded_as_points,
@@ -25,6 +26,7 @@ from lidarium.mapping.sparse.mapper.frame_coding import (
 )
 from lidarium.mapping.sparse.mapper.merging import are_covered, are_near, merged_codes
 from lidarium.mapping.sparse.rigid_motions import checked_poses, inverse_of, moved_points
+from lidarium.mapping.sparse.seen_floor import FloorPoints
 from lidarium.mapping.sparse.settings import MapperSettings
 from lidarium.mapping.sparse.sparse_map import FreeCodes, OccupiedCodes, SparseMap, free_codes, occupied_codes
 
@@ -54,12 +56,24 @@ class IncrementalMapper:
         self._counts = code_counts(k, self.settings.floor_share)
         self._floor = floor
         self._map: SparseMap | None = None
+        keeps_floor = self.settings.floor_gap_m > 0.0 and self.settings.mode != "thesis"
+        self._floor_points = FloorPoints(self.settings.floor_gap_m) if keeps_floor else None
+        fits = self.settings.fits_boxes and self.settings.merges and self.settings.mode != "thesis"
+        self._cells = SeenPoints() if fits else None
+        self._is_fitted = True
 
     @property
     def map(self) -> SparseMap:
-        """The map of all frames so far."""
+        """The map of all frames so far; which floor was seen is not known after a correction."""
         if self._map is None:
             raise ValueError("the map has no frame yet; want one to be added")
+        if not self._is_fitted and self._cells is not None:
+            frame = len(self._map.poses) - 1
+            self._map = replace(self._map, occupied=fitted_codes(self._map.occupied, self._cells.middles, frame))
+        if not self._is_fitted and self._floor_points is not None:
+            seen = self._floor_points.seen(self._map.boxes, self._map.floor, self.settings.floor_height_m)
+            self._map = replace(self._map, seen_floor=seen)
+        self._is_fitted = True
         return self._map
 
     def is_due(self, pose: NDArray[np.float64]) -> bool:
@@ -103,12 +117,15 @@ class IncrementalMapper:
         else:
             occupied, ground = self._coded_frame(cloud, known, floor)
         self._floor = floor
-        self._map = replace(known, occupied=occupied, ground=ground)
+        self._map = replace(known, occupied=occupied, ground=ground, seen_floor=None)
+        self._is_fitted = False
         return True
 
     def correct(self, poses: NDArray[np.float64]) -> None:
         """Move the codes with corrected poses (F, 4, 4) of the frames that were taken."""
         self._map = self.map.moved(poses)
+        # Points and cells are of the poses before.
+        self._floor_points, self._cells = None, None
 
     def forget(self, gone: NDArray[np.bool_]) -> None:
         """Leave out occupied codes of the map that are no longer there, (M,) bool."""
@@ -120,6 +137,10 @@ class IncrementalMapper:
         """Return a map's codes, as recorded, with those of its last frame."""
         settings, frame = self.settings, len(known.poses) - 1
         obstacles, on_floor = split_points(cloud, floor, settings)
+        if self._floor_points is not None:
+            self._floor_points.add(on_floor, floor)
+        if self._cells is not None:
+            self._cells.add(obstacles)
         obstacles = obstacles[~are_covered(obstacles, known.boxes)]
         on_floor = on_floor[~are_near(on_floor, known.free, settings.merge_radius_m)]
         found = coded_floor(on_floor, self._counts[1], settings, frame)

@@ -1,6 +1,7 @@
 """Columns of a file that are points, normals and weights."""
 
 import struct
+import sys
 import zlib
 
 import numpy as np
@@ -417,3 +418,75 @@ def test_commas_that_may_be_either_are_refused(tmp_path, text):
     (tmp_path / "a.xyz").write_text(text)
     with pytest.raises(ValueError, match="want decimal points"):
         read_cloud(tmp_path / "a.xyz")
+
+
+def test_headers_of_cloudcompare_and_pts_are_passed_over(tmp_path):
+    rows = "1 2 3 4\n5 6 7 8\n"
+    for name, content, expected in (
+        ("a.asc", f"//X Y Z Intensity\n{rows}", [[1, 2, 3], [5, 6, 7]]),
+        ("b.asc", f"//X Y Z Intensity\n2\n{rows}", [[1, 2, 3], [5, 6, 7]]),
+        ("c.pts", f"2\r\n{rows}", [[1, 2, 3], [5, 6, 7]]),
+        ("d.csv", "intensity,Z,Y,X\n1,2,3,4\n5,6,7,8\n", [[4, 3, 2], [8, 7, 6]]),
+        ("e.txt", f"# made by hand\n{rows}", [[1, 2, 3], [5, 6, 7]]),
+    ):
+        (tmp_path / name).write_text(content)
+        np.testing.assert_array_equal(read_cloud(tmp_path / name).points, expected)
+    (tmp_path / "short.pts").write_text(f"3\n{rows}")
+    with pytest.raises(ValueError, match="claims 3 points, and 2 lines follow"):
+        read_cloud(tmp_path / "short.pts")
+
+
+def test_arrays_and_laser_scans_are_clouds(tmp_path):
+    points = np.random.default_rng(0).normal(size=(5, 4)).astype(np.float32)
+    np.save(tmp_path / "a.npy", points)
+    (tmp_path / "a.bin").write_bytes(points.tobytes())
+    for name in ("a.npy", "a.bin"):
+        np.testing.assert_array_equal(read_cloud(tmp_path / name).points, points[:, :3])
+    (tmp_path / "b.bin").write_bytes(points.tobytes()[:-3])
+    with pytest.raises(ValueError, match="has 77 bytes; want a multiple of 16"):
+        read_cloud(tmp_path / "b.bin")
+    np.save(tmp_path / "flat.npy", points[:, :2])
+    with pytest.raises(ValueError, match="shape"):
+        read_cloud(tmp_path / "flat.npy")
+
+
+@pytest.mark.parametrize("name", ["a.las", "a.laz"])
+def test_las_files_keep_the_digits_of_grids_and_leave_out_noise(tmp_path, name):
+    laspy = pytest.importorskip("laspy", reason="the extra clouds is not installed")
+    points = np.random.default_rng(0).uniform(0.0, 5.0, (200, 3)) + np.array([530_000.0, 181_000.0, 35.0])
+    header = laspy.LasHeader(point_format=6, version="1.4")
+    header.scales, header.offsets = np.full(3, 1e-4), points.min(axis=0)
+    las = laspy.LasData(header)
+    las.xyz = points
+    las.classification = np.where(np.arange(200) < 3, 7, 1).astype(np.uint8)
+    las.write(tmp_path / name)
+    cloud = read_cloud(tmp_path / name)
+    assert len(cloud) == 197
+    np.testing.assert_allclose(cloud.points + cloud.offset, points[3:], atol=5e-4)
+    assert any("3 points of noise are left out" in remark for remark in cloud.remarks)
+    (tmp_path / name).write_bytes((tmp_path / name).read_bytes()[:200])
+    with pytest.raises(ValueError, match=name):
+        read_cloud(tmp_path / name)
+
+
+def test_scans_of_e57_files_are_moved_by_their_poses(tmp_path):
+    pye57 = pytest.importorskip("pye57", reason="the extra clouds is not installed")
+    points = np.random.default_rng(0).uniform(0.0, 5.0, (50, 3))
+    file = pye57.E57(str(tmp_path / "a.e57"), mode="w")
+    columns = {f"cartesian{axis}": points[:, k] for k, axis in enumerate("XYZ")}
+    for shift in (0.0, 10.0):
+        file.write_scan_raw(columns, rotation=np.array([1.0, 0.0, 0.0, 0.0]), translation=np.array([shift, 0.0, 0.0]))
+    file.close()
+    found = read_cloud(tmp_path / "a.e57").points
+    np.testing.assert_allclose(found, np.concatenate([points, points + np.array([10.0, 0.0, 0.0])]), atol=1e-4)
+    (tmp_path / "a.e57").write_bytes((tmp_path / "a.e57").read_bytes()[:60])
+    with pytest.raises(ValueError, match=r"a\.e57"):
+        read_cloud(tmp_path / "a.e57")
+
+
+@pytest.mark.parametrize(("name", "package"), [("a.las", "laspy"), ("a.e57", "pye57")])
+def test_a_missing_package_is_named_with_its_extra(tmp_path, monkeypatch, name, package):
+    (tmp_path / name).write_bytes(b"LASF" if name == "a.las" else b"ASTM-E57")
+    monkeypatch.setitem(sys.modules, package, None)
+    with pytest.raises(ValueError, match=rf'need the package {package}; pip install "lidarium\[clouds\]"'):
+        read_cloud(tmp_path / name)

@@ -6,10 +6,14 @@ import numpy as np
 import pytest
 from furnished_room import room_points
 from scipy.spatial import cKDTree
+from scipy.spatial.transform import Rotation
 
 from lidarium.mapping.point_clouds.ply_files import write_ply
 from lidarium.mapping.point_clouds.point_cloud import PointCloud
+from lidarium.mapping.sparse.graph import build_graph
 from lidarium.mapping.sparse.map_files import read_sparse_map
+from lidarium.mapping.sparse.planning import plan
+from lidarium.mapping.sparse.swept_body import SweptBody
 from lidarium.scripts.main import main
 
 
@@ -92,3 +96,75 @@ def test_a_map_of_grid_coordinates_is_that_of_the_room_at_an_offset(shared_cases
     assert len(maps["grid"].free) == len(maps["local"].free)
     low, high = (maps["grid"].free - np.array([0.0, 0.0, 35.0]), maps["local"].free)
     assert cKDTree(low).query(high)[0].max() < 0.05
+
+
+def test_all_frames_that_are_named_are_used(shared_cases, tmp_path, capsys):
+    folder = shared_cases / "cloud-frame-left-out"
+    clouds, poses = [str(folder / f"frame_{k}.npz") for k in "ab"], [str(folder / f"pose_{k}.txt") for k in "ab"]
+    request = ["sparse-map", *clouds, "--poses", *poses, "--out", str(tmp_path / "map.smap"), "--json"]
+    assert main(request) == 0
+    result = json.loads(capsys.readouterr().out)
+    assert result["frames"] == {"all": 2, "used": 2}
+    assert result["agreement"] > 0.99
+    assert result["unlike_points"] == {"points": 0, "boxes": 0}
+    found, _ = read_sparse_map(tmp_path / "map.smap")
+    graph = build_graph(found.free, found.boxes, SweptBody(radius=0.3))
+    assert plan(graph, np.array([2.2, 0.7]), np.array([4.2, 0.7])).length == pytest.approx(2.17, abs=0.02)
+    # The floor around the first point was seen by neither frame.
+    graph = build_graph(found.free, found.boxes, SweptBody(radius=0.3), floor=found.seen_floor)
+    assert plan(graph, np.array([2.2, 0.7]), np.array([4.2, 0.7])).reason == "start without floor"
+    clouds, poses = [clouds[0], *clouds], [poses[0], *poses]
+    request = ["sparse-map", *clouds, "--poses", *poses, "--out", str(tmp_path / "map.smap"), "--json"]
+    assert main([*request, "--least-motion", "0.1"]) == 0
+    assert json.loads(capsys.readouterr().out)["frames"] == {"all": 3, "used": 2}
+
+
+def test_frames_that_contradict_each_other_are_refused(shared_cases, tmp_path, capsys):
+    folder = shared_cases / "cloud-phantom-boxes"
+    clouds, poses = [str(folder / f"depth_{k}.png") for k in "01"], [str(folder / f"pose_{k}.txt") for k in "01"]
+    request = ["sparse-map", *clouds, "--intrinsics", "525,525,319.5,239.5", "--out", str(tmp_path / "map.smap")]
+    inverse = []
+    for k, path in enumerate(poses):
+        inverse.append(str(tmp_path / f"{k}.txt"))
+        np.savetxt(inverse[-1], np.linalg.inv(np.loadtxt(path)))
+    # As given they have no floor, or contradict.
+    assert main([*request, "--poses", *inverse, "--world-to-camera"]) == 0
+    assert (tmp_path / "map.smap").exists()
+    (tmp_path / "map.smap").unlink()
+    capsys.readouterr()
+    assert main([*request, "--poses", poses[0], poses[0]]) == 2
+    assert "frames contradict each other: of what they see twice" in capsys.readouterr().err
+    assert not (tmp_path / "map.smap").exists()
+
+
+def test_a_folder_of_tum_becomes_a_map(shared_cases, tmp_path, capsys):
+    folder, data = shared_cases / "cloud-phantom-boxes", tmp_path / "tum"
+    data.mkdir()
+    truth, depth = [], []
+    for k in range(2):
+        (data / f"{k}.png").write_bytes((folder / f"depth_{k}.png").read_bytes())
+        pose = np.loadtxt(folder / f"pose_{k}.txt")
+        x, y, z, w = Rotation.from_matrix(pose[:3, :3]).as_quat()
+        truth.append(f"{k}.01 {pose[0, 3]} {pose[1, 3]} {pose[2, 3]} {x} {y} {z} {w}")
+        depth.append(f"{k}.0 {k}.png")
+    (data / "depth.txt").write_text("\n".join(depth))
+    (data / "groundtruth.txt").write_text("\n".join(truth))
+    request = ["sparse-map", str(data), "--intrinsics", "525,525,319.5,239.5", "--out", str(tmp_path / "map.smap")]
+    assert main([*request, "--scale", "0.001", "--json"]) == 0
+    result = json.loads(capsys.readouterr().out)
+    assert result["frames"] == {"all": 2, "used": 2}
+    assert result["floor"]["area_m2"] > 10.0
+    assert main([*request, "--poses", str(folder / "pose_0.txt")]) == 2
+    assert "is a folder with poses" in capsys.readouterr().err
+
+
+def test_a_cloud_with_little_floor_has_a_map_if_its_share_is_given(tmp_path, capsys):
+    x, y = np.meshgrid(np.arange(0.0, 2.0, 0.04), np.arange(0.0, 2.0, 0.04))
+    floor = np.stack([x, y, np.zeros_like(x)], axis=-1).reshape(-1, 3)
+    rng = np.random.default_rng(0)
+    clutter = rng.normal((6.0, 6.0, 3.0), (2.0, 2.0, 0.6), (200_000, 3))
+    np.savez(tmp_path / "cloud.npz", xyz=np.concatenate([floor, clutter]))
+    request = ["sparse-map", str(tmp_path / "cloud.npz"), "--out", str(tmp_path / "map.smap")]
+    assert main(request) == 2
+    assert "a smaller share (--floor-share)" in capsys.readouterr().err
+    assert main([*request, "--floor-share", "0.005"]) in (0, 4)

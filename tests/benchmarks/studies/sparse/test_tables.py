@@ -5,7 +5,7 @@ import math
 import pytest
 from published_pages import assert_published, keep
 
-from lidarium.benchmarks.studies.sparse import paths, quantisation, study
+from lidarium.benchmarks.studies.sparse import drops, paths, quantisation, study
 from lidarium.benchmarks.studies.sparse import thesis_figures as thesis
 from lidarium.benchmarks.studies.sparse.figures import figure_table
 from lidarium.benchmarks.studies.sparse.maps import THESIS, THESIS_FRAME_CODES
@@ -137,4 +137,9 @@ def test_errors_are_means_over_clouds_and_curves_are_drawn(tmp_path, clouds):
 def test_the_page_of_stored_figures_is_that_which_is_published(tmp_path, lines, clouds):
     keep(tmp_path / paths.PATHS_FILE, lines)
     keep(tmp_path / quantisation.QUANTISATION_FILE, clouds)
+    counts = {"answered": 975, "over": 0}
+    blind = {"answered": 1000, "over": 400}
+    usages = {"incremental": counts, "incremental, all floor": blind, "full": counts, "full, all floor": blind}
+    keep(tmp_path / drops.DROPS_FILE, [{"place": place, "requests": 1000, **usages} for place in PLACES])
+    assert "| apartment | full | 97.5 | 0 | 400 |" in study.page(tmp_path)
     assert_published("sparse", study.page(tmp_path), tmp_path)
