@@ -231,6 +231,8 @@ def _pcd_header(content: bytes) -> _PcdHeader:
     points = _numbers(said["POINTS"])[0] if said.get("POINTS") else area
     if points < 1:
         raise ValueError("it holds no points")
+    if said.get("WIDTH") and area != points:
+        raise ValueError(f"its header has {area:,} points by WIDTH and HEIGHT, and {points:,} by POINTS")
     if min(counts) < 1 or points * sum(counts) > MAX_FILE_BYTES:
         raise ValueError(f"it claims {points:,} points of {sum(counts):,} numbers; want fewer")
     return _PcdHeader(names, kinds, counts, points, form, start)
