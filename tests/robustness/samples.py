@@ -281,7 +281,8 @@ def _clouds(folder: Path) -> None:
         "faces.ply": ply("binary_big_endian", points.astype(">f4").tobytes(), count=count)
         .replace(b"element face 0", b"element face 1")
         .replace(b"property list uchar int i\nend_header", faces)
-        + b"\x03" + np.array([0, 1, 20], ">i4").tobytes(),
+        + b"\x03"
+        + np.array([0, 1, 20], ">i4").tobytes(),
         "mesh.obj": b"# a floor\n" + vertices + b"f 1 2 17 16\nf -1/1 -2/2 -3/3\n",
         "lines.xyz": b"# x y z\n" + lines,
         "commas.txt": lines.replace(b" ", b"; ").replace(b".", b","),

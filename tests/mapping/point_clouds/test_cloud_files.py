@@ -203,7 +203,10 @@ BAD = {
         pcd("binary_compressed", body=struct.pack("<II", 4, 36) + b"\x00\x00\xe0\xff"),
         "damaged",
     ),
-    "width.pcd": (pcd(body=lines_of(POINTS)).replace(b"POINTS 3", b"POINTS 2"), "3 points by WIDTH and HEIGHT, and 2 by"),
+    "width.pcd": (
+        pcd(body=lines_of(POINTS)).replace(b"POINTS 3", b"POINTS 2"),
+        "3 points by WIDTH and HEIGHT, and 2 by",
+    ),
     "more.ply": (ply("ascii", lines_of(POINTS), count=2), "claims 2 points, and 12 bytes are left"),
     "more.bytes.ply": (ply("binary_big_endian", POINTS.tobytes(), count=1), "claims 1 points, and 24 bytes are left"),
     "header.ply": (b"ply\nformat ascii 1.0\n", "no line end_header"),
