@@ -3,7 +3,6 @@
 Each file here is written in other forms that its format allows; all have to be read as the first one is.
 """
 
-import bz2
 import gzip
 import importlib.util
 import json
@@ -13,7 +12,6 @@ from dataclasses import replace
 import cv2
 import numpy as np
 import pytest
-from recorded_logs import recording
 
 from lidarium.envs.floors.catalogue.names import describe_floor
 from lidarium.envs.floors.importers import load_file
@@ -160,7 +158,7 @@ def test_a_trajectory_is_the_same_in_every_form(tmp_path):
     write_tum(tmp_path / "plain.tum", stamps, poses)
     text = (tmp_path / "plain.tum").read_text()
     rows = [line.split() for line in text.splitlines()]
-    forms = {name: content for name, content in encodings(text)}
+    forms = dict(encodings(text))
     forms["remarks"] = ("# stamp x y z qx qy qz qw\n" + text).encode()
     forms["other order"] = "\n".join(reversed(text.splitlines())).encode()
     forms["tabs"] = text.replace(" ", "\t").encode()
@@ -284,7 +282,7 @@ def test_the_picture_of_a_map_is_the_same_in_every_form(name, tmp_path):
 
 
 HEADERS = {
-    **{name: content for name, content in encodings(header())},
+    **dict(encodings(header())),
     "JSON": json.dumps(HEADER).encode(),
     "one line": ("{" + header().strip().replace("\n", ", ") + "}").encode(),
     "list in lines": header(origin="\n  - 1.5\n  - -2.0\n  - 0.5").encode(),
@@ -369,13 +367,15 @@ SVGS = {
         "<style>path {fill: none; stroke: rgb(0,0,0); stroke-width: 10}</style><path d='M0 0H600V400H0ZM300 0V250'/>"
     ),
     "transform": svg(
-        f"<g transform='translate(300 200) scale(2)'><path d='M-150-100h300v200h-300zM0-100v125' {WALLS.replace('10', '5')}/></g>"
+        "<g transform='translate(300 200) scale(2)'>"
+        f"<path d='M-150-100h300v200h-300zM0-100v125' {WALLS.replace('10', '5')}/></g>"
     ),
     "matrix": svg(f"<path transform='matrix(0 -1 1 0 0 400)' d='M0 0H400V600H0ZM400 300H150' {WALLS}/>"),
     "used": svg(f"<defs><path id='a' d='M0 0H600V400H0ZM300 0V250' {WALLS}/></defs><use href='#a'/>"),
     "inner drawing": svg(f"<svg x='100' y='50'><path d='M-100-50H500V350H-100ZM200-50V200' {WALLS}/></svg>"),
     "inner scale": svg(
-        f"<svg width='600' height='400' viewBox='0 0 60 40'><path d='M0 0H60V40H0ZM30 0V25' {WALLS.replace('10', '1')}/></svg>"
+        "<svg width='600' height='400' viewBox='0 0 60 40'>"
+        f"<path d='M0 0H60V40H0ZM30 0V25' {WALLS.replace('10', '1')}/></svg>"
     ),
     "millimetres": svg(
         "<path d='M0 0H600V400H0Z' " + WALLS + "/><line x1='79.375mm' x2='79.375mm' y2='66.1458mm' " + WALLS + "/>"
