@@ -132,7 +132,7 @@ def read_text(path: Path, maximum: int = MAX_FILE_BYTES) -> str:
     """Read a text file (UTF-8, or UTF-16 with its mark), unpacked if its name ends in .gz."""
     content = _read_unpacked(path, maximum)
     try:
-        return content.decode(_encoding(content[:_HEAD_BYTES]))
+        return content.decode(encoding_of(content[:_HEAD_BYTES]))
     except UnicodeDecodeError as error:
         raise ValueError(f"{path} is not a text file: {error.reason} at byte {error.start}") from error
 
@@ -141,7 +141,7 @@ _HEAD_BYTES = 200
 _DECLARED = re.compile(rb"<\?xml[^>]*encoding\s*=\s*[\"'](iso-8859-1|iso-8859-15|windows-1252)[\"']", re.IGNORECASE)
 
 
-def _encoding(begin: bytes) -> str:
+def encoding_of(begin: bytes) -> str:
     """Return the encoding of a text by its first bytes; programs of Windows write UTF-16, XML declares others."""
     if begin[:2] in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE):
         return "utf-16"
@@ -160,7 +160,7 @@ def read_lines(path: Path, longest: int) -> Iterator[str]:
         length = 0
         # Lines of a packed file are found ten times as fast in a buffer.
         buffer = io.BufferedReader(gzip.GzipFile(fileobj=file) if is_packed else file)  # type: ignore[type-var]
-        encoding = _encoding(buffer.peek(2)[:2])
+        encoding = encoding_of(buffer.peek(2)[:2])
         with io.TextIOWrapper(buffer, encoding, "replace", newline="\n") as lines:
             while line := lines.readline(longest + 1):
                 length += len(line)

@@ -401,3 +401,267 @@ def test_a_drawing_of_svg_is_the_same_in_every_form(name, tmp_path):
     area, width, height = area_and_size(tmp_path / "a.svg", 0.01)
     assert area == pytest.approx(5.9 * 3.9 - 0.1 * 2.5, abs=0.12)
     assert (width, height) == (pytest.approx(5.9, abs=0.06), pytest.approx(3.9, abs=0.06))
+
+
+LINES = [(0, 0, 6, 0), (6, 0, 6, 4), (6, 4, 0, 4), (0, 4, 0, 0), (3, 0, 3, 2.5)]
+ROOM_M2 = pytest.approx(5.9 * 3.9 - 0.1 * 2.45, abs=0.1)
+UNITS = {"mm": (4, 0.001), "cm": (5, 0.01), "m": (6, 1.0), "inches": (1, 0.0254), "feet": (2, 0.3048)}
+
+
+def dxf(name):
+    """Return the text of a drawing of the room."""
+    ezdxf = pytest.importorskip("ezdxf", reason="ezdxf is not installed: extra [dxf]")
+    version = "R12" if name == "R12" else "R2010"
+    code, unit = UNITS.get(name, (6, 1.0))
+    document = ezdxf.new(version, units=code)
+    space = document.modelspace()
+    lines = [tuple(value / unit for value in line) for line in LINES]
+    if name == "polylines":
+        space.add_lwpolyline([(0, 0), (6, 0), (6, 4), (0, 4)], close=True)
+        space.add_lwpolyline([(3, 0), (3, 2.5)])
+    elif name == "closed by hand":
+        space.add_lwpolyline([(0, 0), (6, 0), (6, 4), (0, 4), (0, 0)])
+        space.add_polyline3d([(3, 0, 0), (3, 1, 2), (3, 2.5, 0)])
+    elif name in ("block", "mirrored block", "block in a block", "scaled block"):
+        factor = 1000.0 if name == "scaled block" else 1.0
+        block = document.blocks.new("PLAN")
+        for x1, y1, x2, y2 in lines:
+            block.add_line((factor * x1, factor * y1), (factor * x2, factor * y2))
+        scale = {"xscale": -1.0 / factor if "mirrored" in name else 1.0 / factor, "yscale": 1.0 / factor}
+        around = document.blocks.new("AROUND") if name == "block in a block" else space
+        around.add_blockref("PLAN", (40, -7), scale | ({"rotation": 180.0} if name == "block" else {}))
+        if name == "block in a block":
+            space.add_blockref("AROUND", (3, 3))
+    else:
+        for x1, y1, x2, y2 in reversed(lines) if name == "other order" else lines:
+            space.add_line((x1, y1), (x2, y2))
+    import io
+
+    stream = io.StringIO()
+    document.write(stream)
+    return stream.getvalue()
+
+
+DRAWN = [
+    *UNITS,
+    *(
+        "R12",
+        "polylines",
+        "closed by hand",
+        "block",
+        "mirrored block",
+        "block in a block",
+        "scaled block",
+        "other order",
+    ),
+]
+
+
+@pytest.mark.parametrize("name", DRAWN)
+def test_a_drawing_of_dxf_is_the_same_in_every_form(name, tmp_path):
+    text = dxf(name)
+    forms = [text, text.replace("\n", "\r\n")] + ([] if name != "m" else [text.replace("\n  ", "\n"), "\ufeff" + text])
+    for content in forms:
+        (tmp_path / "a.dxf").write_bytes(content.encode())
+        area, width, height = area_and_size(tmp_path / "a.dxf", 1.0 if name == "R12" else None)
+        assert area == ROOM_M2
+        assert (width, height) == (pytest.approx(6.1, abs=0.02), pytest.approx(4.1, abs=0.02))
+
+
+def outline_files():
+    """Yield a name and a text of each other format of plans, and its other forms."""
+    rows = [tuple(10 * value for value in line) for line in LINES]
+    amrl = "".join(f"{a}, {b}, {c}, {d}\n" for a, b, c, d in LINES)
+    yield "a.vectormap.txt", None, amrl, [amrl.replace(", ", ","), amrl.replace(", ", "\t,")]
+    corners = [[0, 0], [6, 0], [6, 4], [0, 4]]
+    expo = json.dumps({"id": "h", "verts": [*corners, [0, 0]]}) + "\n"
+    yield "a.json", None, expo, [json.dumps({"verts": corners, "room_num": 1}, indent=1), expo.replace("0", "0.0")]
+    octile = ["@" * 14, *["@" + "." * 12 + "@"] * 8, "@" * 14]
+    grid = "type octile\nheight 10\nwidth 14\nmap\n" + "\n".join(octile) + "\n"
+    yield "a.map", 0.5, grid, [grid.replace(".", "G"), grid.replace("@", "T")]
+    xml = "".join(f'<linesegment x1="{a}" y1="{b}" x2="{c}" y2="{d}" type="Wall"/>' for a, b, c, d in rows)
+    kth = (
+        '<?xml version="1.0"?>\n<floor><Scale PixelDistance="10" RealDistance="1.0"/>'
+        f'<space name="a"><contour>{xml}</contour></space></floor>\n'
+    )
+    yield "a.xml", None, kth, [kth.replace("><", ">\n <"), kth.replace('"', "'")]
+
+
+@pytest.mark.parametrize(("name", "resolution", "text", "others"), list(outline_files()), ids=lambda each: "")
+def test_a_plan_is_the_same_in_every_form(name, resolution, text, others, tmp_path):
+    (tmp_path / name).write_text(text)
+    expected = area_and_size(tmp_path / name, resolution)
+    assert expected[0] > 15.0
+    for content in [*(content for _, content in encodings(text)), *(other.encode() for other in others)]:
+        (tmp_path / name).write_bytes(content)
+        assert area_and_size(tmp_path / name, resolution) == expected
+        (tmp_path / f"{name}.gz").write_bytes(gzip.compress(content))
+        assert area_and_size(tmp_path / f"{name}.gz", resolution) == expected
+
+
+# Worlds
+
+BOXES = [(0, -4, 10.2, 0.2), (0, 4, 10.2, 0.2), (-5, 0, 0.2, 8.2), (5, 0, 0.2, 8.2)]
+POST = (-1, 2, 0.6, 0.6)
+
+
+def collision(wide, high, pose="", kind="box"):
+    shapes = {
+        "box": f"<box><size>{wide} {high} 1</size></box>",
+        "polyline": "<polyline>"
+        + "".join(
+            f"<point>{x * wide} {y * high}</point>" for x, y in ((-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5))
+        )
+        + "<height>1</height></polyline>",
+    }
+    return f'<collision name="c">{pose}<geometry>{shapes[kind]}</geometry></collision>'
+
+
+def model(name, body, pose=""):
+    return f'<model name="{name}">{pose}<link name="l">{body}</link></model>'
+
+
+def hall():
+    return "".join(
+        model(f"wall_{k}", collision(w, h), f"<pose>{x} {y} 0.5 0 0 0</pose>") for k, (x, y, w, h) in enumerate(BOXES)
+    )
+
+
+def sdf(post, version="1.6", extra=""):
+    return f'<?xml version="1.0"?>\n<sdf version="{version}"><world name="w">{hall()}{post}{extra}</world></sdf>\n'
+
+
+BOX = collision(0.6, 0.6)
+PLAIN_SDF = sdf(model("post", BOX, "<pose>-1 2 0.5 0 0 0</pose>"))
+QUARTER = math.pi / 2.0
+SDFS = {
+    **dict(encodings(PLAIN_SDF)),
+    "pose in lines": PLAIN_SDF.replace("-1 2 0.5 0 0 0", "\n  -1.0 2e0\n 5e-1\t0 -0 0.0 \n"),
+    "pose of a link": sdf(f'<model name="p"><link name="l"><pose>-1 2 0.5 0 0 0</pose>{BOX}</link></model>'),
+    "pose of a collision": sdf(model("p", collision(0.6, 0.6, "<pose>-1 2 0.5 0 0 0</pose>"))),
+    "poses of all": sdf(
+        '<model name="p"><pose>-3 1 0 0 0 1.5707963267948966</pose><link name="l"><pose>1 0 0.5 0 0 0</pose>'
+        + collision(0.6, 0.6, "<pose>0 -2 0 0 0 0</pose>")
+        + "</link></model>"
+    ),
+    "turned by a quarter": sdf(model("p", BOX, f"<pose>-1 2 0.5 0 0 {QUARTER}</pose>")),
+    "laid on its side": sdf(
+        model(
+            "p",
+            '<collision name="c"><geometry><box><size>1 0.6 0.6</size></box></geometry></collision>',
+            f"<pose>-1 2 0.5 0 {QUARTER} 0</pose>",
+        )
+    ),
+    "degrees": sdf(model("p", BOX, '<pose degrees="true">-1 2 0.5 0 0 90</pose>'), "1.9"),
+    "quaternion": sdf(
+        model("p", BOX, '<pose rotation_format="quat_xyzw">-1 2 0.5 0 0 0.7071068 0.7071068</pose>'), "1.9"
+    ),
+    "polyline": sdf(model("p", collision(0.6, 0.6, kind="polyline"), "<pose>-1 2 0 0 0 0</pose>")),
+    "relative to a frame": sdf(
+        '<frame name="f"><pose>3 3 0 0 0 0</pose></frame>'
+        + model("p", BOX, '<pose relative_to="f">-4 -1 0.5 0 0 0</pose>'),
+        "1.9",
+    ),
+    "relative to a turned frame": sdf(
+        f'<frame name="f"><pose>1 1 0 0 0 {QUARTER}</pose></frame>'
+        + model("p", BOX, '<pose relative_to="f">1 2 0.5 0 0 0</pose>'),
+        "1.9",
+    ),
+    "relative to a model": sdf(model("p", BOX, '<pose relative_to="wall_1">-1 -2 0 0 0 0</pose>'), "1.9"),
+    "attached frame": sdf(
+        '<frame name="g" attached_to="wall_1"><pose>0 -1 0 0 0 0</pose></frame>'
+        + model("p", BOX, '<pose relative_to="g">-1 -1 0 0 0 0</pose>'),
+        "1.9",
+    ),
+    "model in a model": sdf(
+        '<model name="q"><pose>-2 1 0 0 0 0</pose>' + model("p", BOX, "<pose>1 1 0.5 0 0 0</pose>") + "</model>", "1.9"
+    ),
+    "two links": sdf(
+        '<model name="p"><link name="a"><pose>1 0 0 0 0 0</pose></link><link name="b">'
+        f'<pose relative_to="a">-2 2 0.5 0 0 0</pose>{BOX}</link></model>',
+        "1.9",
+    ),
+    "included": sdf("<include><uri>model://post</uri><pose>-1 2 0.5 0 0 0</pose></include>"),
+    "included with a name": sdf("<include><name>a</name><uri>model://post</uri><pose>-1 2 0.5 0 0 0</pose></include>"),
+    "included as file": sdf("<include><uri>file://post</uri><pose>-1 2 0.5 0 0 0</pose></include>"),
+    "included where it stands": sdf("<include><uri>model://standing</uri></include>"),
+    "included within": sdf("<include><uri>model://around</uri><pose>-2 1 0 0 0 0</pose></include>", "1.9"),
+    "more elements": sdf(
+        model("post", BOX.replace("</geometry>", "</geometry><surface/>"), "<pose>-1 2 0.5 0 0 0</pose>"),
+        extra='<light name="sun" type="directional"/><physics type="ode"/><include><uri>model://sun</uri></include>',
+    ),
+    "remarks": sdf("<!-- a -- post -->" + model("post", BOX, "<pose><!-- x -->-1 2 0.5 0 0 0</pose>")),
+    "visuals": sdf(
+        model("post", BOX + BOX.replace("collision", "visual").replace("0.6 0.6", "9 9"), "<pose>-1 2 0.5 0 0 0</pose>")
+    ),
+    "saved state": sdf(
+        model("post", BOX, "<pose>3 3 0.5 0 0 0</pose>"),
+        extra='<state world_name="w"><model name="post"><pose>-1 2 0.5 0 0 0</pose></model></state>',
+    ),
+}
+INCLUDED = {
+    "post": model("post", BOX),
+    "standing": model("standing", BOX, "<pose>-1 2 0.5 0 0 0</pose>"),
+    "around": '<model name="around"><include><uri>model://post</uri><pose>1 1 0.5 0 0 0</pose></include></model>',
+}
+
+
+@pytest.mark.parametrize("name", SDFS)
+def test_a_world_of_gazebo_is_the_same_in_every_form(name, tmp_path):
+    for folder, body in INCLUDED.items():
+        (tmp_path / "models" / folder).mkdir(parents=True)
+        (tmp_path / "models" / folder / "model.sdf").write_text(f'<sdf version="1.9">{body}</sdf>')
+    content = SDFS[name]
+    (tmp_path / "a.world").write_bytes(content if isinstance(content, bytes) else content.encode())
+    floor = load_file(tmp_path / "a.world")
+    assert not floor.remark
+    assert floor.bounds == pytest.approx((-5.1, -4.1, 5.1, 4.1))
+    assert describe_floor(floor)["area_m2"] == pytest.approx(9.8 * 7.8 - 0.36, abs=0.01)
+    x, y, wide, high = POST
+    (post,) = [solid.polygon for solid in floor.solids if np.ptp(solid.polygon, axis=0).max() < 2.0]
+    assert post.min(axis=0) == pytest.approx((x - wide / 2, y - high / 2), abs=1e-5)
+    assert post.max(axis=0) == pytest.approx((x + wide / 2, y + high / 2), abs=1e-5)
+
+
+STAGE = """define plan model
+(
+  boundary 1
+)
+plan
+(
+  size [6.0 4.0 1.0]
+  pose [1 2 0 0]
+  bitmap "map.pgm"
+)
+define rover position ( size [0.4 0.4 0.2] )
+rover ( pose [ 0 1 0 90 ] color "red" )
+"""
+STAGES = {
+    **dict(encodings(STAGE)),
+    "one line": " ".join(STAGE.split()),
+    "remarks": STAGE.replace("(\n", "( # a remark ( [\n"),
+    "no blanks": STAGE.replace(" (", "(").replace("[ ", "[").replace(" ]", "]"),
+    "without a definition": STAGE.replace("define rover position ( size [0.4 0.4 0.2] )", "").replace(
+        "rover", "position"
+    ),
+    "other order": "\n".join(STAGE.splitlines()[-2:] + STAGE.splitlines()[:-2]) + "\n",
+    "numbers": STAGE.replace("6.0 4.0 1.0", "6 4e0 1").replace("[1 2 0 0]", "[ 1.0 2.0 0.0 360.0 ]"),
+    "old pose": STAGE.replace("[1 2 0 0]", "[1 2 0]").replace("[6.0 4.0 1.0]", "[6 4]"),
+    "included": 'include "plan.inc"\n' + STAGE.split(")\n", 1)[1],
+    "defined wholly": STAGE.replace("boundary 1", 'boundary 1 bitmap "map.pgm" size [6 4 1]').replace(
+        'bitmap "map.pgm"\n)', ")", 1
+    ),
+    "more properties": "resolution 0.02\ninterval_sim 100\nwindow ( size [ 600 400 ] scale 20 )\n" + STAGE,
+}
+
+
+@pytest.mark.parametrize("name", STAGES)
+def test_a_world_of_stage_is_the_same_in_every_form(name, tmp_path):
+    (tmp_path / "map.pgm").write_bytes(netpbm("P5", room(), 255))
+    (tmp_path / "plan.inc").write_text(STAGE.split(")\n", 1)[0] + ")\n")
+    content = STAGES[name]
+    (tmp_path / "a.world").write_bytes(content if isinstance(content, bytes) else content.encode())
+    floor = load_file(tmp_path / "a.world")
+    assert describe_floor(floor)["area_m2"] == pytest.approx(21.65, abs=0.1)
+    assert floor.starts == pytest.approx(np.array([[0.0, 1.0, math.pi / 2.0]]))
+    assert np.add(floor.bounds[:2], floor.bounds[2:]) / 2.0 == pytest.approx((1.0, 2.0), abs=0.06)

@@ -19,7 +19,7 @@ import numpy as np
 from lidarium.envs.floors.floor import Floor
 from lidarium.envs.floors.importers.common import read_text, refuse_resolution
 from lidarium.envs.floors.importers.ros_map import floor_of_map
-from lidarium.mapping.files.guarded_reading import open_guarded, printable
+from lidarium.mapping.files.guarded_reading import encoding_of, open_guarded, printable
 from lidarium.mapping.files.images import MAX_PIXELS, read_image
 from lidarium.mapping.files.map_files import FREE, OCCUPIED, RESOLUTION, MapImage
 from lidarium.mapping.geometry.bounds import shown
@@ -44,7 +44,8 @@ def matches(path: Path) -> bool:
     """Return whether a world is not XML, as Gazebo's are."""
     with open_guarded(path) as file:
         begin = file.read(4096)
-    return not begin.removeprefix(b"\xef\xbb\xbf").lstrip().startswith(b"<") and bool(begin.strip())
+    text = begin.decode(encoding_of(begin), "ignore").strip()
+    return bool(text) and not text.startswith("<")
 
 
 def load(path: Path, resolution: float | None) -> Floor:
