@@ -149,6 +149,13 @@ def encoding_of(begin: bytes) -> str:
     return declared[1].decode() if declared else "utf-8-sig"
 
 
+def without_mark(content: bytes) -> bytes:
+    """Return the bytes of a text in UTF-8 without its mark; other bytes as they are."""
+    if encoding_of(content[:2]) == "utf-16":
+        return content.decode("utf-16").encode()
+    return content.removeprefix(codecs.BOM_UTF8)
+
+
 def read_lines(path: Path, longest: int) -> Iterator[str]:
     """Yield the lines of a text file, plain or packed, one after the other.
 

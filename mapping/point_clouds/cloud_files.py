@@ -16,6 +16,7 @@ from lidarium.mapping.files.guarded_reading import (
     read_arrays,
     read_bytes,
     reading,
+    without_mark,
 )
 from lidarium.mapping.files.output import write_whole
 from lidarium.mapping.kernels.compilation import Array, kernel
@@ -359,7 +360,7 @@ def read_cloud(
         content = _read_npz(path)
     else:
         with reading(path, f"a whole {kind} file"):
-            content = _PARSERS[kind](read_bytes(path))
+            content = _PARSERS[kind](without_mark(read_bytes(path)))
     return _cloud_of(content, scale, str(path))
 
 
