@@ -7,6 +7,7 @@ R. Vaughan, "Massively multi-robot simulation in Stage", Swarm Intelligence 2, 2
 """
 
 import math
+import os
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -67,7 +68,7 @@ def _map_of(path: Path, model: _Model) -> MapImage:
     """Return the picture of a model as a map."""
     name = model.properties["bitmap"][0]
     picture = path.parent / name
-    if not picture.is_file():
+    if not os.path.isfile(picture):
         picture = path.parent / PureWindowsPath(name).name
     pixels = read_image(picture)
     first = pixels if pixels.ndim == 2 else pixels[..., 0]
@@ -138,7 +139,7 @@ def _models(path: Path, words: Iterator[str], defined: dict[str, _Model], depth:
         if word == "include":
             name = next(words, "")
             file = path.parent / name
-            if ".." not in Path(name).parts and file.is_file():
+            if ".." not in Path(name).parts and os.path.isfile(file):
                 yield from _models(file, _words(file), defined, depth + 1)
         elif word == "define":
             name, kind = next(words, ""), next(words, "")
