@@ -294,15 +294,28 @@ def measure_building(floor: Floor) -> _BuildingMeasures:
     )
 
 
-def _unreached(raster: Raster) -> NDArray[np.float64]:
-    """Return the free areas behind walls or openings that are too narrow, seen from the largest one, (n,) [m2].
+def measure_reach(floor: Floor, place: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
+    """Return the free areas that a robot of radius 0.30 m cannot reach from a place, (n,), and the whole one [m2]."""
+    full = floor.raster(_RESOLUTION, 0.0, _BODY_HEIGHT)
+    return _unreached(full, place), float(np.count_nonzero(full.solid == 0)) * _RESOLUTION**2
 
-    Corners and gaps that a disc does not fit into belong to the area around them.
+
+def _unreached(raster: Raster, place: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
+    """Return the free areas behind walls or openings that are too narrow, (n,) [m2].
+
+    They are those seen from the area of a place, or from the largest one. Corners and gaps that a disc does not fit
+    into belong to the area around them.
     """
     space = configuration_space(raster, MEASURED_RADIUS)
     if not space.any():
         return np.zeros(0)
     free, largest = raster.solid == 0, _largest_part(space)
+    if place is not None:
+        column, row = np.floor((np.asarray(place)[:2] - raster.origin) / raster.resolution).astype(np.int64)
+        # A robot that is smaller stands where the disc does not fit: the largest area counts.
+        if space[row, column]:
+            _, parts = cv2.connectedComponents(space.astype(np.uint8), connectivity=4)
+            largest = parts == parts[row, column]
     reach = MEASURED_RADIUS / raster.resolution + 1.0
     near, near_others = (
         cv2.distanceTransform((~part).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE) <= reach

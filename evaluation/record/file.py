@@ -5,6 +5,7 @@
 
 import io
 import json
+import math
 import zipfile
 from pathlib import Path
 from typing import Any
@@ -181,4 +182,10 @@ def _is_event(event: Any) -> bool:  # noqa: ANN401
         and isinstance(event.get("kind"), str)
         and TIME.hold(event.get("time_s"))
         and "agent" in event
+        and _is_place(event.get("x"), event.get("y"))
     )
+
+
+def _is_place(x: Any, y: Any) -> bool:  # noqa: ANN401
+    """Whether both are numbers or neither is known."""
+    return (x is None and y is None) or all(type(each) in (int, float) and math.isfinite(each) for each in (x, y))

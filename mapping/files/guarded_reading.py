@@ -4,6 +4,7 @@ Sizes of arrays are read from headers before memory is allocated. Errors that re
 harmful bytes become ``ValueError``, which names the file and the cure.
 """
 
+import codecs
 import errno
 import gc
 import gzip
@@ -11,6 +12,7 @@ import io
 import lzma
 import math
 import os
+import re
 import stat
 import struct
 import threading
@@ -127,11 +129,31 @@ def _read_unpacked(path: Path, maximum: int = MAX_FILE_BYTES) -> bytes:
 
 
 def read_text(path: Path, maximum: int = MAX_FILE_BYTES) -> str:
-    """Read a text file (UTF-8), unpacked if its name ends in .gz."""
+    """Read a text file (UTF-8, or UTF-16 with its mark), unpacked if its name ends in .gz."""
+    content = _read_unpacked(path, maximum)
     try:
-        return _read_unpacked(path, maximum).decode("utf-8-sig")
+        return content.decode(encoding_of(content[:_HEAD_BYTES]))
     except UnicodeDecodeError as error:
         raise ValueError(f"{path} is not a text file: {error.reason} at byte {error.start}") from error
+
+
+_HEAD_BYTES = 200
+_DECLARED = re.compile(rb"<\?xml[^>]*encoding\s*=\s*[\"'](iso-8859-1|iso-8859-15|windows-1252)[\"']", re.IGNORECASE)
+
+
+def encoding_of(begin: bytes) -> str:
+    """Return the encoding of a text by its first bytes; programs of Windows write UTF-16, XML declares others."""
+    if begin[:2] in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE):
+        return "utf-16"
+    declared = _DECLARED.match(begin)
+    return declared[1].decode() if declared else "utf-8-sig"
+
+
+def without_mark(content: bytes) -> bytes:
+    """Return the bytes of a text in UTF-8 without its mark; other bytes as they are."""
+    if encoding_of(content[:2]) == "utf-16":
+        return content.decode("utf-16").encode()
+    return content.removeprefix(codecs.BOM_UTF8)
 
 
 def read_lines(path: Path, longest: int) -> Iterator[str]:
@@ -144,14 +166,16 @@ def read_lines(path: Path, longest: int) -> Iterator[str]:
         allowed = max_unpacked(os.fstat(file.fileno()).st_size) if is_packed else MAX_FILE_BYTES
         length = 0
         # Lines of a packed file are found ten times as fast in a buffer.
-        with io.BufferedReader(gzip.GzipFile(fileobj=file)) if is_packed else file as lines:
+        buffer = io.BufferedReader(gzip.GzipFile(fileobj=file) if is_packed else file)  # type: ignore[type-var]
+        encoding = encoding_of(buffer.peek(2)[:2])
+        with io.TextIOWrapper(buffer, encoding, "replace", newline="\n") as lines:
             while line := lines.readline(longest + 1):
                 length += len(line)
                 if len(line) > longest:
                     raise ValueError(f"{path} has a line of more than {longest:,} bytes; want a log")
                 if length > allowed:
                     raise ValueError(f"{path} has more than {allowed:,} bytes when unpacked; want fewer")
-                yield line.decode("utf-8", "replace")
+                yield line
 
 
 def max_unpacked(packed: int) -> int:

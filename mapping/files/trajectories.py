@@ -17,6 +17,9 @@ from lidarium.mapping.geometry.rigid import composed, relative
 MAX_LINE_BYTES = 1 << 16
 """Longest line of a file of numbers."""
 
+_MAX_STRETCH = 0.1
+"""By how much the length of a quaternion may differ from 1: files have one decimal at least."""
+
 
 def write_tum(path: Path, stamps: NDArray[np.float64], poses: NDArray[np.float64]) -> None:
     """Write stamps (n,) [s] and poses (n, 3), whole or not at all.
@@ -40,7 +43,14 @@ def read_tum(path: Path) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """
     table = read_numbers(path, 8, "a trajectory (stamp x y z qx qy qz qw)")
     table = table[np.argsort(table[:, 0], kind="stable")]
-    x, y, z, w = table[:, 4:8].T
+    norms = np.linalg.norm(table[:, 4:8], axis=1)
+    if not (np.abs(norms - 1.0) < _MAX_STRETCH).all():
+        worst = table[np.abs(norms - 1.0).argmax()]
+        raise ValueError(
+            f"{path} has the rotation {' '.join(f'{value:g}' for value in worst[4:])} at {worst[0]:g} s; want unit "
+            "quaternions qx qy qz qw"
+        )
+    x, y, z, w = table[:, 4:8].T / norms
     heading = np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
     return table[:, 0].copy(), np.stack([table[:, 1], table[:, 2], heading], axis=1)
 

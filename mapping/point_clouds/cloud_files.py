@@ -16,6 +16,7 @@ from lidarium.mapping.files.guarded_reading import (
     read_arrays,
     read_bytes,
     reading,
+    without_mark,
 )
 from lidarium.mapping.files.output import write_whole
 from lidarium.mapping.kernels.compilation import Array, kernel
@@ -259,6 +260,8 @@ def _pcd_header(content: bytes) -> _PcdHeader:
     points = _numbers(said["POINTS"])[0] if said.get("POINTS") else area
     if points < 1:
         raise ValueError("it holds no points")
+    if said.get("WIDTH") and area != points:
+        raise ValueError(f"its header has {area:,} points by WIDTH and HEIGHT, and {points:,} by POINTS")
     if min(counts) < 1 or points * sum(counts) > MAX_FILE_BYTES:
         raise ValueError(f"it claims {points:,} points of {sum(counts):,} numbers; want fewer")
     return _PcdHeader(names, kinds, counts, points, form, start)
@@ -401,7 +404,7 @@ def read_cloud(
         content = _READERS[kind](path)
     else:
         with reading(path, f"a whole {kind} file"):
-            content = _PARSERS[kind](read_bytes(path))
+            content = _PARSERS[kind](without_mark(read_bytes(path)))
     return _cloud_of(content, scale, str(path))
 
 

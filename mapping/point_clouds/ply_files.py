@@ -87,15 +87,25 @@ def parse_ply(content: bytes) -> Content:
         raise ValueError(f"it claims {sum(each.count for each in elements):,} elements in {len(content):,} bytes")
     if not order:
         lines = content[start:].split(b"\n")[sum(element.count for element in before) :]
+        _check_rest(b"\n".join(lines[sum(each.count for each in elements[place:]) :]).strip(), 1, vertices.count)
         table = text_columns(b"\n".join(lines), [names.index(name) for name in wanted], vertices.count)
         columns: dict[str, NDArray[np.generic]] = dict(zip(wanted, table.T, strict=True))
         found = cloud_of_columns(columns)
         polygons = _text_faces(lines[vertices.count :], elements[place + 1 :])
     else:
+        if not any(counts for each in elements[place + 1 :] if each.count for *_, counts in each.properties):
+            end = start + sum(each.count * each.least_bytes for each in elements[place:])
+            _check_rest(content[end:], row.itemsize, vertices.count)
         rows = np.frombuffer(content, row, vertices.count, start)
         found = cloud_of_columns({name: rows[name] for name in wanted})
         polygons = _binary_faces(content, start + vertices.count * row.itemsize, order, elements[place + 1 :])
     return replace(found, triangles=triangles_of(polygons, vertices.count))
+
+
+def _check_rest(rest: bytes, point: int, count: int) -> None:
+    """Refuse a file with more after its last element than a point takes [bytes]: its counts are wrong."""
+    if len(rest) >= point:
+        raise ValueError(f"it claims {count:,} points, and {len(rest):,} bytes are left after its last element")
 
 
 def _faces_among(elements: list[_Element]) -> tuple[list[_Element], _Element | None]:

@@ -192,7 +192,7 @@ def _show_floor(command: _Show) -> Answer:
         _save_picture(command.out / f"{file_name(floor.name)}.png", floor)
         write_result(command, f"{file_name(floor.name)}.json", result)
         files = [f"{file_name(floor.name)}.json", f"{file_name(floor.name)}.png"]
-    return Answer(result, floor_description(result, command.out, files, about), _verdict(result))
+    return Answer(result, floor_description(result, command.out, files, about), verdict_of_reach(result))
 
 
 def _generate_floor(command: _Generate) -> Answer:
@@ -322,10 +322,10 @@ def write_floor(command: Command, floor: "Floor", resolution: float) -> Answer:
     write_result(command, f"{stem}.json", result, folder)
     files = [f"{stem}.{kind}" for kind in ("yaml", "pgm", "png", "json")]
     check_written(folder, files)
-    return Answer(result, floor_description(result, folder, files), _verdict(result))
+    return Answer(result, floor_description(result, folder, files), verdict_of_reach(result))
 
 
-def _verdict(result: dict[str, Any]) -> int:
+def verdict_of_reach(result: dict[str, Any]) -> int:
     """Return the exit code: a floor of which robots reach the smaller part is hardly what was meant."""
     return DOUBTFUL if result["reachable_m2"] < 0.5 * result["whole_m2"] else DONE
 

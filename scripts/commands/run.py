@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from lidarium.scripts import first_start
+from lidarium.scripts.commands.floors import verdict_of_reach
 from lidarium.scripts.common import DONE, DOUBTFUL, INTERRUPTED, Answer, Progress, TeamCommand, file_name, notify
 from lidarium.scripts.options import (
     FilmOptions,
@@ -139,19 +140,25 @@ def _answer(command: Run, policy: "Policy", options: dict[str, Any], views: "Seq
     episode = _explore(command, policy, env, films, {} if starts is None else {"starts": starts})
     assert env.floor is not None
     folder = _folder(command, env.floor.name)
+    from lidarium.envs.floors.catalogue.names import describe_reach
     from lidarium.evaluation.episodes.result import result_of
 
     result = result_of(episode, command.chosen_policy, history)
     if options:
         result["policy_settings"] = options
-    if env.floor.remark:
-        notify(f"{env.floor.name}: {env.floor.remark}")
-        result["floor_remark"] = env.floor.remark
+    reach = describe_reach(env.floor, env.world.starts[0])
+    if reach["remark"]:
+        is_whole = reach["reachable_m2"] > 0.99 * reach["whole_m2"]
+        share = "" if is_whole else f"; {reach['reachable_m2']:.1f} of {reach['whole_m2']:.1f} m2 can"
+        notify(f"{env.floor.name}: {reach['remark']}{share}")
+        result |= {f"floor_{name}": value for name, value in reach.items()}
+    # Starts that were chosen say which area is meant.
+    exit_code = verdict_of_reach(reach) if starts is None or isinstance(starts, str) else DONE
     files = write_run(folder, episode, result, recorder, command.chosen_policy, command.films)
     return Answer(
         result,
         run_summary(command.chosen_policy, episode, result, folder, files),
-        INTERRUPTED if episode.is_interrupted else DOUBTFUL if "failed_metrics" in result else DONE,
+        INTERRUPTED if episode.is_interrupted else DOUBTFUL if "failed_metrics" in result else exit_code,
     )
 
 

@@ -4,6 +4,7 @@ import gzip
 import io
 import random
 import re
+import struct
 import zipfile
 import zlib
 from collections.abc import Callable
@@ -43,6 +44,8 @@ def mutated(content: bytes, name: str, chance: random.Random) -> bytes:
         return gzip.compress(_damaged(gzip.decompress(content), chance), 1)
     if name.endswith(".npz") and chance.random() < 0.8:
         return _repacked(content, chance)
+    if name.endswith(".smap") and chance.random() < 0.8:
+        return _repacked_map(content, chance)
     return _damaged(content, chance)
 
 
@@ -73,6 +76,18 @@ def _repacked(content: bytes, chance: random.Random) -> bytes:
         for name, member in members.items():
             archive.writestr(name, member)
     return packed.getvalue()
+
+
+def _repacked_map(content: bytes, chance: random.Random) -> bytes:
+    """Damage the numbers of a sparse map, or its header, with a length and checksum that fit."""
+    header, body = bytearray(content[:40]), zlib.decompress(content[40:])
+    body = _damaged(body, chance) if chance.random() < 0.7 else _number(body, chance)
+    if chance.random() < 0.3:
+        place = 12 + 4 * chance.randrange(4)
+        header[place : place + 4] = struct.pack("<I", chance.choice((0, 1, 7, 40, 1000, 1 << 20, (1 << 32) - 1)))
+    packed = zlib.compress(body)
+    header[28:40] = struct.pack("<III", len(body), len(packed), zlib.crc32(packed))
+    return bytes(header) + packed
 
 
 def _bad_header(content: bytes, chance: random.Random) -> bytes:

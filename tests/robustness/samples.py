@@ -10,10 +10,14 @@ import cv2
 import numpy as np
 import yaml
 from bag_forms import write_form
+from cloud_files import lines_of, packed_body, pcd, ply
 from drawn_decisions import drawn_decision
 
 import lidarium
 from lidarium.agents.learned.network import _shapes, save_weights
+from lidarium.agents.srt.safe_region import DIRECTIONS
+from lidarium.agents.srt.tree import RegionRules
+from lidarium.agents.srt.tree_files import write_tree
 from lidarium.envs.settings.making import make_settings
 from lidarium.evaluation.episodes.runner import run_episode
 from lidarium.evaluation.episodes.watching import WatchedExploration
@@ -28,6 +32,10 @@ from lidarium.mapping.files.spline_files import write_spline_map
 from lidarium.mapping.files.trajectories import write_tum
 from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.grids.scan_geometry import ScanGeometry
+from lidarium.mapping.sparse.graph import build_graph
+from lidarium.mapping.sparse.map_files import _GraphEdges, write_sparse_map
+from lidarium.mapping.sparse.mapper.full import map_cloud
+from lidarium.mapping.sparse.swept_body import SweptBody
 from lidarium.mapping.splines.features import observe, scan_points
 from lidarium.mapping.splines.spline_map import SplineMap
 from lidarium.training.teaching.samples import samples_of, write_samples
@@ -129,6 +137,8 @@ def make_samples(folder: Path) -> None:
     _maps(folder)
     _floors(folder)
     _logs(folder)
+    _clouds(folder)
+    _trees(folder)
     _results(folder)
     _trainings(folder)
 
@@ -252,6 +262,54 @@ def _logs(folder: Path) -> None:
         spline_map.update(observe(scan_points(scan, geometry)), Transform(*pose))
     write_spline_map(folder / "splines.json", spline_map)
     write_spline_map(folder / "splines.npz", spline_map)
+
+
+def _clouds(folder: Path) -> None:
+    """Write a floor of 3 m x 2 m with a wall in each form of clouds, as depth image and as sparse map."""
+    x, y = (each.ravel() for each in np.meshgrid(np.arange(0.0, 3.0, 0.2), np.arange(0.0, 2.0, 0.2)))
+    across, up = (each.ravel() for each in np.meshgrid(np.arange(0.0, 2.0, 0.2), np.arange(0.2, 1.0, 0.2)))
+    ground, wall = np.stack([x, y, 0.0 * x], axis=1), np.stack([0.0 * up + 3.0, across, up], axis=1)
+    points = np.concatenate([ground, wall]).round(2).astype(np.float32)
+    count, lines = len(points), lines_of(points)
+    vertices = b"".join(b"v " + line + b"\n" for line in lines.splitlines())
+    faces = b"property list uchar int vertex_indices\nend_header"
+    files = {
+        "ascii.pcd": pcd(points=count, body=lines),
+        "binary.pcd": pcd("binary", points=count, body=points.tobytes()),
+        "packed.pcd": pcd("binary_compressed", points=count, body=packed_body(points.T.tobytes())),
+        "ascii.ply": ply("ascii", lines, count=count),
+        "faces.ply": ply("binary_big_endian", points.astype(">f4").tobytes(), count=count)
+        .replace(b"element face 0", b"element face 1")
+        .replace(b"property list uchar int i\nend_header", faces)
+        + b"\x03"
+        + np.array([0, 1, 20], ">i4").tobytes(),
+        "mesh.obj": b"# a floor\n" + vertices + b"f 1 2 17 16\nf -1/1 -2/2 -3/3\n",
+        "lines.xyz": b"# x y z\n" + lines,
+        "commas.txt": lines.replace(b" ", b"; ").replace(b".", b","),
+    }
+    for name, content in files.items():
+        (folder / f"cloud_{name}").write_bytes(content)
+    np.savez_compressed(folder / "cloud.npz", xyz=points)
+    depth = np.full((24, 32), 2000, np.uint16)
+    depth[:8], depth[20:, :5] = 0, 65535
+    cv2.imwrite(str(folder / "depth.png"), depth)
+    cv2.imwrite(str(folder / "depth.pgm"), depth)
+    (folder / "pose.txt").write_text("0 0 1 0.5\n-1 0 0 0.25\n0 -1 0 1.0\n0 0 0 1\n")
+    sparse_map = map_cloud(points, 32)
+    graph = build_graph(sparse_map.free, sparse_map.boxes, SweptBody(radius=0.2, height=0.5))
+    write_sparse_map(folder / "sparse.smap", sparse_map, _GraphEdges(graph.nodes, graph.edges))
+    write_sparse_map(folder / "sparse_text.txt", sparse_map)
+
+
+def _trees(folder: Path) -> None:
+    """Write a tree of two agents; one sees a wall."""
+    rules = RegionRules("star", 0.3, 4.0, 0.1, False)
+    view = np.full(DIRECTIONS, 4.0)
+    first = rules.node(0, "robot_0", np.array([0.0, 0.0, 0.5]), None, view)
+    near = np.where(np.arange(DIRECTIONS) < DIRECTIONS // 3, 1.5, view)
+    nodes = [first, rules.node(1, "robot_1", np.array([1.0, 0.5, -1.0]), 0, near)]
+    nodes[0].neighbours[1] = 1.1
+    write_tree(folder / "tree.npz", nodes, {"robot_0": rules, "robot_1": rules}, np.array([2.0, -1.0]))
 
 
 def _results(folder: Path) -> None:

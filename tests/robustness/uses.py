@@ -9,6 +9,7 @@ from drawn_decisions import drawn_decision
 
 from lidarium.agents import make_policy
 from lidarium.agents.learned.network import Network, load_weights
+from lidarium.agents.srt.tree_files import read_tree
 from lidarium.envs.floors.catalogue.drawn import load_drawn
 from lidarium.envs.floors.catalogue.names import load_floor
 from lidarium.envs.floors.floor import Floor
@@ -31,6 +32,14 @@ from lidarium.mapping.files.spline_files import compact_arrays, read_spline_map
 from lidarium.mapping.files.trajectories import interpolated, read_tum
 from lidarium.mapping.localization.localizer import Sensing
 from lidarium.mapping.localization.registry import make_localizer
+from lidarium.mapping.point_clouds.cameras import Intrinsics, read_pose
+from lidarium.mapping.point_clouds.cloud_files import read_cloud
+from lidarium.mapping.sparse.graph import build_graph
+from lidarium.mapping.sparse.map_files import _parsed_binary, binary_content, read_sparse_map
+from lidarium.mapping.sparse.mapper.full import map_cloud
+from lidarium.mapping.sparse.planning import plan
+from lidarium.mapping.sparse.swept_body import SweptBody
+from lidarium.mapping.sparse.up_axis import check_up
 from lidarium.scripts.commands.evaluate import summary_of
 from lidarium.training.places import place_of
 from lidarium.training.settings import read_training
@@ -90,6 +99,33 @@ def _splines(path: Path) -> None:
     spline_map = read_spline_map(path)
     compact_arrays(spline_map)
     spline_map.sample()
+
+
+def _cloud(path: Path) -> None:
+    cloud = read_cloud(path)
+    assert np.isfinite(cloud.points).all()
+    check_up(cloud.points, (0.0, 0.0, 1.0), 0)
+    map_cloud(cloud.points, 16)
+
+
+def _depth(path: Path) -> None:
+    cloud = read_cloud(path, intrinsics=Intrinsics(30.0, 30.0, 16.0, 12.0))
+    assert np.isfinite(cloud.points).all()
+
+
+def _sparse(path: Path) -> None:
+    sparse_map, edges = read_sparse_map(path)
+    again, _ = _parsed_binary(binary_content(sparse_map, edges))
+    assert np.array_equal(again.free, sparse_map.free) or path.suffix == ".txt"  # text has more digits
+    graph = build_graph(sparse_map.free, sparse_map.boxes, SweptBody(radius=0.2, height=0.5))
+    if len(graph.nodes):
+        plan(graph, graph.nodes[0, :2], graph.nodes[-1, :2])
+
+
+def _tree(path: Path) -> None:
+    tree = read_tree(path)
+    for node in tree.nodes:
+        assert np.isfinite(node.pose).all()
 
 
 def _record(path: Path) -> None:
@@ -162,6 +198,11 @@ USES: dict[str, Callable[[Path], None]] = {
     "trajectory": _trajectory,
     "relations": read_relations,
     "splines": _splines,
+    "cloud": _cloud,
+    "depth": _depth,
+    "pose": read_pose,
+    "sparse": _sparse,
+    "tree": _tree,
     "record": _record,
     "suite": _suite,
     "episodes": _episodes,

@@ -21,7 +21,7 @@ from lidarium.envs.floors.catalogue.drawn import DATA, about_drawn, drawn_names,
 from lidarium.envs.floors.catalogue.real import COLLECTIONS, load_real, real_floors
 from lidarium.envs.floors.catalogue.store import floor_store, hash_of_code
 from lidarium.envs.floors.floor import Floor, Solid
-from lidarium.envs.floors.free_space import measure_building
+from lidarium.envs.floors.free_space import measure_building, measure_reach
 from lidarium.envs.floors.generation.buildings import KINDS, BuildingSettings, generate_building
 from lidarium.envs.floors.importers import FORMATS, load_file
 from lidarium.mapping.files.map_files import RESOLUTION
@@ -220,20 +220,30 @@ def _hash_of_floors(specs: Iterable[str]) -> str:
 def describe_floor(floor: Floor) -> dict[str, Any]:
     """Describe a floor in figures."""
     measures = measure_building(floor)
-    remarks = [each for each in (floor.remark, left_out(measures.left_out_m2)) if each]
     x_min, y_min, x_max, y_max = floor.bounds
     return {
         "name": floor.name,
         "size_m": [round(x_max - x_min, 3), round(y_max - y_min, 3)],
         "area_m2": measures.area_m2,
-        "reachable_m2": round(measures.whole_m2 - float(measures.left_out_m2.sum()), 3),
-        "whole_m2": round(measures.whole_m2 + floor.left_out_m2, 3),
+        **_reach(floor, measures.left_out_m2, measures.whole_m2),
         "loops": measures.loops,
         "clutter": measures.clutter,
         "rooms": measures.rooms,
         "solids": len(floor.solids),
         "sha256": floor.sha256,
-        "remark": "; ".join(remarks),
+    }
+
+
+def describe_reach(floor: Floor, start: NDArray[np.float64]) -> dict[str, Any]:
+    """Say how much of a floor can be reached from a start, x, y, ... [m], and what is assumed and left out of it."""
+    return _reach(floor, *measure_reach(floor, start))
+
+
+def _reach(floor: Floor, left_out_m2: NDArray[np.float64], whole_m2: float) -> dict[str, Any]:
+    return {
+        "reachable_m2": round(whole_m2 - float(left_out_m2.sum()), 3),
+        "whole_m2": round(whole_m2 + floor.left_out_m2, 3),
+        "remark": "; ".join(each for each in (floor.remark, left_out(left_out_m2)) if each),
     }
 
 

@@ -146,8 +146,8 @@ def enclosed(
     if np.count_nonzero(union) >= _CLOSED_SHARE * np.prod((high - low) / resolution + 4.0):
         return _outlines(path, union, origin, resolution)
     distance = _distance(1 - drawn, resolution)
-    insides, areas = [], []
-    for gap in _GAPS:
+    insides, areas = [np.packbits(union)], [np.count_nonzero(union)]
+    for gap in _GAPS[1:]:
         union |= _inside(distance, gap / 2.0, resolution)
         insides.append(np.packbits(union))  # five of them, of up to 20 MB each
         areas.append(np.count_nonzero(union))

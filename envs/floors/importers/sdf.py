@@ -7,6 +7,7 @@ Open Robotics, SDFormat specification 1.11: world, model, link, collision, geome
 """
 
 import math
+import os
 import re
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable
@@ -298,7 +299,7 @@ def _beside(path: Path, *parts: str) -> Path | None:
     if not parts[0] or any(".." in Path(part).parts or Path(part).is_absolute() for part in parts):
         return None
     folders = (path.parent, path.parent / "models", path.parent.parent, path.parent.parent / "models")
-    return next((file for folder in folders if (file := folder.joinpath(*parts)).is_file()), None)
+    return next((file for folder in folders if os.path.isfile(file := folder.joinpath(*parts))), None)
 
 
 def _pose(path: Path, element: Element) -> Pose:

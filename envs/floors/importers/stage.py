@@ -7,6 +7,7 @@ R. Vaughan, "Massively multi-robot simulation in Stage", Swarm Intelligence 2, 2
 """
 
 import math
+import os
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -19,7 +20,7 @@ import numpy as np
 from lidarium.envs.floors.floor import Floor
 from lidarium.envs.floors.importers.common import read_text, refuse_resolution
 from lidarium.envs.floors.importers.ros_map import floor_of_map
-from lidarium.mapping.files.guarded_reading import open_guarded, printable
+from lidarium.mapping.files.guarded_reading import encoding_of, open_guarded, printable
 from lidarium.mapping.files.images import MAX_PIXELS, read_image
 from lidarium.mapping.files.map_files import FREE, OCCUPIED, RESOLUTION, MapImage
 from lidarium.mapping.geometry.bounds import shown
@@ -44,7 +45,8 @@ def matches(path: Path) -> bool:
     """Return whether a world is not XML, as Gazebo's are."""
     with open_guarded(path) as file:
         begin = file.read(4096)
-    return not begin.removeprefix(b"\xef\xbb\xbf").lstrip().startswith(b"<") and bool(begin.strip())
+    text = begin.decode(encoding_of(begin), "ignore").strip()
+    return bool(text) and not text.startswith("<")
 
 
 def load(path: Path, resolution: float | None) -> Floor:
@@ -66,7 +68,7 @@ def _map_of(path: Path, model: _Model) -> MapImage:
     """Return the picture of a model as a map."""
     name = model.properties["bitmap"][0]
     picture = path.parent / name
-    if not picture.is_file():
+    if not os.path.isfile(picture):
         picture = path.parent / PureWindowsPath(name).name
     pixels = read_image(picture)
     first = pixels if pixels.ndim == 2 else pixels[..., 0]
@@ -137,7 +139,7 @@ def _models(path: Path, words: Iterator[str], defined: dict[str, _Model], depth:
         if word == "include":
             name = next(words, "")
             file = path.parent / name
-            if ".." not in Path(name).parts and file.is_file():
+            if ".." not in Path(name).parts and os.path.isfile(file):
                 yield from _models(file, _words(file), defined, depth + 1)
         elif word == "define":
             name, kind = next(words, ""), next(words, "")

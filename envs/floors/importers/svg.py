@@ -48,10 +48,36 @@ def _numbers(text: str) -> list[float]:
     return list(map(float, _NUMBERS.findall(text)))
 
 
-def _length(text: str | None, otherwise: float = 0.0) -> float:
-    """Return a length in the drawing's units; other units are taken for these."""
-    found = _numbers(text or "")
-    return found[0] if found else otherwise
+_LENGTH = re.compile(rf"\s*({_NUMBER})\s*([A-Za-z]+|%)?")
+_UNITS = {"": 1.0, "px": 1.0, "pt": 96 / 72, "pc": 16.0, "in": 96.0, "cm": 96 / 2.54, "mm": 96 / 25.4}
+"""The drawing's units of a unit of length (CSS Values and Units 4, section 6.2)."""
+
+_View = tuple[float, float]
+"""Width and height of the part of a drawing of which lengths may be shares, in its units."""
+
+
+def _length(text: str | None, otherwise: float = 0.0, whole: float = math.nan) -> float:
+    """Return a length in the drawing's units; shares are of a whole, which may be unknown (nan)."""
+    found = _LENGTH.match(text or "")
+    if found is None:
+        return otherwise
+    unit = (found[2] or "").lower()
+    if unit == "%":
+        return 0.01 * float(found[1]) * whole
+    if unit not in _UNITS:
+        raise ValueError(f"a length is {shown(text)}; want one without a unit, or px, pt, pc, in, cm, mm")
+    return float(found[1]) * _UNITS[unit]
+
+
+def _view_within(element: Element, around: _View) -> _View:
+    """Return the size that shares of lengths within a drawing or symbol are of."""
+    box = _numbers(element.get("viewBox", ""))
+    if len(box) == 4:
+        return box[2], box[3]
+    wide, high = (
+        _length(element.get(name), whole, whole) for name, whole in zip(("width", "height"), around, strict=True)
+    )
+    return wide, high
 
 
 def _transform_of(element: Element) -> NDArray[np.float64]:
@@ -60,24 +86,28 @@ def _transform_of(element: Element) -> NDArray[np.float64]:
     return np.array([[found.a, found.c, found.e], [found.b, found.d, found.f], [0.0, 0.0, 1.0]], np.float64)
 
 
-def outlines(element: Element, kind: str) -> list[Polyline]:
+_UPWARDS = ("y", "y1", "y2", "cy", "ry", "height")
+
+
+def outlines(element: Element, kind: str, view: _View = (math.nan, math.nan)) -> list[Polyline]:
     """Return the outlines of a shape; none if it is no shape."""
 
     def value(name: str) -> float:
-        return _length(element.get(name))
+        whole = math.hypot(*view) / math.sqrt(2.0) if name == "r" else view[name in _UPWARDS]
+        return _length(element.get(name), whole=whole)
 
     if kind == "line":
         return [np.array([[value("x1"), value("y1")], [value("x2"), value("y2")]])]
     if kind == "rect":
         x, y, width, height = (value(name) for name in ("x", "y", "width", "height"))
         corners = [(x, y), (x + width, y), (x + width, y + height), (x, y + height), (x, y)]
-        return [np.array(corners)] if width > 0.0 and height > 0.0 else []
+        return [] if width <= 0.0 or height <= 0.0 else [np.array(corners)]
     if kind in ("circle", "ellipse"):
         wide, high = (value("r"),) * 2 if kind == "circle" else (value("rx"), value("ry"))
         turns = np.linspace(0.0, 2.0 * math.pi, 4 * CURVE_PARTS + 1)
         ring = np.stack([value("cx") + wide * np.cos(turns), value("cy") + high * np.sin(turns)], axis=1)
         ring[-1] = ring[0]
-        return [ring] if wide > 0.0 and high > 0.0 else []
+        return [] if wide <= 0.0 or high <= 0.0 else [ring]
     if kind in ("polyline", "polygon"):
         given = _numbers(element.get("points", ""))
         points = np.array(given[: len(given) // 2 * 2]).reshape(-1, 2)
@@ -200,6 +230,9 @@ _UNSEEN = frozenset(
         "text",
     )
 )
+_PARTS = frozenset(("svg", "symbol"))
+"""Elements that may have a view box."""
+
 _OF_STYLE = (
     "fill",
     "stroke",
@@ -262,7 +295,7 @@ def load(path: Path, resolution: float | None) -> Floor:
         raise ValueError(f"{path} begins with {shown(_kind(root))}; want an svg element")
     to_metres = np.diag([resolution, -resolution, 1.0])
     drawing = _Drawing(root)
-    found = drawing.shapes(root, to_metres, dict(_DEFAULTS), ())
+    found = drawing.shapes(root, to_metres, dict(_DEFAULTS), (), (math.nan, math.nan))
     shapes = list(few_enough(path, found, lambda shape: sum(map(len, shape.outlines))))
     drawn = [shape for shape in shapes if shape.is_solid_line or shape.is_solid_inside]
     if not drawn:
@@ -324,11 +357,16 @@ class _Drawing:
             yield f"{self._sheet.unread} rules of its style sheet are not understood and left out"
 
     def shapes(
-        self, element: Element, around: NDArray[np.float64], inherited: Style, path: tuple[Element, ...]
+        self,
+        element: Element,
+        around: NDArray[np.float64],
+        inherited: Style,
+        path: tuple[Element, ...],
+        view: _View,
     ) -> Iterator[_Shape]:
         """Yield the shapes of an element and of all within it, in the order in which they are painted.
 
-        ``path`` holds the elements around it, the outermost first.
+        ``path`` holds the elements around it, the outermost first; lengths may be shares of ``view``.
         """
         kind = _kind(element)
         if kind in _UNSEEN and not (kind == "symbol" and path and _kind(path[-1]) == "use"):
@@ -343,23 +381,28 @@ class _Drawing:
         if style["display"].strip() == "none":
             return
         matrix = around @ _transform_of(element) if "transform" in element.attrib else around
-        found = outlines(element, kind)
+        if kind == "svg" and len(path) > 1:
+            matrix = matrix @ _placed(element, element, view)
+        if kind in _PARTS:
+            view = _view_within(element, view)
+        found = outlines(element, kind, view)
         if found and style["visibility"].strip() == "visible":
             placed = [outline @ matrix[:2, :2].T + matrix[:2, 2] for outline in found]
             (a, b), (c, d) = matrix[:2, :2].tolist()
             scale = math.sqrt(abs(a * d - b * c))
-            yield _Shape(
-                placed,
-                None if kind == "line" else self._is_dark(style, "fill"),
-                self._is_dark(style, "stroke"),
-                _length(style["stroke-width"], 1.0) * scale,
-            )
+            width = _length(style["stroke-width"], 1.0, math.hypot(*view) / math.sqrt(2.0)) * scale
+            inside = None if kind == "line" else self._is_dark(style, "fill")
+            shape = _Shape(placed, inside, self._is_dark(style, "stroke"), width)
+            if math.isfinite(width + sum(outline.sum() for outline in placed)):
+                yield shape
+            elif shape.is_solid_inside or shape.is_solid_line:
+                raise ValueError("a length is a share of the drawing, which has no viewBox; want a viewBox")
         self._pictures += kind == "image"
         if kind == "use" and (used := self._named.get(_link(element))) is not None:
-            shifted = matrix @ _placed(element, used)
-            yield from self.shapes(used, shifted, style, path)
+            shifted = matrix @ _placed(element, used, view)
+            yield from self.shapes(used, shifted, style, path, view)
         for child in element:
-            yield from self.shapes(child, matrix, style, path)
+            yield from self.shapes(child, matrix, style, path, view)
 
     def _style(self, path: tuple[Element, ...], inherited: Style) -> Style:
         """Return the style of an element.
@@ -427,15 +470,19 @@ def _link(element: Element) -> str:
     return link.strip().removeprefix("#")
 
 
-def _placed(use: Element, used: Element) -> NDArray[np.float64]:
-    """Return where an element is used, (3, 3): a symbol with a view box fits into the size asked for."""
-    x, y = (_length(use.get(name)) for name in ("x", "y"))
+def _placed(use: Element, used: Element, view: _View) -> NDArray[np.float64]:
+    """Return where an element is used, (3, 3): a symbol with a view box fits into the size asked for.
+
+    A drawing within a drawing is placed as one that is used where it stands.
+    """
+    x, y = (_length(use.get(name), whole=whole) for name, whole in zip("xy", view, strict=True))
     box = _numbers(used.get("viewBox", ""))
     matrix = np.array([[1.0, 0.0, x], [0.0, 1.0, y], [0.0, 0.0, 1.0]])
-    if _kind(used) != "symbol" or len(box) != 4 or not (box[2] > 0.0 and box[3] > 0.0):
+    if not (_kind(used) == "symbol" or use is used) or len(box) != 4 or not (box[2] > 0.0 and box[3] > 0.0):
         return matrix
     wide, high = (
-        _length(use.get(name) or used.get(name), size) for name, size in (("width", box[2]), ("height", box[3]))
+        _length(use.get(name) or used.get(name), size, whole)
+        for name, size, whole in zip(("width", "height"), box[2:], view, strict=True)
     )
     scale = min(wide / box[2], high / box[3])
     # The middle of the view box is in the middle of the size.

@@ -10,6 +10,7 @@ import io
 import os
 import re
 import sqlite3
+import struct
 import tempfile
 import urllib.parse
 from collections.abc import Callable, Collection, Iterator
@@ -243,8 +244,29 @@ def _has_stated_size(chunk: Chunk) -> bool:
     return True
 
 
+def _check_whole_sqlite(path: Path) -> None:
+    """Refuse a database that lacks pages, or whose last messages are in a log beside it: both would be missing.
+
+    Page size and count are at bytes 16 and 28 (SQLite, "Database File Format", 1.3).
+    """
+    with open_guarded(path) as file:
+        header = file.read(100)
+        size = file.seek(0, os.SEEK_END)
+    if len(header) == 100:
+        side, pages = struct.unpack(">H10xI", header[16:32])
+        if size < pages * (65536 if side == 1 else side):
+            raise ValueError(f"{path} is not a whole bag, it is cut off; {WANTED}")
+    log = path.with_name(f"{path.name}-wal")
+    if log.is_file() and log.stat().st_size:
+        raise ValueError(
+            f"{path} was not closed, its last messages are in {log.name}; want them in it, as by "
+            f"sqlite3 {path.name} 'PRAGMA wal_checkpoint(TRUNCATE)'"
+        )
+
+
 @contextmanager
 def _open_sqlite(path: Path, budget: _Budget) -> Iterator[_Storage]:
+    _check_whole_sqlite(path)
     size = path.stat().st_size
     steps = iter(range((_SQL_STEPS + _SQL_STEPS_PER_BYTE * size) // 10_000))
     uri = f"file:{urllib.parse.quote(str(path.absolute()))}?mode=ro&immutable=1"

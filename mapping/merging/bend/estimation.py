@@ -177,8 +177,11 @@ def _interpolate(points: Array, corner: tuple[float, float], spacing: float, off
             found[i, axis] = (1.0 - v) * lower + v * upper
 
 
-INDEPENDENT_M = 0.5
-"""Length of wall that errs alike [m]."""
+INDEPENDENT_M, BENT_ALIKE_M = 0.5, 15.0
+"""Lengths of wall that err alike by noise, and by a bend [m].
+
+The latter so that 86 % of errors of half of the maps of real robots are within two standard deviations.
+"""
 
 MIN_SPREAD_M = 0.01
 """Error of maps without any bend [m]."""
@@ -297,7 +300,7 @@ def estimate_bend(a: DescribedMap, b: DescribedMap, a_from_b: Transform, setting
     _find_gaps(a.levels, a.distance, a.resolution, positions, normals, settings.last_reach_m, gaps, found)
     field = OffsetField(corner, spacing, offsets.reshape(rows, columns, 2))
     wall_m = b.resolution * len(b.walls) / max(len(sample), 1)
-    return _described(a_from_b, field, (walls, normals, gaps), found, wall_m)
+    return _described(a_from_b, field, (walls, normals, gaps), found, wall_m, max(a.resolution, b.resolution))
 
 
 def _turned(transform: Transform, normals: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -335,8 +338,12 @@ def _described(
     seen: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]],
     found: NDArray[np.bool_],
     wall_m: float,
+    side: float,
 ) -> Bend:
-    """Return the result for the nearest rigid motion; a sampled cell represents a length of wall."""
+    """Return the result for the nearest rigid motion; a sampled cell represents a length of wall.
+
+    Walls of both maps are drawn to about a cell, whose side is given, by programs of their own: all may err alike.
+    """
     walls, normals, gaps = seen
     if found.sum() < 3:
         return Bend(a_from_b, field, 0.0, 0.0, 0.0, 1.0, np.diag([np.inf] * 3))
@@ -352,8 +359,9 @@ def _described(
     strain = float(np.sqrt((steps**2).sum(axis=1).mean())) / field.spacing_m if len(steps) else 0.0
     bend_m = float(np.sqrt((rest.at(held) ** 2).sum(axis=1).mean()))
     spread = math.sqrt(0.5 * math.pi) * float(np.abs(gaps[found]).mean())
-    variance = spread**2 + bend_m**2 + MIN_SPREAD_M**2
+    variance = spread**2 + MIN_SPREAD_M**2 + BENT_ALIKE_M / INDEPENDENT_M * bend_m**2
     covariance = _covariance(target - target.mean(axis=0), normals[found], variance, wall_m)
+    covariance += np.diag([side**2, side**2, 0.0])
     growth_m = abs(scale - 1.0) * float(np.sqrt(((held - held.mean(axis=0)) ** 2).sum(axis=1).mean()))
     return Bend(nearest, rest, bend_m, strain, spread, scale, covariance, growth_m)
 

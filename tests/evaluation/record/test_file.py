@@ -151,6 +151,7 @@ def test_members_that_are_not_good_are_refused(path):
         ("poses.npy", None),
         ("poses.npy", b"no array"),
         ("events.json", b"{}"),
+        ("events.json", b'[{"time_s": 0.0, "kind": "decision", "agent": "robot_0", "x": 1.0}]'),
         ("header.json", b"["),
     ):
         original = path.read_bytes()

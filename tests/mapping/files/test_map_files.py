@@ -233,6 +233,11 @@ def test_maps_of_other_programs_have_the_right_area(shared_cases, name):
     assert measure_building(floor).area_m2 == pytest.approx(SHARED[name], abs=0.05)
 
 
+def test_an_area_along_the_border_of_a_picture_is_told_to_be_outside(shared_cases):
+    floor = load_file(shared_cases / "outside-larger-than-inside" / "track.yaml")
+    assert "free space along the picture's border was taken for outside" in floor.remark
+
+
 HEADER_OF_MAP_FILES = {
     "image": "map.png",
     "resolution": 0.05,

@@ -49,3 +49,17 @@ def test_logs_of_other_programs_are_followed_over_all_their_scans(shared_cases, 
     turns = (followed.poses - followed.poses[0] - known + known[0])[:, 2]
     assert np.abs(np.remainder(turns + math.pi, 2.0 * math.pi) - math.pi).max() < math.radians(1.0)
     assert not followed.slam.doubts.stretches
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("bag-laser-mounting/upside_down.mcap", "the laser hangs upside down"),
+        ("odometry-jump/reset.log.gz", "odometry jumps 1 times as no robot moves"),
+        ("odometry-stops/stops_at_half.log.gz", "from 1036.600 to 1073.000 s"),
+        ("robotlaser-header/resolution_is_count.log.gz", "are assumed"),
+        ("wild-stamp/clock_begins_anew.log.gz", "clock"),
+    ],
+)
+def test_what_is_mended_is_told(shared_cases, name, words):
+    assert any(words in remark for remark in read_log(shared_cases / name).remarks)

@@ -22,6 +22,15 @@ def test_what_is_no_trajectory_is_refused(tmp_path, text):
         read_tum(tmp_path / "bad.tum")
 
 
+def test_rotations_are_unit_quaternions_but_for_what_files_round(tmp_path):
+    (tmp_path / "rounded.tum").write_text("0 0 0 0 0 0 0.7 0.7\n")
+    assert read_tum(tmp_path / "rounded.tum")[1][0, 2] == pytest.approx(0.5 * math.pi)
+    for rotation in ("0 0 0 0", "0 0 1.57 0.5", "0 0 0.99 0.9"):
+        (tmp_path / "bad.tum").write_text(f"0 0 0 0 0 0 0 1\n1 0 0 0 {rotation}\n")
+        with pytest.raises(ValueError, match=rf"bad\.tum has the rotation {rotation} at 1 s; want unit quaternions"):
+            read_tum(tmp_path / "bad.tum")
+
+
 def test_poses_between_stamps_turn_the_short_way():
     poses = np.array([[0.0, 0.0, 3.0], [2.0, 0.0, -3.0]])
     found = interpolated(np.array([0.0, 1.0]), poses, np.array([-1.0, 0.5, 2.0]))

@@ -204,11 +204,17 @@ BAD = {
         pcd("binary_compressed", body=struct.pack("<II", 4, 36) + b"\x00\x00\xe0\xff"),
         "damaged",
     ),
+    "width.pcd": (
+        pcd(body=lines_of(POINTS)).replace(b"POINTS 3", b"POINTS 2"),
+        "3 points by WIDTH and HEIGHT, and 2 by",
+    ),
+    "more.ply": (ply("ascii", lines_of(POINTS), count=2), "claims 2 points, and 12 bytes are left"),
+    "more.bytes.ply": (ply("binary_big_endian", POINTS.tobytes(), count=1), "claims 1 points, and 24 bytes are left"),
     "header.ply": (b"ply\nformat ascii 1.0\n", "no line end_header"),
     "short.ply": (ply("binary_little_endian", POINTS.tobytes()[:-1]), "claims 3 points .* truncated"),
     "claims.ply": (ply("binary_big_endian", POINTS.tobytes(), count=10**9), "claims"),
     "none.ply": (ply("ascii", b"", count=0), "holds no points"),
-    "nan.ply": (ply("ascii", b"nan 0 0\n" + lines_of(POINTS)), "nan or inf"),
+    "nan.ply": (ply("ascii", b"nan 0 0\n" + lines_of(POINTS), count=4), "nan or inf"),
     "form.ply": (ply("binary_middle", b""), "no format of"),
     "kind.ply": (ply("ascii", b"", "float float number"), "type number"),
     "lists.ply": (

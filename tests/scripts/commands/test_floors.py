@@ -288,3 +288,16 @@ def test_layers_meshes_and_what_cannot_be_reached_are_told(shared_cases, tmp_pat
     assert main(["floors", "show", hall, "--skip-meshes"]) == 0
     assert "2 collisions are left out" in capsys.readouterr().out
     assert main(["floors", "show", "apartment", "--skip-meshes"]) == 2
+
+
+def test_a_run_tells_what_of_a_drawing_cannot_be_reached(shared_cases, tmp_path, capsys):
+    flat = str(shared_cases / "dxf-layers-and-doors" / "flat.dxf")
+    asked = ["run", "--floor", flat, "--robots", "1", "--horizon-s", "1", "--out", str(tmp_path), "--json"]
+    assert main(asked) == 4
+    told, error = capsys.readouterr()
+    assert "flat: 37.6 m2 in 4 other areas cannot be reached and are left out; 33.8 of 71.8 m2 can" in error
+    result = json.loads(told)
+    assert result["floor_reachable_m2"] == pytest.approx(33.8, abs=0.05)
+    assert result["floor_whole_m2"] == pytest.approx(71.8, abs=0.05)
+    assert main([*asked, "--starts", "7.5,3.5,0"]) == 0  # in another room
+    assert "33.8 of" not in capsys.readouterr().err

@@ -242,6 +242,14 @@ def test_maps_of_unlike_scale_are_refused_with_the_scale(shared_cases, tmp_path,
         assert float(remark.split(" times")[0].split()[-1]) == pytest.approx(wanted, abs=0.005)
 
 
+def test_maps_whose_unknown_grey_nav2_calls_free_are_joined(shared_cases, tmp_path, capsys):
+    paths = [str(shared_cases / "nav2-unknown-is-free" / f"{name}.yaml") for name in "ab"]
+    assert main(["merge", *paths, "--json", "--out", str(tmp_path)]) == 0
+    found = json.loads(capsys.readouterr().out)["maps"]["b"]
+    wanted = (0.0, 10.0, -math.pi / 2.0)
+    assert [found[name] for name in ("x", "y", "theta")] == pytest.approx(wanted, abs=0.005)
+
+
 def test_a_symmetric_place_is_joined_and_doubtful(tmp_path, capsys):
     levels = room(room(blank(240, 240), 20, 20, 90, 190), 106, 90, 100, 50)
     levels[104:112, 100:130] = FREE

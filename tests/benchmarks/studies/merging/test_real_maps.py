@@ -48,6 +48,9 @@ def data(tmp_path):
         "theta_deg": -math.degrees(truth.theta),
         "usable": True,
     }
+    cosine, sine = math.cos(truth.theta), -math.sin(truth.theta)
+    turned = np.array([[cosine, -sine], [sine, cosine]]) @ entry["src_pts"][0]
+    entry["tx"], entry["ty"] = (entry["dst_pts"][0] - turned).tolist()
     content = {"E5_01__E5_02": entry, "E5_01__E5_layout": {**entry, "usable": False}}
     (pairs / "halmstad" / "ground_truth.json.gz").write_bytes(gzip.compress(json.dumps(content).encode()))
     save(pairs / "real" / "one_A.png", apartment())
@@ -67,6 +70,8 @@ def test_pairs_of_one_building_and_strangers_are_told_apart(data):
     assert halmstad["is_accepted"]
     assert halmstad["is_right"]
     assert halmstad["distance_m"] < 0.05
+    assert halmstad["is_calibrated"]
+    assert 0.0 < halmstad["deviations"] < 2.0
     assert not real["is_tuned"]
     assert real["is_right"]
     assert real["distance_m"] == pytest.approx(0.0, abs=1e-6)
@@ -83,6 +88,8 @@ def test_the_page_tells_recall_wrong_ones_and_what_is_missed(data):
     assert "| `halmstad E5` | yes | 1 | 100.0 % (1 of 1;" in page
     assert "| `strangers` | no | 2 | - | 0.0 % (0 of 2;" in page
     assert "| 0.8 | 100.0 % (2 of 2;" in page
+    assert "| every other pair of E5 and the easy halves of logs | yes | 100.0 % (1 of 1;" in page
+    assert "| the others | no | 100.0 % (1 of 1;" in page
 
 
 def test_a_folder_without_maps_has_no_rows(tmp_path):

@@ -232,6 +232,12 @@ def test_worlds_of_other_programs_have_their_area(shared_cases, name, area):
     assert describe_floor(load_file(shared_cases / name))["area_m2"] == pytest.approx(area, abs=0.01)
 
 
+def test_an_included_post_stands_where_the_include_says(shared_cases):
+    raster = load_file(shared_cases / "sdf-include-pose" / "include.world").raster(0.05, 0.2, 0.2)
+    rows, columns = np.floor((np.array([[-2.0, -1.0], [0.0, 0.0]]) - raster.origin)[:, ::-1] / 0.05).astype(int).T
+    assert raster.solid[rows, columns].tolist() == [1, 0]
+
+
 def test_all_meshes_that_cannot_be_read_are_named(shared_cases):
     path = shared_cases / "sdf-frames-and-meshes" / "two_meshes.world"
     with pytest.raises(ValueError, match=r"2 collisions .* seat .* foot .*--skip-meshes"):

@@ -70,3 +70,10 @@ def test_a_world_of_another_program_has_its_area_and_start(shared_cases):
     assert float((floor.cells.solid == 0).sum()) * floor.cells.resolution**2 == pytest.approx(94.9, abs=0.01)
     assert floor.cells.resolution == pytest.approx(0.05)
     assert floor.starts == pytest.approx(np.array([[-4.0, 2.0, math.pi / 2]]))
+
+
+def test_an_endless_name_of_the_picture_is_refused(tmp_path):
+    text = f'plan ( size [6 4 1] pose [0 0 0 0] bitmap "{"a" * 5000}.png" )\n'
+    (tmp_path / "a.world").write_text(text)
+    with pytest.raises(FileNotFoundError, match="its name is too long"):
+        load_file(tmp_path / "a.world")

@@ -63,6 +63,10 @@ def test_transforms_move_points_as_defined(text, point, wanted):
 def test_numbers_need_no_space_between_them():
     assert _numbers("1-2.5.5e1,+3") == [1.0, -2.5, 5.0, 3.0]
     assert _length("12.5px") == 12.5
+    assert _length("1in") == pytest.approx(_length("25.4mm")) == pytest.approx(_length("72pt")) == 96.0
+    assert _length("25 %", whole=8.0) == 2.0
+    with pytest.raises(ValueError, match="a length is '3vw'; want one without a unit, or px"):
+        _length("3vw")
     assert _length(None, 3.0) == _length("none", 3.0) == 3.0
 
 
@@ -239,3 +243,9 @@ def test_a_plan_that_is_too_large_says_what_to_do(tmp_path):
     (tmp_path / "other.svg").write_text("<html/>")
     with pytest.raises(ValueError, match=r"begins with 'html'; want an svg element"):
         load_file(tmp_path / "other.svg", 0.01)
+
+
+def test_dark_shares_of_a_drawing_without_a_size_are_refused(tmp_path):
+    (tmp_path / "a.svg").write_text("<svg><rect width='50%' height='9'/></svg>")
+    with pytest.raises(ValueError, match=r"a.svg .*a share of the drawing, which has no viewBox"):
+        load_file(tmp_path / "a.svg", 1.0)

@@ -392,3 +392,18 @@ def test_sqlite_files_that_make_rows_of_nothing_are_refused(statements, words, t
         database.executescript(TABLES + statements)
     with pytest.raises(ValueError, match=rf"a.db3 .*{words}"):
         read_bag_log(tmp_path / "a.db3")
+
+
+def test_sqlite_files_without_their_last_messages_are_refused(log, tmp_path):
+    write_mcap_log(tmp_path / "log.mcap", log)
+    write_form(tmp_path / "a.db3", tmp_path / "log.mcap")
+    content = (tmp_path / "a.db3").read_bytes()
+    (tmp_path / "cut.db3").write_bytes(content[:-60])
+    with pytest.raises(ValueError, match=r"cut.db3 is not a whole bag, it is cut off"):
+        read_bag_log(tmp_path / "cut.db3")
+    with closing(sqlite3.connect(tmp_path / "a.db3")) as database:  # as the recorder that is killed leaves it
+        database.executescript("PRAGMA journal_mode = WAL; DELETE FROM messages WHERE id > 9;")
+        shutil.copy(tmp_path / "a.db3", tmp_path / "b.db3")
+        shutil.copy(tmp_path / "a.db3-wal", tmp_path / "b.db3-wal")
+    with pytest.raises(ValueError, match=r"b.db3 was not closed, its last messages are in b.db3-wal; want"):
+        read_bag_log(tmp_path / "b.db3")
