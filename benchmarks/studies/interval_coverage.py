@@ -111,7 +111,7 @@ def cases(resamples: int) -> Iterator[Case]:
     for family in FAMILIES:
         yield _median(family, True, True)
     yield _median(FAMILIES[0], False, False)
-    draws = {"resamples": resamples}
+    draws: dict[str, Any] = {"resamples": resamples}
     for family in FAMILIES:
         yield Case(
             "mean",

@@ -48,8 +48,8 @@ Times = Mapping[tuple[str, int], float]
 def _ratio(first: Times, second: Times, keys: Sequence[tuple[str, int]]) -> str:
     if len(keys) < 2:
         return "-"
-    times = ([each[key] for key in keys] for each in (first, second))
-    return f"{paired_ratio(*times, clusters=[floor for floor, _ in keys]):.3f}"
+    ours, theirs = ([each[key] for key in keys] for each in (first, second))
+    return f"{paired_ratio(ours, theirs, clusters=[floor for floor, _ in keys]):.3f}"
 
 
 def merges_text(episodes: Iterable[Episode]) -> str:

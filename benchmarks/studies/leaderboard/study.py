@@ -162,7 +162,7 @@ def _multiples(path: Path, bounds: Mapping[tuple[str, int], float]) -> Multiples
     for episode in _bounded(read_episodes(path / EPISODES_FILE), bounds):
         found.setdefault((episode["policy"], episode["robots"]), []).append(episode)
     multiples = {key: over_bound(rows, HORIZON_S) for key, rows in found.items()}
-    return {key: multiple for key, multiple in multiples.items() if multiple is not None}
+    return {key: found.ratio.estimate for key, found in multiples.items() if found is not None}
 
 
 def _bounded(episodes: Iterable[dict[str, Any]], bounds: Mapping[tuple[str, int], float]) -> Iterator[dict[str, Any]]:

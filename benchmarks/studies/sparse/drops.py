@@ -102,7 +102,8 @@ def frames_with_areas(place: Place, areas: Areas) -> Iterator[Frame]:
 def _are_in(points: NDArray[np.float64], boxes: NDArray[np.float64]) -> NDArray[np.bool_]:
     """Return which points (N, 3) are above one of boxes (M, 2, 2), (N,) bool."""
     flat = points[:, None, :2]
-    return np.asarray(((flat >= boxes[:, 0]) & (flat <= boxes[:, 1])).all(axis=2).any(axis=1))
+    inside: NDArray[np.bool_] = np.all((flat >= boxes[:, 0]) & (flat <= boxes[:, 1]), axis=2)
+    return np.asarray(np.any(inside, axis=1))
 
 
 def _on_stairs(points: NDArray[np.float64], eye: NDArray[np.float64], box: NDArray[np.float64]) -> NDArray[np.float64]:

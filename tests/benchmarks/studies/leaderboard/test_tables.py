@@ -14,7 +14,7 @@ def times(seconds, share=1.0):
 def group(robots, **seconds):
     values = {name: {"median": {"estimate": 12.4}} for name in ("path_m", "overlap_percent")}
     difference = {"estimate": -40.0, "low": -50.0, "high": -30.0}
-    comparison = {"policy": "learned", "key": "t99_s", "difference": difference, "p_holm": 0.001}
+    comparison = {"policy": "learned", "key": "t99_s", "difference": difference, "is_beyond_chance": True}
     return {
         "robots": robots,
         "times": {"t99_s": {name: times(value) for name, value in seconds.items()}},
