@@ -153,10 +153,10 @@ def _lasers(options: dict[str, Any], base: ExplorationSettings) -> dict[str, Any
     """Take ``lidar``, ``lidars`` and ``noise`` out of the options, and return the settings that they make."""
     lidars = options.pop("lidars", () if "lidar" in options else base.lidars)
     lidar, noise = options.pop("lidar", base.lidar), options.pop("noise", None)
-    if isinstance(lidar, list | tuple):
+    if isinstance(lidar, list | tuple) and lidar:
         lidar, lidars = base.lidar, lidar
-    if isinstance(lidars, list | tuple):
-        lidars = checked_lidars([_part("lidar", each) for each in lidars])
+    is_list = isinstance(lidars, list | tuple)
+    lidars = checked_lidars([_part("lidar", each) for each in lidars] if is_list else lidars)
     if noise is not None:
         noise_floor, noise_share = NOISE[noise]
         lidar, *lidars = (

@@ -29,7 +29,8 @@ def test_the_lidar_of_the_team_reaches_as_far_and_as_wide_as_any():
     assert (lidar.range_min, lidar.range_max, lidar.field_of_view) == (0.02, 8.0, math.radians(240.0))
     assert make_settings(robots=1, lidar=[NEAR, FAR]).lidar == NEAR
     noisy = make_settings(lidar=[NEAR, Lidar(beams=91, noise_share=0.02)])
-    assert noisy.lidar.is_noisy and not noisy.is_ideal
+    assert noisy.lidar.is_noisy
+    assert not noisy.is_ideal
 
 
 def test_equal_lidars_are_one():
@@ -72,6 +73,7 @@ def test_the_order_of_lidars_belongs_to_the_identity_of_settings():
         (["urg", {"range": 3.0}], "Lidar: unknown setting 'range'"),
         (["urg", {"range_max": -1.0}], "range_max of the laser is -1.0; want a number above 0"),
         (3, "lidar is 3; want Lidar or its name"),
+        ([], r"lidar is \[\]; want Lidar or its name"),
     ],
 )
 def test_bad_lidars_are_refused(lidar, message):
