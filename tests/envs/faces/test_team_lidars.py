@@ -145,7 +145,9 @@ def test_slam_works_with_the_own_lidar(lidars):
     assert np.array_equal(env.beliefs.believed[0], alone.beliefs.believed[0])
     assert np.array_equal(env.beliefs.log_odds[0], alone.beliefs.log_odds[0])
     assert not np.array_equal(env.beliefs.believed, env.world.poses)
-    assert np.abs(env.beliefs.believed - env.world.poses).max() < 0.2
+    # The near lidar sees a single wall for a while, along which nothing holds its pose.
+    far = lidars.index(FAR)
+    assert np.abs(env.beliefs.believed[far] - env.world.poses[far]).max() < 0.1
 
 
 def test_pybullet_senses_with_the_own_lidar():
