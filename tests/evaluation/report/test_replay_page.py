@@ -101,7 +101,7 @@ def test_a_lone_robot_has_no_map_beside_the_teams_and_true_poses_are_not_believe
 
 def test_scans_of_lidars_that_differ_are_sampled_at_the_same_angles():
     near, wide = Lidar(beams=120, field_of_view=math.pi, range_max=2.0), Lidar(beams=120, field_of_view=2.0 * math.pi)
-    samples, sampler, env = sampled(lidar=[near, wide])
+    samples, sampler, env = sampled(horizon_s=4.0, lidar=[near, wide])
     angles, last = np.array(sampler.beam_angles(env)), samples.scans[-1]
     assert np.array_equal(last[1], env.simulation.ranges[1, ::2])
     is_in_view = np.abs(angles) <= math.pi / 2 + 1e-3
