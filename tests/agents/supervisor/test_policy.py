@@ -243,14 +243,14 @@ def test_a_robot_gets_its_order_once_and_is_away():
     assert errands.action("a") is None
     errands.cancel("a")
     assert not errands.is_away("a")
-    assert len(errands) == 0
+    assert not errands.has_any(["a"])
     errands.cancel("a")
 
 
 def test_a_command_without_a_target_is_no_errand():
     errands = _Errands(Robots())
     errands.begin(Command("a", OrderKind.PAUSE, 1, "wait"))
-    assert len(errands) == 0
+    assert not errands.has_any(["a"])
 
 
 @pytest.mark.parametrize(("after_s", "is_left"), [(LOST_S, 1), (LOST_S + 0.1, 0)])
@@ -263,7 +263,7 @@ def test_an_order_that_was_not_taken_is_lost_after_a_while(after_s, is_left):
     assert not errands.is_away("a")
     team.time_s += after_s
     errands.review("a")
-    assert len(errands) == is_left
+    assert errands.has_any(["a"]) == is_left
 
 
 @pytest.mark.parametrize("state", [DriveState.ARRIVED, DriveState.NO_PATH])
