@@ -41,7 +41,7 @@ class ChosenTours(TourFrontier):
         Each knows the picks of those before it; its options are ranked by the tours that are left.
         """
         navigation = self.navigation(agents[0])
-        reach = self.team.belief(agents[0]).lidar.range_max
+        reach = min(self.team.belief(agent).lidar.range_max for agent in self.team.agents)
         scene = scene_of(options, navigation, reach, self.settings.weights, self._progress(navigation))
         sequence, picks = options.sequence, list[int | None]()
         for robot in range(len(agents)):

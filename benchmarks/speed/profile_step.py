@@ -118,7 +118,7 @@ class StepParts:
         team = DrivenTeam(floor, ROBOTS, scales=ExplorationSettings().egocentric_scales)
         for _ in range(WARM_STEPS):
             team.step()
-        simulation, lidar = team.simulation, team.simulation.lidar
+        simulation, lidar = team.simulation, team.simulation.lidars[0]
         beams, reach = lidar.beams, lidar.range_max / floor.resolution
         poses, velocities, commands = (simulation.world.poses.copy(), simulation.world.velocities.copy(), team.commands)
         places = poses / [floor.resolution, floor.resolution, 1.0]

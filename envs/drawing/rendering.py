@@ -199,9 +199,9 @@ def classify(
 
 
 def _draw_fans(frame: Frame, scene: Scene, view: View, colours: list[Colour]) -> None:
-    lidar, ranges = scene.settings.lidar, scene.simulation.ranges[scene.rows]
+    ranges = scene.simulation.ranges[scene.rows]
     tinted = frame.copy()
-    for robot, colour in enumerate(colours):
+    for robot, (lidar, colour) in enumerate(zip(scene.settings.team_lidars, colours, strict=True)):
         x, y, theta = scene.poses[robot]
         # No return is drawn to the greatest range, an invalid beam not at all.
         lengths = np.clip(

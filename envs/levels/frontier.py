@@ -74,7 +74,7 @@ class FrontierOffers:
             settings.least_frontier,
             round(offers * settings.frontiers_by_size),
             ray_directions(),
-            round(settings.lidar.range_max / resolution),
+            np.array([round(lidar.range_max / resolution) for lidar in settings.team_lidars], np.int64),
         )
         is_gain_observed = GAINS in settings.observe
         self.offers = Offers(

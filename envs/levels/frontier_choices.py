@@ -215,8 +215,8 @@ class ViewReach(NamedTuple):
         Number of offers for the longest frontiers, the others are the cheapest.
     rays : (rays, 2) float64
         Directions by which gains are measured.
-    range_cells : int
-        Range at which robots see [cells].
+    range_cells : (robots,) int64
+        Range at which each robot sees [cells].
     """
 
     spans: NDArray[np.int64]
@@ -225,7 +225,7 @@ class ViewReach(NamedTuple):
     least_size: float
     by_size: int
     rays: NDArray[np.float64]
-    range_cells: int
+    range_cells: NDArray[np.int64]
 
 
 class Renewal(NamedTuple):
@@ -331,7 +331,8 @@ def _offer(
         )
         mask[i] = 1
         if offers.gains.size > 0:
-            gain = expected_gain(log_odds, places[k, 0], places[k, 1], view.rays, view.range_cells)
+            reach = view.range_cells[row % planning.robots]
+            gain = expected_gain(log_odds, places[k, 0], places[k, 1], view.rays, reach)
             offers.gains[row, i] = min(gain * resolution * resolution, MOST_GAIN)
     offers.counts[row] = count
 

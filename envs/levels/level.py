@@ -113,7 +113,7 @@ class Level(ABC):
         self.steps = 1
         self.drives = no_drives(1)
         self.following = Following(
-            settings.lidar.unit_vectors,
+            settings.lidar.unit_vectors[None],
             np.zeros(1),
             np.zeros(4),
             False,

@@ -11,6 +11,7 @@ from lidarium.envs.simulation.kernels.arrays import (
     MAP,
     MAP_COLUMNS,
     MAP_ROWS,
+    RANGE_MAX,
     TOUCHED,
     TOUCHED_ROWS,
     WorldArrays,
@@ -51,8 +52,8 @@ class _Sources(NamedTuple):
         Origin of each robot's map frame, and its goal, in the frame of its believed pose [m].
     pools : (rows, scales * 3) int64
         Address, rows and columns of each robot's pooled maps.
-    limits : (4,) float64
-        Resolution of the maps [m], and limits of ranges [m], speeds [m/s] and turn rates [rad/s].
+    limits : (3,) float64
+        Resolution of the maps [m], and limits of speeds [m/s] and turn rates [rad/s].
     scales : (scales,) int64
         Scales of the pooled maps [cells].
     """
@@ -65,7 +66,7 @@ class _Sources(NamedTuple):
     scales: Annotated[Array, np.int64, 1]
 
 
-RESOLUTION, LONGEST_RANGE, TOP_SPEED, TOP_TURN_RATE = range(4)
+RESOLUTION, TOP_SPEED, TOP_TURN_RATE = range(3)
 """Places in ``_Sources.limits``."""
 
 
@@ -112,10 +113,11 @@ def write_row(row: int, sources: Array, observed: Arrays) -> None:
     ranges, believed, velocities, bumpers = world.ranges, world.believed, world.measured, world.bumpers
     scans, poses, motions, presses = observed[SCAN], observed[POSE], observed[VELOCITY], observed[BUMPER]
     maps, egocentric_maps, observed_goals = observed[LEVELS], observed[EGOCENTRIC_LEVELS], observed[GOAL]
-    range_max, max_speed, max_turn_rate = limits[LONGEST_RANGE], limits[TOP_SPEED], limits[TOP_TURN_RATE]
+    max_speed, max_turn_rate = limits[TOP_SPEED], limits[TOP_TURN_RATE]
     farthest = np.float32(FARTHEST)
     if scans.size > 0:
-        no_return, longest = np.float32(range_max), np.float32(range_max - RANGE_GAP)
+        no_return = np.float32(world.sensor[row % world.sensor.shape[0], RANGE_MAX])
+        longest = np.float32(np.float64(no_return) - RANGE_GAP)
         for beam in range(ranges.shape[1]):
             value = ranges[row, beam]
             hit = min(value, longest)

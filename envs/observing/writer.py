@@ -76,7 +76,7 @@ class ObservationWriter:
         self._absent = [np.empty((0,) * len(kinds[name][0]), kinds[name][1]) for name in absent]
         self._in_order = itemgetter(*((*self.keys, *absent).index(name) for name in KEYS))
         # The space's bounds are float32, and so are those to which values are clipped.
-        limits = [float(np.float32(limit)) for limit in (settings.lidar.range_max, *settings.speed_limits.max(axis=0))]
+        limits = [float(np.float32(limit)) for limit in settings.speed_limits.max(axis=0)]
         self._simulation = simulation
         self._arrays = (
             offsets,

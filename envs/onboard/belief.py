@@ -61,7 +61,8 @@ class Belief:
     @property
     def lidar(self) -> Lidar:
         """The own laser."""
-        return self._perception.settings.lidar
+        lidars = self._perception.settings.team_lidars
+        return lidars[self._row % len(lidars)]
 
     @property
     def map(self) -> NavigationMap:

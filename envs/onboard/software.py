@@ -52,9 +52,9 @@ class Software:
         """
         robots = self._settings.robots
         if self._localizes:
-            for robot in range(robots):
+            for robot, lidar in enumerate(self._settings.team_lidars):
                 row = episode * robots + robot
-                localizer = make_localizer(self._settings.localization, self._settings.lidar, self._settings.localizer)
+                localizer = make_localizer(self._settings.localization, lidar, self._settings.localizer)
                 draws = np.random.default_rng([seed, LOCALIZER_STREAM, robot])
                 localizer.reset(self._perception.beliefs.believed[row].copy(), int(draws.integers(2**63)))
                 self._perception.poses.localizers[row] = localizer

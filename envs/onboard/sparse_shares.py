@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.mapping.geometry.rigid import Transform
-from lidarium.mapping.sparse.rigid_motions import moved_boxes
+from lidarium.mapping.geometry.rigid_motions import moved_boxes
 
 BOX_BYTES, NODE_BYTES, NUMBER_BYTES = 24, 12, 4
 """A box and a node as float32, and the number of one that is gone."""

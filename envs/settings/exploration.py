@@ -3,7 +3,7 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, is_dataclass
-from typing import Annotated, Any, get_args, get_type_hints
+from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,7 @@ from lidarium.envs.settings.battery import BATTERIES, Battery
 from lidarium.envs.settings.cameras import CAMERAS as CAMERAS
 from lidarium.envs.settings.cameras import DepthCamera
 from lidarium.envs.settings.faults import NO_FAULTS, FaultSettings
-from lidarium.envs.settings.lidar import LIDARS, Lidar
+from lidarium.envs.settings.lidar import LIDARS, Lidar, by_robot, checked_lidars, envelope_of_lidars
 from lidarium.envs.settings.limits import OBSERVABLES as OBSERVABLES
 from lidarium.envs.settings.limits import check_workload, egocentric_scales_of, observed_names
 from lidarium.envs.settings.observables import check_sensed
@@ -106,7 +106,10 @@ class ExplorationSettings:
         Names of the robots of a mixed team, in order, from the front again if these are too few; empty
         if all are ``robot``.
     lidar : Lidar
-        The laser of each.
+        The laser of each; with ``lidars`` one with the longest range, the widest view and the most noise of them.
+    lidars : tuple of Lidar
+        The lasers of a team whose lasers differ, in order, from the front again if these are too few; empty if all
+        are ``lidar``. The numbers of beams and the heights must be equal.
     camera : DepthCamera or None
         The depth camera of each; None for none.
     occupancy : OccupancySettings
@@ -184,6 +187,7 @@ class ExplorationSettings:
     robot: Robot = field(default_factory=lambda: ROBOTS["kobuki"])
     kinds: tuple[str, ...] = ()
     lidar: Lidar = field(default_factory=lambda: LIDARS["urg"])
+    lidars: tuple[Lidar, ...] = ()
     camera: DepthCamera | None = None
     occupancy: Annotated[OccupancySettings, OCCUPANCY] = field(default_factory=OccupancySettings)
     sparse_map: SparseMapSettings = field(default_factory=SparseMapSettings)
@@ -231,6 +235,10 @@ class ExplorationSettings:
         object.__setattr__(self, "kinds", kinds_of(self.kinds))
         if self.kinds:
             object.__setattr__(self, "robot", envelope_of(self.team))
+        lidars = checked_lidars(self.lidars)
+        if lidars:
+            object.__setattr__(self, "lidar", envelope_of_lidars(by_robot(lidars, self.robots)))
+        object.__setattr__(self, "lidars", lidars if len(set(lidars)) > 1 else ())
         if self.localization not in _localizations():
             raise ValueError(f"localization is {self.localization!r}; want one of {', '.join(_localizations())}")
         if self.starts is not None and self.starts not in STARTS:
@@ -303,6 +311,11 @@ class ExplorationSettings:
         return [ROBOTS[self.kinds[k % len(self.kinds)]] for k in range(self.robots)]
 
     @property
+    def team_lidars(self) -> list[Lidar]:
+        """The laser of each robot."""
+        return by_robot(self.lidars or self.lidar, self.robots)
+
+    @property
     def speed_limits(self) -> NDArray[np.float64]:
         """Greatest speed and turn rate of each robot, (robots, 2) [m/s, rad/s]."""
         return np.array([(robot.max_speed, robot.max_turn_rate) for robot in self.team])
@@ -323,7 +336,10 @@ class ExplorationSettings:
         return max(round(self.decision_period_s / self.time_step), 1)
 
 
-_KINDS = {name: (kind, *get_args(kind)) for name, kind in get_type_hints(ExplorationSettings).items()}
+_KINDS = {
+    name: (kind, *get_args(kind)) if get_origin(kind) is not tuple else (kind,)
+    for name, kind in get_type_hints(ExplorationSettings).items()
+}
 
 PARTS: dict[str, type] = {
     name: kind for name, kinds in _KINDS.items() for kind in kinds if isinstance(kind, type) and is_dataclass(kind)

@@ -1,10 +1,11 @@
 """Planar laser range finders, with the noise of their ranges."""
 
 import math
-from dataclasses import dataclass
-from typing import Annotated
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Annotated, Any
 
-from lidarium.mapping.geometry.bounds import Distance, above, check_settings, within
+from lidarium.mapping.geometry.bounds import Distance, above, check_settings, shown, within
 from lidarium.mapping.grids.scan_geometry import MAX_BEAMS, ScanGeometry
 from lidarium.registry import Registry
 
@@ -64,3 +65,34 @@ NOISE: Registry[tuple[float, float]] = Registry("noise")
 NOISE.register("none", (0.0, 0.0), "exact ranges")
 NOISE.register("datasheet", (0.01, 0.01), "0.01 m or 1 % of the range, the larger, as in the data sheet")
 NOISE.register("thesis", (0.03, 0.0), "0.03 m, as in the theses")
+
+
+def by_robot(lidar: Lidar | Sequence[Lidar], robots: int) -> list[Lidar]:
+    """Return the laser of each robot: those of a sequence in order, from the front again if these are too few."""
+    lidars = [lidar] if isinstance(lidar, Lidar) else lidar
+    return [lidars[k % len(lidars)] for k in range(robots)]
+
+
+def checked_lidars(lidars: Any) -> tuple[Lidar, ...]:  # noqa: ANN401
+    """Return the lasers of a team as a tuple, checked."""
+    wanted = f"want Lidar or its name ({', '.join(LIDARS)}) for each robot, in a list"
+    if not isinstance(lidars, list | tuple):
+        raise ValueError(f"lidars is {shown(lidars)}; {wanted}")
+    for each in lidars:
+        if not isinstance(each, Lidar):
+            raise ValueError(f"lidars has {shown(each)}; {wanted}")
+    for name in ("beams", "height"):
+        values = [getattr(each, name) for each in lidars]
+        if len(set(values)) > 1:
+            raise ValueError(
+                f"{name} of the lidars is {shown(values)}; want the same for all robots of a team: their lidars may "
+                "differ in field_of_view, range_min, range_max, noise_floor and noise_share"
+            )
+    return tuple(lidars)
+
+
+def envelope_of_lidars(lidars: Sequence[Lidar]) -> Lidar:
+    """Return a laser with the longest range, the widest view and the most noise of a team's."""
+    largest = ("field_of_view", "range_max", "noise_floor", "noise_share")
+    bounds = {name: max(getattr(each, name) for each in lidars) for name in largest}
+    return replace(lidars[0], range_min=min(each.range_min for each in lidars), **bounds)

@@ -14,7 +14,7 @@ from lidarium.envs.settings.exploration import (
     with_parts,
 )
 from lidarium.envs.settings.faults import NO_FAULTS, FaultSettings
-from lidarium.envs.settings.lidar import NOISE, Lidar
+from lidarium.envs.settings.lidar import NOISE, Lidar, checked_lidars
 from lidarium.envs.settings.limits import LEARNERS_SEE
 from lidarium.envs.settings.radio import RadioSettings
 from lidarium.mapping.geometry.bounds import Rule, check_values, rules_of, shown, within
@@ -76,6 +76,7 @@ def make_settings(settings: ExplorationSettings | None = None, **options: Any) -
     **options
         Any attribute of `ExplorationSettings`; a part such as ``robot`` or ``reward`` also as a mapping of
         its values, and ``robot``, ``lidar``, ``camera``, ``odometry``, ``radio`` and ``battery`` by name.
+        A list as ``lidar`` has the laser of each robot.
         ``noise`` ("none", "datasheet" or "thesis") sets the noise of the laser, ``resolution`` the cell of
         the maps [m], ``max_cycles`` the horizon in steps instead of ``horizon_s``. ``realism`` ("ideal",
         "lab" or "field") sets noise, odometry, localization, radio and faults unless they are given.
@@ -103,12 +104,7 @@ def make_settings(settings: ExplorationSettings | None = None, **options: Any) -
     if realism is not None:
         options = {**REALISM[realism], **options}
     options = {name: _part(name, value) for name, value in options.items()}
-    lidar = options.pop("lidar", base.lidar)
-    noise = options.pop("noise", None)
-    if noise is not None and isinstance(lidar, Lidar):
-        noise_floor, noise_share = NOISE[noise]
-        lidar = replace(lidar, noise_floor=noise_floor, noise_share=noise_share)
-    options["lidar"] = lidar
+    options |= _lasers(options, base)
     resolution = options.pop("resolution", None)
     if resolution is not None:
         check_values({"resolution": resolution}, OCCUPANCY.bounds, "the maps")
@@ -153,6 +149,23 @@ def _horizon(max_cycles: Any, options: Mapping[str, Any], base: ExplorationSetti
     return float(max_cycles * time_step)
 
 
+def _lasers(options: dict[str, Any], base: ExplorationSettings) -> dict[str, Any]:
+    """Take ``lidar``, ``lidars`` and ``noise`` out of the options, and return the settings that they make."""
+    lidars = options.pop("lidars", () if "lidar" in options else base.lidars)
+    lidar, noise = options.pop("lidar", base.lidar), options.pop("noise", None)
+    if isinstance(lidar, list | tuple) and lidar:
+        lidar, lidars = base.lidar, lidar
+    is_list = isinstance(lidars, list | tuple)
+    lidars = checked_lidars([_part("lidar", each) for each in lidars] if is_list else lidars)
+    if noise is not None:
+        noise_floor, noise_share = NOISE[noise]
+        lidar, *lidars = (
+            replace(each, noise_floor=noise_floor, noise_share=noise_share) if isinstance(each, Lidar) else each
+            for each in (lidar, *lidars)
+        )
+    return {"lidar": lidar, "lidars": lidars}
+
+
 def _part(name: str, value: Any) -> Any:  # noqa: ANN401
     """Return the value of an option, if it is a part by its name or by its values."""
     if name in PARTS and isinstance(value, Mapping):
@@ -191,6 +204,9 @@ def _replaced(part: Any, path: list[str], value: Any, name: str) -> Any:  # noqa
     if path[0] not in known:
         said = unknown("setting", path[0], known, MOST_LISTED)
         raise ValueError(f"{name!r} is no setting: {said}")
+    if isinstance(part, ExplorationSettings) and path[0] == "lidar" and len(path) > 1 and part.lidars:
+        # The laser of each robot: the one of the team is made from them.
+        return make_settings(part, lidar=[_replaced(each, path[1:], value, name) for each in part.lidars])
     if len(path) > 1:
         value = _replaced(getattr(part, path[0]), path[1:], value, name)
     elif isinstance(part, OccupancySettings):

@@ -18,7 +18,7 @@ def kinematic_world(settings: ExplorationSettings, episodes: int = 1) -> Kinemat
     """Return the kinematic world of that many episodes."""
     return KinematicWorld(
         settings.team,
-        settings.lidar,
+        settings.team_lidars,
         settings.time_step,
         episodes,
         settings.odometry,
@@ -32,7 +32,7 @@ def simulation_of(world: World, settings: ExplorationSettings, kind: type[Simula
     """Return the simulation of a world, with the beliefs and the score that settings ask for."""
     simulation = kind(
         world,
-        settings.lidar,
+        settings.team_lidars,
         settings.occupancy,
         settings.time_step,
         settings.threads,

@@ -27,7 +27,7 @@ class KinematicSimulation(Simulation):
     def of_team(
         cls,
         robots: Sequence[Robot],
-        lidar: Lidar,
+        lidar: Lidar | Sequence[Lidar],
         occupancy: OccupancySettings,
         time_step: float = 0.1,
         episodes: int = 1,

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from lidarium.envs.settings.faults import NO_FAULTS, FaultSettings
-from lidarium.envs.settings.lidar import Lidar
+from lidarium.envs.settings.lidar import Lidar, by_robot
 from lidarium.envs.settings.odometry import ODOMETRY, OdometrySettings
 from lidarium.envs.settings.robots import Robot
 from lidarium.envs.simulation.disturbances.faults import FAULT_NUMBERS, plan_faults
@@ -26,8 +26,8 @@ class KinematicWorld:
     ----------
     robots : sequence of Robot
         The team of every episode.
-    lidar : Lidar
-        The laser of every robot.
+    lidar : Lidar or sequence of Lidar
+        The laser of every robot, or of each in order; see ``by_robot``.
     time_step : float
         Length of a step [s].
     episodes : int
@@ -45,7 +45,7 @@ class KinematicWorld:
     def __init__(
         self,
         robots: Sequence[Robot],
-        lidar: Lidar,
+        lidar: Lidar | Sequence[Lidar],
         time_step: float = 0.1,
         episodes: int = 1,
         odometry: OdometrySettings = ODOMETRY["ideal"],
@@ -53,7 +53,8 @@ class KinematicWorld:
         faults: FaultSettings = NO_FAULTS,
         horizon_s: float | None = None,
     ) -> None:
-        self.robots, self.episodes, self.lidar, self.time_step = len(robots), episodes, lidar, time_step
+        self.robots, self.episodes, self.time_step = len(robots), episodes, time_step
+        self.lidars = by_robot(lidar, self.robots)
         self._odometry, self._faults, self._horizon_s = odometry, faults, horizon_s
         self.bodies = np.stack([robot.numbers for robot in robots])
         rows = self.robots * episodes
@@ -69,8 +70,8 @@ class KinematicWorld:
         self.failed, self.faults = np.zeros(rows, np.uint8), np.zeros((rows, faults.capacity * FAULT_NUMBERS))
         self.bumpers, self.contacts = np.zeros((rows, 3), np.int8), np.zeros(rows, np.uint8)
         self.travelled, self.collisions = np.zeros(rows), np.zeros(rows, np.int64)
-        self.ranges = np.full((rows, lidar.beams), np.inf, np.float32)
-        self.true_ranges = np.full((rows, lidar.beams), np.inf, np.float32)
+        self.ranges = np.full((rows, self.lidars[0].beams), np.inf, np.float32)
+        self.true_ranges = np.full((rows, self.lidars[0].beams), np.inf, np.float32)
         is_plain = odometry.is_ideal and not has_odometry
         self.odometry_model = np.zeros(0) if is_plain else odometry.numbers
         self.wheels, self.odometry, self.driven = (
@@ -80,8 +81,8 @@ class KinematicWorld:
         )
         # Wheels that measure exactly measure the true velocities.
         self.measured = self.velocities if is_plain else np.zeros((rows, 2))
-        self.noise_table, self.unit_vectors = GAUSSIAN_TABLE, lidar.unit_vectors
-        self.sensor = sensor_numbers(lidar, time_step, 1.0)
+        self.noise_table, self.sensor = GAUSSIAN_TABLE, sensor_numbers(self.lidars, time_step, 1.0)
+        self.unit_vectors = np.concatenate([each.unit_vectors for each in self.lidars])
         self._everywhere = np.ones(episodes, np.bool_)
         self._table = table_of_owners(self)
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from lidarium.envs.floors.free_space import reachable_free_space
 from lidarium.envs.settings.cameras import DepthCamera
-from lidarium.envs.settings.lidar import Lidar
+from lidarium.envs.settings.lidar import Lidar, by_robot
 from lidarium.envs.simulation.backend import World
 from lidarium.envs.simulation.beliefs import Beliefs
 from lidarium.envs.simulation.depth.depth_sensor import DepthSensor
@@ -79,8 +79,8 @@ class Simulation:
     ----------
     world : World
         Moves the bodies and senses.
-    lidar : Lidar
-        The laser of every robot.
+    lidar : Lidar or sequence of Lidar
+        The laser of every robot, or of each in order; see ``by_robot``.
     occupancy : OccupancySettings
         Resolution and sensor model of the maps; its cell must be a whole multiple of the floors' raster cell.
     time_step : float
@@ -109,7 +109,7 @@ class Simulation:
     def __init__(
         self,
         world: World,
-        lidar: Lidar,
+        lidar: Lidar | Sequence[Lidar],
         occupancy: OccupancySettings,
         time_step: float = 0.1,
         threads: int = 1,
@@ -122,11 +122,12 @@ class Simulation:
         rows, is_true = self.robots * self.episodes, localization == "truth"
         self.beliefs = Beliefs(rows, self.robots, occupancy, scales, is_true)
         self.score = Score(self.robots, self.episodes, reward_weights)
-        self.lidar, self.occupancy, self.time_step = lidar, occupancy, time_step
+        self.lidars, self.occupancy, self.time_step = by_robot(lidar, self.robots), occupancy, time_step
         self._flags = {"truth": TRUE_POSE, "odometry": DEAD_RECKONING}.get(localization, 0)
         self._teammate_flag = KNOWN_TEAMMATES if pose_sources.knows_teammates else SOME_TEAMMATES
-        self.sensor = sensor_numbers(lidar, time_step, occupancy.resolution)
-        self.unit_vectors, self.noise_table = lidar.unit_vectors, GAUSSIAN_TABLE
+        self.sensor = sensor_numbers(self.lidars, time_step, occupancy.resolution)
+        self.unit_vectors = np.concatenate([each.unit_vectors for each in self.lidars])
+        self.noise_table = GAUSSIAN_TABLE
         sensors = world.sensors
         self.ranges, self.odometry = sensors["scan"], sensors["odometry"]
         self.measured, self.bumpers = sensors["velocity"], sensors["bumper"]

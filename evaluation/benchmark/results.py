@@ -116,10 +116,10 @@ def collect(
     for task in tasks:
         path = folder / task.name
         own = list(read_episodes(path).rows) if (path / EPISODES_FILE).is_file() else []
-        own = [row for row in own if row["floor"] in task.floors_of(size)]
+        own = [row for row in own if _floor_of(row) in task.floors_of(size)]
         rows, wrong = _as_frozen(task, own)
         remarks += wrong
-        theirs = [row for row in shipped.get(task.name, ()) if row["floor"] in task.floors_of(size)]
+        theirs = [row for row in shipped.get(task.name, ()) if _floor_of(row) in task.floors_of(size)]
         mine = {row["policy"] for row in rows}
         standings += _standings(task, size, rows, [row for row in theirs if row["policy"] not in mine])
         everything += [*rows, *(row for row in theirs if row["policy"] not in mine)]
@@ -147,14 +147,14 @@ def _as_frozen(task: BenchmarkTask, rows: Sequence[Row]) -> tuple[list[Row], lis
     kept: list[Row] = []
     wrong: dict[tuple[str, str], list[str]] = {}
     for row in rows:
-        floor, starts = frozen[row["floor"]]
+        floor, starts = frozen[_floor_of(row)]
         for what, now, before in (
             ("settings", row["settings_sha256"][:16], task.hashes.settings),
             ("floor", row["floor_sha256"][:16], floor),
             ("starts", starts_hash(row["starts"]), starts),
         ):
             if now != before:
-                why = f"{row['floor']} ({now}, in the benchmark {before})"
+                why = f"{_floor_of(row)} ({now}, in the benchmark {before})"
                 wrong.setdefault((row["policy"], what), []).append(why)
                 break
         else:
@@ -197,7 +197,12 @@ def _standings(task: BenchmarkTask, size: Size, own: Sequence[Row], theirs: Sequ
 
 def _times(rows: Iterable[Row], horizon_s: float) -> dict[str, float]:
     """Return the time to 99 % on each floor, the horizon if it was not reached."""
-    return {row["floor"]: horizon_s if row[_REACHED] is None else row[_REACHED] for row in rows}
+    return {_floor_of(row): horizon_s if row[_REACHED] is None else row[_REACHED] for row in rows}
+
+
+def _floor_of(row: Row) -> str:
+    """Return the floor by the name that was asked for; ``building:17`` calls itself by its kind."""
+    return str(row[KEY].split(" | ")[1])
 
 
 def _overall(standings: Sequence[Standing]) -> dict[str, tuple[float, int]]:

@@ -35,13 +35,14 @@ from lidarium.mapping.kernels.views import grid_at
 @kernel
 def _is_any_pair_near(world: WorldArrays, first: int, robots: int) -> bool:
     """Whether the footprints of two robots at work may meet."""
-    reach = 2.0 * world.sensor[RANGE_MAX] + 4.0 * world.sensor[MAP_RESOLUTION]
     for row in range(first, first + robots):
         for other in range(row + 1, first + robots):
             gap_x, gap_y = (
                 world.poses[row, 0] - world.poses[other, 0],
                 world.poses[row, 1] - world.poses[other, 1],
             )
+            ranges = world.sensor[row - first, RANGE_MAX] + world.sensor[other - first, RANGE_MAX]
+            reach = ranges + 4.0 * world.sensor[0, MAP_RESOLUTION]
             if not (world.flags[row] | world.flags[other]) & ENDED and gap_x * gap_x + gap_y * gap_y < reach * reach:
                 return True
     return False

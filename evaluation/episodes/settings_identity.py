@@ -25,6 +25,7 @@ def realism_of(settings: ExplorationSettings) -> str:
 
 LATER = (
     "kinds",
+    "lidars",
     "localizer",
     "camera",
     "starts",

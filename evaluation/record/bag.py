@@ -78,14 +78,13 @@ class _BagRecorder(Watcher):
         is_true = env.settings.odometry.is_ideal and env.settings.localization == "truth"
         reckoned = relative(self._starts, poses) if is_true else env.simulation.odometry
         odom_on_map = composed(poses, relative(reckoned, np.zeros_like(poses)))
+        lidars = env.settings.team_lidars
         for row, robot in enumerate(env.possible_agents):
             odom, base = f"{robot}/odom", f"{robot}/base_link"
             self._writer.transform(MAP_FRAME, odom, time_s, odom_on_map[row])
             self._writer.transform(odom, base, time_s, reckoned[row])
             self._writer.odometry(f"/{robot}/odom", odom, base, time_s, reckoned[row])
-            self._writer.scan(
-                f"/{robot}/scan", f"{robot}/laser", time_s, env.simulation.ranges[row], env.settings.lidar
-            )
+            self._writer.scan(f"/{robot}/scan", f"{robot}/laser", time_s, env.simulation.ranges[row], lidars[row])
         if _is_due(env, steps, PATH_STEP_S):
             self._times.append(time_s)
             self._poses.append(poses.copy())

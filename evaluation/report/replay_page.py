@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from lidarium.envs.drawing.frame_parts import team_colours
 from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.floors.floor import Floor
+from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.evaluation.drawing.record_frames import radius_of
 from lidarium.evaluation.episodes.watching import Watcher
 from lidarium.evaluation.record.episode_record import EpisodeRecord
@@ -95,7 +96,7 @@ class ReplaySampler(Watcher):
         self._renderings = env.beliefs.renderings.copy()
         self._steps_of_map = max(round(self._map_period / settings.time_step), 1)
         self._steps_of_scan = max(round(self._scan_period / settings.time_step), 1)
-        self._stride = -(-settings.lidar.beams // MOST_BEAMS)
+        self._choose_beams(settings)
         self._last = self._places(env)
         self._sample_maps(env, is_whole=True)
         self._sample_scans(env)
@@ -117,10 +118,20 @@ class ReplaySampler(Watcher):
         """Return the angles of the sampled beams against the heading [rad]."""
         return [round(float(angle), 5) for angle in env.settings.lidar.angles[:: self._stride]]
 
+    def _choose_beams(self, settings: ExplorationSettings) -> None:
+        """Choose the beam of each robot that is sampled at each angle of the page; some views may not reach it."""
+        self._stride = -(-settings.lidar.beams // MOST_BEAMS)
+        angles = settings.lidar.angles[:: self._stride]
+        lidars = settings.team_lidars
+        nearest = np.stack([np.rint((angles - lidar.angle_first) / lidar.angle_increment) for lidar in lidars])
+        self._is_in_view = (nearest >= 0) & (nearest < settings.lidar.beams)
+        self._nearest = np.where(self._is_in_view, nearest, 0).astype(np.int64)
+
     def _sample_scans(self, env: ExplorationEnv) -> None:
         samples = self.samples
         samples.scan_times.append(int(env.world.steps[0]) * env.settings.time_step)
-        samples.scans.append(np.array(env.simulation.ranges[:, :: self._stride], np.float32))
+        ranges = np.take_along_axis(env.simulation.ranges, self._nearest, axis=1)
+        samples.scans.append(np.where(self._is_in_view, ranges, np.float32(np.inf)))
         if env.settings.localization != "truth":
             samples.believed.append(believed_on_floor(env))
 

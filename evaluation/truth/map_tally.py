@@ -73,7 +73,7 @@ class Team(NamedTuple):
 @kernel
 def cells_beyond(world: WorldArrays, row: int, episode: int) -> tuple[int, int]:
     """Rows and columns by which a map on the floor's lattice begins before the masks."""
-    frame, origin, resolution = world.frames[episode], world.origins[row], world.sensor[MAP_RESOLUTION]
+    frame, origin, resolution = world.frames[episode], world.origins[row], world.sensor[0, MAP_RESOLUTION]
     return int(round((frame[1] - origin[1]) / resolution)), int(round((frame[0] - origin[0]) / resolution))
 
 
@@ -161,7 +161,7 @@ def _box(
     """
     row, episode = team.first + robot, team.first // team.robots
     pose, change = last.poses[robot], last.changes[robot]
-    resolution, frame = world.sensor[MAP_RESOLUTION], world.frames[episode]
+    resolution, frame = world.sensor[0, MAP_RESOLUTION], world.frames[episode]
     first_row, first_column = cells_beyond(world, row, episode)
     if not world.flags[row] & TRUE_POSE:
         # A robot with a wrong believed pose may map cells that are far away.
@@ -171,7 +171,7 @@ def _box(
             max(change[2] - first_column, 0) >> 6,
             min((change[3] - first_column + 63) >> 6, shape[1]),
         )
-    reach = (world.sensor[RANGE_MAX] + world.travelled[row] - last.travelled[robot]) / resolution + SLACK
+    reach = (world.sensor[robot, RANGE_MAX] + world.travelled[row] - last.travelled[robot]) / resolution + SLACK
     x, y = (pose[0] - frame[0]) / resolution, (pose[1] - frame[1]) / resolution
     row_low, row_high = max(int(math.floor(y - reach)), 0), min(int(math.ceil(y + reach)), shape[0])
     column_low, column_high = (
@@ -229,7 +229,7 @@ def _count_turned(world: WorldArrays, team: Team, robot: int, maps: CountedMaps,
         world.origins[row],
         world.frames[team.first // team.robots],
     )
-    resolution = world.sensor[MAP_RESOLUTION]
+    resolution = world.sensor[0, MAP_RESOLUTION]
     cosine, sine = math.cos(start[2]), math.sin(start[2])
     for line in range(max(change[0], 0), min(change[1], belief[1])):
         for word in range(max(change[2], 0) >> 6, (min(change[3], belief[2]) + 63) >> 6):

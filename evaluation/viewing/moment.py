@@ -146,7 +146,7 @@ def _trails(env: ExplorationEnv) -> NDArray[np.float64]:
 
 def _scan(env: ExplorationEnv, row: int) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
     """Return the end points of a robot's beams on it, (beams, 3), and which beams met something."""
-    lidar = env.settings.lidar
+    lidar = env.settings.team_lidars[row]
     stride = -(-lidar.beams // MOST_BEAMS)
     ranges = env.simulation.ranges[row, ::stride].astype(np.float64)
     is_hit = np.isfinite(ranges) & (ranges < lidar.range_max)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from lidarium.mapping.sparse.rigid_motions import inverse_of
+from lidarium.mapping.geometry.rigid_motions import inverse_of
 
 FRAMES = 12
 """Frames that others are compared with, at most: they spread over the sequence."""

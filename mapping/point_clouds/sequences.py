@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.mapping.files.guarded_reading import MAX_FILE_BYTES, read_text, reading
+from lidarium.mapping.geometry.rigid_motions import inverse_of
 from lidarium.mapping.point_clouds.cameras import TUM_UNITS
 from lidarium.mapping.point_clouds.columns import text_columns
-from lidarium.mapping.sparse.rigid_motions import inverse_of
 
 DEPTHS, TRUTH = "depth.txt", "groundtruth.txt"
 SCANS, POSES, CALIBRATION = "velodyne", "poses.txt", "calib.txt"

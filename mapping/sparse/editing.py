@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from lidarium.mapping.geometry.rigid_motions import checked_poses
 from lidarium.mapping.sparse.mapper.merging import are_near, merged_codes
-from lidarium.mapping.sparse.rigid_motions import checked_poses
 from lidarium.mapping.sparse.seen_floor import SeenFloor
 from lidarium.mapping.sparse.sparse_map import FreeCodes, OccupiedCodes, SparseMap, occupied_codes
 

@@ -13,8 +13,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from lidarium.mapping.geometry.rigid_motions import checked_poses, inverse_of, moved_boxes, moved_points, turned
 from lidarium.mapping.sparse.floor_plane import FloorPlane
-from lidarium.mapping.sparse.rigid_motions import checked_poses, inverse_of, moved_boxes, moved_points, turned
 from lidarium.mapping.sparse.seen_floor import SeenFloor
 from lidarium.mapping.sparse.settings import MapperSettings
 

@@ -141,9 +141,9 @@ def _frames_of(command: _SparseMapping, told: _Told) -> "Sequence":
     """Return the files of a command and their poses."""
     import numpy as np
 
+    from lidarium.mapping.geometry.rigid_motions import inverse_of
     from lidarium.mapping.point_clouds.cameras import read_pose
     from lidarium.mapping.point_clouds.sequences import Sequence, read_sequence
-    from lidarium.mapping.sparse.rigid_motions import inverse_of
 
     if command.clouds[0].is_dir():
         if len(command.clouds) > 1 or command.poses:
@@ -162,11 +162,11 @@ def _frames_of(command: _SparseMapping, told: _Told) -> "Sequence":
 
 def _mapped(command: _SparseMapping, frames: "Sequence", told: _Told) -> "tuple[SparseMap, int]":
     """Return the map of a command's clouds, and how many points they have."""
+    from lidarium.mapping.geometry.rigid_motions import moved_points
     from lidarium.mapping.sparse.mapper.fitting import SeenPoints, unlike_points
     from lidarium.mapping.sparse.mapper.frame_coding import usable_points
     from lidarium.mapping.sparse.mapper.full import map_cloud
     from lidarium.mapping.sparse.mapper.incremental import IncrementalMapper
-    from lidarium.mapping.sparse.rigid_motions import moved_points
 
     settings, total, used = _settings(command), 0, 0
     cells = SeenPoints()
@@ -223,10 +223,10 @@ def _clouds(
     """Yield the points of each cloud and its pose in the map, whose origin is near the first cloud."""
     import numpy as np
 
+    from lidarium.mapping.geometry.rigid_motions import inverse_of
     from lidarium.mapping.point_clouds.agreement import FrameAgreement
     from lidarium.mapping.point_clouds.cloud_files import FAR, read_cloud
     from lidarium.mapping.sparse.floor_plane import find_floor
-    from lidarium.mapping.sparse.rigid_motions import inverse_of
 
     x, y, z = numbers_of("--up", command.up, (3,))
     levelling: NDArray[np.float64] | None = None

@@ -92,7 +92,7 @@ def known_floor(env: ExplorationEnv) -> KnownFloor:
         tables.body,
         tables.laser,
         settings.robot.radius,
-        settings.lidar.range_max,
+        min(lidar.range_max for lidar in settings.team_lidars),
         starts,
         (side, sample),
     )

@@ -105,7 +105,7 @@ def measure(effort: Effort) -> list[Line]:
     for _ in range(30):
         team.step()
     simulation, floor = team.simulation, straight_floor()
-    lidar, settings = simulation.lidar, OccupancySettings(resolution=floor.resolution)
+    lidar, settings = simulation.lidars[0], OccupancySettings(resolution=floor.resolution)
     scans: list[tuple[float, float, NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]] = []
     for pose, ranges in zip(simulation.world.poses, simulation.ranges.astype(np.float64), strict=True):
         cosine, sine = np.cos(pose[2]), np.sin(pose[2])

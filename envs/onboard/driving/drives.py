@@ -84,8 +84,8 @@ class Following(NamedTuple):
 
     Attributes
     ----------
-    unit_vectors : (2, beams) float64
-        Directions of the beams.
+    unit_vectors : (robots, 2, beams) float64
+        Directions of the beams of each robot.
     radii : (robots,) float64
         Radius of the bodies [m].
     limits : (4,) float64

@@ -64,8 +64,8 @@ class Bodies(NamedTuple):
 
     Attributes
     ----------
-    unit_vectors : (2, beams) float64
-        Directions of the beams.
+    unit_vectors : (robots, 2, beams) float64
+        Directions of the beams of each robot.
     radii : (robots,) float64
         Radius of the bodies [m].
     limits : (4,) float64
@@ -166,7 +166,7 @@ def safe_speed(sensed: Sensed, bodies: Bodies, robot: int) -> float:
     """
     braking, time_step = bodies.limits[BRAKING], bodies.limits[TIME_STEP]
     own, speed = bodies.radii[robot] + SIDE_GAP, sensed.velocities[robot, 0]
-    gap = _gap_in_scan(sensed.ranges[robot], bodies.unit_vectors, own)
+    gap = _gap_in_scan(sensed.ranges[robot], bodies.unit_vectors[robot], own)
     allowed = math.sqrt(2.0 * braking * max(gap - STANDSTILL - 0.5 * time_step * speed, 0.0))
     if bodies.knows_teammates:
         teammate_gap = _gap_to_teammates(robot, sensed.poses, sensed.velocities, bodies, bodies.present)

@@ -80,7 +80,7 @@ class TeamDriver:
             ]
         )
         self.following = Following(
-            settings.lidar.unit_vectors,
+            np.stack([lidar.unit_vectors for lidar in settings.team_lidars]),
             np.full(settings.robots, robot.radius),
             limits,
             perception.poses.knows_teammates,

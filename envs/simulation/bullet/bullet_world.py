@@ -75,7 +75,7 @@ class BulletWorld(KinematicWorld):
     def __init__(
         self,
         robots: Sequence[Robot],
-        lidar: Lidar,
+        lidar: Lidar | Sequence[Lidar],
         time_step: float = 0.1,
         episodes: int = 1,
         odometry: OdometrySettings = ODOMETRY["ideal"],
@@ -212,7 +212,7 @@ class BulletWorld(KinematicWorld):
         leaning &= np.repeat(chosen, self.robots) & (self.flags & ENDED == 0)
         for row in np.flatnonzero(leaning).tolist():
             episode, robot = divmod(row, self.robots)
-            scan_leaning(self._physics[episode], robot, self.lidar, self.true_ranges[row])
+            scan_leaning(self._physics[episode], robot, self.lidars[robot], self.true_ranges[row])
             disturb_scan(self._table, row, self.robots)
 
     def __getstate__(self) -> dict[str, Any]:

@@ -10,7 +10,7 @@ def make_bullet(settings: ExplorationSettings, episodes: int = 1) -> Simulation:
     """Return the simulation of a world of PyBullet."""
     world = BulletWorld(
         settings.team,
-        settings.lidar,
+        settings.team_lidars,
         settings.time_step,
         episodes,
         settings.odometry,

@@ -6,6 +6,7 @@ A kernel views the arrays if they lie. Arrays handed over as arguments would be 
 every use, by all threads in the same places of memory; views are not.
 """
 
+from collections.abc import Sequence
 from typing import Annotated, NamedTuple, get_args, get_type_hints
 
 import numpy as np
@@ -38,7 +39,7 @@ DEAD, BROKEN_PHYSICS = 1, 2
     MAP_RESOLUTION,
     TIME_STEP,
 ) = range(10)
-"""Places in ``sensor``."""
+"""Columns of ``sensor``."""
 
 (
     SQUARES,
@@ -71,10 +72,10 @@ class WorldArrays(NamedTuple):
     ----------
     bodies : (robots, 8) float64
         ``Robot.numbers`` of each robot of a team.
-    sensor : (10,) float64
-        Numbers of the laser, the maps and the step, see ``sensor_numbers``.
-    unit_vectors : (2, beams) float64
-        Directions of the beams against the heading.
+    sensor : (robots, 10) float64
+        Numbers of each robot's laser, the maps and the step, see ``sensor_numbers``.
+    unit_vectors : (2 * robots, beams) float64
+        Directions of the beams against the heading: cosines, then sines, of each robot; see ``beams_of``.
     noise_table : (4096,) float32
         ``GAUSSIAN_TABLE``.
     increments : (4,) int64
@@ -128,7 +129,7 @@ class WorldArrays(NamedTuple):
     """
 
     bodies: Annotated[Array, np.float64, 2]
-    sensor: Annotated[Array, np.float64, 1]
+    sensor: Annotated[Array, np.float64, 2]
     unit_vectors: Annotated[Array, np.float64, 2]
     noise_table: Annotated[Array, np.float32, 1]
     increments: Annotated[Array, np.int64, 1]
@@ -177,6 +178,12 @@ def world_at(table: Array) -> WorldArrays:
     return arrays_at(table, WorldArrays)  # type: ignore[no-any-return]
 
 
+@kernel(inline="always")
+def beams_of(world: WorldArrays, robot: int) -> Array:
+    """Return the directions of a robot's beams against the heading, (2, beams)."""
+    return world.unit_vectors[2 * robot : 2 * robot + 2]
+
+
 def table_of_owners(*owners: object) -> NDArray[np.int64]:
     """Return the table of a world's arrays, each an attribute of the first owner that has it.
 
@@ -198,16 +205,13 @@ def table_of_owners(*owners: object) -> NDArray[np.int64]:
     return table_of(arrays)
 
 
-def sensor_numbers(lidar: Lidar, time_step: float, map_resolution: float) -> NDArray[np.float64]:
-    """Return the parameters of the laser, the step [s] and the maps' cells [m] for kernels, shape (10,)."""
-    numbers = np.zeros(10)
-    numbers[ANGLE_FIRST], numbers[ANGLE_INCREMENT] = lidar.angle_first, lidar.angle_increment
-    numbers[FULL_CIRCLE] = float(lidar.is_full_circle)
-    numbers[RANGE_MIN], numbers[RANGE_MAX] = lidar.range_min, lidar.range_max
-    numbers[NOISE_FLOOR], numbers[NOISE_SHARE] = lidar.noise_floor, lidar.noise_share
-    numbers[LASER_HEIGHT], numbers[MAP_RESOLUTION], numbers[TIME_STEP] = (
-        lidar.height,
-        map_resolution,
-        time_step,
-    )
+def sensor_numbers(lidars: Sequence[Lidar], time_step: float, map_resolution: float) -> NDArray[np.float64]:
+    """Return the parameters of each laser, the step [s] and the maps' cells [m] for kernels, shape (robots, 10)."""
+    numbers = np.zeros((len(lidars), 10))
+    for row, lidar in zip(numbers, lidars, strict=True):
+        row[ANGLE_FIRST], row[ANGLE_INCREMENT] = lidar.angle_first, lidar.angle_increment
+        row[FULL_CIRCLE] = float(lidar.is_full_circle)
+        row[RANGE_MIN], row[RANGE_MAX] = lidar.range_min, lidar.range_max
+        row[NOISE_FLOOR], row[NOISE_SHARE] = lidar.noise_floor, lidar.noise_share
+        row[LASER_HEIGHT], row[MAP_RESOLUTION], row[TIME_STEP] = lidar.height, map_resolution, time_step
     return numbers

@@ -29,6 +29,7 @@ from lidarium.envs.simulation.kernels.arrays import (
     TOUCHED_ROWS,
     TRUE_POSE,
     WorldArrays,
+    beams_of,
 )
 from lidarium.envs.simulation.kernels.masks import score_area, window_corner
 from lidarium.envs.simulation.kernels.scanning import ScanScratch, is_noisy, sense
@@ -54,7 +55,7 @@ def _filter_teammates(
 
     They are no part of the floor.
     """
-    sensor, believed = world.sensor, world.believed
+    sensor, believed = world.sensor[row - first], world.believed
     beams = is_hit.shape[0]
     scale = 1.0 / sensor[MAP_RESOLUTION]
     reach = sensor[RANGE_MAX] * scale
@@ -88,17 +89,18 @@ def invalidate_teammates(world: WorldArrays, row: int, first: int, robots: int, 
 
     This holds as far as the robot knows their positions.
     """
-    beams, scale = ranges.shape[0], 1.0 / world.sensor[MAP_RESOLUTION]
+    beams, sensor = ranges.shape[0], world.sensor[row - first]
+    scale = 1.0 / sensor[MAP_RESOLUTION]
     directions, ends, is_hit = np.empty((4, beams)), np.empty((2, beams)), np.empty(beams, np.bool_)
     lengths = np.empty(beams)
-    beam_directions(world.believed[row, 2], world.unit_vectors, directions)
+    beam_directions(world.believed[row, 2], beams_of(world, row - first), directions)
     for beam in range(beams):
-        is_hit[beam] = ranges[beam] <= world.sensor[RANGE_MAX]
+        is_hit[beam] = ranges[beam] <= sensor[RANGE_MAX]
         lengths[beam] = ranges[beam] * scale if is_hit[beam] else 0.0
     scan_ends(lengths, directions, 0.0, 0.0, ends)
     _filter_teammates(world, row, first, robots, 0.0, 0.0, ends, is_hit)
     for beam in range(beams):
-        if not is_hit[beam] and ranges[beam] <= world.sensor[RANGE_MAX]:
+        if not is_hit[beam] and ranges[beam] <= sensor[RANGE_MAX]:
             ranges[beam] = np.float32(np.nan)
 
 
@@ -118,7 +120,7 @@ def _update_map(
     filled is zero.
     """
     directions, lengths, ends, bits = scratch.directions, scratch.lengths, scratch.ends, scratch.windows[0]
-    sensor, believed, origin = world.sensor, world.believed[row], world.origins[row]
+    sensor, believed, origin = world.sensor[row - first], world.believed[row], world.origins[row]
     ranges, belief = world.ranges[row], world.belief_rows[row]
     beams = ranges.shape[0]
     scale = 1.0 / sensor[MAP_RESOLUTION]
@@ -173,7 +175,7 @@ def perceive_robot(world: WorldArrays, row: int, first: int, robots: int, scratc
     The ranges are taken at its believed pose.
     """
     scratch.windows[:] = np.uint64(0)
-    beam_directions(world.believed[row, 2], world.unit_vectors, scratch.directions)
+    beam_directions(world.believed[row, 2], beams_of(world, row - first), scratch.directions)
     _update_map(world, row, first, robots, scratch, (0, 0, 0, 0), False)
 
 
@@ -190,9 +192,10 @@ def sense_and_perceive(
     box = score_area(world, row, first, robots, scratch)
     if not perceives:
         return
-    is_same = world.flags[row] & (TRUE_POSE | OWN_FRAME) == TRUE_POSE and not is_noisy(world.sensor)
+    is_exact = not is_noisy(world.sensor[row - first])
+    is_same = is_exact and world.flags[row] & (TRUE_POSE | OWN_FRAME) == TRUE_POSE
     if not is_same:
         scratch.windows[0] = np.uint64(0)
         if world.believed[row, 2] != world.poses[row, 2]:
-            beam_directions(world.believed[row, 2], world.unit_vectors, scratch.directions)
+            beam_directions(world.believed[row, 2], beams_of(world, row - first), scratch.directions)
     _update_map(world, row, first, robots, scratch, box, is_same)

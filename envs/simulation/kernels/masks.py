@@ -17,6 +17,7 @@ from lidarium.envs.simulation.kernels.arrays import (
     OWN_MASK,
     RANGE_MAX,
     WorldArrays,
+    beams_of,
 )
 from lidarium.envs.simulation.kernels.scanning import ScanScratch, is_noisy, measure
 from lidarium.mapping.grids.scan_geometry import beam_directions
@@ -29,8 +30,8 @@ from lidarium.mapping.kernels.views import grid_at
 def score_robot(world: WorldArrays, row: int, first: int, robots: int, scratch: ScanScratch) -> None:
     """Add the area seen by a robot's true ranges to its mask."""
     scratch.windows[:] = np.uint64(0)
-    beam_directions(world.poses[row, 2], world.unit_vectors, scratch.directions)
-    true_lengths(world.true_ranges[row], world.sensor, scratch.lengths)
+    beam_directions(world.poses[row, 2], beams_of(world, row - first), scratch.directions)
+    true_lengths(world.true_ranges[row], world.sensor[row - first], scratch.lengths)
     score_area(world, row, first, robots, scratch)
 
 
@@ -68,7 +69,7 @@ def _seen_area(
 
     Returns the box that holds bits, and its first row and word in the masks.
     """
-    sensor, frame = world.sensor, world.frames[first // robots]
+    sensor, frame = world.sensor[row - first], world.frames[first // robots]
     scale = 1.0 / sensor[MAP_RESOLUTION]
     x, y = (world.poses[row, 0] - frame[FRAME_X]) * scale, (world.poses[row, 1] - frame[FRAME_Y]) * scale
     row_offset, column_offset = window_corner(x, y, sensor[RANGE_MAX] * scale)
@@ -115,12 +116,12 @@ def footprint(
     bits : (window rows, words) uint64
         Zero on entry; of the shape of ``window_rows`` and ``window_words``.
     """
-    sensor, beams = world.sensor, world.ranges.shape[1]
+    sensor, beams = world.sensor[row - first], world.ranges.shape[1]
     directions, lengths, ends = np.empty((4, beams)), np.empty(beams), np.empty((2, beams))
     if is_noisy(sensor):
         measure(world, row, first, robots, directions, np.empty(beams, np.float32), lengths)
     else:
         # The sensor measured the true ranges: nothing has to be cast again.
-        beam_directions(world.poses[row, 2], world.unit_vectors, directions)
+        beam_directions(world.poses[row, 2], beams_of(world, row - first), directions)
         true_lengths(world.ranges[row], sensor, lengths)
     return _seen_area(world, row, first, robots, lengths, directions, ends, bits)  # type: ignore[no-any-return]

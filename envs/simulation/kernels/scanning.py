@@ -20,6 +20,7 @@ from lidarium.envs.simulation.kernels.arrays import (
     RANGE_MAX,
     RANGE_MIN,
     WorldArrays,
+    beams_of,
 )
 from lidarium.envs.simulation.kernels.ray_casting import cast_scan, cut_by_disc
 from lidarium.mapping.grids.scan_geometry import Beams, beam_directions
@@ -67,7 +68,7 @@ def measure(
     It fills ``ranges`` [m], inf for no return, and ``lengths`` of the beams [map cells].
     """
     robot, episode = row - first, first // robots
-    sensor, frame, poses = world.sensor, world.frames[episode], world.poses
+    sensor, frame, poses = world.sensor[robot], world.frames[episode], world.poses
     resolution = frame[FRAME_RESOLUTION]
     reach = sensor[RANGE_MAX] / resolution
     x, y, heading = (
@@ -76,7 +77,7 @@ def measure(
         poses[row, 2],
     )
     angle_first, increment = sensor[ANGLE_FIRST], sensor[ANGLE_INCREMENT]
-    beam_directions(heading, world.unit_vectors, directions)
+    beam_directions(heading, beams_of(world, robot), directions)
     beams = Beams(x, y, heading, angle_first, increment, directions, reach)
     cast_scan(world.floor_rows[episode], beams, lengths)
     for other in range(robots):
@@ -100,7 +101,7 @@ def measure(
 @kernel(nrt=False)
 def _add_noise(world: WorldArrays, row: int, first: int, robots: int) -> None:
     """Disturb a scan as the sensor does."""
-    sensor, ranges = world.sensor, world.ranges[row]
+    sensor, ranges = world.sensor[row - first], world.ranges[row]
     beams, episode = ranges.shape[0], first // robots
     noise = scratch_vector(beams, np.float32)
     fill_gaussian(stream_key(world.seeds[episode], row - first, world.steps[episode]), world.noise_table, noise)
@@ -119,7 +120,7 @@ def sense(world: WorldArrays, row: int, first: int, robots: int, directions: Arr
     Lengths are in map cells.
     """
     measure(world, row, first, robots, directions, world.ranges[row], lengths)
-    if is_noisy(world.sensor):
+    if is_noisy(world.sensor[row - first]):
         _add_noise(world, row, first, robots)
 
 
@@ -128,14 +129,14 @@ def sense_robot(world: WorldArrays, row: int, first: int, robots: int, scratch: 
     """Take the scan of one robot, and keep its true ranges."""
     measure(world, row, first, robots, scratch.directions, world.true_ranges[row], scratch.lengths)
     world.ranges[row, :] = world.true_ranges[row]
-    if is_noisy(world.sensor):
+    if is_noisy(world.sensor[row - first]):
         _add_noise(world, row, first, robots)
 
 
 @kernel(inline="always")
 def disturb_robot(world: WorldArrays, row: int, first: int, robots: int, scratch: ScanScratch) -> None:
     """Disturb true ranges of one robot that are not of ``measure`` as the sensor does."""
-    sensor, faults = world.sensor, world.faults[row]
+    sensor, faults = world.sensor[row - first], world.faults[row]
     step, ranges = world.steps[first // robots], world.true_ranges[row]
     blind_beams(faults, step, sensor[ANGLE_FIRST], sensor[ANGLE_INCREMENT], ranges, scratch.lengths)
     world.ranges[row, :] = ranges
@@ -155,7 +156,10 @@ def scan_scratch(world: WorldArrays) -> ScanScratch:
 
     They are freed when the kernel that asks for them returns. Do not call this within a loop.
     """
-    beams, reach = world.ranges.shape[1], world.sensor[RANGE_MAX] / world.sensor[MAP_RESOLUTION]
+    beams, longest = world.ranges.shape[1], 0.0
+    for robot in range(world.sensor.shape[0]):
+        longest = max(longest, world.sensor[robot, RANGE_MAX])
+    reach = longest / world.sensor[0, MAP_RESOLUTION]
     # The windows of a laser that reaches far on a fine map are too large for the stack.
     windows = np.empty((2, window_rows(reach), window_words(reach)), np.uint64)
     return ScanScratch(

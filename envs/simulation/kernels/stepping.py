@@ -108,7 +108,7 @@ def _encode(world: WorldArrays, episode: int, robots: int, velocities: Array) ->
             world.bodies[row - first],
             Encoders(world.wheels[row], world.measured[row], world.odometry[row]),
             velocities[row],
-            world.sensor[TIME_STEP],
+            world.sensor[0, TIME_STEP],
         )
 
 
@@ -122,7 +122,7 @@ def _move(world: WorldArrays, episode: int, robots: int, commands: Array, moves_
             _drive(world, episode, robots, commands)
             commands = world.driven
         grids = body_grids(world.floor_rows[episode], world.frames[episode])
-        move_robots(grids, team_of(world, first, last), commands[first:last], world.sensor[TIME_STEP])
+        move_robots(grids, team_of(world, first, last), commands[first:last], world.sensor[0, TIME_STEP])
     if moves_bodies and has_odometry:
         _encode(world, episode, robots, world.velocities)
 

@@ -9,11 +9,11 @@ from typing import Annotated, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from lidarium.mapping.geometry.rigid_motions import inverse_of, moved_points
 from lidarium.mapping.grids.growing_array import GrowingArray
 from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.planning.frontiers.frontier_map import Clusters, FrontierMap
 from lidarium.mapping.point_clouds.cameras import Intrinsics
-from lidarium.mapping.sparse.rigid_motions import inverse_of, moved_points
 from lidarium.mapping.sparse.swept_body import SweptBody
 
 FX, FY, CX, CY = range(4)

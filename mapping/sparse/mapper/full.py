@@ -8,6 +8,7 @@ Sparse mapper, section 1, *full reconstruction*.
 import numpy as np
 from numpy.typing import NDArray
 
+from lidarium.mapping.geometry.rigid_motions import checked_poses, moved_points
 from lidarium.mapping.sparse.floor_plane import FloorPlane, find_floor
 from lidarium.mapping.sparse.mapper.fitting import SeenPoints, fitted_codes
 from lidarium.mapping.sparse.mapper.frame_coding import (
@@ -22,7 +23,6 @@ from lidarium.mapping.sparse.mapper.frame_coding import (
     voxels_of,
 )
 from lidarium.mapping.sparse.mapper.merging import merged_codes
-from lidarium.mapping.sparse.rigid_motions import checked_poses, moved_points
 from lidarium.mapping.sparse.seen_floor import FloorPoints, SeenFloor
 from lidarium.mapping.sparse.settings import MapperSettings
 from lidarium.mapping.sparse.sparse_map import OccupiedCodes, SparseMap, occupied_codes

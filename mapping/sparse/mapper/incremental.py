@@ -13,6 +13,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from lidarium.mapping.geometry.rigid_motions import checked_poses, inverse_of, moved_points
 from lidarium.mapping.sparse.floor_plane import FloorPlane, find_floor
 from lidarium.mapping.sparse.mapper.fitting import SeenPoints, fitted_codes
 from lidarium.mapping.sparse.mapper.frame_coding import (
@@ -25,7 +26,6 @@ from lidarium.mapping.sparse.mapper.frame_coding import (
     voxels_of,
 )
 from lidarium.mapping.sparse.mapper.merging import are_covered, are_near, merged_codes
-from lidarium.mapping.sparse.rigid_motions import checked_poses, inverse_of, moved_points
 from lidarium.mapping.sparse.seen_floor import FloorPoints
 from lidarium.mapping.sparse.settings import MapperSettings
 from lidarium.mapping.sparse.sparse_map import FreeCodes, OccupiedCodes, SparseMap, free_codes, occupied_codes

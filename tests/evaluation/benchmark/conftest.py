@@ -27,7 +27,7 @@ easy = 6
 
 [tasks.Seen-1]
 about = "one robot with a camera"
-floors = ["apartment", "clinic"]
+floors = ["building:3000000", "clinic"]
 robots = 1
 full = 2
 easy = 1

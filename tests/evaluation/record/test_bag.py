@@ -11,6 +11,7 @@ pytest.importorskip("mcap_ros2", reason="mcap-ros2-support is not installed")
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 
+from lidarium.envs.settings.lidar import Lidar
 from lidarium.evaluation.record.bag import write_bag
 from lidarium.evaluation.record.replay import drive_again
 from lidarium.evaluation.truth.beliefs import maps_on_floor
@@ -55,6 +56,16 @@ def test_scans_and_odometry_are_those_of_the_robots(episode):
     half = len(record.commands) // 2
     again = drive_again(replace(record, commands=record.commands[:half], header={**record.header, "endings": []}))
     assert np.array_equal(log.ranges[half], again.simulation.ranges[1])
+
+
+def test_scans_have_the_angles_and_ranges_of_the_own_lidar(recorded, tmp_path):
+    lidars = [Lidar(beams=91, range_max=2.0), Lidar(beams=91, range_max=8.0, field_of_view=3.0)]
+    record, env = recorded("nearest_frontier", resolution=0.05, horizon_s=2.0, lidar=lidars)
+    write_bag(tmp_path / "episode.mcap", record)
+    for row, lidar in enumerate(env.settings.team_lidars):
+        (_, scan), *_ = messages(tmp_path / "episode.mcap", f"/robot_{row}/scan")
+        found = (scan.range_max, scan.angle_min, scan.angle_increment)
+        assert found == pytest.approx((lidar.range_max, lidar.angle_first, lidar.angle_increment), abs=1e-6)
 
 
 def test_transforms_lead_from_the_map_to_the_true_pose(episode):

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from page_reader import columns, maps_of, plain_numbers, signed_numbers, unpacked
 
 import lidarium
+from lidarium.envs.settings.lidar import Lidar
 from lidarium.envs.settings.making import make_settings
 from lidarium.evaluation.episodes.runner import run_episode
 from lidarium.evaluation.episodes.watching import WatchedExploration
@@ -96,6 +97,17 @@ def test_a_lone_robot_has_no_map_beside_the_teams_and_true_poses_are_not_believe
     angles = sampler.beam_angles(env)
     assert len(angles) == samples.scans[0].shape[1] <= MOST_BEAMS
     assert angles[0] == pytest.approx(env.settings.lidar.angles[0], abs=1e-5)
+
+
+def test_scans_of_lidars_that_differ_are_sampled_at_the_same_angles():
+    near, wide = Lidar(beams=120, field_of_view=math.pi, range_max=2.0), Lidar(beams=120, field_of_view=2.0 * math.pi)
+    samples, sampler, env = sampled(horizon_s=4.0, lidar=[near, wide])
+    angles, last = np.array(sampler.beam_angles(env)), samples.scans[-1]
+    assert np.array_equal(last[1], env.simulation.ranges[1, ::2])
+    is_in_view = np.abs(angles) <= math.pi / 2 + 1e-3
+    assert np.isinf(last[0, ~is_in_view]).all()
+    nearest = np.abs(near.angles[None] - angles[is_in_view, None]).argmin(axis=1)
+    assert np.array_equal(last[0, is_in_view], env.simulation.ranges[0, nearest])
 
 
 @pytest.fixture(scope="module")

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from furnished_room import pose_at, room_points, seen_from
 
+from lidarium.mapping.geometry.rigid_motions import inverse_of
 from lidarium.mapping.point_clouds.agreement import FRAMES, FrameAgreement
 from lidarium.mapping.point_clouds.cameras import Intrinsics, read_depth_image, read_pose
-from lidarium.mapping.sparse.rigid_motions import inverse_of
 
 
 def agreement_of(frames):

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from furnished_room import box_points, pose_at, room_points, seen_from
 
+from lidarium.mapping.geometry.rigid_motions import checked_poses, moved_points
 from lidarium.mapping.sparse.floor_plane import FloorPlane, find_floor
-from lidarium.mapping.sparse.rigid_motions import checked_poses, moved_points
 from lidarium.mapping.sparse.settings import FloorSettings
 
 

@@ -51,7 +51,7 @@ def test_rows_stand_by_team_then_world_the_best_first():
     learned = ["50", "100 %", "60 (55 to 65)", "1.51", "**-40 (-50 to -30)**", "12", "12"]
     assert lines[3][3:] == learned
     assert lines[0][6] == lines[6][6] == "-"
-    assert lines[2][5] == "never (too few for an interval)"
+    assert lines[2][5] == "never (no interval)"
 
 
 def test_the_short_table_shows_one_team_of_the_ideal_world():

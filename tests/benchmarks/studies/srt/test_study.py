@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from published_pages import assert_published, keep
 
+from lidarium.agents.srt.policy import SensorBasedRandomTree
 from lidarium.benchmarks.studies import STUDIES
 from lidarium.benchmarks.studies.srt import study as srt
 from lidarium.benchmarks.studies.srt import tables
@@ -17,7 +18,6 @@ from lidarium.benchmarks.studies.srt.goal_runs import (
     VARIED_ON,
     WORLDS,
     GoalRun,
-    drive_to_goal,
     measure_goal_run,
     measure_tree,
 )
@@ -72,7 +72,8 @@ def test_trees_by_variants_of_the_thesis_are_measured_with_and_without_a_goal():
     thesis, ball = (measure_tree(GoalRun(tree, "srt_lab", 0)) for tree in ("thesis", "thesis, ball"))
     assert (thesis["mode"], ball["mode"]) == ("thesis", "thesis, ball")
     assert thesis["nodes"] != ball["nodes"]
-    assert drive_to_goal(GoalRun("thesis", "srt_lab", 0))[1].settings.drive == "controls"
+    mode, settings = TREES["thesis"]
+    assert SensorBasedRandomTree(mode, **settings).settings.drive == "controls"
     shown = tables.trees([{**thesis, "world": floor} for floor in VARIED_ON] + [ball])
     assert f"| apartment | thesis | 1 | {thesis['ending']} 1 | " in shown
 

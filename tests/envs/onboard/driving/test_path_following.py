@@ -79,7 +79,7 @@ class Drive:
                     self.backing,
                 ),
                 Bodies(
-                    simulation.lidar.unit_vectors,
+                    np.stack([lidar.unit_vectors for lidar in simulation.lidars]),
                     simulation.world.bodies[:, 0].copy(),
                     self.limits,
                     self.knows_teammates,

@@ -25,7 +25,8 @@ RADIUS = 0.2
 
 def bodies_of(robots, knows_teammates=True):
     limits = np.array([0.5, 2.0, 1.0, 0.1])
-    return Bodies(UNIT, np.full(robots, RADIUS), limits, knows_teammates, np.ones(robots, np.uint8), FORESIGHT_TIMES)
+    beams, radii, present = np.stack([UNIT] * robots), np.full(robots, RADIUS), np.ones(robots, np.uint8)
+    return Bodies(beams, radii, limits, knows_teammates, present, FORESIGHT_TIMES)
 
 
 def sensed_of(poses, ranges=None, contact=None):

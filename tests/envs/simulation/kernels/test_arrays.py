@@ -30,14 +30,14 @@ from lidarium.mapping.kernels.compilation import kernel
 def move_on(table):
     """Write into some arrays, and return the sizes of those that nobody has."""
     world = world_at(table)
-    world.poses[1, 2] = world.sensor[0] + world.travelled[0]
+    world.poses[1, 2] = world.sensor[0, 0] + world.travelled[0]
     world.flags[0] |= 4
     world.contacts[2] = 1
     return world.ranges.size + world.floor_rows.size
 
 
 def test_kernels_write_into_the_arrays_of_the_first_owner_that_has_them():
-    first = SimpleNamespace(poses=np.zeros((3, 3)), sensor=np.array([1.5, 0.0]), flags=np.ones(3, np.int64))
+    first = SimpleNamespace(poses=np.zeros((3, 3)), sensor=np.array([[1.5, 0.0]]), flags=np.ones(3, np.int64))
     second = SimpleNamespace(
         poses=np.zeros((3, 3)), travelled=np.array([0.25, 0.0, 0.0]), contacts=np.zeros(3, np.uint8)
     )
@@ -80,10 +80,10 @@ def test_a_sensor_is_known_by_its_numbers():
         noise_share=0.02,
         height=0.3,
     )
-    numbers = sensor_numbers(lidar, 0.2, 0.05)
+    around = Lidar(beams=5, field_of_view=2.0 * math.pi)
+    numbers, numbers_around = sensor_numbers([lidar, around], 0.2, 0.05)
     assert numbers[[ANGLE_FIRST, ANGLE_INCREMENT]] == pytest.approx([-math.pi / 2, math.pi / 4])
     assert numbers[FULL_CIRCLE] == 0.0
     assert numbers[[RANGE_MIN, RANGE_MAX, NOISE_FLOOR, NOISE_SHARE]].tolist() == [0.05, 7.0, 0.01, 0.02]
     assert numbers[[LASER_HEIGHT, MAP_RESOLUTION, TIME_STEP]].tolist() == [0.3, 0.05, 0.2]
-    around = Lidar(beams=8, field_of_view=2.0 * math.pi)
-    assert sensor_numbers(around, 0.1, 0.05)[FULL_CIRCLE] == 1.0
+    assert numbers_around[FULL_CIRCLE] == 1.0

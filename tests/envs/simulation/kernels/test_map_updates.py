@@ -211,7 +211,7 @@ def test_the_map_is_that_of_the_occupancy_grid_fed_with_the_same_scans(tables):
     one = simulation(1, noise=0.01)
     one.place(0, tables, starts_on(tables, 1, generator), 1)
     one.world.flags[:] &= ~KNOWN_TEAMMATES
-    lidar = one.lidar
+    lidar = one.lidars[0]
     geometry = ScanGeometry(beams=lidar.beams, field_of_view=lidar.field_of_view, range_max=lidar.range_max)
     grid = OccupancyGrid(OccupancySettings(resolution=0.05))
     for step in range(30):

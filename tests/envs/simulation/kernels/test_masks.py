@@ -28,7 +28,7 @@ def scanned(noise=0.0):
 
 def between_beams(simulation, row):
     """The cells of a map between a robot and the ends of its true beams, and those too near to an edge."""
-    world, lidar = simulation.world, simulation.lidar
+    world, lidar = simulation.world, simulation.lidars[0]
     x, y, heading = world.poses[row]
     ranges = np.minimum(simulation.ranges[row], lidar.range_max)
     ends = np.stack([x + ranges * np.cos(heading + lidar.angles), y + ranges * np.sin(heading + lidar.angles)])
@@ -60,7 +60,7 @@ def look(table, row, robots, bits):
 
 
 def area_from(simulation, row):
-    reach = simulation.sensor[RANGE_MAX] / simulation.sensor[MAP_RESOLUTION]
+    reach = simulation.sensor[0, RANGE_MAX] / simulation.sensor[0, MAP_RESOLUTION]
     bits = np.zeros((window_rows(reach), window_words(reach)), np.uint64)
     _, row_offset, word_offset = look(simulation.table, row, 2, bits)
     rows, columns = simulation.beliefs.log_odds[row].shape

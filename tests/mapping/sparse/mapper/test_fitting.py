@@ -5,6 +5,7 @@ import pytest
 from furnished_room import room_points
 from scipy.spatial import cKDTree
 
+from lidarium.mapping.geometry.rigid_motions import moved_points
 from lidarium.mapping.point_clouds.cameras import Intrinsics, read_depth_image, read_pose
 from lidarium.mapping.sparse.graph import build_graph
 from lidarium.mapping.sparse.mapper.fitting import (
@@ -22,7 +23,6 @@ from lidarium.mapping.sparse.mapper.full import map_cloud
 from lidarium.mapping.sparse.mapper.incremental import IncrementalMapper
 from lidarium.mapping.sparse.mapper.merging import are_covered
 from lidarium.mapping.sparse.planning import plan, points_along
-from lidarium.mapping.sparse.rigid_motions import moved_points
 from lidarium.mapping.sparse.settings import MapperSettings
 from lidarium.mapping.sparse.sparse_map import occupied_codes
 from lidarium.mapping.sparse.swept_body import SweptBody

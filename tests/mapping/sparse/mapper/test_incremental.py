@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from furnished_room import pose_at, room_points, seen_from
 
+from lidarium.mapping.geometry.rigid_motions import moved_points
 from lidarium.mapping.sparse.floor_plane import FloorPlane
 from lidarium.mapping.sparse.mapper.frame_coding import split_points
 from lidarium.mapping.sparse.mapper.incremental import IncrementalMapper
 from lidarium.mapping.sparse.mapper.merging import are_covered
-from lidarium.mapping.sparse.rigid_motions import moved_points
 from lidarium.mapping.sparse.settings import MapperSettings
 
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from lidarium.mapping.files.images import read_image
+from lidarium.mapping.geometry.rigid_motions import moved_points
 from lidarium.mapping.point_clouds.cameras import Intrinsics, points_of_depth
 from lidarium.mapping.sparse.floor_plane import FloorPlane, find_floor
 from lidarium.mapping.sparse.map_files import _parsed_binary, binary_content, text_content
@@ -13,7 +14,6 @@ from lidarium.mapping.sparse.mapper.frame_coding import split_points
 from lidarium.mapping.sparse.mapper.full import map_cloud
 from lidarium.mapping.sparse.mapper.incremental import IncrementalMapper
 from lidarium.mapping.sparse.mapper.merging import are_covered
-from lidarium.mapping.sparse.rigid_motions import moved_points
 from lidarium.mapping.sparse.settings import FloorSettings, MapperSettings
 
 KINECT = Intrinsics(585.0, 585.0, 320.0, 240.0)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from furnished_room import pose_at
 
-from lidarium.mapping.sparse.rigid_motions import checked_poses, inverse_of, moved_boxes, moved_points
+from lidarium.mapping.geometry.rigid_motions import checked_poses, inverse_of, moved_boxes, moved_points
 
 
 def test_motions_are_undone_by_their_inverse():

@@ -1,0 +1,39 @@
+"""The rows of reference policies that ship are those that this lidarium makes."""
+
+import pytest
+
+from lidarium.evaluation.benchmark.results import reference_rows
+from lidarium.evaluation.benchmark.tasks import benchmark, starts_hash
+from lidarium.evaluation.suites.episodes_file import KEY, TIMINGS
+from lidarium.evaluation.suites.trial_run import run_trial
+
+NAME = "lidarium-1"
+ROWS = reference_rows(NAME)
+TASKS = benchmark(NAME).tasks
+SAME_ON_ALL_MACHINES = ("Buildings-1", "Buildings-8", "Homes-2", "RobotMaps-2", "Dungeons-1", "BrokenRadio-4")
+"""Tasks in which nothing goes through BLAS."""
+
+
+@pytest.mark.parametrize("task", TASKS.values(), ids=list(TASKS))
+def test_rows_are_of_every_policy_on_every_frozen_floor(task):
+    rows = ROWS[task.name]
+    floors = dict(zip(task.floors, zip(task.hashes.floors, task.hashes.starts, strict=True), strict=True))
+    assert {row["policy"] for row in rows} == set(task.policies)
+    for policy in task.policies:
+        assert sorted(row[KEY].split(" | ")[1] for row in rows if row["policy"] == policy) == sorted(floors)
+    for row in rows:
+        floor, starts = floors[row[KEY].split(" | ")[1]]
+        assert row["settings_sha256"].startswith(task.hashes.settings)
+        assert row["floor_sha256"].startswith(floor)
+        assert starts_hash(row["starts"]) == starts
+
+
+@pytest.mark.parametrize("name", SAME_ON_ALL_MACHINES)
+def test_an_episode_gives_the_shipped_row_to_the_bit(name):
+    task = TASKS[name]
+    suite = task.suite((task.baseline,), "easy")
+    trial = next(suite.trials())
+    (shipped,) = [row for row in ROWS[name] if row[KEY] == trial.key]
+    found = run_trial(suite, trial)
+    known = {key: value for key, value in found.items() if key not in (*TIMINGS, "record")}
+    assert known == shipped
