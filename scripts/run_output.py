@@ -84,10 +84,11 @@ def _write_sparse_maps(folder: Path, episode: "Episode") -> list[str]:
 
     files = []
     for row, mapper in sorted(episode.env.perception.sparse_maps.made.items()):
-        if mapper.map is not None:
+        sparse_map = mapper.record
+        if sparse_map is not None:
             path = folder / f"{episode.env.possible_agents[row]}.smap"
-            write_sparse_map(path, mapper.map)
-            pictures = save_sparse_pictures(path, mapper.map.boxes, mapper.map.free, way=mapper.trail)
+            write_sparse_map(path, sparse_map)
+            pictures = save_sparse_pictures(path, sparse_map.boxes, sparse_map.free, way=mapper.trail)
             files += [path.name, *(Path(picture).name for picture in pictures)]
     return files
 

@@ -30,6 +30,7 @@ from lidarium.mapping.sparse.exploring.ground import (
 from lidarium.mapping.sparse.exploring.navigation import SparseNavigation, sparse_navigation
 from lidarium.mapping.sparse.floor_plane import FloorPlane
 from lidarium.mapping.sparse.mapper.incremental import IncrementalMapper
+from lidarium.mapping.sparse.seen_floor import FloorPoints
 from lidarium.mapping.sparse.settings import MapperSettings
 from lidarium.mapping.sparse.sparse_map import SparseMap
 from lidarium.mapping.sparse.swept_body import SweptBody
@@ -132,6 +133,18 @@ class SparseMapper:
     def map(self) -> SparseMap | None:
         """The map; None before the first image that shows anything."""
         return self._mapper.map if self._coded else None
+
+    @property
+    def record(self) -> SparseMap | None:
+        """The map with the floor that was seen, for a file: each cell of seen ground counts as a point of floor."""
+        made, ground = self.map, self.ground
+        if made is None:
+            return None
+        rows, columns = np.nonzero(ground.cells)
+        middles = (np.column_stack([columns, rows]) + ground.low + 0.5) * ground.cell_m
+        points = FloorPoints(ground.cell_m)
+        points.add(np.pad(middles, ((0, 0), (0, 1))), made.floor)
+        return replace(made, seen_floor=points.seen(made.boxes, made.floor, made.settings.floor_height_m))
 
     def share(self) -> SparseShare:
         """Return the map as it is now, to be sent or combined; it stays as it is."""

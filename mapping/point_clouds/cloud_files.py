@@ -3,7 +3,7 @@
 import itertools
 import re
 import struct
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -27,15 +27,27 @@ from lidarium.mapping.point_clouds.ply_files import MAX_HEADER, parse_ply
 from lidarium.mapping.point_clouds.point_cloud import PointCloud
 from lidarium.mapping.point_clouds.survey_files import read_e57, read_las
 
-_VERTICES = re.compile(rb"^[ \t]*v[ \t]([^\r\n]*)", re.MULTILINE)
+_VERTICES = re.compile(rb"^[ \t]*v(?![^ \t\r\n])([^\r\n]*)", re.MULTILINE)
 _FACES = re.compile(rb"^[ \t]*f[ \t]([^\r\n]*)", re.MULTILINE)
+# Wavefront Technologies, "Advanced Visualizer Manual", appendix B1, "Object Files (.obj)".
+_OBJ_WORDS = frozenset(
+    b"v vt vn vp vc cstype deg bmat step p l f fo curv curv2 surf parm trim hole scrv sp end con g s mg o bevel lod "
+    b"c_interp d_interp usemap maplib usemtl mtllib shadow_obj trace_obj ctech stech call csh".split()
+)
 _DECIMAL_COMMA = re.compile(rb"[-+]?\d*,\d+(?:[eE][-+]?\d+)?")
 _CHECKED_LINES = 100
 
 
 def _parse_obj(content: bytes) -> Content:
-    """Return the vertices and faces of an OBJ file's bytes; all else is passed over."""
-    points = text_columns(b"\n".join(_VERTICES.findall(content)), (0, 1, 2))
+    """Return the vertices and faces of an OBJ file's bytes; its other elements are passed over."""
+    content = content.replace(b"\\\r\n", b" ").replace(b"\\\n", b" ")
+    vertices = [line.split(b"#")[0].split() for line in _VERTICES.findall(content)]
+    lengths = np.array([len(words) for words in vertices], np.int64)
+    if (lengths < 3).any():
+        raise ValueError(
+            f"{np.count_nonzero(lengths < 3):,} of its {len(lengths):,} vertices have less than three columns: damaged?"
+        )
+    points = text_columns(b"\n".join(b" ".join(words[:3]) for words in vertices), (0, 1, 2))
     groups: dict[int, list[list[int]]] = {}
     before: NDArray[np.int64] | None = None
     for face in _FACES.finditer(content):
@@ -48,7 +60,25 @@ def _parse_obj(content: bytes) -> Content:
             corners = [corner + count + 1 if corner < 0 else corner for corner in corners]
         groups.setdefault(len(corners), []).append(corners)
     polygons = [np.array(group, np.int64).reshape(len(group), -1) - 1 for group in groups.values()]
-    return Content(points, triangles=triangles_of(polygons, len(points)))
+    return Content(points, triangles=triangles_of(polygons, len(points)), remarks=_doubts_of(content, lengths, groups))
+
+
+def _doubts_of(
+    content: bytes, lengths: NDArray[np.int64], faces: Mapping[int, Sequence[Sequence[int]]]
+) -> tuple[str, ...]:
+    """Say which lines of an OBJ file are none, and how many vertices and faces are of other lengths."""
+    remarks = []
+    lines = [line.split(b"#")[0].split() for line in content.splitlines()]
+    strange = [number for number, words in enumerate(lines, 1) if words and words[0] not in _OBJ_WORDS]
+    if strange:
+        remarks.append(f"{len(strange):,} lines are no OBJ and passed over, the first is line {strange[0]:,}: damaged?")
+    usual = int(np.bincount(lengths).argmax())
+    if others := int(np.count_nonzero(lengths != usual)):
+        remarks.append(f"{others:,} of {len(lengths):,} vertices have not {usual} numbers as most: damaged?")
+    short = sum(len(group) for corners, group in faces.items() if corners < 3)
+    if short:
+        remarks.append(f"{short:,} faces have fewer than three corners and are passed over: damaged?")
+    return tuple(remarks)
 
 
 def _parse_xyz(content: bytes) -> Content:

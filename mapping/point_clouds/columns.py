@@ -59,7 +59,7 @@ def _stacked(
 
 
 def text_columns(content: bytes, places: Sequence[int], rows: int | None = None) -> NDArray[np.float64]:
-    """Return columns of lines of numbers.
+    """Return columns of lines of numbers, all of which have as many: in a damaged line others are x, y and z.
 
     Returns
     -------
@@ -71,4 +71,13 @@ def text_columns(content: bytes, places: Sequence[int], rows: int | None = None)
         raise ValueError("it holds no points")
     if rows is not None and len(lines) < rows:
         raise ValueError(f"it claims {rows:,} points and holds {len(lines):,} lines: truncated")
+    counts = np.array([len(line.partition(b"#")[0].split()) for line in lines[:rows]])
+    usual = int(np.bincount(counts).argmax())
+    others = np.flatnonzero(counts != usual)
+    if len(others):
+        first = lines[others[0]][:60].decode("ascii", "replace")
+        raise ValueError(
+            f"{len(others):,} of its {len(counts):,} lines of numbers have not {usual} columns as most: damaged? The "
+            f"first is {first!r}"
+        )
     return np.loadtxt(lines[:rows], np.float64, usecols=places, ndmin=2, encoding="ascii")

@@ -24,7 +24,9 @@ def test_a_run_by_camera_mounts_one_and_writes_maps_that_can_be_planned_on(tmp_p
     low, high = sparse_map.free[:, :2].min(axis=0), sparse_map.free[:, :2].max(axis=0)
     ends = [f"{x:.2f},{y:.2f}" for x, y in (0.7 * low + 0.3 * high, 0.3 * low + 0.7 * high)]
     assert main(["plan", str(out / "robot_0.smap"), "--from", ends[0], "--to", ends[1], "--json"]) == 0
-    assert json.loads(capsys.readouterr().out)["found"]
+    answer = json.loads(capsys.readouterr().out)
+    assert answer["found"]
+    assert answer["remarks"] == []
 
 
 def test_a_run_without_a_policy_that_maps_writes_no_sparse_map(tmp_path, capsys):

@@ -117,7 +117,7 @@ def cloud_of(frames: list[Frame]) -> NDArray[np.float32]:
 
 def _graph(name: str, found: SparseMap, thesis: ThesisPlace) -> TopologicalGraph:
     if "thesis" not in name:
-        return build_graph(found.free, found.boxes, BODY)
+        return build_graph(found.free, found.boxes, BODY, floor=found.seen_floor)
     settings = ThesisGraphSettings(
         height=thesis.height, connection_radius=thesis.connection_radius, neighbours=thesis.neighbours
     )

@@ -159,7 +159,7 @@ def _tops(place: Place, graphs: dict[str, TopologicalGraph]) -> dict[str, float]
 
 def _noisy(place: Place, noisy: SparseMap, requests: NDArray[np.float64]) -> dict[str, int]:
     """Return how many requests a map of noisy frames answers, how many of the paths collide, and its boxes."""
-    graph = build_graph(noisy.free, noisy.boxes, BODY)
+    graph = build_graph(noisy.free, noisy.boxes, BODY, floor=noisy.seen_floor)
     paths = [plan(graph, start, goal) for start, goal in requests]
     answered = [each.path for each in paths if each.is_found]
     collide = sum(place.collides(path) for path in answered)

@@ -24,6 +24,9 @@ MOST_EMPTY = 0.25
 CELL_M = 0.02
 """Side of the cells in which points are kept [m]."""
 
+_HALF_M = 0.5 * CELL_M + 1e-6
+"""The middle of a cell is at most this far from a box with its points, which may be on the cell's border [m]."""
+
 _SAMPLE_M = 0.05
 _SAMPLES_AT_ONCE = 2_000_000
 _BITS = 21
@@ -106,16 +109,16 @@ def fitted_codes(codes: OccupiedCodes, points: NDArray[np.float64], frame: int =
     """
     if len(points) == 0:
         return codes
-    tree, half = cKDTree(points), 0.5 * CELL_M
+    tree = cKDTree(points)
     near = near_distance(tree)
     is_empty = empty_shares(codes.boxes, tree, near) > MOST_EMPTY
     kept = codes.taken(~is_empty)
     parts = []
     for low, high in codes.boxes[is_empty]:
-        within = points[((points >= low - half) & (points <= high + half)).all(axis=1)]
+        within = points[((points >= low - _HALF_M) & (points <= high + _HALF_M)).all(axis=1)]
         parts.append(_divided(within, tree, near))
     boxes = np.concatenate([kept.boxes, *parts])
-    missed = points[~are_covered(points, boxes + np.array([[-half], [half]]))]
+    missed = points[~are_covered(points, boxes + np.array([[-_HALF_M], [_HALF_M]]))]
     parts += [_divided(group, tree, near) for group in _groups(missed)]
     return kept.joined(occupied_codes(np.concatenate([np.empty((0, 2, 3)), *parts]), frame))
 

@@ -12,7 +12,7 @@ from lidarium.envs.settings.cameras import CAMERAS
 from lidarium.envs.settings.making import make_settings
 from lidarium.mapping.geometry.rigid import Transform, composed, relative
 from lidarium.mapping.localization.localizer import KeyScans
-from lidarium.mapping.sparse.exploring.ground import BLOCKED, SEEN
+from lidarium.mapping.sparse.exploring.ground import BLOCKED, SEEN, UNKNOWN
 from tests.ground_views import depth_image
 
 NOBODY = np.empty((0, 3))
@@ -82,6 +82,23 @@ def test_a_path_on_the_map_leads_round_what_the_laser_does_not_see():
     for x, y in route.points + env.perception.poses.offset(0):
         gap = math.hypot(max(3.0 - x, 0, x - 4.0), max(1.5 - y, 0, y - 2.5))
         assert gap >= env.settings.robot.radius
+
+
+def test_the_map_for_a_file_knows_the_floor_that_was_seen():
+    env = made()
+    assert env.belief("robot_0").sparse_map.seen_m2 > 0.0
+    known = turned_round(env, 20).belief("robot_0").sparse_map
+    kept = env.perception.sparse_maps.made[0].record
+    bears = kept.seen_floor.supports(0.05).bears
+    ground, told = known.navigation.ground, {SEEN: 0, UNKNOWN: 0}
+    offsets = np.stack(np.meshgrid(*2 * [np.linspace(-0.2, 0.2, 9)]), axis=-1).reshape(-1, 2)
+    for place in np.random.default_rng(0).uniform((0.2, 0.2), (6.8, 3.8), (400, 2)):
+        around = ground.levels[tuple(ground.cells_of(place + offsets).T)]
+        for level, is_borne in ((SEEN, True), (UNKNOWN, False)):
+            if (around == level).all():
+                assert bears(place) == is_borne
+                told[level] += 1
+    assert min(told.values()) > 20
 
 
 def test_a_robot_without_a_camera_has_no_sparse_map():

@@ -69,6 +69,37 @@ def test_lines_of_an_xyz_are_points_whatever_follows():
 
 
 @pytest.mark.parametrize(
+    ("content", "remarks"),
+    [
+        (b"v 1 2 3\nv 4 5 \\\n6\nvp 0.1\nusemtl wood # of an oak\n", ()),
+        (b"v 1 2 3\nv4 5 6\n7 8 9\nv 4 5 6\n", ("2 lines are no OBJ and passed over, the first is line 2: damaged?",)),
+        (b"v 1 2 3 1 1 1\nv 4 5 6\n", ("1 of 2 vertices have not 3 numbers as most: damaged?",)),
+        (b"v 1 2 3\nv 4 5 6\nf 1 2\n", ("1 faces have fewer than three corners and are passed over: damaged?",)),
+    ],
+)
+def test_damaged_lines_of_an_obj_are_told(content, remarks):
+    found = _parse_obj(content)
+    np.testing.assert_array_equal(found.points, [[1, 2, 3], [4, 5, 6]])
+    assert found.remarks == remarks
+
+
+@pytest.mark.parametrize(
+    ("parse", "content", "message"),
+    [
+        (
+            _parse_xyz,
+            b"1 2 3 255\n12 3 255\n1 2 3 255 # good\n1 2 3 25 5\n",
+            r"2 of its 4 lines .* damaged\? The first is '12 3",
+        ),
+        (_parse_obj, b"v 1 2 3\nv 12 3\nv\n", "2 of its 3 vertices"),
+    ],
+)
+def test_lines_of_other_lengths_are_refused_with_their_number(parse, content, message):
+    with pytest.raises(ValueError, match=message):
+        parse(content)
+
+
+@pytest.mark.parametrize(
     ("parse", "content", "message"),
     [
         (_parse_obj, b"f 1 2 3\n", "holds no points"),

@@ -22,7 +22,7 @@ from lidarium.mapping.sparse.mapper.frame_coding import split_points
 from lidarium.mapping.sparse.mapper.full import map_cloud
 from lidarium.mapping.sparse.mapper.incremental import IncrementalMapper
 from lidarium.mapping.sparse.mapper.merging import are_covered
-from lidarium.mapping.sparse.planning import plan
+from lidarium.mapping.sparse.planning import plan, points_along
 from lidarium.mapping.sparse.settings import MapperSettings
 from lidarium.mapping.sparse.sparse_map import occupied_codes
 from lidarium.mapping.sparse.swept_body import SweptBody
@@ -72,6 +72,51 @@ def test_points_in_no_box_get_one():
     points = points[points[:, 2] > 0.1]
     found = fitted_codes(occupied_codes(np.array([[[0.0, 0.0, 0.1], [0.1, 4.0, 2.4]]])), cells_of(points))
     assert are_covered(points, found.boxes + np.array([[-0.01], [0.01]])).all()
+
+
+def test_points_on_borders_of_cells_add_no_box():
+    x, y = np.meshgrid(np.arange(64, 104) * 0.03, np.arange(54, 81) * 0.03)
+    top = np.stack([x, y, np.full_like(x, 0.72)], axis=-1).reshape(-1, 3)
+    codes = occupied_codes(np.stack([top.min(axis=0), top.max(axis=0)])[None])
+    np.testing.assert_array_equal(fitted_codes(codes, cells_of(top)).boxes, codes.boxes)
+
+
+def table_points():
+    """Points of a floor, of a table top, and of its edge, a strip that stands out by 11 cm."""
+    x, y = np.meshgrid(np.arange(0.0, 6.0, 0.03), np.arange(0.0, 5.0, 0.03))
+    floor = np.stack([x, y, np.zeros_like(x)], axis=-1).reshape(-1, 3)
+    x, y = np.meshgrid(np.arange(2.4, 3.6, 0.02), np.arange(2.0, 2.8, 0.02))
+    top = np.stack([x, y, np.full_like(x, 0.72)], axis=-1).reshape(-1, 3)
+    x, z = np.meshgrid(np.arange(2.4, 3.6, 0.04), (0.69, 0.71))
+    return floor, top, np.stack([x, np.full_like(x, 1.89), z], axis=-1).reshape(-1, 3)
+
+
+def least_gap(free, boxes, floor, obstacles):
+    """Return how near paths past the table come to points, of a body of 0.30 m [m]."""
+    graph = build_graph(free, boxes, SweptBody(radius=0.3, height=1.2), floor=floor)
+    tree, rng = cKDTree(obstacles[:, :2]), np.random.default_rng(0)
+    paths = [plan(graph, *rng.uniform(((0.4, 0.4), (4.1, 0.4)), ((1.9, 4.5), (5.5, 4.5)))) for _ in range(40)]
+    assert all(path.is_found for path in paths)
+    return min(float(tree.query(points_along(path.path[:, :2], 0.01))[0].min()) for path in paths)
+
+
+def test_paths_keep_the_radius_from_an_edge_that_no_code_has():
+    floor, top, edge = table_points()
+    both, free = np.concatenate([top, edge]), floor[::37]
+    free = free[((free[:, :2] < (2.1, 1.59)) | (free[:, :2] > (3.9, 3.1))).any(axis=1)]
+    codes = occupied_codes(np.stack([top.min(axis=0), top.max(axis=0)])[None])
+    assert least_gap(free, codes.boxes, None, both) < 0.2
+    assert least_gap(free, fitted_codes(codes, cells_of(both)).boxes, None, both) >= 0.3 - 1e-6
+
+
+@pytest.mark.parametrize("codes", [64, 1024])
+def test_paths_keep_the_radius_from_an_edge_that_a_later_frame_sees(codes):
+    floor, top, edge = table_points()
+    mapper = IncrementalMapper(codes, MapperSettings(least_motion_m=0.0))
+    for part in (np.concatenate([floor, top]), np.concatenate([floor[::7], edge])):
+        mapper.add(part, np.eye(4))
+    for found in (mapper.map, map_cloud(np.concatenate(table_points()), codes)):
+        assert least_gap(found.free, found.boxes, found.seen_floor, np.concatenate([top, edge])) >= 0.3 - 1e-6
 
 
 @pytest.mark.parametrize("seed", range(6))
