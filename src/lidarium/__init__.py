@@ -236,7 +236,7 @@ def _register_task(task: str, robots: int) -> None:
     registered, maker = f"lidarium/{task}-v1", "lidarium.evaluation.benchmark.tasks"
     if robots == 1 and registered not in gymnasium.registry:
         gymnasium.register(id=registered, entry_point=f"{maker}:make_solo_task", kwargs={"task": task})
-    if hasattr(pettingzoo, "register"):
+    if hasattr(pettingzoo, "register") and registered not in pettingzoo.parallel_registry:
         pettingzoo.register("parallel", registered, entry_point=f"{maker}:make_task", kwargs={"task": task})
 
 
