@@ -93,7 +93,12 @@ def median_bands(values: Values, confidence: float = 0.95) -> Values:
     For curves over time; the same figures as `median_interval` gives column by column.
     """
     columns = [median_interval(column, confidence) for column in np.asarray(values, np.float64).T]
-    return np.array([[each.estimate, each.low, each.high] for each in columns]).T
+    # A curve on which all runs agree at some time has a band of no width there.
+    ends = [
+        (each.low, each.high) if each.is_known or each.size < FEWEST_FOR_INTERVAL else (each.estimate, each.estimate)
+        for each in columns
+    ]
+    return np.array([[each.estimate, *both] for each, both in zip(columns, ends, strict=True)]).T
 
 
 @lru_cache(maxsize=1024)

@@ -36,7 +36,7 @@ def shown(found: Interval | None, digits: int = 2) -> str:
         return "-"
     text = number(found.estimate, digits)
     if not found.is_known:
-        return f"{text} (no interval)"
+        return text
     return f"{text} ({number(found.low, digits)} to {number(found.high, digits)})"
 
 
