@@ -34,7 +34,7 @@ def test_a_row_compares_pairs(episodes):
 def test_two_pairs_are_too_few_for_an_interval(episodes):
     few = {policy: dict(list(of_policy.items())[:2]) for policy, of_policy in episodes.items()}
     cells = [cell.strip() for cell in learned._row(few, "learned", "tour_frontier", 1).strip("|").split("|")]
-    assert cells[4] == "0.805 (too few for an interval)"
+    assert cells[4] == "0.805 (no interval)"
     assert "inf" not in " ".join(cells)
 
 
