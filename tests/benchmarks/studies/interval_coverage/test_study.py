@@ -38,6 +38,6 @@ def test_every_case_has_a_name_of_its_own():
 
 
 def test_a_case_is_reached_by_its_larger_sizes_alone():
-    few, many = [(0.8, 0), (0.8, 0)], [(0.95, 0), (0.94, 0), (0.96, 0)]
+    few, many = [(0.8, 0)] * 4, [(0.95, 0), (0.94, 0), (0.96, 0)]
     assert coverage.is_reached(few + many)
     assert not coverage.is_reached([*few, (0.92, 0), *many[1:]])
