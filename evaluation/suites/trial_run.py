@@ -69,7 +69,7 @@ def run_trial(suite: Suite, trial: Trial, records: Path | None = None) -> dict[s
     env = WatchedExploration(
         trial.floor, settings, image_resolution, [history] if records is None else [history, recorder]
     )
-    rule = stop_rule_of(suite.stop)
+    rule = stop_rule_of(suite.stop, trial.robots)
     starts = suite.starts_of(trial) or (
         drawn_starts(trial.floor, settings, trial.seed, image_resolution) if suite.draws_starts else None
     )
