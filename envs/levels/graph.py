@@ -91,7 +91,7 @@ class GraphLevel(Level):
         decision_period_s: float | None = None,
     ) -> None:
         super().__init__(perception, settings, shares_map, decision_period_s)
-        if settings.localization != TRUE_POSE or not isinstance(perception.world, KinematicWorld):
+        if settings.localization != TRUE_POSE or type(perception.world) is not KinematicWorld:
             raise ValueError(
                 f"robots of the level 'graph' do not drive, and localization is {settings.localization!r} in the "
                 f"world {settings.backend!r}; want localization={TRUE_POSE!r} and backend='kinematic'"
@@ -106,7 +106,8 @@ class GraphLevel(Level):
         self._lattices: dict[int, _Lattice] = {}
         self._graphs: dict[int, NodeGraph] = {}
         self._offered: dict[int, NDArray[np.int64]] = {}
-        self._wait = max(round((decision_period_s or settings.decision_period_s) / settings.time_step), 1)
+        self.period_s = settings.decision_period_s if decision_period_s is None else decision_period_s
+        self._wait = max(round(self.period_s / settings.time_step), 1)
 
     def start(self, episode: int) -> None:
         """Begin an episode: no node is known."""
@@ -177,15 +178,17 @@ class GraphLevel(Level):
         ends = {row: graphs[row].positions[way[0]] for row, way in ways.items() if way}
         while clashing := [row for row in ends if _is_taken(row, places, ends)]:
             del ends[clashing[-1]]
-        longest = 0.0
-        for row, end in ends.items():
-            longest = max(longest, self._put(row, end))
-            states = self.drives.states
-            states[row] = ARRIVED if len(ways[row]) == 1 else DRIVING
+        longest = max((math.dist(end, places[row]) for row, end in ends.items()), default=0.0)
         step = self.settings.time_step * self.settings.robot.cruise_speed
         steps = max(math.ceil(longest / step - 1e-9), 1) if ends else self._wait
+        taken, horizon = self.perception.world.steps, self.settings.horizon_steps
+        if horizon is not None and taken[episode] + steps > horizon:  # nobody arrives before the episode is cut
+            ends, steps = {}, horizon - int(taken[episode])
+        for row, end in ends.items():
+            self._put(row, end)
+            self.drives.states[row] = ARRIVED if len(ways[row]) == 1 else DRIVING
         # The step that follows is counted by itself.
-        self.perception.world.steps[episode] += steps - 1
+        taken[episode] += steps - 1
 
     def _way(self, row: int, graph: NodeGraph) -> list[int]:
         """Return the nodes on a robot's way to the one that its target stands for, and note it as its path."""
@@ -218,14 +221,14 @@ class GraphLevel(Level):
         ends = self._cells(row, np.vstack([graph.positions[useful], target]))
         ends = np.clip(ends, 0, np.array(log_odds.shape) - 1)
         end = ends[-1]
-        is_hidden = [not line_is_free(log_odds, end[0], end[1], cell[0], cell[1]) for cell in ends[:-1]]
+        is_hidden = np.array([not line_is_free(log_odds, end[0], end[1], cell[0], cell[1]) for cell in ends[:-1]])
         return int(useful[np.lexsort((graph.lengths[useful], gaps[useful], is_hidden))[0]])
 
-    def _put(self, row: int, end: NDArray[np.float64]) -> float:
-        """Put a robot at a position in the frame of its believed pose; return the length of its move [m]."""
+    def _put(self, row: int, end: NDArray[np.float64]) -> None:
+        """Put a robot at a position in the frame of its believed pose."""
         world = self.perception.world
         gap = end - self.perception.beliefs.believed[row, :2]
-        length, turn = math.hypot(gap[0], gap[1]), 0.0
+        length = math.hypot(gap[0], gap[1])
         if not self.settings.known_starts:
             turn = float(world.starts[row, 2])
             cosine, sine = math.cos(turn), math.sin(turn)
@@ -234,7 +237,6 @@ class GraphLevel(Level):
         world.poses[row, 2] = math.atan2(gap[1], gap[0])
         world.velocities[row] = 0.0
         world.travelled[row] += length
-        return length
 
     def observe(self, acted: Mask, live: Mask, seen: Mask, out: dict[str, NDArray[Any]], infos: dict[str, Any]) -> None:
         """Write the nodes in reach, and report the states of the robots' drives."""
@@ -262,7 +264,7 @@ class GraphLevel(Level):
     def _cells(self, row: int, positions: NDArray[np.float64]) -> NDArray[np.int64]:
         """Return the cells (row, column) of positions (N, 2) in the frame of the believed pose."""
         gaps = (positions - self.perception.beliefs.origins[row]) / self.settings.occupancy.resolution
-        return np.floor(gaps[:, ::-1] + 1e-9).astype(np.int64)
+        return np.asarray(np.floor(gaps[:, ::-1] + 1e-9), np.int64)
 
     def _lattice(self, row: int) -> _Lattice:
         """Return the lattice of a robot, which is that of its team if they share one map."""
@@ -311,7 +313,9 @@ class GraphLevel(Level):
         open_nodes = np.flatnonzero(lattice.is_node & ~lattice.is_spent)
         frontiers = frontiers_of(log_odds, *lattice.corner, graph.frontier_spacing / resolution)
         reach = self.settings.lidar.range_max
-        counts = count_in_sight(log_odds, lattice.cells[open_nodes], frontiers, graph.utility_share * reach / resolution)
+        counts = count_in_sight(
+            log_odds, lattice.cells[open_nodes], frontiers, graph.utility_share * reach / resolution
+        )
         utilities[open_nodes] = np.where(counts > graph.least_utility, counts, 0)
         lattice.is_spent[open_nodes] = utilities[open_nodes] == 0
         is_searching = (is_new | lattice.is_node & ~lattice.is_spent) & (gaps < reach + graph.spacing)
@@ -343,9 +347,7 @@ def _passable(navigation: NavigationMap, radius: float) -> NDArray[np.int8]:
     return np.where((navigation.log_odds < 0) & ~is_narrow, -1, 1).astype(np.int8)
 
 
-def _is_taken(
-    row: int, places: Mapping[int, NDArray[np.float64]], ends: Mapping[int, NDArray[np.float64]]
-) -> bool:
+def _is_taken(row: int, places: Mapping[int, NDArray[np.float64]], ends: Mapping[int, NDArray[np.float64]]) -> bool:
     """Whether another robot stays on a robot's next node, or an earlier one moves there."""
     for other, place in places.items():
         end = ends.get(other, place)

@@ -59,8 +59,8 @@ def ways_along(
     count = len(positions)
     gaps = positions[edges[:, 0]] - positions[edges[:, 1]]
     weights = csr_array((np.hypot(gaps[:, 0], gaps[:, 1]), (edges[:, 0], edges[:, 1])), shape=(count, count))
-    lengths, previous = dijkstra(weights, directed=False, indices=here, return_predecessors=True)
-    return np.asarray(lengths, np.float64), np.asarray(previous, np.int64)
+    lengths, previous = dijkstra(weights, directed=False, indices=[here], return_predecessors=True)
+    return np.asarray(lengths[0], np.float64), np.asarray(previous[0], np.int64)
 
 
 @kernel
@@ -87,7 +87,7 @@ def pairs_of(edges: NDArray[np.bool_], columns: int) -> NDArray[np.int64]:
     reach = edges.shape[1] // 2
     nodes, up, across = np.nonzero(edges)
     others = nodes + (up - reach) * columns + across - reach
-    return np.stack([nodes, others], axis=1)[nodes < others]
+    return np.asarray(np.stack([nodes, others], axis=1)[nodes < others], np.int64)
 
 
 @kernel

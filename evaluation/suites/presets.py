@@ -195,7 +195,11 @@ PRESETS: dict[str, _Preset] = {
         files=("floorplans/dungeon_test/*.png",),
         image_resolution=_DARE_PIXEL,
         starts=_dare_start,
-        differences=("walls keep the pixels of 0.2 m; the project halves its pictures",),
+        differences=(
+            "walls keep the pixels of 0.2 m; the project halves its pictures",
+            "the laser sees all free space in sight; the project draws beams as lines of cells, which leave gaps, and "
+            "its ways are longer",
+        ),
     ),
     "chen": _Preset(
         project="Self-learning exploration (Chen et al., IROS 2019)",
