@@ -45,6 +45,16 @@ POLICIES.register(
     "least cost of distance less size of the frontier, both in metres (explore_lite)",
 )
 POLICIES.register(
+    "nearest_node",
+    "lidarium.agents.frontier.nodes:NearestNode",
+    "at the level of nodes: to the nearest node with utility (as in DARE)",
+)
+POLICIES.register(
+    "utility_node",
+    "lidarium.agents.frontier.nodes:UtilityNode",
+    "at the level of nodes: to the node of most utility, discounted by its distance (as in DARE)",
+)
+POLICIES.register(
     "tour_frontier",
     "lidarium.agents.tours.policy:TourFrontier",
     "the team shares out all frontiers as tours past places from which much is seen",

@@ -121,7 +121,7 @@ class TeamCommand(Command):
         }
 
     @property
-    def run_options(self) -> dict[str, bool]:
+    def run_options(self) -> dict[str, Any]:
         """Options of ``run_episode`` that are set."""
         return {name: True for name in ("merging", "plans_sparsely") if getattr(self, name)}
 

@@ -12,6 +12,7 @@ LEVELS: Registry[type[Level]] = Registry("level")
 LEVELS.register("velocity", "lidarium.envs.levels.velocity:VelocityLevel", "speed and turn rate, for a step")
 LEVELS.register("waypoint", "lidarium.envs.levels.waypoint:WaypointLevel", "a point to drive to")
 LEVELS.register("frontier", "lidarium.envs.levels.frontier:FrontierLevel", "one of the frontiers in reach")
+LEVELS.register("graph", "lidarium.envs.levels.graph:GraphLevel", "one of the nodes of a graph, seeing at nodes only")
 
 L = TypeVar("L", bound=type[Level])
 

@@ -12,6 +12,7 @@ from lidarium.envs.settings.battery import BATTERIES, Battery
 from lidarium.envs.settings.cameras import CAMERAS as CAMERAS
 from lidarium.envs.settings.cameras import DepthCamera
 from lidarium.envs.settings.faults import NO_FAULTS, FaultSettings
+from lidarium.envs.settings.graph import GraphSettings
 from lidarium.envs.settings.lidar import LIDARS, Lidar, by_robot, checked_lidars, envelope_of_lidars
 from lidarium.envs.settings.limits import OBSERVABLES as OBSERVABLES
 from lidarium.envs.settings.limits import check_workload, egocentric_scales_of, observed_names
@@ -173,6 +174,8 @@ class ExplorationSettings:
     frontiers_by_size : float
         Share of the frontiers that are offered because they are the longest; the others are those with the
         cheapest way.
+    graph : GraphSettings
+        The nodes of the level of nodes.
     state_cells : int
         Side of the pictures in the true ``state`` of the team [cells].
     raster_resolution : float
@@ -217,6 +220,7 @@ class ExplorationSettings:
     frontiers: Annotated[int, within(1, MAX_FRONTIERS)] = 32
     least_frontier: Annotated[float, within(0.0, 1e4)] = 0.5
     frontiers_by_size: Annotated[float, share()] = 0.5
+    graph: GraphSettings = field(default_factory=GraphSettings)
     state_cells: Annotated[int, within(1, MAX_EGOCENTRIC_CELLS)] = 32
     raster_resolution: Annotated[float, within(0.005, 10.0)] = 0.025
     decision_period_s: Annotated[float, above(0.0, 1e6)] = 2.0

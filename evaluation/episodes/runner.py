@@ -66,6 +66,7 @@ def run_episode(
     raise_interrupt: bool = True,
     merging: bool | MergingSettings | None = None,
     plans_sparsely: bool = False,
+    level: str | None = None,
 ) -> Episode:
     """Run a policy from reset until every robot has ended.
 
@@ -74,7 +75,7 @@ def run_episode(
     policy : Policy
         The policy; its ``Stop`` ends a robot at its next step.
     env : ExplorationEnv
-        The environment; it is switched to the policy's level of decision.
+        The environment; it is switched to the level of decision.
     seed : int
         Seed of all draws of the environment and the policy.
     options : mapping, optional
@@ -88,6 +89,8 @@ def run_episode(
         Whether robots exchange and merge their maps (`MergedMaps`), and with which settings. No merging by default.
     plans_sparsely : bool, optional
         Whether robots drive along routes on their sparse maps (`SparsePlanning`); False by default.
+    level : str, optional
+        The level at which the policy's actions are carried out, such as ``graph``; the policy's own by default.
 
     Returns
     -------
@@ -108,7 +111,7 @@ def run_episode(
     5.0
     """
     check_observed(policy, type(policy).__name__, env.settings.observe)
-    env.use_level(policy.level, policy.shares_map, policy.decision_period_s)
+    env.use_level(level or policy.level, policy.shares_map, policy.decision_period_s)
     if plans_sparsely and env.driver is None:
         raise ValueError("plans_sparsely is set, but the policy decides speeds; want waypoints or frontiers")
     world: World = SparsePlanning(env, policy.shares_map) if plans_sparsely else env

@@ -32,6 +32,7 @@ LATER = (
     "frontiers",
     "least_frontier",
     "frontiers_by_size",
+    "graph",
     "state_cells",
     "pyramid_cells",
     "pyramid_levels",

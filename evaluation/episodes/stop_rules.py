@@ -89,8 +89,8 @@ class Stopper:
                 env.stop(agent, STOP_REASON)
 
 
-def stop_rule_of(content: Mapping[str, Any] | None) -> StopRule | None:
-    """Make a rule of the content of a suite's file."""
+def stop_rule_of(content: Mapping[str, Any] | None, robots: int = 1) -> StopRule | None:
+    """Make a rule of the content of a suite's file for a team; ``decisions`` may be a table by the number of robots."""
     if content is None:
         return None
     if not isinstance(content, Mapping):
@@ -99,4 +99,9 @@ def stop_rule_of(content: Mapping[str, Any] | None) -> StopRule | None:
     unknown = sorted(set(content) - set(known))
     if unknown:
         raise ValueError(f"a stop rule has no {unknown[0]!r}; it has {', '.join(known)}")
+    decisions = content.get("decisions")
+    if isinstance(decisions, Mapping):
+        if str(robots) not in decisions:
+            raise ValueError(f"decisions of the stop rule is {shown(decisions)}, without an entry for {robots} robots")
+        return StopRule(**{**content, "decisions": decisions[str(robots)]})
     return StopRule(**content)

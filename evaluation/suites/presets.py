@@ -5,13 +5,22 @@ named. Differences that remain are listed in ``differences``; figures of such a 
 project's only if none of them matters.
 """
 
+import csv
 import difflib
-from collections.abc import Mapping
+import math
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from lidarium.evaluation.suites.suite import Suite
+import numpy as np
+
+from lidarium.envs.floors.catalogue.names import load_floor
+from lidarium.envs.floors.free_space import cell_of
+from lidarium.envs.simulation.kernels.floor_cache import floor_tables
+from lidarium.evaluation.suites.suite import Starts, Suite
+from lidarium.mapping.files.images import read_image
+from lidarium.mapping.grids.grid_lines import visible
 
 _FULL_CIRCLE = 6.283185307179586
 _CLOCK = "time is simulated, not that of a clock on the wall"
@@ -29,14 +38,18 @@ class _Preset:
         Sizes of teams.
     settings : dict
         Options of ``lidarium.parallel_env``.
-    stop : dict
-        As ``StopRule``.
+    stop : dict or None
+        As ``StopRule``; ``decisions`` may be by the number of robots.
     figures : tuple of str
         Keys of an episode's line that the project prints.
     files : tuple of str
         Patterns of its floors below the folder of real data.
     floors : tuple of str
         Substitutes if there are no such files; empty if there are none.
+    image_resolution : float or None
+        Metres per pixel of its floors, if they are images without a scale of their own.
+    starts : callable or None
+        Takes a file and returns the teams of starts there; by default robots start at the floor's own starts.
     differences : tuple of str
         Differences from the project.
     """
@@ -45,10 +58,12 @@ class _Preset:
     source: str
     robots: tuple[int, ...]
     settings: Mapping[str, Any]
-    stop: Mapping[str, Any]
+    stop: Mapping[str, Any] | None
     figures: tuple[str, ...]
     files: tuple[str, ...] = ()
     floors: tuple[str, ...] = ()
+    image_resolution: float | None = None
+    starts: Callable[[Path], Sequence[Starts]] | None = None
     differences: tuple[str, ...] = field(default=())
 
 
@@ -64,7 +79,61 @@ def _lidar(reach: float, beams: int, view: float = _FULL_CIRCLE, noise: float = 
 
 
 _POINT = {"robot": "point", "resolution": 0.1, "stop_coverage": None}
-_GRAPH = "robots drive at 1 m/s with a body of 1 cm; the project moves a point between the nodes of a graph"
+_DRIVES = "robots drive at 1 m/s with a body of 1 cm; the project moves a point between the nodes of a graph"
+_MARK = "robots start at the middle of the map's mark; the project takes one of its pixels"
+
+
+def _around_mark(count: int, apart: float) -> Callable[[Path], Sequence[Starts]]:
+    """Return a function of starts of a team: at the mark, and the nearest places in sight of it that are apart [m]."""
+
+    def starts(path: Path) -> Sequence[Starts]:
+        floor = load_floor(str(path))
+        if not len(floor.starts):
+            return []
+        raster = floor_tables(floor, _RASTER, 0.1, 0.1).body
+        mark = cell_of(raster, floor.starts[0])
+        free = np.argwhere(~raster.solid)
+        free = free[np.argsort(np.hypot(*(free - np.array(mark)).T), kind="stable")]
+        free = free[visible(np.where(raster.solid, np.int8(1), np.int8(-1)), mark, free)]
+        taken = [tuple(float(value) for value in floor.starts[0])]
+        for row, column in free.tolist():
+            place = (raster.origin[0] + (column + 0.5) * _RASTER, raster.origin[1] + (row + 0.5) * _RASTER)
+            if len(taken) < count and all(math.dist(place, other[:2]) >= apart for other in taken):
+                taken.append((*place, 0.0))
+        return [tuple(taken)] if len(taken) == count else []  # type: ignore[arg-type]
+
+    return starts
+
+
+_RASTER = 0.1
+"""Side of the cells in which starts around a mark are looked for [m]."""
+
+_DARE_PIXEL = 0.2
+
+
+def _dare_start(path: Path) -> Sequence[Starts]:
+    """Return DARE's start on a map: the eleventh pixel of the mark when the picture is halved by minima."""
+    pixels = read_image(path)
+    rows, columns = (side // 2 for side in pixels.shape)
+    halved = pixels[: 2 * rows, : 2 * columns].reshape(rows, 2, columns, 2).min(axis=(1, 3))
+    marked = np.argwhere(halved == 208)
+    row, column = marked[10]
+    side = 2.0 * _DARE_PIXEL
+    height = pixels.shape[0] * _DARE_PIXEL
+    return [((((column + 0.5) * side), height - (row + 0.5) * side, 0.0),)]
+
+
+def _mapex_starts(path: Path) -> Sequence[Starts]:
+    """Return MapEx's starts on a map, from its list beside the maps."""
+    rows = read_image(path).shape[0]
+    lines = (path.parent / "starts.csv").read_text(encoding="utf-8").splitlines()
+    listed = [line for line in csv.reader(lines) if not line[0].startswith("#") and line[0] == path.stem]
+    places = [(int(row) - _MAPEX_PADDING, int(column) - _MAPEX_PADDING) for _, row, column in listed]
+    return [((((column + 0.5) * 0.1), (rows - row - 0.5) * 0.1, 0.0),) for row, column in places]
+
+
+_MAPEX_PADDING = 500
+"""Cells that the project adds around its maps."""
 
 PRESETS: dict[str, _Preset] = {
     "explore-bench": _Preset(
@@ -90,15 +159,46 @@ PRESETS: dict[str, _Preset] = {
     ),
     "ariadne": _Preset(
         project="ARiADNE (Cao et al., ICRA 2023)",
-        source="marmotlab/ARiADNE 8d726ad, env.py and sensor.py",
+        source="marmotlab/ARiADNE 8d726ad, env.py, node.py, graph_generator.py and sensor.py",
         robots=(1,),
-        settings={**_POINT, "lidar": _lidar(8.0, 720), "horizon_s": 3600.0},
-        stop={"figure": "remaining_cells", "at_most": 250.0},
-        figures=("path_m", "time_s"),
-        files=("floorplans/synthetic_dungeon/ARiADNE__*.png",),
+        settings={
+            **_POINT,
+            "lidar": _lidar(8.0, 720),
+            "horizon_s": 3600.0,
+            "level": "graph",
+            "graph": {"spacing": 1.9, "utility_share": 0.875, "least_utility": 2, "frontier_spacing": 0.4},
+        },
+        stop={"figure": "remaining_cells", "at_most": 250.0, "decisions": 128},
+        figures=("path_m", "decisions", "success"),
+        files=("floorplans/ariadne/test100/*.png", "floorplans/synthetic_dungeon/ARiADNE__*.png"),
         differences=(
-            _GRAPH,
-            "four of the project's floors, where it has the first hundred of a listing that differs between machines",
+            _MARK,
+            "nodes are 1.9 m apart, 24 around each; the project's are 2.2 m apart along x and 1.7 m along y, with "
+            "edges among the 20 nearest",
+        ),
+    ),
+    "dare": _Preset(
+        project="DARE (Cao et al., ICRA 2025)",
+        source="marmotlab/DARE, parameter.py, classes/env and classes/agent",
+        robots=(1,),
+        settings={
+            "robot": "point",
+            "lidar": _lidar(20.0, 720),
+            "resolution": 0.4,
+            "raster_resolution": _DARE_PIXEL,
+            "stop_coverage": None,
+            "horizon_s": 3600.0,
+            "level": "graph",
+        },
+        stop=None,
+        figures=("path_m", "success"),
+        files=("floorplans/dungeon_test/*.png",),
+        image_resolution=_DARE_PIXEL,
+        starts=_dare_start,
+        differences=(
+            "walls keep the pixels of 0.2 m; the project halves its pictures",
+            "the laser sees all free space in sight; the project draws beams as lines of cells, which leave gaps, and "
+            "its ways are longer",
         ),
     ),
     "chen": _Preset(
@@ -111,19 +211,22 @@ PRESETS: dict[str, _Preset] = {
         files=("floorplans/synthetic_dungeon/DRL_robot_explor__*.png",),
         differences=(
             "robots drive at 1 m/s with a body of 1 cm; the project jumps to one of 50 places around the robot",
+            _MARK,
         ),
     ),
     "ir2": _Preset(
         project="IR2 (Tan et al., IROS 2024)",
-        source="marmotlab/IR2-Multi-Robot-RL-Exploration e53a6fc, env.py and test_driver.py",
+        source="marmotlab/IR2-Multi-Robot-RL-Exploration e53a6fc, env.py, test_parameter.py, ss_realistic_model.py",
         robots=(4, 5),
-        settings={**_POINT, "lidar": _lidar(8.0, 720), "horizon_s": 3600.0},
-        stop={"figure": "c_own_min", "at_least": 0.99, "decisions": 384},
+        settings={**_POINT, "lidar": _lidar(8.0, 720), "horizon_s": 3600.0, "radio": "signal"},
+        stop={"figure": "c_own_min", "at_least": 0.99, "decisions": {"4": 196, "5": 384}},
         figures=("d99_m", "decisions", "c_own_mean_final", "success"),
         files=("floorplans/synthetic_dungeon/large-scale-DRL-__*.png",),
+        starts=_around_mark(5, 1.3),
         differences=(
-            _GRAPH,
-            "the radio is ideal; the project's breaks with distance and walls",
+            _DRIVES,
+            "robots start at the mark and at the places nearest to it, 1.3 m apart; the project's at nodes in sight",
+            "losses of the radio are their means; the project draws them for each episode",
             "floors of a sister project: the project's have no licence",
         ),
     ),
@@ -148,9 +251,12 @@ PRESETS: dict[str, _Preset] = {
         stop={"figure": "c_free", "above": 0.99, "decisions": 128},
         figures=("d99_m", "d90_m", "success", "overlap_mv"),
         files=("floorplans/synthetic_dungeon/large-scale-DRL-__*.png",),
+        starts=_around_mark(4, 4.0),
         differences=(
             "floors of a sister project, smaller than 100 m x 100 m: the project's have no licence",
             "robots drive; the project moves them between the nodes of a graph",
+            "robots start at the mark and at the places nearest to it, 4 m apart, and head east; the project draws "
+            "nodes in sight of the mark and headings",
         ),
     ),
     "maexp": _Preset(
@@ -186,15 +292,12 @@ PRESETS: dict[str, _Preset] = {
         },
         stop={"decisions": 1000},
         figures=("c_valid_final", "iou_occupied", "time_s"),
-        files=(
-            "floorplans/kth/xml/*50010535*",
-            "floorplans/kth/xml/*5001584*",
-            "floorplans/kth/xml/*5005274*",
-            "floorplans/kth/xml/*50052750*",
-        ),
+        files=("floorplans/mapex/*.png",),
+        image_resolution=0.1,
+        starts=_mapex_starts,
         differences=(
             "a step is a second at 1 m/s",
-            "starts are drawn by the seed; the project has a list of its own",
+            "24 of the project's 60 starts, those on maps that are at hand",
             "the project also fills in what it has not seen",
         ),
     ),
@@ -233,18 +336,31 @@ def preset_named(name: str) -> _Preset:
 
 
 def _preset_floors(preset: _Preset, data: Path | None) -> tuple[str, ...]:
-    """Return the floors of a preset.
+    """Return the floors of a preset, in the project's order.
 
-    They are its files below a folder of real data, otherwise their substitutes.
+    They are the files of its first pattern that has any below a folder of real data, otherwise their substitutes.
     """
-    files = [] if data is None else sorted(str(path) for pattern in preset.files for path in Path(data).glob(pattern))
+    found = [] if data is None else [_in_order(Path(data), pattern) for pattern in preset.files]
+    files = next((files for files in found if files), [])
+    if preset.starts is not None:
+        files = [path for path in files if preset.starts(path)]
     if files or preset.floors:
-        return tuple(dict.fromkeys(files)) or preset.floors
+        return tuple(str(path) for path in files) or preset.floors
     where = "no folder of real data was given" if data is None else f"there are none below {data}"
     raise ValueError(
         f"{preset.project} has floors in files ({', '.join(preset.files)}), and {where}; give --data, or "
         "--floors of your own"
     )
+
+
+def _in_order(data: Path, pattern: str) -> list[Path]:
+    """Return the files of a pattern by name, or as ORDER.txt beside them lists them."""
+    files = sorted(data.glob(pattern))
+    listing = files[0].parent / "ORDER.txt" if files else data
+    if not listing.is_file():
+        return files
+    places = {line.split()[1]: int(line.split()[0]) for line in listing.read_text(encoding="utf-8").splitlines()}
+    return sorted(files, key=lambda path: places[path.name])
 
 
 def preset_suite(
@@ -254,13 +370,17 @@ def preset_suite(
     data: Path | None = None,
     floors: tuple[str, ...] = (),
 ) -> Suite:
-    """Make the suite of a preset."""
+    """Make the suite of a preset; on floors of a user's own, robots start at the floors' starts."""
     preset = preset_named(name)
+    chosen = floors or _preset_floors(preset, data)
     return Suite(
         policies=policies,
-        floors=floors or _preset_floors(preset, data),
+        floors=chosen,
         robots=preset.robots,
         seeds=seeds,
+        draws_starts=False,
+        starts={floor: preset.starts(Path(floor)) for floor in chosen} if preset.starts and not floors else {},
         variants={name: preset.settings},
         stop=preset.stop,
+        image_resolution=preset.image_resolution,
     )

@@ -11,6 +11,7 @@ from lidarium.agents import Policy, make_policy
 from lidarium.agents.catalogue import POLICIES
 from lidarium.agents.policy import settings_for
 from lidarium.envs.floors.catalogue.names import is_generated, load_floor, set_floors
+from lidarium.envs.levels import LEVELS
 from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.settings.making import make_settings
 from lidarium.evaluation.episodes.stop_rules import stop_rule_of
@@ -27,7 +28,7 @@ MOST_EACH = 1_000_000
 MOST_TRIALS = 10_000_000
 """Maximum number of episodes of a suite."""
 
-RUN_OPTIONS = ("merging", "plans_sparsely")
+RUN_OPTIONS = ("merging", "plans_sparsely", "level")
 """Options of ``run_episode`` that variants may set, besides settings."""
 
 ROBOTS = Rule(int, bounds=within(1, 64))
@@ -137,8 +138,8 @@ class Suite:
     robots, seeds : tuple of int
         Sizes of teams; seeds.
     variants : dict
-        Settings by name, as the options of ``lidarium.parallel_env``, and ``merging`` and ``plans_sparsely`` as
-        for ``lidarium.run_episode``.
+        Settings by name, as the options of ``lidarium.parallel_env``, and ``merging``, ``plans_sparsely`` and
+        ``level`` as for ``lidarium.run_episode``.
     starts : dict
         By floor: teams of starts (x, y, theta) in the floor's frame [m, rad], tried one after the other in
         place of drawn ones; a team takes as many of them as it has robots.
@@ -148,7 +149,8 @@ class Suite:
     bounds : bool
         Whether each episode is compared with the time of a team that knows the floor. False by default.
     stop : dict or None
-        Rule that ends episodes in addition to the settings, as ``StopRule``.
+        Rule that ends episodes in addition to the settings, as ``StopRule``; ``decisions`` may be a table by the
+        number of robots.
     image_resolution : float or None
         Metres per pixel, if floors are plain images.
     policy_settings : dict
@@ -185,14 +187,19 @@ class Suite:
         for floor in self.floors:
             _check_floor(floor, self.image_resolution)
         for variant in self.variants:
-            for name, value in self.run_options(variant).items():
+            options = self.run_options(variant)
+            level = options.pop("level", None)
+            for name, value in options.items():
                 if not isinstance(value, bool):
                     raise ValueError(f"{name} of variant {variant!r} is {shown(value)}; want true or false")
+            for name, policy in made.items():
+                _check_level(name, policy, variant, level)
             for robots in self.robots:
                 settings = self.settings(variant, robots)
                 for name, policy in made.items():
                     _check_sensors(name, policy, variant, settings)
-        stop_rule_of(self.stop)
+        for robots in self.robots:
+            stop_rule_of(self.stop, robots)
         for floor, given in self.starts.items():
             if floor not in self.floors:
                 raise ValueError(f"the suite has starts on {floor!r}, which is not among its floors")
@@ -325,6 +332,18 @@ def suite_of(content: Mapping[str, Any]) -> Suite:
         image_resolution=content.get("image_resolution"),
         policy_settings=tables_of(content.get("policy_settings", {}), "policy_settings"),
     )
+
+
+def _check_level(name: str, policy: Policy, variant: str, level: Any) -> None:  # noqa: ANN401
+    """Check that the level of a variant carries out the actions of a policy."""
+    wanted = policy.level if level is None else level
+    if not isinstance(wanted, str):
+        raise ValueError(f"level of variant {variant!r} is {shown(level)}; want one of {', '.join(LEVELS)}")
+    if wanted != policy.level and policy.level not in LEVELS[wanted].carries:
+        raise ValueError(
+            f"policy {name!r} decides at the level {policy.level!r}, which level {wanted!r} of variant {variant!r} "
+            "does not carry out"
+        )
 
 
 def _check_sensors(name: str, policy: Policy, variant: str, settings: ExplorationSettings) -> None:

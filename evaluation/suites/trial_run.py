@@ -62,6 +62,8 @@ def run_trial(suite: Suite, trial: Trial, records: Path | None = None) -> dict[s
 
     began = time.perf_counter()
     policy = suite.make_policy(trial.policy)
+    if records is not None and (suite.run_options(trial.variant).get("level") or policy.level) == "graph":
+        raise ValueError("a record runs again by speeds, which moves at the level 'graph' have not; leave out records")
     settings = settings_for(policy, suite.settings(trial.variant, trial.robots))
     history = History()
     image_resolution = _image_resolution(suite, trial)
@@ -69,7 +71,7 @@ def run_trial(suite: Suite, trial: Trial, records: Path | None = None) -> dict[s
     env = WatchedExploration(
         trial.floor, settings, image_resolution, [history] if records is None else [history, recorder]
     )
-    rule = stop_rule_of(suite.stop)
+    rule = stop_rule_of(suite.stop, trial.robots)
     starts = suite.starts_of(trial) or (
         drawn_starts(trial.floor, settings, trial.seed, image_resolution) if suite.draws_starts else None
     )

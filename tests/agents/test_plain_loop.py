@@ -12,7 +12,13 @@ from lidarium.agents import policy_names
 
 HORIZON_S = 12.0
 CAMERA = {"camera": {"columns": 80, "rows": 60, "pitch": 0.35}, "observe": ("scan", "pose", "depth")}
-NEEDS = {"sparse_frontier": CAMERA, "random_walk": {"observe": ("scan", "pose", "bumper")}}
+SMALL_GRAPH = {"graph": {"spacing": 0.6, "neighbours": 1, "frontier_spacing": 0.2, "least_utility": 0}}
+NEEDS = {
+    "sparse_frontier": CAMERA,
+    "random_walk": {"observe": ("scan", "pose", "bumper")},
+    "nearest_node": SMALL_GRAPH,
+    "utility_node": SMALL_GRAPH,
+}
 NAMES = sorted(policy_names())
 LEVELS = ("velocity", "waypoint", "frontier")
 CARRIED = [

@@ -4,14 +4,22 @@ from dataclasses import replace
 
 import pytest
 
+from lidarium.evaluation.episodes.stop_rules import stop_rule_of
 from lidarium.evaluation.suites.campaign import run_trial
 from lidarium.evaluation.suites.presets import PRESETS, preset_named, preset_suite
+
+
+def first_floor(whole, name, horizon_s):
+    """Return a preset's suite on its first floor, for so long [s]."""
+    starts = {floor: teams for floor, teams in whole.starts.items() if floor == whole.floors[0]}
+    settings = {**whole.variants[name], "horizon_s": horizon_s}
+    return replace(whole, floors=whole.floors[:1], starts=starts, variants={name: settings})
 
 
 @pytest.mark.parametrize("name", PRESETS)
 def test_a_preset_runs_and_has_the_figures_that_its_project_prints(name, shared_data):
     whole = preset_suite(name, ("nearest_frontier",), (0,), shared_data)
-    short = replace(whole, floors=whole.floors[:1], variants={name: {**whole.variants[name], "horizon_s": 4.0}})
+    short = first_floor(whole, name, 4.0)
     line = run_trial(short, next(short.trials()))
     assert {figure for figure in preset_named(name).figures if figure not in line} == set()
     assert line["time_s"] <= 4.0 + 1e-6
@@ -31,4 +39,37 @@ def test_unknown_presets_and_empty_folders_are_refused(tmp_path):
         preset_named("ariadn")
     with pytest.raises(ValueError, match="there are none below"):
         preset_suite("ariadne", ("random_walk",), (0,), tmp_path)
-    assert preset_suite("ariadne", ("random_walk",), (0,), None, ("apartment",)).floors == ("apartment",)
+    assert preset_suite("ariadne", ("nearest_node",), (0,), None, ("apartment",)).floors == ("apartment",)
+
+
+def test_robots_start_at_the_marks_or_starts_of_the_projects_maps(shared_data):
+    import cv2
+
+    for name, side, grey in (("dare", 0.2, 208), ("ariadne", 0.1, 203), ("ir2", 0.1, 203), ("marvel", 0.1, 203)):
+        whole = preset_suite(name, ("nearest_frontier",), (0,), shared_data)
+        floor, short = whole.floors[0], first_floor(whole, name, 1.0)
+        (x, y, _), *others = run_trial(short, next(short.trials()))["starts"]
+        pixels = cv2.imread(floor, cv2.IMREAD_GRAYSCALE)
+        assert abs(int(pixels[int(len(pixels) - y / side), int(x / side)]) - grey) <= 1, name
+        assert all(1.0 <= ((x - a) ** 2 + (y - b) ** 2) ** 0.5 <= 9.0 for a, b, _ in others)
+        assert len(others) == whole.robots[0] - 1
+
+
+def test_ariadnes_maps_are_in_its_order_and_mapexs_starts_are_its_own(shared_data):
+    floors = preset_suite("ariadne", ("nearest_node",), (0,), shared_data).floors
+    assert [floor.rpartition("/")[2] for floor in floors[:2]] == ["img_9999.png", "img_9998.png"]
+    assert len(floors) == 100
+    mapex = preset_suite("mapex", ("nearest_frontier",), (0,), shared_data)
+    assert sum(len(teams) for teams in mapex.starts.values()) == 24
+
+
+def test_ir2_ends_after_fewer_decisions_with_four_robots():
+    stop = PRESETS["ir2"].stop
+    assert [stop_rule_of(stop, robots).decisions for robots in (4, 5)] == [196, 384]
+    with pytest.raises(ValueError, match="without an entry for 3 robots"):
+        stop_rule_of(stop, 3)
+
+
+def test_policies_that_a_level_does_not_carry_out_are_refused(shared_data):
+    with pytest.raises(ValueError, match="decides at the level 'velocity', which level 'graph'"):
+        preset_suite("dare", ("srt",), (0,), shared_data)

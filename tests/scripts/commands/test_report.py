@@ -28,7 +28,10 @@ def test_the_report_lies_beside_the_episodes_and_its_figures_are_told(folder, ca
     assert main(["report", str(folder)]) == 0
     told = capsys.readouterr().out
     assert "1 robot, drawn floors" in told
-    assert "careful: 1 robot, drawn floors: fewer than 50 independent runs of `explore_lite` (2), `random_walk` (2)" in told
+    assert (
+        "careful: 1 robot, drawn floors: fewer than 50 independent runs of `explore_lite` (2), `random_walk` (2)"
+        in told
+    )
     assert f"written to {folder / 'report'}" in told
     assert (folder / "report" / "report.md").is_file()
 
