@@ -70,7 +70,7 @@ class TourFrontier(FrontierExplorer):
     def reset(self, team: Team, seed: int = 0) -> None:
         """Begin an episode."""
         super().reset(team, seed)
-        # Any robot may take any view, so it counts what the one that sees least far would see.
+        # Any robot may take any view, so a view counts what the shortest-range lidar of the team would see.
         self._rules = self.settings.rules(min(team.belief(agent).lidar.range_max for agent in team.agents))
         self._legs: dict[Choice, Leg] = {}
         self._intents = {agent: Intent() for agent in team.agents}

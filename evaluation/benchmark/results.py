@@ -44,8 +44,11 @@ class Standing:
         Share of the runs that saw 99 %.
     time_s : Interval
         Median time to 99 % [s]; inf is later than the horizon.
+    is_baseline : bool
+        Whether ratios are of this policy.
     ratio : Interval or None
-        Time over the baseline's on the same floors, geometric mean; times not reached are the horizon.
+        Time over the baseline's on the same floors, geometric mean; times not reached are the horizon. None for the
+        baseline, and if there are no rows of it.
     improvement : Interval or None
         Probability that a run is sooner than the baseline's on the same floor.
     """
@@ -53,6 +56,7 @@ class Standing:
     task: str
     policy: str
     is_reference: bool
+    is_baseline: bool
     runs: int
     asked: int
     success: Interval
@@ -130,6 +134,13 @@ def collect(
             f"Rows are of lidarium {' and '.join(versions)}. The tasks' floors, starts and settings are the same; "
             "policies and SLAM may have changed."
         )
+    compared = {each.task for each in standings if each.is_baseline}
+    remarks += [
+        f"{task.name}: there are no rows of its baseline {task.baseline}, so nothing is compared; run it with "
+        "--reference."
+        for task in tasks
+        if task.name not in compared
+    ]
     short = [each for each in standings if each.runs < each.asked]
     remarks += [f"{each.task}, {each.policy}: {each.runs} of {each.asked} runs." for each in short]
     results = BenchmarkResults(
@@ -184,6 +195,7 @@ def _standings(task: BenchmarkTask, size: Size, own: Sequence[Row], theirs: Sequ
                 task.name,
                 policy,
                 policy not in mine,
+                policy == task.baseline,
                 len(rows),
                 len(task.floors_of(size)),
                 mean_share_interval(reached.is_reached),
@@ -241,7 +253,7 @@ def table_of(tasks: Sequence[BenchmarkTask], results: BenchmarkResults) -> str:
                 str(each.runs) if each.runs == each.asked else f"{each.runs} of {each.asked}",
                 f"{100.0 * each.success.estimate:.0f}",
                 interval(each.time_s, horizons[each.task], digits=0),
-                "baseline" if each.ratio is None else interval(each.ratio, digits=3),
+                "baseline" if each.is_baseline else interval(each.ratio, digits=3),
                 interval(each.improvement, digits=2),
             )
         )
@@ -263,7 +275,7 @@ def table_of(tasks: Sequence[BenchmarkTask], results: BenchmarkResults) -> str:
 
 def card_of(found: Benchmark, tasks: Sequence[BenchmarkTask], results: BenchmarkResults) -> str:
     """Return the card: tasks, rules, floors and licences, how to cite, and what ran."""
-    header = ("task", "what it asks", "robots", "floors, easy / full", "baseline", "settings")
+    header = ("id", "task", "robots", "floors, easy / full", "baseline", "settings")
     rows = [
         (
             f"`{task.id}`",

@@ -9,7 +9,6 @@ docs/reference/statistics.md and docs/results/interval_coverage.md.
 from lidarium.evaluation.statistics.estimates import (
     interquartile_mean,
     interquartile_mean_interval,
-    mean_bands,
     mean_interval,
     mean_share_interval,
     median_bands,
@@ -41,7 +40,6 @@ __all__ = [
     "interquartile_mean",
     "interquartile_mean_interval",
     "kaplan_meier",
-    "mean_bands",
     "mean_interval",
     "mean_share_interval",
     "median_bands",

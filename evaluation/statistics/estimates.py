@@ -14,8 +14,7 @@ at the edge of the statistical precipice (NeurIPS 2021). Its standard error: Tuk
 the winsorised variance. Shares: Wilson, Journal of the American Statistical Association 22 (1927). Brown, Cai
 and DasGupta, Interval estimation for a binomial proportion, Statistical Science 16 (2001): close to nominal
 in the mean over shares, also for few runs and shares near 0 or 1. Shares of clusters: Korn and Graubard, Confidence
-intervals for proportions with small expected number of positive counts, Survey Methodology 24 (1998). Bands: Montiel
-Olea and Plagborg-Moller, Simultaneous confidence bands, Journal of Applied Econometrics 34 (2019). Medians of
+intervals for proportions with small expected number of positive counts, Survey Methodology 24 (1998). Medians of
 clusters: Woodruff, Confidence intervals for medians and other position measures, JASA 47 (1952).
 """
 
@@ -39,7 +38,6 @@ from lidarium.evaluation.statistics.samples import (
     cluster_indices,
     in_parts,
     no_interval,
-    resample_counts,
     studentised_interval,
 )
 
@@ -372,35 +370,6 @@ def optimality_gap(
         raise ValueError(f"the least time is {took.min():g} and the least bound {least.min():g}; want more than 0")
     gaps = np.maximum(1.0 - least / took, 0.0)
     return mean_interval(gaps, confidence, resamples, seed, clusters, (0.0, 1.0))
-
-
-def mean_bands(values: Values, confidence: float = 0.95, resamples: int = RESAMPLES, seed: int = 0) -> Values:
-    """Return the mean of each column and the ends of a band that holds all the means at once, (3, k).
-
-    The band reaches as many standard errors to both sides as the largest of all columns has in resamples (Montiel Olea
-    and Plagborg-Moller 2019). The ends are infinite if there are fewer than `FEWEST_FOR_INTERVAL` rows.
-
-    Parameters
-    ----------
-    values : (n, k) array_like
-        Curves, such as those of training seeds, at k times.
-    """
-    curves = np.asarray(values, np.float64)
-    if curves.ndim != 2 or not curves.size or not np.isfinite(curves).all():
-        raise ValueError(f"values have shape {curves.shape}; want finite numbers, a row for each curve")
-    size, mean = len(curves), curves.mean(axis=0)
-    deviations = curves - mean
-    errors = np.sqrt((deviations**2).mean(axis=0) / size)
-    if size < FEWEST_FOR_INTERVAL:
-        return np.stack([mean, np.full_like(mean, -np.inf), np.full_like(mean, np.inf)])
-    weights = resample_counts(size, resamples, seed).astype(np.float64) / size
-    shifts = weights @ deviations
-    spreads = np.sqrt(np.maximum(weights @ deviations**2 - shifts**2, 0.0) / size)
-    least = 1e-9 * np.abs(curves).max(axis=0)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        ratios = np.where(np.abs(shifts) <= least, 0.0, np.abs(shifts) / np.where(spreads > least, spreads, 0.0))
-    reach = np.quantile(ratios.max(axis=1), checked_confidence(confidence), method="higher")
-    return np.stack([mean, mean - reach * errors, mean + reach * errors])
 
 
 def _wilson(share: float, trials: float, size: int, confidence: float) -> Interval:

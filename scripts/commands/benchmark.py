@@ -138,7 +138,7 @@ def _text(results: "BenchmarkResults", folder: Path) -> str:
             each.runs,
             f"{100.0 * each.success.estimate:.0f} %",
             "never" if math.isinf(each.time_s.estimate) else f"{each.time_s.estimate:.0f}",
-            "baseline" if each.ratio is None else f"{each.ratio:.2f}",
+            "baseline" if each.is_baseline else "-" if each.ratio is None else f"{each.ratio:.2f}",
         )
         for each in results.standings
     ]

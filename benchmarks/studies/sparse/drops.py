@@ -42,7 +42,7 @@ STAIR_M, TREAD_M, STAIRS = 0.17, 0.25, 8
 
 @dataclass(frozen=True, eq=False)
 class Areas:
-    """What is on the floor of a place.
+    """Stairwells, holes and pallets on the floor of a place.
 
     `kinds`: of ``KINDS``, one for each area; `boxes` (N, 2, 2) float64: low and high corner of each [m].
     """

@@ -194,16 +194,19 @@ def set_floors(name: str) -> tuple[str, ...]:
     """
     short, colon, wanted = name.removeprefix("set:").partition(":")
     _check_set(short)
-    first, count = SETS.get(short, (0, 0))
-    floors = real_floors(short) if short in COLLECTIONS else range(first, first + count)
-    if colon:
-        if not (wanted.isascii() and wanted.isdigit() and 1 <= int(wanted) <= len(floors)):
-            raise ValueError(
-                f"{name!r} wants {wanted!r} floors; the set {short} has {len(floors)}, as in "
-                f"set:{short}:{min(len(floors), 40)}"
-            )
-        floors = floors[: int(wanted)]
-    return tuple(each if isinstance(each, str) else f"building:{each}" for each in floors)
+    if short in COLLECTIONS:
+        floors = real_floors(short)
+    else:
+        first, count = SETS[short]
+        floors = tuple(f"building:{seed}" for seed in range(first, first + count))
+    if not colon:
+        return floors
+    if not (wanted.isascii() and wanted.isdigit() and 1 <= int(wanted) <= len(floors)):
+        raise ValueError(
+            f"{name!r} wants {wanted!r} floors; the set {short} has {len(floors)}, as in "
+            f"set:{short}:{min(len(floors), 40)}"
+        )
+    return floors[: int(wanted)]
 
 
 def _set_sha256(name: str) -> str:

@@ -124,3 +124,15 @@ def test_fewer_runs_than_the_size_asks_for_are_said(tiny, tmp_path):
 def test_bad_options_are_answered_in_a_line(tiny, tmp_path, capsys, options, message):
     assert main(["benchmark", "tiny", "--out", str(tmp_path / "x"), *options]) == 2
     assert message in capsys.readouterr().err
+
+
+@pytest.mark.usefixtures("without_page")
+def test_without_rows_of_the_baseline_nothing_is_compared_and_that_is_said(tiny, tmp_path, capsys):
+    (tiny / "tiny.jsonl.xz").unlink()
+    code, written = answer(tmp_path / "mine", "--policies", "explore_lite", "--tasks", "Homes-1", "--quick")
+    assert code == 0
+    (mine,) = written["standings"]
+    assert (mine["policy"], mine["is_baseline"], mine["ratio"]) == ("explore_lite", False, None)
+    assert any("no rows of its baseline nearest_frontier" in remark for remark in written["remarks"])
+    assert "| baseline |" not in (tmp_path / "mine" / "table.md").read_text()
+    assert "baseline\n" not in capsys.readouterr().out

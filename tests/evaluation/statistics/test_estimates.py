@@ -9,7 +9,6 @@ from scipy import stats
 from lidarium.evaluation.statistics import (
     interquartile_mean,
     interquartile_mean_interval,
-    mean_bands,
     mean_interval,
     mean_share_interval,
     median_bands,
@@ -288,24 +287,6 @@ def test_the_optimality_gap_is_the_share_above_the_bound():
     assert 0.0 <= found.low < found.high <= 1.0
     with pytest.raises(ValueError, match="the least bound 0; want more than 0"):
         optimality_gap([1.0], [0.0])
-
-
-def test_bands_hold_whole_curves_more_often_than_intervals_at_each_point():
-    generator, inside, at_points = np.random.default_rng(11), 0, 0
-    for _ in range(200):
-        curves = generator.normal(size=(12, 20))
-        _, low, high = mean_bands(curves, resamples=400)
-        inside += bool(((low <= 0.0) & (high >= 0.0)).all())
-        reach = stats.t.ppf(0.975, 11) * curves.std(axis=0, ddof=1) / np.sqrt(12)
-        at_points += bool((np.abs(curves.mean(axis=0)) <= reach).all())
-    assert inside > 0.9 * 200
-    assert at_points < 0.6 * 200
-
-
-def test_few_curves_have_no_band():
-    mean, low, high = mean_bands(np.arange(12.0).reshape(3, 4))
-    assert mean.tolist() == [4.0, 5.0, 6.0, 7.0]
-    assert np.isinf([low, high]).all()
 
 
 def test_an_interval_is_written_with_its_ends_or_without():

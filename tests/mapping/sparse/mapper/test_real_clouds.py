@@ -1,6 +1,7 @@
 """Real clouds become small maps in which nothing that was seen is lost."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -81,3 +82,4 @@ def test_octomap_leaves_of_a_building_have_a_floor(shared_data):
     assert found.floor.tilt < math.radians(1.0)
     assert len(found.ground) > 50
     assert len(found.occupied) < 512
+    assert len(map_cloud(points, 512, replace(settings, fits_boxes=False)).occupied) < 0.7 * 512
