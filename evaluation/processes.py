@@ -199,6 +199,20 @@ def end_workers(grace_s: float = END_GRACE_S, *, are_ending: bool = False) -> No
             process.join()
 
 
+def end_pool(pool: ProcessPoolExecutor, *, are_ending: bool = False) -> None:
+    """End a pool and its processes.
+
+    Its thread is waited for: Python, on its way out, would write to a pipe that this thread closes just then.
+    """
+    inner: Any = pool
+    thread: threading.Thread | None = inner._executor_manager_thread  # no public name
+    # Not waited for without end: a worker that is stopped would never leave.
+    pool.shutdown(wait=False, cancel_futures=True)
+    end_workers(are_ending=are_ending)
+    if thread is not None:
+        thread.join(END_GRACE_S)
+
+
 def _kill_workers() -> None:
     """End all child processes of this one at once."""
     for process in multiprocessing.active_children():
@@ -320,9 +334,7 @@ def _in_pool(
                             lost.append(following)
             is_whole = True
         finally:
-            # Not waited for without end: a worker that is stopped would never leave.
-            pool.shutdown(wait=False, cancel_futures=True)
-            end_workers(are_ending=is_whole)
+            end_pool(pool, are_ending=is_whole)
     return lost
 
 

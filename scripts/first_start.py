@@ -9,7 +9,7 @@ from concurrent.futures import Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 
-from lidarium.evaluation.processes import interrupts_held
+from lidarium.evaluation.processes import end_pool, interrupts_held
 from lidarium.mapping.kernels.first_start import Entry, compile_kernel
 from lidarium.scripts.common import counted, notify
 
@@ -61,10 +61,7 @@ def _compiled(folder: Path, kernels: Sequence[Entry], processes: int) -> Iterato
     except BrokenProcessPool:
         return  # missing kernels are compiled at their first call
     finally:
-        pool.shutdown(wait=is_whole, cancel_futures=True)
-        if not is_whole:
-            for process in multiprocessing.active_children():
-                process.terminate()
+        end_pool(pool, are_ending=is_whole)
 
 
 def _begin_process() -> None:
