@@ -41,23 +41,31 @@ def shared_cases() -> Path:
     return folder
 
 
-_LONGEST_FIRST = (
+_FIRST = (
     "test_golden_episodes.py",
-    "test_conformance.py",
-    "test_determinism.py",
     "test_heavy.py",
+    "test_kills.py",
+    "test_fuzz.py",
+    "test_slam.py",
+    "test_failing_disk.py",
+    "test_conformance.py",
+    "test_plain_loop.py",
+    "test_determinism.py",
     "test_equality.py",
     "test_frontier.py",
     "test_browser.py",
     "test_study.py",
-    "test_failing_disk.py",
     "test_policy.py",
     "test_signals.py",
-    "test_kills.py",
     "test_wrappers.py",
+    "test_learning_run.py",
+    "test_results.py",
+    "test_sparse_page.py",
 )
+"""Long files. While the first compiles the kernels of environments, other processes run those that need few."""
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Begin with the longest files: each runs in one process, which the others shall not have to wait for."""
-    items.sort(key=lambda item: item.path.name not in _LONGEST_FIRST)
+    place = {name: k for k, name in enumerate(_FIRST)}
+    items.sort(key=lambda item: place.get(item.path.name, len(place)))
