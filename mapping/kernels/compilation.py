@@ -44,7 +44,7 @@ Array = NDArray[Any]
 
 _numba_config: Any = config
 _caching: Any = FunctionCache
-_listening: Any = event.Listener
+_events: Any = event
 
 IS_INTERPRETED = bool(_numba_config.DISABLE_JIT)
 """Whether Python runs the kernels, as they are written."""
@@ -145,7 +145,7 @@ def kernel(
     return decorate if function is None else decorate(function)
 
 
-class _WithoutCollection(_listening):
+class _WithoutCollection(_events.Listener):
     """Keeps Python's garbage collector from running while kernels compile, which takes a tenth of that time."""
 
     depth = 0  # a kernel compiles those that it calls
@@ -165,7 +165,7 @@ class _WithoutCollection(_listening):
             gc.enable()
 
 
-event.register("numba:compile", _WithoutCollection())
+_events.register("numba:compile", _WithoutCollection())
 
 
 # -- Cache -------------------------------------------------------------------------------------------------
