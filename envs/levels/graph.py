@@ -13,7 +13,7 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from lidarium.envs.levels.level import STEPS, Level, Mask, Turn, add_info, check_rows
-from lidarium.envs.levels.node_graph import NodeGraph, add_edges, count_in_sight, frontiers_of, pairs_of, ways_along
+from lidarium.envs.levels.node_graph import NodeGraph, add_edges, frontiers_of, in_sight, pairs_of, thinned, ways_along
 from lidarium.envs.levels.waypoint import Ways, give_ways, is_way, read_ways
 from lidarium.envs.onboard.driving.drives import DRIVE_STATES
 from lidarium.envs.onboard.driving.path_following import ARRIVED, DRIVING, IDLE, MAX_POINTS
@@ -43,7 +43,11 @@ class _Lattice(NamedTuple):
     cells : (L, 2) int64
         Their cells (row, column).
     is_node, is_spent : (L,) bool
-        Whether they are known to be free, and whether a robot was there or hardly a frontier was in sight before.
+        Whether they are known to be free, and whether a robot came there or hardly a frontier was in sight before.
+    lacks_edges : (L,) bool
+        Nodes from which edges are looked for when a robot is near.
+    seen : list of (C,) int64
+        Frontier cells that were in sight of each node and are still frontiers, as indices of the flat map.
     edges : (L, side, side) bool
         Edges to neighbours, see `add_edges`.
     columns : int
@@ -56,6 +60,8 @@ class _Lattice(NamedTuple):
     cells: NDArray[np.int64]
     is_node: NDArray[np.bool_]
     is_spent: NDArray[np.bool_]
+    lacks_edges: NDArray[np.bool_]
+    seen: list[NDArray[np.int64]]
     edges: NDArray[np.bool_]
     columns: int
     corner: NDArray[np.float64]
@@ -285,6 +291,8 @@ class GraphLevel(Level):
                 self._cells(row, positions),
                 np.zeros(len(steps), np.bool_),
                 np.zeros(len(steps), np.bool_),
+                np.zeros(len(steps), np.bool_),
+                [np.zeros(0, np.int64)] * len(steps),
                 np.zeros((len(steps), side, side), np.bool_),
                 len(across),
                 corner,
@@ -294,10 +302,11 @@ class GraphLevel(Level):
     def _graph(self, row: int) -> NodeGraph:
         """Return the graph on a robot's map.
 
-        Nodes that have hardly anything to show lose their utility for good. Edges are found from new nodes and from
-        those with utility near the robot, and stay.
+        A frontier cell counts for a node from when it was in sight, as the one of its square, until it is no frontier
+        any more. Nodes that have hardly anything to show, and those where a robot has come to, lose their utility for
+        good. Edges are looked for from nodes near the robot, until these have no utility, and stay.
         """
-        graph, resolution = self.settings.graph, self.settings.occupancy.resolution
+        graph = self.settings.graph
         navigation, lattice = self._map(row), self._lattice(row)
         log_odds, place = navigation.log_odds, self.perception.beliefs.believed[row, :2]
         passable = _passable(navigation, self.settings.robot.radius)
@@ -307,26 +316,38 @@ class GraphLevel(Level):
         is_free = passable[lattice.cells[:, 0], lattice.cells[:, 1]] < 0
         is_free[here] |= is_on_lattice
         is_new = is_free & ~lattice.is_node
-        lattice.is_node[is_new] = True
-        lattice.is_spent[here] |= is_on_lattice
-        utilities = np.zeros(len(gaps), np.int64)
-        open_nodes = np.flatnonzero(lattice.is_node & ~lattice.is_spent)
-        frontiers = frontiers_of(log_odds, *lattice.corner, graph.frontier_spacing / resolution)
+        lattice.is_node[is_new] = lattice.lacks_edges[is_new] = True
+        if is_on_lattice and not is_new[here]:
+            lattice.is_spent[here], lattice.lacks_edges[here] = True, False
         reach = self.settings.lidar.range_max
-        counts = count_in_sight(
-            log_odds, lattice.cells[open_nodes], frontiers, graph.utility_share * reach / resolution
+        is_counted = is_new | lattice.is_node & ~lattice.is_spent & (gaps <= 2.0 * reach)
+        self._count(lattice, np.flatnonzero(is_counted), log_odds)
+        utilities = np.array([len(cells) for cells in lattice.seen], np.int64)
+        utilities[lattice.is_spent] = 0
+        is_searching = lattice.is_node & lattice.lacks_edges & (gaps < reach + graph.spacing)
+        add_edges(
+            passable, lattice.cells, lattice.columns, lattice.is_node, np.flatnonzero(is_searching), lattice.edges
         )
-        utilities[open_nodes] = np.where(counts > graph.least_utility, counts, 0)
-        lattice.is_spent[open_nodes] = utilities[open_nodes] == 0
-        is_searching = (is_new | lattice.is_node & ~lattice.is_spent) & (gaps < reach + graph.spacing)
-        arguments = (passable, lattice.cells, lattice.columns, lattice.is_node)
-        add_edges(*arguments, np.flatnonzero(is_searching), lattice.edges)
+        lattice.lacks_edges[is_searching & (utilities == 0)] = False
         positions, edges = lattice.positions, pairs_of(lattice.edges, lattice.columns)
         if not is_on_lattice:  # a robot that has started beside the lattice
             here = len(positions)
             positions, utilities = np.vstack([positions, place]), np.append(utilities, 0)
             edges = np.vstack([edges, self._edges_beside(row, place, passable, lattice)])
         return NodeGraph(positions, utilities, here, *ways_along(positions, edges, here))
+
+    def _count(self, lattice: _Lattice, nodes: NDArray[np.int64], log_odds: NDArray[np.int8]) -> None:
+        """Bring the frontier cells that some nodes have seen up to date."""
+        graph, resolution = self.settings.graph, self.settings.occupancy.resolution
+        is_frontier = frontiers_of(log_odds)
+        frontiers = thinned(np.argwhere(is_frontier), lattice.corner, graph.frontier_spacing / resolution)
+        numbers = frontiers[:, 0] * log_odds.shape[1] + frontiers[:, 1]
+        reach = graph.utility_share * self.settings.lidar.range_max / resolution
+        for node, sees in zip(nodes, in_sight(log_odds, lattice.cells[nodes], frontiers, reach), strict=True):
+            before = lattice.seen[node]
+            now = np.union1d(before[is_frontier.ravel()[before]], numbers[sees])
+            lattice.seen[node] = now
+            lattice.is_spent[node] = len(now) <= graph.least_utility
 
     def _edges_beside(
         self, row: int, place: NDArray[np.float64], passable: NDArray[np.int8], lattice: _Lattice

@@ -91,17 +91,10 @@ def pairs_of(edges: NDArray[np.bool_], columns: int) -> NDArray[np.int64]:
 
 
 @kernel
-def frontiers_of(log_odds: Array, row: float, column: float, side: float) -> NDArray[np.int64]:
-    """Return a frontier cell (row, column) of each square that has some, (M, 2) int64.
-
-    A frontier cell is free and has 2 to 7 unknown cells among the eight around it. Squares have sides of ``side``
-    cells and a corner at the cell ``row``, ``column``; each gives the cell that is nearest to its own corner.
-    """
+def frontiers_of(log_odds: Array) -> NDArray[np.bool_]:
+    """Return which cells are frontiers: free, with 2 to 7 unknown cells among the eight around (kernel)."""
     rows, columns = log_odds.shape
-    first_row, first_column = np.floor(-row / side), np.floor(-column / side)
-    height = int(np.floor((rows - row) / side) - first_row) + 1
-    width = int(np.floor((columns - column) / side) - first_column) + 1
-    nearest, best = np.full((height, width), np.inf), np.zeros((height, width, 2), np.int64)
+    found = np.zeros((rows, columns), np.bool_)
     for i in range(rows):
         for j in range(columns):
             if log_odds[i, j] >= 0:
@@ -110,34 +103,34 @@ def frontiers_of(log_odds: Array, row: float, column: float, side: float) -> NDA
             for k in range(max(i - 1, 0), min(i + 2, rows)):
                 for m in range(max(j - 1, 0), min(j + 2, columns)):
                     unknown += log_odds[k, m] == 0
-            if not 1 < unknown < 8:
-                continue
-            up, across = np.floor((i - row) / side), np.floor((j - column) / side)
-            rise, run = i - row - up * side, j - column - across * side
-            p, q = int(up - first_row), int(across - first_column)
-            if rise * rise + run * run < nearest[p, q]:
-                nearest[p, q] = rise * rise + run * run
-                best[p, q, 0], best[p, q, 1] = i, j
-    count = 0
-    found = np.empty((height * width, 2), np.int64)
-    for p in range(height):
-        for q in range(width):
-            if nearest[p, q] < np.inf:
-                found[count] = best[p, q]
-                count += 1
-    return found[:count]
+            found[i, j] = 1 < unknown < 8
+    return found
+
+
+def thinned(cells: NDArray[np.int64], corner: NDArray[np.float64], side: float) -> NDArray[np.int64]:
+    """Return one of the cells (M, 2) of each square that has some: the one nearest to the corner of its square.
+
+    Squares have sides of ``side`` cells and corners in steps of it from ``corner`` (row, column). Those beside the
+    lines through ``corner`` reach across them: the corner of a square is the one that is nearest to ``corner``.
+    """
+    gaps = cells - corner
+    squares = np.trunc(gaps / side)
+    excess = ((gaps - squares * side) ** 2).sum(axis=1)
+    order = np.lexsort((cells[:, 0], cells[:, 1], excess))
+    _, firsts = np.unique(squares[order], axis=0, return_index=True)
+    return cells[np.sort(order[firsts])]
 
 
 @kernel
-def count_in_sight(log_odds: Array, cells: Array, frontiers: Array, reach: float) -> NDArray[np.int64]:
-    """Return how many frontier cells (M, 2) are in sight of each cell (N, 2), nearer than ``reach`` [cells].
+def in_sight(log_odds: Array, cells: Array, frontiers: Array, reach: float) -> NDArray[np.bool_]:
+    """Return which frontier cells (M, 2) are in sight of each cell (N, 2) and nearer than ``reach`` [cells], (N, M).
 
     In sight means that all cells between are known to be free.
     """
-    counts = np.zeros(len(cells), np.int64)
+    seen = np.zeros((len(cells), len(frontiers)), np.bool_)
     for n in range(len(cells)):
         for m in range(len(frontiers)):
             rise, run = frontiers[m, 0] - cells[n, 0], frontiers[m, 1] - cells[n, 1]
             if rise * rise + run * run < reach * reach:
-                counts[n] += line_is_free(log_odds, cells[n, 0], cells[n, 1], frontiers[m, 0], frontiers[m, 1])
-    return counts
+                seen[n, m] = line_is_free(log_odds, cells[n, 0], cells[n, 1], frontiers[m, 0], frontiers[m, 1])
+    return seen

@@ -5,7 +5,7 @@ import pytest
 
 import lidarium
 from lidarium import Floor, Solid
-from lidarium.envs.levels.node_graph import add_edges, count_in_sight, frontiers_of, pairs_of, ways_along
+from lidarium.envs.levels.node_graph import add_edges, frontiers_of, in_sight, pairs_of, thinned, ways_along
 
 LIDAR = {
     "beams": 720,
@@ -53,14 +53,37 @@ def test_ways_go_around_what_is_not_known_to_be_free():
 def test_utility_counts_frontiers_in_sight_and_in_range():
     grid = np.zeros((12, 12), np.int8)
     grid[2:10, 2:10] = -1
-    frontiers = frontiers_of(grid, 0.0, 0.0, 1.0)
+    frontiers = np.argwhere(frontiers_of(grid))
     assert len(frontiers) == 28  # the rim of a square of eight cells
     cells = np.array([(5, 5), (2, 2)])
-    assert count_in_sight(grid, cells, frontiers, 100.0).tolist() == [28, 28]
-    assert count_in_sight(grid, cells, frontiers, 1.5)[1] == 3
+    assert in_sight(grid, cells, frontiers, 100.0).sum(axis=1).tolist() == [28, 28]
+    assert in_sight(grid, cells, frontiers, 1.5)[1].sum() == 3
     grid[3:9, 4] = 1
-    assert count_in_sight(grid, cells[:1], frontiers, 100.0)[0] < 28
-    assert len(frontiers_of(grid, 0.0, 0.0, 4.0)) < 28
+    assert in_sight(grid, cells[:1], frontiers, 100.0).sum() < 28
+
+
+def test_of_the_frontiers_in_a_square_the_nearest_to_its_corner_counts():
+    cells = np.array([(5, 5), (6, 6), (9, 5), (3, 2), (-3, -3), (1, 7)])
+    # Squares of four cells around (5, 5); those beside it are twice as wide.
+    assert thinned(cells, np.array([5.0, 5.0]), 4.0).tolist() == [[5, 5], [9, 5], [-3, -3], [1, 7]]
+
+
+def test_a_frontier_counts_until_it_is_none_any_more():
+    """Though another one of its square is the one that counts for the nodes that see it now."""
+    env = lidarium.parallel_env(corridor(), level="graph", **{**OPTIONS, "graph": {"spacing": 1.0}})
+    observations, _ = env.reset(seed=0)
+    policy = lidarium.policy("nearest_node")
+    policy.reset(env)
+    level, most = env.engine.level, 0
+    while env.agents:
+        lattice = level._lattice(0)
+        is_frontier = frontiers_of(level._map(0).log_odds)
+        for node in np.flatnonzero(lattice.is_node & ~lattice.is_spent):
+            if np.hypot(*(lattice.positions[node] - env.world.poses[0, :2])) <= 10.0:
+                assert is_frontier.ravel()[lattice.seen[node]].all()
+                most = max(most, len(lattice.seen[node]))
+        observations, *_ = env.step(policy.act(observations))
+    assert most > 0
 
 
 @pytest.mark.parametrize("policy", ["nearest_node", "utility_node", "nearest_frontier", "tour_frontier"])
