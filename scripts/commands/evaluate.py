@@ -73,7 +73,7 @@ class _Evaluate(TeamCommand):
     bounds: bool = False
     """compare each episode with the time of a team that knows the floor (extra `bounds`)"""
     records: bool = True
-    """keep a record of every episode, for replays and for the pictures of the report"""
+    """keep a record of every episode, for replays and for the pictures of the report; the level graph has none"""
 
 
 def execute(command: _Evaluate) -> Answer:

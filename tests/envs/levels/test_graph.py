@@ -6,6 +6,7 @@ import pytest
 import lidarium
 from lidarium import Floor, Solid
 from lidarium.envs.levels.node_graph import add_edges, frontiers_of, in_sight, pairs_of, thinned, ways_along
+from lidarium.scripts.main import main
 
 LIDAR = {
     "beams": 720,
@@ -143,3 +144,11 @@ def test_what_the_level_cannot_do_is_refused():
         env.step({"robot_0": 401})
     with pytest.raises(ValueError, match="scale of utility_node is 0"):
         lidarium.policy("utility_node", scale=0.0)
+
+
+def test_an_evaluation_keeps_no_records_of_moves_along_edges(tmp_path, capsys):
+    words = ["--policies", "nearest_node", "--floors", "srt_l_room", "--robots", "1", "--horizon-s", "60"]
+    assert main(["evaluate", *words, "--seeds", "1", "--workers", "1", "--out", str(tmp_path / "out"), "--json"]) == 0
+    assert '"record":null' in (tmp_path / "out" / "episodes.jsonl").read_text()
+    assert not list(tmp_path.rglob("*.npz"))
+    capsys.readouterr()
