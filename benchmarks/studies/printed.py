@@ -1,0 +1,179 @@
+"""Policies by the rules of other projects, beside the figures that these have printed.
+
+J. Cao et al., "DARE: diffusion policy for autonomous robot exploration", ICRA 2025, Table I; Y. Cao et al.,
+"ARiADNE: a reinforcement learning approach using attention-based deep networks for exploration", ICRA 2023; C. Ho et
+al., "MapEx: indoor structure exploration with probabilistic information gain from global map predictions", ICRA 2025.
+"""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lidarium.benchmarks.studies.shared.study import Study
+from lidarium.evaluation.statistics.estimates import paired_ratio
+from lidarium.evaluation.suites.campaign import EPISODES_FILE
+from lidarium.evaluation.suites.episodes_file import read_episodes
+from lidarium.evaluation.suites.presets import PRESETS, preset_suite
+from lidarium.evaluation.suites.suite import Suite
+
+NODES = ("nearest_node", "utility_node")
+WAYPOINTS = ("nearest_frontier", "utility_frontier", "explore_lite", "tour_frontier", "learned")
+POLICIES = {"dare": NODES + WAYPOINTS, "ariadne": NODES + WAYPOINTS, "mapex": (*WAYPOINTS, "srt")}
+"""Policies by preset; the first is the one that others are compared with."""
+
+TABLE_I = {
+    "nearest": (652, 76),
+    "utility": (585, 79),
+    "NBVP": (645, 109),
+    "TARE local": (558, 67),
+    "ARiADNE": (579, 82),
+    "DARE": (563, 71),
+    "near-optimal, on the known map": (499, 61),
+}
+"""Ways on DARE's 100 maps and their deviations [m], as printed in its Table I."""
+
+MAPEX_OVER_NEAREST = 1.254
+"""Coverage of MapEx over that of its nearest frontier on KTH, as printed in its paper."""
+
+PAGE = """# Printed tables
+
+One robot by the rules of other projects: their floors, starts, sensors and ends of episodes, as
+[presets](../reference/presets.md). What remains different is listed there.
+
+## DARE
+
+{dare_floors} maps of [DARE](https://github.com/marmotlab/DARE) (MIT). Robots move between nodes 4 m apart and see at
+these, 20 m far; an episode ends where no node has utility. Ways as means and deviations over maps. *Over nearest* is
+the ratio of printed means, and of ours the geometric mean of ratios to `nearest_node`, map by map, with its 95 %
+interval. The project's sensor draws beams as lines of cells, which leave gaps that have to be looked at: with a laser
+like ours its own nearest and utility take ways as `nearest_node` and `utility_node`, within 1 %. Ways of the two parts
+of the table are therefore not to be compared, but ratios are.
+
+| planner | way [m] | over nearest |
+|---|---:|---:|
+{printed}
+{dare}
+
+## ARiADNE
+
+{ariadne_floors} test maps of [ARiADNE](https://github.com/marmotlab/ARiADNE) (MIT), in pixels of 0.1 m. Robots move
+between nodes and see at these, 8 m far; an episode ends where 250 free cells are left unseen, or after 128 decisions.
+The figures of its paper are not at hand.
+
+| policy | ended so | way [m] | over `nearest_node` |
+|---|---:|---:|---:|
+{ariadne}
+
+## MapEx
+
+{mapex_floors} starts on KTH maps of [MapEx](https://github.com/castacks/MapEx) (Clear BSD). Robots drive for 1000 s at
+1 m/s and see 20 m far. *Mean coverage* is the mean over an episode. The paper prints coverage {mapex_printed:.3f} of
+that of its nearest frontier, with predicted maps.
+
+| policy | known in the end | mean coverage | over `nearest_frontier` |
+|---|---:|---:|---:|
+{mapex}
+"""
+
+
+def suites(data: Path | None, every: int = 1) -> dict[str, Suite]:
+    """Return the suites of presets; none without the folder of data."""
+    if data is None:
+        return {}
+    found = {name: preset_suite(name, policies, (0,), data) for name, policies in POLICIES.items()}
+    return {name: _part(suite, every) for name, suite in found.items()}
+
+
+def _part(suite: Suite, every: int) -> Suite:
+    floors = suite.floors[::every]
+    return replace(suite, floors=floors, starts={floor: suite.starts[floor] for floor in floors if suite.starts})
+
+
+def page(folder: Path) -> str:
+    """Return the results as markdown."""
+    episodes = {name: by_policy(name, folder / name / EPISODES_FILE) for name in POLICIES}
+    counts = {f"{name}_floors": len(next(iter(found.values()), {})) for name, found in episodes.items()}
+    return PAGE.format(
+        **counts,
+        printed=_printed(),
+        dare=_dare(episodes["dare"]),
+        ariadne=_ariadne(episodes["ariadne"]),
+        mapex=_mapex(episodes["mapex"]),
+        mapex_printed=MAPEX_OVER_NEAREST,
+    )
+
+
+Episodes = Mapping[str, Mapping[str, Mapping[str, Any]]]
+"""Episodes by policy, and by floor and start."""
+
+
+def by_policy(preset: str, path: Path) -> dict[str, dict[str, Mapping[str, Any]]]:
+    """Return the episodes of a preset by policy, those of floors and starts that all policies have."""
+    found: dict[str, dict[str, Mapping[str, Any]]] = {policy: {} for policy in POLICIES[preset]}
+    for episode in read_episodes(path) if path.exists() else []:
+        place = f"{episode['floor']} {episode['starts']}"
+        found.setdefault(episode["policy"], {})[place] = episode
+    common = sorted(set.intersection(*(set(each) for each in found.values())))
+    return {policy: {place: each[place] for place in common} for policy, each in found.items()}
+
+
+def _printed() -> str:
+    nearest = TABLE_I["nearest"][0]
+    rows = (
+        f"| {planner}, printed | {way} +- {deviation} | {way / nearest:.3f} |"
+        for planner, (way, deviation) in TABLE_I.items()
+    )
+    return "\n".join(rows)
+
+
+def _dare(ours: Episodes) -> str:
+    rows = []
+    for policy, episodes in ours.items():
+        ways = [_way(each) for each in episodes.values()]
+        if ways:
+            rows.append(f"| `{policy}` | {np.mean(ways):.0f} +- {np.std(ways):.0f} | {_over(ours, policy, _way)} |")
+    return "\n".join(rows) or "| not run | - | - |"
+
+
+def _ariadne(ours: Episodes) -> str:
+    rows, limit = [], PRESETS["ariadne"].stop
+    for policy, episodes in ours.items():
+        ways = [_way(each) for each in episodes.values()]
+        if ways and limit is not None:
+            ended = sum(each["decisions"] < limit["decisions"] for each in episodes.values())
+            rows.append(f"| `{policy}` | {ended} of {len(ways)} | {np.mean(ways):.1f} | {_over(ours, policy, _way)} |")
+    return "\n".join(rows) or "| not run | - | - | - |"
+
+
+def _mapex(ours: Episodes) -> str:
+    rows = []
+    for policy, episodes in ours.items():
+        known = [float(each["c_valid_final"]) for each in episodes.values()]
+        areas = [_area(each) for each in episodes.values()]
+        if known:
+            cells = f"{np.mean(known):.3f} | {np.mean(areas):.3f} | {_over(ours, policy, _area)}"
+            rows.append(f"| `{policy}` | {cells} |")
+    return "\n".join(rows) or "| not run | - | - | - |"
+
+
+def _way(episode: Mapping[str, Any]) -> float:
+    return float(sum(episode["path_m"]))
+
+
+def _area(episode: Mapping[str, Any]) -> float:
+    return float(episode["auc"])
+
+
+def _over(ours: Episodes, policy: str, figure: Any) -> str:  # noqa: ANN401
+    """Return the ratio of a figure to that of the first policy, as text."""
+    baseline = next(iter(ours))
+    if policy == baseline:
+        return "1"
+    values, others = ([figure(each) for each in episodes.values()] for episodes in (ours[policy], ours[baseline]))
+    return f"{paired_ratio(values, others):.3f}"
+
+
+STUDY = Study(page, suites)
