@@ -121,7 +121,7 @@ def test_an_interrupted_evaluation_keeps_what_is_finished_and_goes_on(tmp_path, 
     assert process.wait(30) == 130
     kept = read_episodes(tmp_path / "episodes.jsonl")
     assert kept
-    assert evaluate(*arguments) == 0
+    assert evaluate(*arguments, "--workers", "1") == 0
     assert "8 of 8 episodes finished" in capsys.readouterr().out
     assert read_episodes(tmp_path / "episodes.jsonl")[: len(kept)] == kept
 
