@@ -18,7 +18,7 @@ from lidarium.envs.settings.lidar import Lidar
 
 REAL = {"localization": "slam", "odometry": "typical", "noise": "datasheet", "known_starts": False}
 SEEN = ("scan", "pose", "velocity", "bumper", "map", "egocentric_map")
-SMALL = {"lidar": Lidar(beams=24, range_max=3.0), "resolution": 0.1}
+SMALL = {"lidar": Lidar(beams=24, range_max=3.0), "resolution": 0.1, "raster_resolution": 0.1}
 
 SMALL_ROOMS = Floor(
     "small_rooms",
@@ -43,7 +43,7 @@ CASES = {
     "merged": team(drawn_floor, 2, "frontier", merged=False, robots=2, known_starts=False, **SMALL),
     "nearest_frontier": policy("nearest_frontier", "srt_l_room", 5, robots=1, **SMALL),
     "srt": policy("srt", "srt_l_room", 5, robots=1, **SMALL),
-    "run": command("--floor srt_l_room --robots 2 --horizon-s 0.3 " + COARSE),
+    "run": command("--floor srt_l_room --robots 2 --horizon-s 0.2 " + COARSE),
 }
 
 

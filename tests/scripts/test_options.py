@@ -1,11 +1,13 @@
 """Options that commands share: policies, supervisor, films, the live view."""
 
+import io
 import json
 import re
 import signal
 import socket
 import subprocess
 import sys
+import threading
 import urllib.request
 from pathlib import Path
 
@@ -188,6 +190,7 @@ RUN = ["run", "--robots", "2", "--map-resolution", "0.05", "--seed", "4"]
 SHORT = [*RUN, "--horizon-s", "3"]
 PROGRAM = "import sys; from lidarium.scripts.main import main; sys.exit(main())"
 PATIENCE_S = 120.0
+ADDRESS = r"the run is shown at (http://127\.0\.0\.1:\d+/\S+/)"
 
 OF_THE_MACHINE = {"steps_per_s", "decision_ms", "tick_ms", "peak_mb"}
 """What of a result is of the clock and the memory, and differs from run to run."""
@@ -206,16 +209,6 @@ def begin(*arguments):
         text=True,
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
-
-
-def address(process):
-    """Read where a process shows its run."""
-    while True:
-        line = process.stderr.readline()
-        assert line, "it has ended"
-        found = re.search(r"the run is shown at (http://127\.0\.0\.1:\d+/\S+/)", line)
-        if found:
-            return found.group(1)
 
 
 def test_files_are_the_same_with_and_without_a_view(tmp_path, capsys):
@@ -263,30 +256,68 @@ def test_a_missing_extra_is_named_before_anything_is_written(tmp_path, capsys, m
     assert not (tmp_path / "out").exists()
 
 
+class Heard(io.StringIO):
+    """Standard error that acts once it is told some words."""
+
+    def __init__(self, words, act):
+        super().__init__()
+        self.words, self.act = words, act
+
+    def write(self, text):
+        count = super().write(text)
+        if self.act and self.words in self.getvalue():
+            act, self.act = self.act, None
+            act()
+        return count
+
+
+@pytest.fixture
+def interruptible():
+    """A test run in the background may ignore the signal."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("interruptible")
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
-def test_an_interrupt_ends_a_viewed_run_and_keeps_what_it_found(tmp_path, number, code):
-    process = begin(*RUN, "--horizon-s", 600, "--view", "--view-port", 0, "--out", tmp_path)
-    address(process)
-    while "explored" not in process.stderr.readline():
-        pass
-    process.send_signal(number)
-    out, errors = process.communicate(timeout=PATIENCE_S)
-    assert process.returncode == code, errors
-    assert "Traceback" not in errors
-    assert "interrupted" in out
+def test_an_interrupt_ends_a_viewed_run_and_keeps_what_it_found(tmp_path, capsys, monkeypatch, number, code):
+    errors = Heard("explored", lambda: signal.raise_signal(number))
+    monkeypatch.setattr(sys, "stderr", errors)
+    assert main([*RUN, "--horizon-s", "600", "--view", "--view-port", "0", "--out", str(tmp_path)]) == code
+    assert re.search(ADDRESS, errors.getvalue())
+    assert "Traceback" not in errors.getvalue()
+    assert "interrupted" in capsys.readouterr().out
     assert json.loads((tmp_path / "result.json").read_text())["interrupted"] is True
 
 
+@pytest.mark.usefixtures("interruptible")
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_page_that_stays_is_there_until_an_interrupt(tmp_path, number):
+def test_a_page_that_stays_is_there_until_an_interrupt(tmp_path, capsys, monkeypatch, number):
+    is_over, seen = threading.Event(), []
+
+    def visit():
+        with urllib.request.urlopen(re.search(ADDRESS, errors.getvalue()).group(1), timeout=PATIENCE_S) as answer:
+            seen.extend([answer.status, (tmp_path / "result.json").exists(), is_over.is_set()])
+        signal.pthread_kill(threading.main_thread().ident, number)
+
+    visitor = threading.Thread(target=visit)
+    errors = Heard("stays until Ctrl-C", visitor.start)
+    monkeypatch.setattr(sys, "stderr", errors)
+    arguments = [*SHORT, "--view", "--view-port", "0", "--view-stay", "--json", "--out", str(tmp_path)]
+    assert main(arguments) == 0
+    is_over.set()
+    visitor.join(PATIENCE_S)
+    assert seen == [200, True, False]
+    assert "Traceback" not in errors.getvalue()
+    assert json.loads(capsys.readouterr().out)["interrupted"] is False
+
+
+def test_an_interrupt_ends_the_process_of_a_page_that_stays(tmp_path):
     process = begin(*SHORT, "--view", "--view-port", 0, "--view-stay", "--json", "--out", tmp_path)
-    where = address(process)
     while "stays until Ctrl-C" not in process.stderr.readline():
-        pass
-    with urllib.request.urlopen(where, timeout=PATIENCE_S) as answer:
-        assert answer.status == 200
-    assert (tmp_path / "result.json").exists()
-    process.send_signal(number)
+        assert process.poll() is None
+    process.send_signal(signal.SIGINT)
     out, errors = process.communicate(timeout=PATIENCE_S)
     assert process.returncode == 0, errors
     assert "Traceback" not in errors

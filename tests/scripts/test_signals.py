@@ -22,7 +22,7 @@ PROGRAM = "import sys; from lidarium.scripts.main import main; sys.exit(main())"
 PATIENCE_S = 120.0
 """Processes are given this long, on a machine that is busy."""
 
-ENDLESS = ["--policies", "random_walk", "--robots", "1", "--horizon-s", "60", "--map-resolution", "0.05"]
+SMALL = ["--floors", "srt_l_room", "--robots", "1", "--horizon-s", "10", "--map-resolution", "0.1"]
 
 
 def begin(*arguments):
@@ -38,7 +38,7 @@ def begin(*arguments):
 
 def begin_evaluation(out):
     """An evaluation of two workers that has a first episode."""
-    process = begin("evaluate", *ENDLESS, "--seeds", 5000, "--workers", 2, "--out", out)
+    process = begin("evaluate", "--policies", "random_walk", *SMALL, "--seeds", 5000, "--workers", 2, "--out", out)
     wait_until(lambda: (out / "episodes.jsonl").exists() and (out / "episodes.jsonl").stat().st_size)
     return process
 
@@ -64,7 +64,8 @@ def is_there(number):
 
 def test_a_run_that_is_terminated_keeps_its_finished_parts(tmp_path):
     out = tmp_path / "out"
-    process = begin("run", "--floor", "office:3", "--policy", "random_walk", "--robots", 1, "--gif", "--out", out)
+    team = ["--policy", "random_walk", "--robots", 1, "--map-resolution", 0.1]
+    process = begin("run", "--floor", "apartment", *team, "--gif", "--film-width", 200, "--out", out)
     while "explored" not in process.stderr.readline():
         pass
     process.send_signal(signal.SIGTERM)

@@ -21,7 +21,7 @@ SMALL = {
         {"floors": 2, "kinds": {"apartment": 1.0}, "robots": [1]},
     ],
     "fit": {"epochs": 2, "batch": 8},
-    "ppo": {"decisions": 48, "checkpoint": 16, "environments": 1, "steps": 16, "batch": 8, "epochs": 1},
+    "ppo": {"decisions": 24, "checkpoint": 8, "environments": 1, "steps": 8, "batch": 8, "epochs": 1},
     "validation": {"floors": ["apartment:2000000"], "robots": [1]},
 }
 
@@ -57,7 +57,7 @@ def test_a_training_leaves_weights_and_a_card(whole):
     assert card["best"] in card["validation"]
     assert set(card["validation"]) == {"round-0", "round-1", "mean", "rewards"}
     assert card["validation"][card["best"]]["episodes"] == 1
-    assert [number for number, _ in card["rewards"]] == [16, 32, 48]
+    assert [number for number, _ in card["rewards"]] == [8, 16, 24]
     assert set(card["fits"]) == {"round-0", "round-1"}
     assert {"lidarium", "python", "numpy", "torch", "sb3-contrib"} <= card["versions"].keys()
     assert card["training"]["seed"] == 1

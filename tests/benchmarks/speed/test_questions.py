@@ -78,8 +78,9 @@ def test_the_profile_has_all_parts_and_they_make_up_the_whole(tmp_path):
 
 
 def test_a_second_start_compiles_nothing():
-    cached_start.start()
     told = cached_start.start()
+    if told.compiled:  # the first start of this machine
+        told = cached_start.start()
     assert told.compiled == 0
     assert told.loaded > 0
 

@@ -27,11 +27,11 @@ easy = 6
 
 [tasks.Seen-1]
 about = "one robot with a camera"
-floors = ["building:3000000", "clinic"]
+floors = ["srt_l_room", "apartment:3000000"]
 robots = 1
 full = 2
 easy = 1
-settings = { camera = "xtion_tilted", lidar.range_max = 4.0 }
+settings = { camera = { columns = 64, rows = 48, pitch = 0.35 }, lidar.range_max = 4.0 }
 policies = ["sparse_frontier"]
 baseline = "sparse_frontier"
 """

@@ -41,11 +41,11 @@ def supervised_page(recorded, tmp_path_factory):
     """The page of an episode in which maps are merged and robots are ordered about."""
     record, _ = recorded(
         "supervised",
-        robots=3,
+        robots=2,
         seed=0,
         known_starts=False,
-        resolution=0.05,
-        horizon_s=60.0,
+        resolution=0.1,
+        horizon_s=30.0,
         localization="slam",
     )
     path = tmp_path_factory.mktemp("supervised") / "episode.html"
@@ -155,7 +155,7 @@ def test_an_episode_is_picked_played_paused_and_scrubbed_by_mouse(page):
     before = canvas_of(page)
     page.choose("Speed", SLOW, "#replay")
     page.button("Play").click()
-    page.wait(lambda: shown_time(page) >= 3)
+    page.wait(lambda: shown_time(page) >= 1)
     page.button("Pause").click()
     stopped = shown_time(page)
     assert (canvas_of(page) != before).any()
@@ -242,7 +242,7 @@ def test_all_of_it_goes_by_keyboard(page):
     assert shown_time(page) == 2
     assert page.driver.switch_to.active_element.get_attribute("aria-valuetext") == "0:02 of 0:40"
     page.keys(Keys.SPACE)
-    page.wait(lambda: shown_time(page) > 4)
+    page.wait(lambda: shown_time(page) > 2)
     page.keys(Keys.SPACE)
     assert page.find("#replay .primary").text == "Play"
     page.keys(Keys.END)

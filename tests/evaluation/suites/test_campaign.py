@@ -192,7 +192,7 @@ def test_episodes_are_set_beside_what_a_team_that_knew_the_floor_needs(tmp_path)
     suite = Suite(
         policies=("nearest_frontier", "tour_frontier"),
         floors=("apartment:3",),
-        variants={"default": {"resolution": 0.05, "stop_coverage": 0.99, "horizon_s": 600.0}},
+        variants={"default": {"resolution": 0.1, "stop_coverage": 0.99, "horizon_s": 600.0}},
         bounds=True,
     )
     lines = list(Campaign(suite, tmp_path / "out", records=False).run())

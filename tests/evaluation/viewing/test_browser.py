@@ -35,7 +35,7 @@ def page(driver):
         env = WatchedExploration("apartment", SETTINGS, watchers=[LiveView(server, policy, "random_walk")])
         run = threading.Thread(target=run_episode, args=(policy, env, 0))
         run.start()
-        show_on_screen(driver, "light")
+        show_on_screen(driver, "light", 960, 600)
         driver.get(address_of(server))
         page = Browser(driver)
         page.env = env
@@ -55,10 +55,10 @@ def says(page, text):
 
 
 def picture(page):
-    """What the browser shows of the scene, left of the panel, in blocks of 10 x 10 pixels."""
+    """What the browser shows of the scene, left of the panel and below notices, in blocks of 5 x 5 pixels."""
     content = np.frombuffer(page.driver.get_screenshot_as_png(), np.uint8)
-    scene = cv2.imdecode(content, cv2.IMREAD_COLOR)[150:, :900]
-    return cv2.resize(scene, (90, 65), interpolation=cv2.INTER_AREA).astype(np.int64)
+    scene = cv2.imdecode(content, cv2.IMREAD_COLOR)[150:, :620]
+    return cv2.resize(scene, (124, 90), interpolation=cv2.INTER_AREA).astype(np.int64)
 
 
 def are_alike(one, other):
@@ -72,7 +72,7 @@ def still(page):
 
     def is_still():
         nonlocal before
-        time.sleep(1.0)
+        time.sleep(0.5)
         last, before = before, picture(page)
         return are_alike(last, before)
 

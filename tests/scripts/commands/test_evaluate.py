@@ -97,6 +97,8 @@ def test_an_interrupted_evaluation_keeps_what_is_finished_and_goes_on(tmp_path, 
         "8",
         "--horizon-s",
         "200",
+        "--map-resolution",
+        "0.1",
         "--out",
         str(tmp_path),
         "--workers",
@@ -114,12 +116,12 @@ def test_an_interrupted_evaluation_keeps_what_is_finished_and_goes_on(tmp_path, 
     while time.monotonic() < ended and not (
         (tmp_path / "episodes.jsonl").exists() and (tmp_path / "episodes.jsonl").stat().st_size
     ):
-        time.sleep(0.05)
+        time.sleep(0.02)
     process.send_signal(signal.SIGINT)
     assert process.wait(30) == 130
     kept = read_episodes(tmp_path / "episodes.jsonl")
     assert kept
-    assert evaluate(*arguments) == 0
+    assert evaluate(*arguments, "--workers", "1") == 0
     assert "8 of 8 episodes finished" in capsys.readouterr().out
     assert read_episodes(tmp_path / "episodes.jsonl")[: len(kept)] == kept
 

@@ -117,24 +117,21 @@ def test_a_copy_goes_on_by_itself(ring_run, ring_followed, twin_of):
 
 def test_walls_keep_headings_from_drifting():
     errors_of = {}
+    run = driven(ring(), RING_ROUND, noise=0.05, drift=(-0.05, -0.05))
     for uses_walls in (True, False):
-        found = []
-        for seed in range(2):
-            run = driven(ring(), RING_ROUND, seed, noise=0.05, drift=(-0.05, -0.05))
-            slam = Slam(SlamSettings(uses_walls=uses_walls, closures=ClosureSettings(delay_s=1e6)), GEOMETRY)
-            told, _ = follow(slam, run.sensings)
-            found.append(relative(run.truth, told)[:, 2])
-        errors_of[uses_walls] = np.degrees(np.sqrt(np.mean(np.square(found))))
+        slam = Slam(SlamSettings(uses_walls=uses_walls, closures=ClosureSettings(delay_s=1e6)), GEOMETRY)
+        told, _ = follow(slam, run.sensings)
+        errors_of[uses_walls] = np.degrees(np.sqrt(np.mean(np.square(relative(run.truth, told)[:, 2]))))
     assert errors_of[True] < 0.5
     assert errors_of[True] < 0.6 * errors_of[False]
 
 
 def test_the_first_scan_is_laid_on_the_map_that_it_began():
-    turned = {}
+    there_and_back = [(0.9, 0.9), (5.0, 0.9), (2.0, 0.9), (6.0, 0.9)]
+    runs, turned = [driven(ring(), there_and_back, seed, noise=0.02) for seed in range(6)], {}
     for start_path_m in (7.0, 1e6):
         found = []
-        for seed in range(16):
-            run = driven(ring(), [(0.9, 0.9), (5.0, 0.9), (2.0, 0.9), (6.0, 0.9)], seed, noise=0.02)
+        for run in runs:
             slam = Slam(SlamSettings(uses_walls=False, graph=GraphSettings(start_path_m=start_path_m)), GEOMETRY)
             told, _ = follow(slam, run.sensings)
             found.append(np.mean(relative(run.truth, told)[len(told) // 2 :, 2]))
