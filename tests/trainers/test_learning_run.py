@@ -1,6 +1,8 @@
 """The scripts that train several seeds, compare them on unseen floors, and draw rewards."""
 
 import json
+import pickle
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -9,15 +11,25 @@ from trainer_scripts import script
 import lidarium
 
 
-def test_a_learning_run_compares_networks_and_policies_on_unseen_floors(tmp_path):
+class Here(ThreadPoolExecutor):
+    """A pool without processes, which starts at once; what it is given can be sent to a process."""
+
+    def __init__(self, workers, context):
+        super().__init__(1)
+
+    def map(self, do, tasks):
+        return super().map(pickle.loads(pickle.dumps(do)), tasks)
+
+
+def test_a_learning_run_compares_networks_and_policies_on_unseen_floors(tmp_path, monkeypatch):
     module = script("learning_run", "torch", "rl")
     plan = module.Plan(
         seeds=2,
         updates=1,
         train_floors="set:train:2",
         floors="set:validation:2",
-        horizon_s=4.0,
-        workers=2,
+        horizon_s=2.0,
+        workers=1,
         out=tmp_path,
     )
     module.main(plan)
@@ -29,7 +41,8 @@ def test_a_learning_run_compares_networks_and_policies_on_unseen_floors(tmp_path
     assert page.read_text().count("\n| `") == len(module.CLASSIC)
     assert (tmp_path / "training.png").stat().st_size > 1000
     page.write_text(page.read_text() + "\n## Notes\n\nBeside other work.\n")
-    module.main(module.Plan(seeds=0, floors="set:validation:2", horizon_s=4.0, workers=1, out=tmp_path))
+    monkeypatch.setattr(module, "ProcessPoolExecutor", Here)
+    module.main(module.Plan(seeds=0, floors="set:validation:2", horizon_s=2.0, workers=1, out=tmp_path))
     assert json.loads((tmp_path / "training.json").read_text()) == numbers
     assert page.read_text().endswith("\n## Notes\n\nBeside other work.\n")
 
@@ -73,8 +86,10 @@ def test_the_conclusion_is_made_of_the_figures():
     assert words.count("\n") < 5
 
 
-def test_networks_that_attend_are_compared_with_what_they_were(tmp_path):
+def test_networks_that_attend_are_compared_with_what_they_were(tmp_path, monkeypatch):
     module = script("attention", "sb3_contrib", "rl")
+    monkeypatch.setattr(module, "ProcessPoolExecutor", Here)
+    monkeypatch.setattr(module.torch, "set_num_threads", lambda threads: None)  # it would hold for all tests
     plan = module.Attention(
         seeds=1,
         updates=1,
