@@ -123,7 +123,7 @@ def test_robots_that_localize_by_slam_see_both_rooms(known_starts):
 
 
 def test_an_apartment_is_explored_by_slam():
-    env = made("apartment", realism="lab", horizon_s=110.0)
+    env = made("apartment", realism="lab", horizon_s=65.0)
     explored(env)
     assert seen_share(env) > 0.7
     assert env.perception.sparse_maps.of(0).corrections > 0
@@ -131,9 +131,9 @@ def test_an_apartment_is_explored_by_slam():
 
 
 def test_more_robots_see_more_and_share_what_they_have_seen():
-    alone = made("apartment", horizon_s=35.0)
-    team = made("apartment", robots=3, horizon_s=35.0)
-    apart = made("apartment", robots=3, horizon_s=35.0)
+    alone = made("apartment", horizon_s=20.0)
+    team = made("apartment", robots=3, horizon_s=20.0)
+    apart = made("apartment", robots=3, horizon_s=20.0)
     explored(alone)
     explored(team)
     explored(apart, shares_map=False)
