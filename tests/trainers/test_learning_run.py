@@ -89,6 +89,7 @@ def test_the_conclusion_is_made_of_the_figures():
 def test_networks_that_attend_are_compared_with_what_they_were(tmp_path, monkeypatch):
     module = script("attention", "sb3_contrib", "rl")
     monkeypatch.setattr(module, "ProcessPoolExecutor", Here)
+    monkeypatch.setattr(module, "ROLLOUT", 8)
     monkeypatch.setattr(module.torch, "set_num_threads", lambda threads: None)  # it would hold for all tests
     plan = module.Attention(
         seeds=1,
@@ -105,7 +106,7 @@ def test_networks_that_attend_are_compared_with_what_they_were(tmp_path, monkeyp
     assert all(0.0 < each <= 1.0 for reached in numbers["coverage"].values() for each in reached)
     page = (tmp_path / "attention.md").read_text()
     assert page.count("\n| `") == len(numbers["drawn"])
-    assert "2,048 decisions" in page
+    assert "256 decisions" in page
 
 
 def test_curves_are_means_of_the_last_updates_that_had_an_end():

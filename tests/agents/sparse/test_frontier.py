@@ -96,7 +96,7 @@ def test_robots_drive_round_a_table_that_their_lasers_do_not_see():
 def test_the_same_seed_gives_the_same_run_to_the_bit():
     ends = []
     for _ in range(2):
-        env = made(realism="lab", robots=2, horizon_s=40.0)
+        env = made(realism="lab", robots=2, horizon_s=20.0)
         episode = explored(env, seed=3)
         ends.append((env.world.poses.copy(), env.beliefs.believed.copy(), episode.given_up))
     assert np.array_equal(ends[0][0], ends[1][0])
@@ -105,7 +105,7 @@ def test_the_same_seed_gives_the_same_run_to_the_bit():
 
 
 def test_an_environment_and_a_policy_are_used_again_as_if_new():
-    env, policy = made(horizon_s=30.0), lidarium.policy("sparse_frontier")
+    env, policy = made(horizon_s=15.0), lidarium.policy("sparse_frontier")
     ends = []
     for _ in range(2):
         run_episode(policy, env, seed=1)
