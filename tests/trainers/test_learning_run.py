@@ -28,7 +28,7 @@ def test_a_learning_run_compares_networks_and_policies_on_unseen_floors(tmp_path
         updates=1,
         train_floors="set:train:2",
         floors="set:validation:2",
-        horizon_s=2.0,
+        horizon_s=4.0,
         workers=1,
         out=tmp_path,
     )
@@ -42,7 +42,7 @@ def test_a_learning_run_compares_networks_and_policies_on_unseen_floors(tmp_path
     assert (tmp_path / "training.png").stat().st_size > 1000
     page.write_text(page.read_text() + "\n## Notes\n\nBeside other work.\n")
     monkeypatch.setattr(module, "ProcessPoolExecutor", Here)
-    module.main(module.Plan(seeds=0, floors="set:validation:2", horizon_s=2.0, workers=1, out=tmp_path))
+    module.main(module.Plan(seeds=0, floors="set:validation:2", horizon_s=4.0, workers=1, out=tmp_path))
     assert json.loads((tmp_path / "training.json").read_text()) == numbers
     assert page.read_text().endswith("\n## Notes\n\nBeside other work.\n")
 
