@@ -23,13 +23,15 @@ class Here(ThreadPoolExecutor):
 
 def test_a_learning_run_compares_networks_and_policies_on_unseen_floors(tmp_path, monkeypatch):
     module = script("learning_run", "torch", "rl")
+    monkeypatch.setattr(module, "ProcessPoolExecutor", Here)
+    monkeypatch.setattr(module.torch, "set_num_threads", lambda threads: None)  # it would hold for all tests
     plan = module.Plan(
         seeds=2,
         updates=1,
         train_floors="set:train:2",
         floors="set:validation:2",
         horizon_s=4.0,
-        workers=1,
+        workers=2,
         out=tmp_path,
     )
     module.main(plan)
@@ -41,7 +43,6 @@ def test_a_learning_run_compares_networks_and_policies_on_unseen_floors(tmp_path
     assert page.read_text().count("\n| `") == len(module.CLASSIC)
     assert (tmp_path / "training.png").stat().st_size > 1000
     page.write_text(page.read_text() + "\n## Notes\n\nBeside other work.\n")
-    monkeypatch.setattr(module, "ProcessPoolExecutor", Here)
     module.main(module.Plan(seeds=0, floors="set:validation:2", horizon_s=4.0, workers=1, out=tmp_path))
     assert json.loads((tmp_path / "training.json").read_text()) == numbers
     assert page.read_text().endswith("\n## Notes\n\nBeside other work.\n")
