@@ -1,6 +1,8 @@
 """The scripts that train several seeds, compare them on unseen floors, and draw rewards."""
 
 import json
+import pickle
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -9,8 +11,20 @@ from trainer_scripts import script
 import lidarium
 
 
-def test_a_learning_run_compares_networks_and_policies_on_unseen_floors(tmp_path):
+class Here(ThreadPoolExecutor):
+    """A pool without processes, which starts at once; what it is given can be sent to a process."""
+
+    def __init__(self, workers, context):
+        super().__init__(1)
+
+    def map(self, do, tasks):
+        return super().map(pickle.loads(pickle.dumps(do)), tasks)
+
+
+def test_a_learning_run_compares_networks_and_policies_on_unseen_floors(tmp_path, monkeypatch):
     module = script("learning_run", "torch", "rl")
+    monkeypatch.setattr(module, "ProcessPoolExecutor", Here)
+    monkeypatch.setattr(module.torch, "set_num_threads", lambda threads: None)  # it would hold for all tests
     plan = module.Plan(
         seeds=2,
         updates=1,
@@ -73,8 +87,11 @@ def test_the_conclusion_is_made_of_the_figures():
     assert words.count("\n") < 5
 
 
-def test_networks_that_attend_are_compared_with_what_they_were(tmp_path):
+def test_networks_that_attend_are_compared_with_what_they_were(tmp_path, monkeypatch):
     module = script("attention", "sb3_contrib", "rl")
+    monkeypatch.setattr(module, "ProcessPoolExecutor", Here)
+    monkeypatch.setattr(module, "ROLLOUT", 8)
+    monkeypatch.setattr(module.torch, "set_num_threads", lambda threads: None)  # it would hold for all tests
     plan = module.Attention(
         seeds=1,
         updates=1,
@@ -90,7 +107,7 @@ def test_networks_that_attend_are_compared_with_what_they_were(tmp_path):
     assert all(0.0 < each <= 1.0 for reached in numbers["coverage"].values() for each in reached)
     page = (tmp_path / "attention.md").read_text()
     assert page.count("\n| `") == len(numbers["drawn"])
-    assert "2,048 decisions" in page
+    assert "256 decisions" in page
 
 
 def test_curves_are_means_of_the_last_updates_that_had_an_end():

@@ -96,7 +96,7 @@ def test_robots_drive_round_a_table_that_their_lasers_do_not_see():
 def test_the_same_seed_gives_the_same_run_to_the_bit():
     ends = []
     for _ in range(2):
-        env = made(realism="lab", robots=2, horizon_s=40.0)
+        env = made(realism="lab", robots=2, horizon_s=20.0)
         episode = explored(env, seed=3)
         ends.append((env.world.poses.copy(), env.beliefs.believed.copy(), episode.given_up))
     assert np.array_equal(ends[0][0], ends[1][0])
@@ -105,7 +105,7 @@ def test_the_same_seed_gives_the_same_run_to_the_bit():
 
 
 def test_an_environment_and_a_policy_are_used_again_as_if_new():
-    env, policy = made(horizon_s=30.0), lidarium.policy("sparse_frontier")
+    env, policy = made(horizon_s=15.0), lidarium.policy("sparse_frontier")
     ends = []
     for _ in range(2):
         run_episode(policy, env, seed=1)
@@ -123,7 +123,7 @@ def test_robots_that_localize_by_slam_see_both_rooms(known_starts):
 
 
 def test_an_apartment_is_explored_by_slam():
-    env = made("apartment", realism="lab", horizon_s=110.0)
+    env = made("apartment", realism="lab", horizon_s=65.0)
     explored(env)
     assert seen_share(env) > 0.7
     assert env.perception.sparse_maps.of(0).corrections > 0
@@ -131,9 +131,9 @@ def test_an_apartment_is_explored_by_slam():
 
 
 def test_more_robots_see_more_and_share_what_they_have_seen():
-    alone = made("apartment", horizon_s=35.0)
-    team = made("apartment", robots=3, horizon_s=35.0)
-    apart = made("apartment", robots=3, horizon_s=35.0)
+    alone = made("apartment", horizon_s=20.0)
+    team = made("apartment", robots=3, horizon_s=20.0)
+    apart = made("apartment", robots=3, horizon_s=20.0)
     explored(alone)
     explored(team)
     explored(apart, shares_map=False)

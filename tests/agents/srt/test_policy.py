@@ -11,8 +11,14 @@ from lidarium.agents.policy import Stop
 from lidarium.agents.srt.explorer import Explorer
 from lidarium.agents.srt.memories import MapMemory
 from lidarium.agents.srt.policy import SensorBasedRandomTree
+from lidarium.envs.floors.floor import Floor, Solid
 from lidarium.envs.settings.lidar import Lidar
 from lidarium.evaluation.episodes.runner import run_episode
+
+WALL = Solid(np.array([[2.0, 0.0], [2.2, 0.0], [2.2, 1.7], [2.0, 1.7]]))
+PILLAR = Solid(np.array([[3.2, 1.2], [3.5, 1.2], [3.5, 1.5], [3.2, 1.5]]))
+ROOM = Floor("room", (0.0, 0.0, 4.5, 3.0), (WALL, PILLAR), starts=np.array([[0.8, 0.8, 0.0]]))
+"""A small room, of which a part is behind a wall."""
 
 
 @lru_cache
@@ -46,7 +52,7 @@ def test_an_enclosed_goal_is_unreachable_and_the_robot_is_back_at_its_start():
 
 
 def test_without_a_goal_a_room_is_explored_and_the_robot_is_back_at_its_start():
-    episode = finished("scene_room", robot="kobuki")
+    episode = finished(ROOM, robot="kobuki")
     assert episode.env.scorer.ended_because == {"robot_0": "explored"}
     assert episode.env.scorer.coverage > 0.98
     assert max(away_from_start(episode)) < 0.2
@@ -109,7 +115,7 @@ def test_every_chain_of_parents_ends_at_the_first_node():
 
 
 def test_no_edge_of_the_tree_crosses_what_stands_there():
-    episode = finished("scene_room", robot="kobuki")
+    episode = finished(ROOM, robot="kobuki")
     env, tree = episode.env, episode.policy.tree
     belief = env.belief("robot_0")
     origin = np.array(belief.map_origin) + env.world.poses[0, :2] - belief.pose[:2]

@@ -29,7 +29,7 @@ def test_one_command_makes_the_page_and_goes_on(monkeypatch, tmp_path):
     monkeypatch.setattr(bounds, "TEAMS", (1,))
     monkeypatch.setattr(bounds, "ROUNDS", 10)
     monkeypatch.setattr(bounds, "PLAN_ROUNDS", 10)
-    monkeypatch.setattr(bounds, "SPACING", (1.6, 1.0))
+    monkeypatch.setattr(bounds, "SPACING", (2.4, 1.5))
     monkeypatch.setattr(bounds, "EXACT_S", 0.0)
     command = ["reproduce", "bounds", "--runs", str(tmp_path / "runs"), "--out", str(tmp_path / "out")]
     assert main([*command, "--workers", "1"]) == 0

@@ -24,11 +24,14 @@ LOW_TABLE = Floor(
     starts=np.array([[1.0, 2.0, 0.0]]),
 )
 
+CAMERA = {"columns": 80, "rows": 60, "pitch": 0.35}
+"""A camera of few pixels, tilted down."""
+
 
 def made(floor=LOW_TABLE, level="waypoint", **options):
     chosen = {
         "robots": 1,
-        "camera": "xtion_tilted",
+        "camera": CAMERA,
         "resolution": 0.05,
         "stop_coverage": None,
         "map_cells": 64,
@@ -68,7 +71,7 @@ def test_spaces_are_those_of_the_environment_below():
 
 
 def test_chosen_frontiers_are_driven_to_along_sparse_routes():
-    env = SparsePlanning(made("apartment", "frontier", horizon_s=60.0))
+    env = SparsePlanning(made("apartment", "frontier", horizon_s=30.0))
     observations, _ = env.reset(seed=0)
     followed = 0
     while env.agents:
@@ -131,10 +134,10 @@ def test_a_policy_of_the_laser_explores_along_sparse_routes(backend):
     env = lidarium.parallel_env(
         "open_apartment",
         robots=2,
-        camera={"columns": 80, "rows": 60, "pitch": 0.35},
+        camera=CAMERA,
         backend=backend,
         resolution=0.05,
-        horizon_s=60.0,
+        horizon_s=25.0,
         map_cells=32,
         starts="fixed",
     )
@@ -145,7 +148,7 @@ def test_a_policy_of_the_laser_explores_along_sparse_routes(backend):
 
 
 def test_a_batch_drives_along_the_routes_of_single_environments():
-    options = {"robots": 1, "camera": "xtion_tilted", "resolution": 0.05, "stop_coverage": None, "map_cells": 64}
+    options = {"robots": 1, "camera": CAMERA, "resolution": 0.05, "stop_coverage": None, "map_cells": 64}
     batch = lidarium.vector_env(2, LOW_TABLE, level="waypoint", plans_sparsely=True, **{"starts": "fixed", **options})
     single = SparsePlanning(made())
     batch.reset(seed=0)

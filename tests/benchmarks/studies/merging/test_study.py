@@ -20,7 +20,7 @@ FLOORS = [
 
 @pytest.fixture
 def small_bank(monkeypatch):
-    few = Wanted(plenty=3, little=1, negative=2, like_places=1, copies=1, indistinct=1)
+    few = Wanted(plenty=1, little=1, negative=1, like_places=1, copies=1, indistinct=1)
     monkeypatch.setattr(merging, "bank_floors", lambda data, every: FLOORS)
     monkeypatch.setattr(merging, "STRUCTURE_FLOORS", 1)
     monkeypatch.setattr(features, "REPEATS", 1)
@@ -28,7 +28,7 @@ def small_bank(monkeypatch):
         # What is patched here holds in this process alone.
         monkeypatch.setattr(module, "shared_out", lambda work, tasks, workers, is_apart: shared_out(work, tasks, 1))
     monkeypatch.setattr(bank, "RUNS", 1)
-    monkeypatch.setattr(drives, "HORIZON_S", 15.0)
+    monkeypatch.setattr(drives, "HORIZON_S", 10.0)
     monkeypatch.setattr(making, "Wanted", lambda: few)
 
 

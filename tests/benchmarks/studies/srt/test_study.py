@@ -69,6 +69,7 @@ def test_tables_have_a_line_for_each_world_and_mode(line):
 
 
 def test_trees_by_variants_of_the_thesis_are_measured_with_and_without_a_goal(monkeypatch):
+    monkeypatch.setitem(goal_runs.SETTINGS, "horizon_s", 30.0)
     thesis, ball = (measure_tree(GoalRun(tree, "srt_lab", 0)) for tree in ("thesis", "thesis, ball"))
     assert (thesis["mode"], ball["mode"]) == ("thesis", "thesis, ball")
     assert thesis["nodes"] != ball["nodes"]

@@ -1,5 +1,7 @@
 """The experiment of supervised teams: what is run, and a tiny part of it from end to end."""
 
+import shutil
+
 import numpy as np
 import pytest
 from published_pages import assert_published
@@ -22,7 +24,7 @@ from lidarium.envs.floors.starts import draw_starts
 from lidarium.evaluation.statistics import Interval
 from lidarium.evaluation.suites.campaign import Campaign
 
-SMALL = {**plan.SETTINGS, "localization": "truth", "odometry": "ideal", "horizon_s": 3.0}
+SMALL = {**plan.SETTINGS, "localization": "truth", "odometry": "ideal", "horizon_s": 1.0}
 
 
 def test_the_whole_plan_has_ten_generated_and_five_other_floors_ten_seeds_and_three_policies():
@@ -55,8 +57,7 @@ def test_a_folder_without_the_real_floors_is_refused(tmp_path):
         plan.suites(tmp_path)
 
 
-@pytest.fixture
-def tiny(monkeypatch):
+def make_tiny(monkeypatch):
     monkeypatch.setattr(plan, "SETTINGS", SMALL)
     monkeypatch.setattr(supervisor, "SETTINGS", SMALL)
     monkeypatch.setattr(plan, "TO_THE_END", {"stop_coverage": None})
@@ -68,12 +69,27 @@ def tiny(monkeypatch):
     monkeypatch.setattr(plan, "POLICIES", ("supervised", "oracle_starts"))
 
 
-def test_a_tiny_share_runs_from_end_to_end_and_is_not_run_again(tiny, tmp_path):
+@pytest.fixture
+def tiny(monkeypatch):
+    make_tiny(monkeypatch)
+
+
+@pytest.fixture(scope="module")
+def tenth(tmp_path_factory):
+    """All runs of a tenth of the tiny study."""
+    folder = tmp_path_factory.mktemp("tenth")
+    with pytest.MonkeyPatch.context() as monkeypatch:
+        make_tiny(monkeypatch)
+        for name, suite in STUDIES["supervisor"].suites(None, 10).items():
+            campaign = Campaign(suite, folder / name, records=False)
+            assert len(list(campaign.run())) == campaign.total > 0
+            assert not campaign.failures
+    return folder
+
+
+def test_a_tiny_share_runs_from_end_to_end_and_is_not_run_again(tiny, tenth, tmp_path):
     study = STUDIES["supervisor"]
-    for name, suite in study.suites(None, 10).items():
-        campaign = Campaign(suite, tmp_path / name, records=False)
-        assert len(list(campaign.run())) == campaign.total > 0
-        assert not campaign.failures
+    shutil.copytree(tenth, tmp_path, dirs_exist_ok=True)
     steps = list(study.work(tmp_path, None, 10, 1))
     assert steps == [step for step in steps if step[0] in ("runs in which a robot fails", "logs")]
     assert list(study.work(tmp_path, None, 10, 1)) == steps
@@ -203,12 +219,10 @@ def test_energy_stands_in_tables_of_runs_that_count_it():
     assert "energy" not in team_table([{**runs[0], "energy_j": None}], alone)
 
 
-def test_the_page_is_of_what_was_asked_for_though_the_folder_holds_more(tiny, tmp_path):
+def test_the_page_is_of_what_was_asked_for_though_the_folder_holds_more(tiny, tenth, tmp_path):
     study = STUDIES["supervisor"]
-    more = {"pairs": study.suites(None, 5)["pairs"]}
-    for suites in (more, study.suites(None, 10)):
-        for name, suite in suites.items():
-            list(Campaign(suite, tmp_path / name, records=False).run())
+    shutil.copytree(tenth, tmp_path, dirs_exist_ok=True)
+    assert list(Campaign(study.suites(None, 5)["pairs"], tmp_path / "pairs", records=False).run())
     asked = sum(1 for suite in study.suites(None, 10).values() for _ in suite.trials())
     assert not any(step[0] != "logs" for step in study.work(tmp_path, None, 10, 1))
     assert f"{asked} runs," in study.page(tmp_path)
@@ -226,7 +240,7 @@ def test_a_robot_dies_at_half_of_what_its_own_team_took():
 
 def test_what_the_others_cover_of_what_a_dead_robot_leaves_is_told(tiny, tmp_path):
     teams = plan.suites(None, 10)["teams"]
-    suite, trials = failing_suite([row("supervised", 2, 0, 4.0, "apartment")], teams)
+    suite, trials = failing_suite([row("supervised", 2, 0, 1.0, "apartment")], teams)
     lines = list(Campaign(suite, tmp_path, records=False, trials=trials[:1]).run())
     assert [line["policy"] for line in lines] == ["supervised"]
     assert lines[0]["ended_because"]["robot_0"] == "failed"
