@@ -70,7 +70,7 @@ def test_ariadnes_maps_are_in_its_order_and_mapexs_starts_are_its_own(ran):
     floors = ran("ariadne")[0].floors
     assert [floor.rpartition("/")[2] for floor in floors[:2]] == ["img_9999.png", "img_9998.png"]
     assert len(floors) == 100
-    assert sum(len(teams) for teams in ran("mapex")[0].starts.values()) == 24
+    assert sum(len(teams) for teams in ran("mapex")[0].starts.values()) == 23
 
 
 def test_ir2_ends_after_fewer_decisions_with_four_robots():
