@@ -1,7 +1,10 @@
 """Infos as numbers under the same names."""
 
+import gymnasium
 import numpy as np
+import pytest
 
+import lidarium  # noqa: F401 registers the ids
 from lidarium.envs.faces.conventions import ending_number, flat_row_infos
 from lidarium.envs.simulation.endings import REASONS
 
@@ -27,3 +30,14 @@ def test_rows_have_the_names_of_single_infos_with_masks_beside_them():
     assert names == {"truth.pose.0", "truth.pose.1", "truth.pose.2", "coverage", "ended"}
     assert all(found[f"_{name}"].tolist() == [True, True] for name in names)
     assert flat_row_infos({}, 3)["ended"].tolist() == [0.0, 0.0, 0.0]
+
+
+def test_numbers_are_tensors_by_gymnasiums_wrapper():
+    torch = pytest.importorskip("torch")
+    pytest.importorskip("array_api_compat", reason='it is not installed: pip install "gymnasium[array-api]"')
+    env = gymnasium.wrappers.NumpyToTorch(gymnasium.make("lidarium/Exploration-v1", infos="flat"))
+    _, infos = env.reset(seed=0)
+    assert 0.0 < infos["truth.coverage"].item() < 1.0
+    observation, _, _, _, infos = env.step(torch.zeros(2))
+    assert infos
+    assert all(isinstance(value, torch.Tensor) for value in (*observation.values(), *infos.values()))
