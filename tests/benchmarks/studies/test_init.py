@@ -17,7 +17,7 @@ NAMES = (
         "machines",
         "merging",
     ),
-    *("parity", "realism", "slam", "sparse", "splines", "srt", "supervisor"),
+    *("parity", "printed", "realism", "slam", "sparse", "splines", "srt", "supervisor"),
 )
 
 

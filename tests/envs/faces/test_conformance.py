@@ -141,8 +141,8 @@ def options_of(level, backend, name):
 
 
 def stop_one(episode, step, team):
-    """Let the first robot of the first episode end by itself."""
-    if (episode, step) == (0, 2):
+    """Let the first robot of the first episode end by itself, unless it has: small rooms show nothing to a graph."""
+    if (episode, step) == (0, 2) and "robot_0" in team.agents:
         team.stop("robot_0", "enough")
 
 
