@@ -9,7 +9,7 @@ import os
 import pytest
 from robustness.fuzz import fuzz
 
-COUNTS = {"files": 2000, "settings": 200}
+COUNTS = {"files": 1000, "settings": 100}
 
 
 @pytest.mark.parametrize("kind", COUNTS)
