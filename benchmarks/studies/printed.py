@@ -1,4 +1,4 @@
-"""Policies by the rules of other projects, beside the figures that these have printed.
+"""Policies under the rules of other projects, compared with the figures that those published.
 
 J. Cao et al., "DARE: diffusion policy for autonomous robot exploration", ICRA 2025, Table I; Y. Cao et al.,
 "ARiADNE: a reinforcement learning approach using attention-based deep networks for exploration", ICRA 2023; C. Ho et
@@ -45,12 +45,12 @@ One robot by the rules of other projects: their floors, starts, sensors and ends
 
 ## DARE
 
-{dare_floors} maps of [DARE](https://github.com/marmotlab/DARE) (MIT). Robots move between nodes 4 m apart and see at
-these, 20 m far; an episode ends where no node has utility. Ways as means and deviations over maps. *Over nearest* is
-the ratio of printed means, and of ours the geometric mean of ratios to `nearest_node`, map by map, with its 95 %
-interval. The project's sensor draws beams as lines of cells, which leave gaps that have to be looked at: with a laser
-like ours its own nearest and utility take ways as `nearest_node` and `utility_node`, within 1 %. Ways of the two parts
-of the table are therefore not to be compared, but ratios are.
+{dare_floors} maps of [DARE](https://github.com/marmotlab/DARE) (MIT). Robots move between nodes 4 m apart and
+scan 20 m around at nodes only; an episode ends when no node has utility. Ways are means and standard deviations over
+maps. *Over nearest* is the ratio of the published means; for our policies it is the geometric mean of the ratios to
+`nearest_node`, map by map, with a 95 % interval. The project traces beams through cells, which leaves unknown gaps that
+robots have to visit: with an exact laser, its own nearest and utility planners take the ways of `nearest_node` and
+`utility_node` within 1 %. Compare ratios between the two parts of the table, not ways.
 
 | planner | way [m] | over nearest |
 |---|---:|---:|
@@ -60,8 +60,8 @@ of the table are therefore not to be compared, but ratios are.
 ## ARiADNE
 
 {ariadne_floors} test maps of [ARiADNE](https://github.com/marmotlab/ARiADNE) (MIT), in pixels of 0.1 m. Robots move
-between nodes and see at these, 8 m far; an episode ends where 250 free cells are left unseen, or after 128 decisions.
-The figures of its paper are not at hand.
+between nodes and scan 8 m around at nodes only; an episode ends when at most 250 free cells are unseen, or after 128
+decisions. The figures of its paper are not at hand.
 
 | policy | ended so | way [m] | over `nearest_node` |
 |---|---:|---:|---:|

@@ -302,9 +302,9 @@ class GraphLevel(Level):
     def _graph(self, row: int) -> NodeGraph:
         """Return the graph on a robot's map.
 
-        A frontier cell counts for a node from when it was in sight, as the one of its square, until it is no frontier
-        any more. Nodes that have hardly anything to show, and those where a robot has come to, lose their utility for
-        good. Edges are looked for from nodes near the robot, until these have no utility, and stay.
+        A node counts a frontier cell from when it was visible, and chosen for its square, until it is no frontier any
+        more. Nodes with few frontiers, and nodes that a robot has visited, have no utility from then on. Edges are
+        searched from nodes near the robot, until these have no utility; edges are never removed.
         """
         graph = self.settings.graph
         navigation, lattice = self._map(row), self._lattice(row)

@@ -108,10 +108,10 @@ def frontiers_of(log_odds: Array) -> NDArray[np.bool_]:
 
 
 def thinned(cells: NDArray[np.int64], corner: NDArray[np.float64], side: float) -> NDArray[np.int64]:
-    """Return one of the cells (M, 2) of each square that has some: the one nearest to the corner of its square.
+    """Return one cell of each square that contains some, the one nearest to the corner of the square, (M, 2).
 
-    Squares have sides of ``side`` cells and corners in steps of it from ``corner`` (row, column). Those beside the
-    lines through ``corner`` reach across them: the corner of a square is the one that is nearest to ``corner``.
+    Squares have sides of ``side`` cells, measured from ``corner`` (row, column) and rounded towards it, so squares at
+    the row and column of ``corner`` are twice as wide. The corner of a square is the one nearest to ``corner``.
     """
     gaps = cells - corner
     squares = np.trunc(gaps / side)

@@ -124,7 +124,7 @@ def _dare_start(path: Path) -> Sequence[Starts]:
 
 
 def _mapex_starts(path: Path) -> Sequence[Starts]:
-    """Return MapEx's starts on a map, from its list beside the maps, without the one that is inside a wall."""
+    """Return the starts in free space that MapEx lists for a map."""
     pixels = read_image(path)
     rows = pixels.shape[0]
     lines = (path.parent / "starts.csv").read_text(encoding="utf-8").splitlines()

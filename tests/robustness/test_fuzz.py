@@ -9,7 +9,7 @@ import os
 import pytest
 from robustness.fuzz import fuzz
 
-COUNTS = {"files": 1000, "settings": 100}
+COUNTS = {"files": 2000, "settings": 200}
 
 
 @pytest.mark.parametrize("kind", COUNTS)

@@ -10,7 +10,7 @@ import sys
 import pytest
 from robustness.kills import run_kills
 
-COUNT = 2
+COUNT = 3
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="children are found by the files of Linux")

@@ -1,4 +1,4 @@
-"""Policies by others' rules stand beside what these have printed, paired by floor and start."""
+"""The page of printed tables pairs policies by floor and start, and shows published figures."""
 
 import json
 
@@ -9,7 +9,7 @@ from lidarium.benchmarks.studies import STUDIES, printed
 
 
 def keep(folder, preset, ways):
-    """Store an episode of each policy on each floor, as long as ``ways`` says."""
+    """Write an episode of each policy on each floor; ``ways`` gives their path lengths."""
     (folder / preset).mkdir()
     lines = [
         {

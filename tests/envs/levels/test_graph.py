@@ -65,7 +65,7 @@ def test_utility_counts_frontiers_in_sight_and_in_range():
 
 def test_of_the_frontiers_in_a_square_the_nearest_to_its_corner_counts():
     cells = np.array([(5, 5), (6, 6), (9, 5), (3, 2), (-3, -3), (1, 7)])
-    # Squares of four cells around (5, 5); those beside it are twice as wide.
+    # Squares of four cells, measured from (5, 5); those at its row and column are twice as wide.
     assert thinned(cells, np.array([5.0, 5.0]), 4.0).tolist() == [[5, 5], [9, 5], [-3, -3], [1, 7]]
 
 
