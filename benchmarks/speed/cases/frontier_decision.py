@@ -34,9 +34,9 @@ NOTES = (
 class Choosers:
     """A batch whose robots choose among their frontiers at random."""
 
-    def __init__(self, robots: int, threads: int = 1, floors: str | None = None) -> None:
+    def __init__(self, robots: int, threads: int = 1, floors: str | None = None, episodes: int = EPISODES) -> None:
         self._env = lidarium.vector_env(
-            EPISODES,
+            episodes,
             floors or FLOORS,
             level="frontier",
             robots=robots,
