@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.evaluation.statistics import FEWEST_FOR_BANDS, mean_bands
+from lidarium.extras import install_command
 from lidarium.mapping.files.guarded_reading import read_text
 
 POINTS = 200
@@ -150,7 +151,7 @@ def _scalars(folder: Path, scalar: str) -> Iterator[Mapping[str, float]]:
     try:
         from tensorboard.backend.event_processing.event_accumulator import EventAccumulator  # type: ignore[import-untyped]
     except ModuleNotFoundError as error:
-        raise ValueError(f"{folder} is read by TensorBoard: pip install 'lidarium[rl]'") from error
+        raise ValueError(f"{folder} is read by TensorBoard: {install_command('rl')}") from error
     events = EventAccumulator(str(folder), size_guidance={"scalars": 0})
     events.Reload()
     names = events.Tags()["scalars"]

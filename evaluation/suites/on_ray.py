@@ -22,6 +22,7 @@ from lidarium.evaluation.processes import CLEANUP_IS_UNSAFE
 from lidarium.evaluation.suites.suite import Suite
 from lidarium.evaluation.suites.trial import Trial
 from lidarium.evaluation.suites.trial_run import run_trial, write_record_bytes
+from lidarium.extras import install_command
 from lidarium.registry import IMPORTS_VARIABLE, import_own
 
 Task = TypeVar("Task")
@@ -112,7 +113,7 @@ def _connected(address: str) -> Any:  # noqa: ANN401
     try:
         import ray
     except ModuleNotFoundError as error:
-        raise ValueError("a Ray cluster needs the extra ray: pip install 'lidarium[ray]'") from error
+        raise ValueError(f"a Ray cluster needs Ray: {install_command('ray')}") from error
     if address != "auto":
         host, colon, port = address.rpartition(":")
         if not (colon and host and port.isascii() and port.isdigit() and 0 < int(port) < 65536):
