@@ -1,6 +1,7 @@
 """The study ``fast``: explorers in the world of ``realism="fast"`` beside the full world, on the same floors."""
 
 from collections.abc import Mapping
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -75,9 +76,7 @@ def page(folder: Path) -> str:
         horizon=HORIZON_S,
         times="\n".join(_times(episodes, common, policy, robots) for robots in TEAMS for policy in POLICIES),
         choices="\n".join(
-            _choice(episodes, common, better, other, robots)
-            for robots in TEAMS
-            for other, better in zip(POLICIES, POLICIES[1:], strict=False)
+            _choice(episodes, common, better, other, robots) for robots in TEAMS for other, better in pairwise(POLICIES)
         ),
         lost=_lost(episodes, common),
     )
