@@ -45,8 +45,10 @@ class SparseMapSettings:
         Codes of an image, at most, of floor and obstacles together.
     most_boxes : int
         A map with more boxes merges them with a larger slack.
-    least_motion_m, least_turn : float
-        An image is coded if the robot has moved or turned this far since the last one [m, rad].
+    least_motion_m : float
+        An image is coded if the robot has moved this far since the last one [m].
+    least_turn : float
+        An image is coded if the robot has turned this far since the last one [rad].
     cell_m : float
         Side of the cells of seen ground [m].
     margin_m : float
