@@ -69,11 +69,11 @@ def serve(threads: int) -> None:
         steps = 3 if kind in KINDS[3:] else STEPS
         if kind == KINDS[2]:
             agents = env.possible_agents
-            actions = [dict.fromkeys(agents, action) for action in generator.uniform(-0.5, 1.0, (steps, 2))]
+            actions: list[Any] = [dict.fromkeys(agents, action) for action in generator.uniform(-0.5, 1.0, (steps, 2))]
         elif kind in KINDS[4:]:
             # Each robot takes the cheapest of its frontiers.
             agents = range(env.num_envs)
-            actions = [np.zeros(env.num_envs, np.int64)] * steps
+            actions = list(np.zeros((steps, env.num_envs), np.int64))
         else:
             agents = range(env.num_envs)
             bounds = (-1.0, 1.0) if kind == KINDS[3] else (-0.5, 1.0)

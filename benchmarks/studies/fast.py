@@ -96,10 +96,10 @@ def _times(episodes: Episodes, common: list[tuple[str, int]], policy: str, robot
 
 
 def _choice(episodes: Episodes, common: list[tuple[str, int]], better: str, other: str, robots: int) -> str:
-    ratios = [
-        paired_ratio(*(_seconds(episodes, common, world, policy, robots) for policy in (better, other)))
-        for world in (FULL, FAST)
-    ]
+    ratios = []
+    for world in (FULL, FAST):
+        ours, theirs = (_seconds(episodes, common, world, policy, robots) for policy in (better, other))
+        ratios.append(paired_ratio(ours, theirs))
     return f"| {robots} | `{better}` | `{other}` | {ratios[0]:.3f} | {ratios[1]:.3f} |"
 
 

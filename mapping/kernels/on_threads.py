@@ -16,7 +16,8 @@ from lidarium.mapping.kernels.compilation import IS_INTERPRETED
 from lidarium.mapping.kernels.llvm import Builder, Value, generic_llvm_overload
 
 _utils: Any = cgutils
-_kinds_of: Any = _dispatcher.compute_fingerprint  # type: ignore[attr-defined]
+_kinds_of: Any = _dispatcher.compute_fingerprint
+_typeof: Any = numba.typeof
 _types: Any = types
 
 
@@ -42,7 +43,7 @@ def on_threads(serial: Any, loop: Any) -> Callable[..., None]:  # noqa: ANN401
 
 def _address_of(kernel: Any, arguments: tuple[Any, ...]) -> int:  # noqa: ANN401
     """Return the address of a kernel's machine code for types of arguments."""
-    kinds = tuple(numba.typeof(each) for each in arguments)
+    kinds = tuple(_typeof(each) for each in arguments)
     kernel.compile(kinds)
     compiled = kernel.overloads[kinds]
     return int(compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name))
