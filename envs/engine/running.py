@@ -14,7 +14,8 @@ from lidarium.envs.simulation.endings import Rules, ending_of
 from lidarium.envs.simulation.kernels.arrays import WorldArrays, world_at
 from lidarium.envs.simulation.kernels.stepping import step_episode
 from lidarium.mapping.kernels.compilation import Array, kernel
-from lidarium.mapping.kernels.work_queue import Work, take_next
+from lidarium.mapping.kernels.on_threads import call_at, on_threads
+from lidarium.mapping.kernels.work_queue import Work, share_of, take_next
 
 
 class Run(NamedTuple):
@@ -126,7 +127,7 @@ def _run_episodes(run: Run, drives: Drives, following: Following, rules: Rules, 
     An episode's observations are written right after its run, while its maps are in the thread's cache.
     """
     # Arguments are not nested further: numba hands no tuples of tuples to threads.
-    for _ in numba.prange(work.threads):
+    for _ in range(work.threads):
         place = take_next(work.taken)
         while place < work.items.shape[0]:
             episode = work.items[place]
@@ -139,4 +140,14 @@ def _run_episodes(run: Run, drives: Drives, following: Following, rules: Rules, 
 
 
 run_serial = kernel(_run_episodes)
-run_parallel = kernel(parallel=True)(_run_episodes)
+
+
+@kernel(parallel=True)
+def _run_on_threads(
+    address: int, run: Run, drives: Drives, following: Following, rules: Rules, observed: Arrays, work: Work
+) -> None:
+    for thread in numba.prange(work.threads):
+        call_at(address, (run, drives, following, rules, observed, share_of(work, thread)))
+
+
+run_parallel = on_threads(run_serial, _run_on_threads)

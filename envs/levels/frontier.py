@@ -4,6 +4,7 @@ import math
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
+import numba
 import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
@@ -20,14 +21,18 @@ from lidarium.envs.levels.frontier_choices import (
 )
 from lidarium.envs.levels.level import STEPS, Mask, Turn, add_info, check_rows
 from lidarium.envs.levels.waypoint import WaypointLevel, Ways, is_way, read_ways
+from lidarium.envs.onboard.driving.drives import Drives
+from lidarium.envs.onboard.driving.planning import Planning
 from lidarium.envs.onboard.driving.team_driver import TeamDriver, footprint_of
 from lidarium.envs.onboard.perception import Perception
 from lidarium.envs.onboard.radio.messages import Orders, Target
+from lidarium.envs.onboard.team_maps import TeamMaps
 from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.settings.limits import GAINS
 from lidarium.mapping.geometry.bounds import shown
 from lidarium.mapping.kernels.compilation import kernel
-from lidarium.mapping.kernels.work_queue import new_work
+from lidarium.mapping.kernels.on_threads import call_at, on_threads
+from lidarium.mapping.kernels.work_queue import Work, new_work, share_of
 from lidarium.mapping.planning.frontiers.approach import default_reach
 from lidarium.mapping.planning.search.search_state import disc_spans
 from lidarium.mapping.planning.search.swept_costs import SweepMemory
@@ -39,7 +44,23 @@ REASONS = ("", "unseen", "blocked", "no_progress")
 _renew_teams_serial = kernel(renew_teams)
 
 
-_renew_teams_parallel = kernel(parallel=True)(renew_teams)
+@kernel(parallel=True)
+def _renew_on_threads(
+    address: int,
+    planning: Planning,
+    maps: TeamMaps,
+    drives: Drives,
+    view: ViewReach,
+    offers: Offers,
+    choices: Choices,
+    renewal: Renewal,
+    work: Work,
+) -> None:
+    for thread in numba.prange(work.threads):
+        call_at(address, (planning, maps, drives, view, offers, choices, renewal, share_of(work, thread)))
+
+
+_renew_teams_parallel = on_threads(_renew_teams_serial, _renew_on_threads)
 
 
 class FrontierOffers:
@@ -68,7 +89,8 @@ class FrontierOffers:
         reach = default_reach(footprint_of(settings.robot.radius), resolution) / resolution
         offers, self._memory = settings.frontiers, SweepMemory(len(perception.memory.table))
         self._view = ViewReach(
-            disc_spans(reach),
+            # A copy that can be written to, as copies of environments have it: one type to kernels.
+            disc_spans(reach).copy(),
             reach,
             settings.time_step,
             settings.least_frontier,
@@ -151,8 +173,8 @@ class FrontierOffers:
             Why each robot's chosen frontier was given up, by number in ``REASONS``; 0 if it was not.
         """
         reasons = np.zeros(len(is_live), np.int8)
-        rows = np.flatnonzero(is_offered | is_live & self.choices.is_chosen)
-        episodes = np.unique(rows // self._robots)
+        is_due = is_offered | is_live & self.choices.is_chosen
+        rows, episodes = np.flatnonzero(is_due), np.flatnonzero(is_due.reshape(-1, self._robots).any(axis=1))
         if len(episodes):
             threads = self._perception.threads_for(len(episodes))
             renew = _renew_teams_parallel if threads > 1 else _renew_teams_serial
@@ -304,8 +326,9 @@ class FrontierLevel(WaypointLevel):
     def observe(self, acted: Mask, live: Mask, seen: Mask, out: dict[str, NDArray[Any]], infos: dict[str, Any]) -> None:
         """Give up unreachable or unproductive choices, offer again, and report both."""
         reasons = self.offers.renew(live, seen)
+        where = slice(None) if seen.all() else seen
         for name, array in self.offers.observed.items():
-            out[name][seen] = array[seen]
+            out[name][where] = array[where]
         super().observe(acted, live, seen, out, infos)
         rows = np.flatnonzero(reasons).tolist()
         if rows:

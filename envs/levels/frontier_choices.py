@@ -3,7 +3,6 @@
 import math
 from typing import NamedTuple
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
@@ -395,7 +394,7 @@ def renew_teams(
     work: Work,
 ) -> None:
     """Give up unreachable or unproductive choices of the robots, then offer again."""
-    for piece in numba.prange(work.threads):
+    for piece in range(work.first, work.first + work.threads):
         k = take_next(work.taken)
         while k < len(work.items):
             episode = work.items[k]

@@ -232,8 +232,11 @@ class Perception:
             records, sharing = self._shared_records, self._robots
         elif shares_map and self.received.adds_up:
             records = self.received.records
+        is_missing = records[:, FLAGS if with_frontiers else LOG_ODDS] == 0
+        if not is_missing.any():  # as in most decisions
+            return records, sharing
         places = np.unique(rows // sharing)
-        for place in places[records[places, FLAGS if with_frontiers else LOG_ODDS] == 0]:
+        for place in places[is_missing[places]]:
             navigation = self.planning_map(int(place) * sharing, shares_map)
             if with_frontiers:
                 _ = navigation.frontiers

@@ -27,16 +27,19 @@ class Work(NamedTuple):
         The number of items that have been taken, see ``take_next``.
     threads : int
         The number of threads that take items.
+    first : int
+        The number of the first of them, which tells the scratch memory of threads apart.
     """
 
     items: NDArray[np.int64]
     taken: NDArray[np.int64]
     threads: int
+    first: int
 
 
 def new_work(items: NDArray[np.int64], threads: int) -> Work:
     """Return work of which nothing has been taken."""
-    return Work(items, new_queue(), threads)
+    return Work(items, new_queue(), threads, 0)
 
 
 def new_queue() -> NDArray[np.int64]:
@@ -54,6 +57,12 @@ def _add_one(address: int) -> int:
 @llvm_overload(_add_one, types.int64, types.int64)
 def _(builder: Builder, address: Value) -> Value:
     return builder.atomic_rmw("add", pointer_at(builder, address, LONG), ir.Constant(LONG, 1), "monotonic")
+
+
+@kernel(inline="always")
+def share_of(work: Work, thread: int) -> Work:
+    """Return the work as one of its threads takes part in it (kernel)."""
+    return Work(work.items, work.taken, np.int64(1), np.int64(thread))  # type: ignore[arg-type]
 
 
 @kernel(forceinline=True)

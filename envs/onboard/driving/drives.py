@@ -192,7 +192,7 @@ def any_newly_done(drives: Drives, first: int, last: int, live: Array, waiting: 
     return newly_done > 0
 
 
-@kernel
+@kernel(nrt=False)
 def follow_team(
     drives: Drives,
     following: Following,
@@ -239,7 +239,7 @@ def follow_team(
     )
 
 
-@kernel
+@kernel(nrt=False)
 def follow_teams(
     drives: Drives,
     following: Following,

@@ -15,7 +15,8 @@ from lidarium.envs.onboard.driving.path_following import ARRIVED, BLOCKED, DRIVI
 from lidarium.envs.onboard.navigation import COLUMNS, ROWS, closeness_of, log_odds_of
 from lidarium.envs.onboard.team_maps import TeamMaps, refresh_team
 from lidarium.mapping.kernels.compilation import Array, kernel
-from lidarium.mapping.kernels.work_queue import Work, take_next
+from lidarium.mapping.kernels.on_threads import call_at, on_threads
+from lidarium.mapping.kernels.work_queue import Work, share_of, take_next
 from lidarium.mapping.planning.path_smoothing import kept_places, line_is_clear
 from lidarium.mapping.planning.search.path_search import budget_of, find_path
 from lidarium.mapping.planning.search.search_state import Passage, Terrain
@@ -291,7 +292,7 @@ def _prepare_teams(planning: Planning, drives: Drives, maps: TeamMaps, work: Wor
 
     The items of the work are episodes; it is noted if a robot is blocked.
     """
-    for piece in numba.prange(work.threads):
+    for piece in range(work.first, work.first + work.threads):
         k = take_next(work.taken)
         while k < len(work.items):
             first = work.items[k] * planning.robots
@@ -312,4 +313,12 @@ def _prepare_teams(planning: Planning, drives: Drives, maps: TeamMaps, work: Wor
 prepare_teams_serial = kernel(_prepare_teams)
 
 
-prepare_teams_parallel = kernel(parallel=True)(_prepare_teams)
+@kernel(parallel=True)
+def _prepare_on_threads(
+    address: int, planning: Planning, drives: Drives, maps: TeamMaps, work: Work, is_blocked: Array
+) -> None:
+    for thread in numba.prange(work.threads):
+        call_at(address, (planning, drives, maps, share_of(work, thread), is_blocked))
+
+
+prepare_teams_parallel = on_threads(prepare_teams_serial, _prepare_on_threads)

@@ -177,16 +177,23 @@ def _share(world: WorldArrays, episode: int, robots: int) -> None:
 
 
 @kernel
+def _sense_episode(table: Array, episode: int, robots: int, perceives: bool) -> None:
+    """Let the robots of an episode sense, score and (if ``perceives``) map."""
+    world = world_at(table)
+    scratch = scan_scratch(world)
+    for row in range(episode * robots, (episode + 1) * robots):
+        if not world.flags[row] & ENDED:
+            sense_and_perceive(world, row, episode * robots, robots, perceives, scratch)
+
+
+@kernel(nrt=False)
 def step_episode(table: Array, episode: int, robots: int, commands: Array, moves_bodies: bool, perceives: bool) -> None:
     """Run a step of one episode: move, and if robots scan in it, sense, score and (if ``perceives``) map."""
     world = world_at(table)
     _move(world, episode, robots, commands, moves_bodies)
     _localize(world, episode, robots)
     if is_scanning(world, episode):
-        scratch = scan_scratch(world)
-        for row in range(episode * robots, (episode + 1) * robots):
-            if not world.flags[row] & ENDED:
-                sense_and_perceive(world, row, episode * robots, robots, perceives, scratch)
+        _sense_episode(table, episode, robots, perceives)
     _share(world, episode, robots)
 
 

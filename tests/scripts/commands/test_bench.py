@@ -1,8 +1,11 @@
 import json
+import sys
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
+from lidarium.benchmarks.speed import against
 from lidarium.benchmarks.speed import all as benchmarks
 from lidarium.benchmarks.speed.harness import timing
 from lidarium.benchmarks.speed.harness.lines import Line, faster
@@ -112,3 +115,34 @@ def test_lines_are_judged_by_their_side():
     assert not Line("error", "", "", None, 0.1, 0.2, is_upper_bound=True).is_reached
     assert Line("rate", "", "", None, 0.1, 0.2).is_reached
     assert Line("told", "", "", None, None, 0.2).is_reached is None
+
+
+@pytest.fixture
+def in_turn(monkeypatch):
+    """A comparison in which frontier decisions take a tenth more time than in the other version."""
+    found = {"waypoint decisions": np.array([[9.0, 9.0], [10.0, 10.0]]), "frontier decisions": np.ones((2, 2))}
+    found["frontier decisions"][0] = 1.1
+    monkeypatch.setattr(against, "times", lambda pythons, threads, rounds, blocks: found)
+
+
+def test_a_guard_names_what_is_slower_than_another_version(in_turn, tmp_path, capsys):
+    assert main(["bench", "--guard", sys.executable, "--json", "--out", str(tmp_path)]) == 3
+    result = json.loads(capsys.readouterr().out)
+    assert result["slower"] == ["frontier decisions"]
+    assert [line["is_slower"] for line in result["lines"]] == [False, True]
+    assert result == json.loads((tmp_path / "guard.json").read_text())
+    assert main(["bench", "--guard", sys.executable]) == 3
+    assert "slower than the other version: frontier decisions" in capsys.readouterr().out
+
+
+def test_a_guard_that_cannot_run_is_refused(monkeypatch, tmp_path, capsys):
+    def ended(pythons, threads, rounds, blocks):
+        raise RuntimeError(f"{pythons[1]} has ended")
+
+    monkeypatch.setattr(against, "times", ended)
+    assert main(["bench", "--guard", str(tmp_path / "python")]) == 2
+    assert "which is no file; want the python of an environment" in capsys.readouterr().err
+    assert main(["bench", "--guard", sys.executable]) == 2
+    assert f"--guard cannot be used: {sys.executable} has ended" in capsys.readouterr().err
+    assert main(["bench", "--guard", sys.executable, "--only", "rays"]) == 2
+    assert "leave out --only" in capsys.readouterr().err
