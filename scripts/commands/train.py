@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from tyro.conf import Positional
 
+from lidarium.extras import install_command
 from lidarium.scripts import first_start
 from lidarium.scripts.common import INTERRUPTED, LINE_PERIOD_S, Answer, Command, notify, table
 
@@ -77,9 +78,7 @@ def _check_extra() -> None:
     """Check that the extra is installed."""
     missing = [name for name in EXTRA if importlib.util.find_spec(name) is None]
     if missing:
-        raise ValueError(
-            f'training needs {", ".join(missing)}; install the extra: pip install -c constraints.txt "lidarium[rl]"'
-        )
+        raise ValueError(f"training needs {', '.join(missing)}: {install_command('rl')}")
 
 
 class _Shown:
