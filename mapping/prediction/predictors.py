@@ -1,0 +1,87 @@
+"""Predictors by name: what guesses the unknown part of a map."""
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.mapping.geometry.bounds import shown
+from lidarium.mapping.prediction.levels import FREE, OCCUPIED
+from lidarium.registry import Registry
+
+
+@dataclass(frozen=True, slots=True)
+class PartialMap:
+    """A map of which a part is known, in squares.
+
+    Attributes
+    ----------
+    levels : (rows, columns) int8
+        -1 free, 0 unknown, 1 occupied; row 0 has the lowest y.
+    side : float
+        Side of a square [m].
+    agent : str
+        Name of the robot whose map it is; empty for a map of nobody.
+    """
+
+    levels: NDArray[np.int8]
+    side: float
+    agent: str = ""
+
+
+class Predictor(ABC):
+    """Predicts which unknown squares of partial maps are free."""
+
+    def reset(self, team: Any) -> None:  # noqa: B027, ANN401 (most predictors keep nothing)
+        """Begin an episode of a team, as `Policy.reset` gets it."""
+
+    @abstractmethod
+    def predict(self, partial: PartialMap) -> NDArray[np.float32] | None:
+        """Return the probability that each square is free, (rows, columns) float32, None for no prediction.
+
+        Entries of known squares are ignored.
+        """
+
+
+class Nothing(Predictor):
+    """Predicts nothing."""
+
+    def predict(self, partial: PartialMap) -> None:
+        """Return None."""
+
+
+PREDICTORS: Registry[type[Predictor]] = Registry("predictor")
+"""Classes of predictors by name; keyword arguments are their settings."""
+
+PREDICTORS.register("nothing", Nothing, "no prediction: policies plan on what is known")
+PREDICTORS.register(
+    "truth",
+    "lidarium.evaluation.truth.floor_predictor:FloorPredictor",
+    "the floor itself, as a bound on what predictions can win; needs known starts",
+)
+
+
+def predicted(predictor: Predictor, partial: PartialMap) -> NDArray[np.float32] | None:
+    """Return a checked prediction: 1 in known free squares, 0 in known occupied ones.
+
+    Raises
+    ------
+    ValueError
+        If the predictor returns an array of another shape, or numbers that are no probabilities.
+    """
+    found = predictor.predict(partial)
+    if found is None:
+        return None
+    name, levels = type(predictor).__name__, partial.levels
+    if not isinstance(found, np.ndarray) or found.shape != levels.shape or found.dtype.kind not in "fiub":
+        what = f"{found.dtype} {found.shape}" if isinstance(found, np.ndarray) else shown(found)
+        raise ValueError(
+            f"predictor {name} returned {what}; want an array {levels.shape} of float32, a probability for each square"
+        )
+    probability = np.where(levels == FREE, 1.0, np.where(levels == OCCUPIED, 0.0, found)).astype(np.float32)
+    if not (probability.min(initial=0.0) >= 0.0 and probability.max(initial=1.0) <= 1.0):
+        worst = probability[~((probability >= 0.0) & (probability <= 1.0))][0]
+        raise ValueError(f"predictor {name} returned {worst}; want probabilities from 0 to 1")
+    return probability
