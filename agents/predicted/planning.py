@@ -26,6 +26,7 @@ VISIT_M = 0.5
 """Cost of slowing down, turning and setting out at each stop [m]."""
 
 WEIGHTS = TourWeights(1.0, 0.4, 0.0)
+"""Weights of tours past stops: the longest, the sum, and nothing for waiting."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,25 +58,27 @@ def rest_of(
     options: TourOptions,
     free: NDArray[np.float32],
     unseen: NDArray[np.float32],
-    side: float,
-    factor: int,
+    squares: tuple[float, int],
     reach: float,
     enough: float,
-) -> Rest:
-    """Return what is left to see.
+) -> Rest | None:
+    """Return what is left to see, None if that is too little for a stop.
 
     Parameters
     ----------
     free, unseen : (rows, columns) float32
         Probability that a square is free, and that it is free and not seen.
-    side, factor : float, int
+    squares : (float, int)
         Side of a square [m], and cells of the map along it.
     reach : float
         How far the lasers see [m].
+    enough : float
+        Share of the free area that has to be seen.
     """
-    is_open = free > 0.5
+    (side, factor), is_open = squares, free > 0.5
     grid = CoarseGrid(is_open, factor, 0, 0, side, 0)
-    robots = np.array([[int(robot.pose[1] / side), int(robot.pose[0] / side)] for robot in options.robots])
+    poses = np.array([[robot.pose[1], robot.pose[0]] for robot in options.robots])
+    robots = np.clip(poses // side, 0, np.array(free.shape) - 1).astype(np.int64)
     views = (np.array([options.grid.row, options.grid.column]) + (options.places + 0.5) * options.grid.factor).astype(
         np.int64
     ) // factor
@@ -87,6 +90,8 @@ def rest_of(
     places = np.argwhere(lattice & is_open & (nearest < UNREACHED))
     spare = (1.0 - enough) * float(free.sum())
     chosen, _ = cover(free, unseen, places, cells, LEAST_STOP / side**2, spare, MOST_COVER)
+    if not len(chosen):
+        return None
     stops = places[chosen]
     order = np.argsort(nearest[stops[:, 0], stops[:, 1]], kind="stable")[:MOST_STOPS]
     stops = stops[order]

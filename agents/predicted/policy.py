@@ -1,6 +1,12 @@
-"""Predicted tours: tours as those of `tour_frontier`, chosen by what is left to see on a predicted map."""
+"""Predicted tours: tours as those of `tour_frontier`, begun by what is left to see on a predicted map.
 
-from dataclasses import dataclass
+Options, views, driving and frontiers given up are those of `tour_frontier`; a predictor that predicts nothing makes the
+same decisions to the bit. With a prediction, robots set out to the option after which the rest costs least: tours past
+places from which all that is probably free and unseen is seen, on paths through what is probably free.
+"""
+
+import warnings
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,78 +16,90 @@ from lidarium.agents.policy import Team
 from lidarium.agents.predicted.planning import costs_of, rest_of
 from lidarium.agents.tours.planning import TourOptions, first_options
 from lidarium.agents.tours.policy import TourFrontier
-from lidarium.envs.onboard.navigation import NavigationMap
-from lidarium.mapping.prediction.levels import UNKNOWN, factor_of, levels_of
-from lidarium.mapping.prediction.predictors import PREDICTORS, PartialMap, Predictor, predicted
+from lidarium.mapping.geometry.bounds import shown
+from lidarium.mapping.prediction.levels import factor_of, levels_of, shares_unknown
+from lidarium.mapping.prediction.predictors import PartialMap, Predictor, make_predictor, predicted
 
 PREDICTED = "predicted"
+"""Sent elsewhere than where tours begin, by what is predicted."""
 
 
 class PredictedTours(TourFrontier):
-    """Explorers on tours past what a predictor says is left."""
+    """Explorers on tours past what is probably left.
 
-    def __init__(self, predictor: str | Predictor = "nothing", shares_map: bool = True, **settings: Any) -> None:  # noqa: ANN401
+    Parameters
+    ----------
+    predictor : str or Predictor, optional
+        Name of a predictor, or one of your own. "network" by default.
+    weights : str or Path, optional
+        File of the network's weights; those of the package by default.
+    falls_back : bool, optional
+        Whether robots go on by `tour_frontier` if the predictor fails, with a warning; by default its error is raised.
+    """
+
+    def __init__(
+        self,
+        predictor: str | Predictor = "network",
+        weights: str | Path = "",
+        falls_back: bool = False,
+        shares_map: bool = True,
+        **settings: Any,  # noqa: ANN401
+    ) -> None:
         super().__init__(shares_map, **settings)
-        self.predictor = PREDICTORS[predictor]() if isinstance(predictor, str) else predictor
+        if not isinstance(falls_back, bool):
+            raise ValueError(f"falls_back is {shown(falls_back)}; want True or False")
+        if isinstance(predictor, Predictor):
+            self.predictor = predictor
+        else:
+            self.predictor = make_predictor(predictor, **({} if weights == "" else {"weights": weights}))
+        self._falls_back = falls_back
 
     def reset(self, team: Team, seed: int = 0) -> None:
         """Begin an episode."""
         super().reset(team, seed)
         self.predictor.reset(team)
-        self._reach = min(team.belief(agent).lidar.range_max for agent in team.agents)
-        self._guesses: dict[int, tuple[float, Guess | None]] = {}
+        self._range = min(team.belief(agent).lidar.range_max for agent in team.agents)
         self._enough = team.settings.stop_coverage or 1.0
-
-    def _guess(self, navigation: NavigationMap) -> "Guess | None":
-        """Return the prediction of a map as it is now, None if there is none."""
-        key = id(navigation)
-        if self._guesses.get(key, (None, None))[0] != self.team.time_s:
-            agent = next(name for name in self.team.agents if self.navigation(name) is navigation)
-            self._guesses[key] = (self.team.time_s, guess_of(self.predictor, navigation, agent))
-        return self._guesses[key][1]
+        self._has_failed = False
 
     def pick(self, agents: list[str], options: TourOptions) -> list[int | None]:
-        """Return which option each robot on one map drives to, robot after robot."""
-        guess = self._guess(self.navigation(agents[0]))
+        """Return which option each robot on one map drives to, robot after robot; each knows the picks before it.
+
+        A robot keeps its goal if tours go on to that.
+        """
         classic = first_options(options)[: len(agents)]
-        if guess is None or len(options.numbers) < 2:
+        if len(options.numbers) < 2:
             return classic
-        rest = rest_of(options, guess.free, guess.unseen, guess.side, guess.factor, self._reach, self._enough)
+        navigation = self.navigation(agents[0])
+        factor = factor_of(navigation.resolution)
+        side = factor * navigation.resolution
+        free = self._predicted(PartialMap(levels_of(navigation.log_odds, factor), side, agents[0]))
+        if free is None:
+            return classic
+        unseen = free * shares_unknown(navigation.log_odds, factor)
+        rest = rest_of(options, free, unseen, (side, factor), self._range, self._enough)
+        if rest is None:
+            return classic
         picks: list[int | None] = []
-        for robot in range(len(agents)):
-            if classic[robot] is not None and options.is_kept[robot, classic[robot]] and classic[robot] not in picks:
-                picks.append(classic[robot])
+        for robot, first in enumerate(classic):
+            if first is not None and options.is_kept[robot, first] and first not in picks:
+                picks.append(first)
                 continue
             costs = costs_of(rest, robot, picks)
             picks.append(int(np.argmin(costs)) if np.isfinite(costs).any() else None)
+            if picks[robot] != first:
+                self._sent_by[agents[robot]] = PREDICTED
         return picks
 
-
-@dataclass(frozen=True, slots=True)
-class Guess:
-    """A map with its prediction.
-
-    Attributes
-    ----------
-    free, unseen : (rows, columns) float32
-        Probability that a square is free, and that it is free and not known.
-    side, factor : float, int
-        Side of a square [m], and cells of the map along it.
-    """
-
-    free: NDArray[np.float32]
-    unseen: NDArray[np.float32]
-    side: float
-    factor: int
-
-
-def guess_of(predictor: Predictor, navigation: NavigationMap, agent: str) -> Guess | None:
-    """Return what a predictor says of a map."""
-    factor, log_odds = factor_of(navigation.resolution), navigation.log_odds
-    side = factor * navigation.resolution
-    levels = levels_of(log_odds, factor)
-    free = predicted(predictor, PartialMap(levels, side, agent))
-    if free is None:
-        return None
-    unseen = np.where(levels == UNKNOWN, free, np.float32(0.0))
-    return Guess(free, unseen, side, factor)
+    def _predicted(self, partial: PartialMap) -> NDArray[np.float32] | None:
+        """Return the prediction of a map, None if there is none."""
+        if not self._falls_back:
+            return predicted(self.predictor, partial)
+        if self._has_failed:
+            return None
+        try:
+            return predicted(self.predictor, partial)
+        except Exception as error:  # whatever a predictor of the user's own raises
+            self._has_failed = True
+            warnings.warn(f"the predictor failed, and robots go on without it: {error}", UserWarning, stacklevel=2)
+            return None

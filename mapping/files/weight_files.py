@@ -55,18 +55,18 @@ class WeightFiles:
             weights: dict[str, NDArray[np.float32]] = load(content)
         except (SafetensorError, ValueError, KeyError, TypeError) as error:
             raise ValueError(f"{name} is no file of weights, or is truncated: {error}") from error
-        self._check(weights, name)
+        self.check(weights, name)
         return weights
 
     def save(self, path: Path, weights: Weights) -> str:
         """Write weights to a file, whole or not at all, and return its SHA-256."""
-        self._check(weights, "what was trained")
+        self.check(weights, "what was trained")
         content = save({name: np.ascontiguousarray(array) for name, array in weights.items()})
         path.parent.mkdir(parents=True, exist_ok=True)
         write_whole(path, content)
         return hashlib.sha256(content).hexdigest()
 
-    def _check(self, weights: Weights, name: str) -> None:
+    def check(self, weights: Weights, name: str) -> None:
         """Check that weights are those of this network."""
         for key in sorted({*weights, *self.shapes}):
             if key not in weights or key not in self.shapes:

@@ -54,6 +54,11 @@ def _pool(log_odds: Array, factor: int, levels: Array) -> None:
             levels[i, j] = OCCUPIED if counts[1, j] > 0 else FREE if is_free else UNKNOWN
 
 
+def shares_unknown(log_odds: NDArray[np.int8], factor: int) -> NDArray[np.float32]:
+    """Return which share of the cells of each square is unknown; parameters as in ``levels_of``."""
+    return (_counts(log_odds == 0, factor) / factor**2).astype(np.float32)
+
+
 def free_squares(free: NDArray[np.bool_], solid: NDArray[np.bool_], factor: int) -> NDArray[np.bool_]:
     """Return the free squares of a whole floor: none of their cells is solid, and at least half are free.
 

@@ -66,7 +66,7 @@ def _shipped() -> Weights:
 
 def load_weights(path: str | Path = "") -> Weights:
     """Return the weights of a file; if ``path`` is empty, the package's."""
-    return _shipped() if path == "" else FILES.load(path)
+    return FILES.load(path) if path != "" else _shipped()
 
 
 @dataclass(frozen=True, slots=True)

@@ -55,12 +55,34 @@ class Nothing(Predictor):
 PREDICTORS: Registry[type[Predictor]] = Registry("predictor")
 """Classes of predictors by name; keyword arguments are their settings."""
 
+PREDICTORS.register(
+    "network",
+    "lidarium.mapping.prediction.network_predictor:NetworkPredictor",
+    "a network that was trained on maps of robots in buildings and dungeons",
+)
 PREDICTORS.register("nothing", Nothing, "no prediction: policies plan on what is known")
 PREDICTORS.register(
     "truth",
     "lidarium.evaluation.truth.floor_predictor:FloorPredictor",
     "the floor itself, as a bound on what predictions can win; needs known starts",
 )
+
+
+def make_predictor(name: str, **settings: Any) -> Predictor:  # noqa: ANN401
+    """Return a new predictor by name.
+
+    Raises
+    ------
+    ValueError
+        If the name or a setting is unknown, or it is no predictor.
+    """
+    try:
+        made = PREDICTORS[name](**settings)
+    except TypeError as error:
+        raise ValueError(f"predictor {name!r} cannot be made with {sorted(settings)}: {error}") from error
+    if not isinstance(made, Predictor):
+        raise ValueError(f"predictor {name!r} makes {type(made).__name__}; want a subclass of Predictor")
+    return made
 
 
 def predicted(predictor: Predictor, partial: PartialMap) -> NDArray[np.float32] | None:
