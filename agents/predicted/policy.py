@@ -18,7 +18,14 @@ from lidarium.agents.tours.planning import TourOptions, first_options
 from lidarium.agents.tours.policy import TourFrontier
 from lidarium.mapping.geometry.bounds import shown
 from lidarium.mapping.prediction.levels import factor_of, levels_of, shares_unknown
-from lidarium.mapping.prediction.predictors import PartialMap, Predictor, make_predictor, predicted
+from lidarium.mapping.prediction.predictors import (
+    PartialMap,
+    Predictor,
+    begin_episode,
+    check_predictor,
+    make_predictor,
+    predicted,
+)
 
 PREDICTED = "predicted"
 """Sent elsewhere than where tours begin, by what is predicted."""
@@ -30,7 +37,7 @@ class PredictedTours(TourFrontier):
     Parameters
     ----------
     predictor : str or Predictor, optional
-        Name of a predictor, or one of your own. "network" by default.
+        Name of a predictor, or an object with its method ``predict``. "network" by default.
     weights : str or Path, optional
         File of the network's weights; those of the package by default.
     falls_back : bool, optional
@@ -48,16 +55,16 @@ class PredictedTours(TourFrontier):
         super().__init__(shares_map, **settings)
         if not isinstance(falls_back, bool):
             raise ValueError(f"falls_back is {shown(falls_back)}; want True or False")
-        if isinstance(predictor, Predictor):
-            self.predictor = predictor
-        else:
-            self.predictor = make_predictor(predictor, **({} if weights == "" else {"weights": weights}))
+        if isinstance(predictor, str):
+            predictor = make_predictor(predictor, **({} if weights == "" else {"weights": weights}))
+        check_predictor(predictor)
+        self.predictor = predictor
         self._falls_back = falls_back
 
     def reset(self, team: Team, seed: int = 0) -> None:
         """Begin an episode."""
         super().reset(team, seed)
-        self.predictor.reset(team)
+        begin_episode(self.predictor, team)
         self._range = min(team.belief(agent).lidar.range_max for agent in team.agents)
         self._enough = team.settings.stop_coverage or 1.0
         self._has_failed = False

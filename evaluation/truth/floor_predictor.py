@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.mapping.prediction.levels import free_squares
-from lidarium.mapping.prediction.predictors import PartialMap, Predictor
+from lidarium.mapping.prediction.predictors import PartialMap
 
 
-class FloorPredictor(Predictor):
+class FloorPredictor:
     """Predicts the truth; robots have to know their starts, so that the floor can be laid on their maps."""
 
     def reset(self, team: Any) -> None:  # noqa: ANN401

@@ -8,14 +8,14 @@ from numpy.typing import NDArray
 
 from lidarium.mapping.prediction.levels import OCCUPIED, SIDE
 from lidarium.mapping.prediction.network import WINDOW, MapNetwork, load_weights
-from lidarium.mapping.prediction.predictors import PartialMap, Predictor
+from lidarium.mapping.prediction.predictors import PartialMap
 from lidarium.mapping.prediction.windows import WindowedPrediction
 
 TOLERANCE = 0.1
 """Squares that differ from the network's by no more than this share are taken as they are."""
 
 
-class NetworkPredictor(Predictor):
+class NetworkPredictor:
     """Predicts by a trained network.
 
     Parameters

@@ -1,8 +1,8 @@
 """Predictors by name: what guesses the unknown part of a map."""
 
-from abc import ABC, abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,29 +31,29 @@ class PartialMap:
     agent: str = ""
 
 
-class Predictor(ABC):
-    """Predicts which unknown squares of partial maps are free."""
+class Predictor(Protocol):
+    """Predicts which unknown squares of partial maps are free.
 
-    def reset(self, team: Any) -> None:  # noqa: B027, ANN401 (most predictors keep nothing)
-        """Begin an episode of a team, as `Policy.reset` gets it."""
+    It may also have a method ``reset(team)``, which is called at the start of each episode.
+    """
 
-    @abstractmethod
     def predict(self, partial: PartialMap) -> NDArray[np.float32] | None:
         """Return the probability that each square is free, (rows, columns) float32, None for no prediction.
 
         Entries of known squares are ignored.
         """
+        ...
 
 
-class Nothing(Predictor):
+class Nothing:
     """Predicts nothing."""
 
     def predict(self, partial: PartialMap) -> None:
         """Return None."""
 
 
-PREDICTORS: Registry[type[Predictor]] = Registry("predictor")
-"""Classes of predictors by name; keyword arguments are their settings."""
+PREDICTORS: Registry[Callable[..., Predictor]] = Registry("predictor")
+"""Factories of predictors by name; keyword arguments are their settings."""
 
 PREDICTORS.register(
     "network",
@@ -80,9 +80,21 @@ def make_predictor(name: str, **settings: Any) -> Predictor:  # noqa: ANN401
         made = PREDICTORS[name](**settings)
     except TypeError as error:
         raise ValueError(f"predictor {name!r} cannot be made with {sorted(settings)}: {error}") from error
-    if not isinstance(made, Predictor):
-        raise ValueError(f"predictor {name!r} makes {type(made).__name__}; want a subclass of Predictor")
+    check_predictor(made)
     return made
+
+
+def check_predictor(predictor: object) -> None:
+    """Check that an object can predict."""
+    if not callable(getattr(predictor, "predict", None)):
+        raise ValueError(f"predictor {shown(predictor)} has no method predict(partial); want one")
+
+
+def begin_episode(predictor: Predictor, team: Any) -> None:  # noqa: ANN401
+    """Tell a predictor that an episode of a team begins, if it wants to know."""
+    reset = getattr(predictor, "reset", None)
+    if reset is not None:
+        reset(team)
 
 
 def predicted(predictor: Predictor, partial: PartialMap) -> NDArray[np.float32] | None:

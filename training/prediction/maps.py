@@ -13,6 +13,7 @@ from lidarium.envs.faces.team import EpisodeTeam
 from lidarium.envs.floors.catalogue.names import SETS
 from lidarium.envs.floors.floor import Floor
 from lidarium.envs.floors.generation.buildings import BuildingSettings, generate_building
+from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.settings.making import make_settings
 from lidarium.evaluation.suites.starts import drawn_starts
 from lidarium.evaluation.truth.floor_predictor import FloorPredictor
@@ -83,26 +84,32 @@ def explore(settings: PredictionSettings, number: int) -> FloorMaps:
         horizon_s=900.0,
         stop_coverage=0.99,
     )
-    floor = floor_of(settings, number)
-    env, policy = ExplorationEnv(floor, team), make_policy(str(generator.choice(EXPLORERS)))
+    # Early maps are small and tell little; most are taken later.
+    wanted = generator.uniform(*COVERAGES, settings.maps)
+    return partial_maps(floor_of(settings, number), team, str(generator.choice(EXPLORERS)), number, wanted)
+
+
+def partial_maps(
+    floor: str | Floor, team: ExplorationSettings, explorer: str, seed: int, coverages: NDArray[np.float64]
+) -> FloorMaps:
+    """Let a team explore a floor, and return its maps whenever it has seen one of some shares of the floor."""
+    env, policy = ExplorationEnv(floor, team), make_policy(explorer)
     env.use_level(policy.level, policy.shares_map, policy.decision_period_s)
-    starts = drawn_starts(floor, team, number)
-    observations, _ = env.reset(seed=number, options=None if starts is None else {"starts": starts})
+    starts = drawn_starts(floor, team, seed)
+    observations, _ = env.reset(seed=seed, options=None if starts is None else {"starts": starts})
     handle, truth = EpisodeTeam(env.engine), FloorPredictor()
-    policy.reset(handle, number)
+    policy.reset(handle, seed)
     truth.reset(handle)
     agent = handle.agents[0]
     navigation = handle.belief(agent).shared_map or handle.belief(agent).map
     factor = factor_of(navigation.resolution)
-    is_free = (
-        truth.predict(PartialMap(levels_of(navigation.log_odds, factor), factor * navigation.resolution, agent)) > 0.5
-    )
-    # Early maps are small and tell little; most are taken later.
-    wanted = list(np.sort(generator.uniform(*COVERAGES, settings.maps)))
-    taken: list[NDArray[np.int8]] = []
-    while wanted and env.agents:
-        if env.scorer.coverage >= wanted[0]:
-            wanted = [each for each in wanted if each > env.scorer.coverage]
+    start = PartialMap(levels_of(navigation.log_odds, factor), factor * navigation.resolution, agent)
+    is_free = truth.predict(start) > 0.5
+    left, taken = np.sort(coverages), list[NDArray[np.int8]]()
+    while len(left) and env.agents:
+        seen = env.scorer.coverage
+        if seen >= left[0]:
+            left = left[left > seen]
             taken.append(levels_of(navigation.log_odds, factor))
         observations = env.step(policy.act(observations))[0]
         observations = {name: observations[name] for name in env.agents}

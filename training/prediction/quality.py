@@ -1,5 +1,6 @@
 """How good predictions are: squares right near what is known, beside two guesses without a network, and calibration."""
 
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 
 import cv2
@@ -42,11 +43,22 @@ class Quality:
 
 
 class QualityTally:
-    """Counts over many maps."""
+    """Counts over many maps.
 
-    def __init__(self) -> None:
-        self._counts = np.zeros(4)
-        self._bins = np.zeros((3, BINS))
+    Parameters
+    ----------
+    counts : sequence of float, optional
+        Counts of other tallies, to go on from.
+    """
+
+    def __init__(self, counts: Sequence[float] = (0.0,) * (4 + 3 * BINS)) -> None:
+        self._counts = np.array(counts[:4], np.float64)
+        self._bins = np.array(counts[4:], np.float64).reshape(3, BINS)
+
+    @property
+    def counts(self) -> list[float]:
+        """The counts as numbers, which may be summed."""
+        return [*self._counts.tolist(), *self._bins.reshape(-1).tolist()]
 
     def add(self, probability: NDArray[np.float32], levels: NDArray[np.int8], is_free: NDArray[np.bool_]) -> None:
         """Count a map; all are (rows, columns)."""

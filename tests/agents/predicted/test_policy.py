@@ -8,7 +8,6 @@ from lidarium.agents.predicted.policy import PredictedTours
 from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.settings.making import make_settings
 from lidarium.evaluation.episodes.runner import run_episode
-from lidarium.mapping.prediction.predictors import Predictor
 
 
 def episode(policy, robots, floor="apartment:7", **settings):
@@ -39,7 +38,7 @@ def test_the_truth_needs_known_starts():
         episode(PredictedTours("truth", shares_map=False), 2, known_starts=False)
 
 
-class Broken(Predictor):
+class Broken:
     def predict(self, partial):
         return np.full(partial.levels.shape, np.nan, np.float32)
 

@@ -55,5 +55,5 @@ def test_what_cannot_be_predicted_is_named(part, tmp_path, capsys, options, mess
 
 def test_a_map_without_free_space_is_refused(tmp_path, capsys):
     path = write_ros_map(tmp_path, "blank", np.full((40, 40), UNKNOWN, np.uint8), (0.0, 0.0, 0.0), 0.1)
-    assert main(["predict", str(path), "--out", str(tmp_path / "out")]) != 0
+    assert main(["predict", str(path), "--predictor", "nothing", "--out", str(tmp_path / "out")]) != 0
     assert "no free cell" in capsys.readouterr().err
