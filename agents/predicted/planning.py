@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -13,11 +14,12 @@ from lidarium.mapping.planning.touring.tours import TourWeights, team_tours, tou
 LATTICE = 3
 """Stops are places of a lattice of so many squares."""
 
-MOST_COVER, MOST_STOPS = 60, 16
-"""Maximum number of stops that cover what is left, and of the nearest that tours pass."""
+MOST_COVER, MOST_NEAR, MOST_STOPS = 60, 24, 16
+"""Maximum number of stops that cover what is left, of those nearest as the crow flies, and of those on tours."""
 
-LEAST_STOP = 0.4
-"""Stops that show less than this are left out [m2]."""
+LEAST_STOPS = ((0.4, 1.0), (0.2, 0.5), (0.08, 0.0))
+"""Stops that show less than the first are left out [m2], and so is the second's share of what may stay unseen. If no
+stop is left, the next ones hold: squares are too coarse to tell when enough is seen."""
 
 KEPT_SHARE = 0.15
 """A stop is left out if an option shows all but this share of its area."""
@@ -59,7 +61,7 @@ def rest_of(
     free: NDArray[np.float32],
     unseen: NDArray[np.float32],
     squares: tuple[float, int],
-    reach: float,
+    sensor_range: float,
     enough: float,
 ) -> Rest | None:
     """Return what is left to see, None if that is too little for a stop.
@@ -70,39 +72,67 @@ def rest_of(
         Probability that a square is free, and that it is free and not seen.
     squares : (float, int)
         Side of a square [m], and cells of the map along it.
-    reach : float
+    sensor_range : float
         How far the lasers see [m].
     enough : float
         Share of the free area that has to be seen.
     """
     (side, factor), is_open = squares, free > 0.5
-    grid = CoarseGrid(is_open, factor, 0, 0, side, 0)
     poses = np.array([[robot.pose[1], robot.pose[0]] for robot in options.robots])
-    robots = np.clip(poses // side, 0, np.array(free.shape) - 1).astype(np.int64)
-    views = (np.array([options.grid.row, options.grid.column]) + (options.places + 0.5) * options.grid.factor).astype(
-        np.int64
-    ) // factor
-    cells = round(reach / side)
-    from_robots = distances_from(grid, robots)
-    nearest = from_robots.min(axis=0)
-    lattice = np.zeros(is_open.shape, np.bool_)
-    lattice[::LATTICE, ::LATTICE] = True
-    places = np.argwhere(lattice & is_open & (nearest < UNREACHED))
-    spare = (1.0 - enough) * float(free.sum())
-    chosen, _ = cover(free, unseen, places, cells, LEAST_STOP / side**2, spare, MOST_COVER)
-    if not len(chosen):
+    corner = np.array([options.grid.row, options.grid.column])
+    cells = corner + (options.places + 0.5) * options.grid.factor
+    robots, views = _squares_of(poses / side, free.shape), _squares_of(cells / factor, free.shape)
+    # Bodies stand there, even if a square of theirs has a part of a wall.
+    is_open[robots[:, 0], robots[:, 1]] = is_open[views[:, 0], views[:, 1]] = True
+    places = _places(is_open, np.concatenate([robots, views]))
+    reach, spare = round(sensor_range / side), (1.0 - enough) * float(free.sum())
+    for least, share in LEAST_STOPS:
+        chosen, _ = cover(free, unseen, places, reach, least / side**2, share * spare, MOST_COVER)
+        if len(chosen):
+            break
+    else:
         return None
     stops = places[chosen]
-    order = np.argsort(nearest[stops[:, 0], stops[:, 1]], kind="stable")[:MOST_STOPS]
-    stops = stops[order]
-    fields = distances_from(grid, stops)
+    gaps = np.abs(stops[:, None] - robots[None]).max(axis=2).min(axis=1)
+    stops = stops[np.argsort(gaps, kind="stable")[:MOST_NEAR]]
+    fields = distances_from(CoarseGrid(is_open, factor, 0, 0, side, 0), stops)
+    # Squares close gaps that bodies fit through: in known space, paths between options are those of finer cells.
+    lengths = _metres(fields[:, views[:, 0], views[:, 1]].T, side)
+    from_options = np.minimum(lengths, _shortest(options.between, lengths))
+    from_robots = np.minimum(
+        _metres(fields[:, robots[:, 0], robots[:, 1]].T, side), _shortest(options.lengths, lengths)
+    )
+    between = np.minimum(
+        _metres(fields[:, stops[:, 0], stops[:, 1]], side), _shortest(np.ascontiguousarray(lengths.T), from_options)
+    )
+    nearest = np.argsort(from_robots.min(axis=0), kind="stable")[:MOST_STOPS]
+    stops = stops[nearest]
     return Rest(
         options,
-        _metres(fields[:, robots[:, 0], robots[:, 1]].T, side),
-        _metres(fields[:, views[:, 0], views[:, 1]].T, side),
-        _metres(fields[:, stops[:, 0], stops[:, 1]], side),
-        shares_left(free, unseen, stops, views, cells),
+        from_robots[:, nearest],
+        from_options[:, nearest],
+        between[np.ix_(nearest, nearest)],
+        shares_left(free, unseen, stops, views, reach),
     )
+
+
+def _squares_of(places: NDArray[np.float64], shape: tuple[int, ...]) -> NDArray[np.int64]:
+    """Return the squares of places (n, 2), row and column in squares."""
+    return np.clip(np.floor(places), 0, np.array(shape) - 1).astype(np.int64)
+
+
+def _places(is_open: NDArray[np.bool_], starts: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return the open squares of a lattice that are connected to any of some starts, (n, 2)."""
+    _, labels = cv2.connectedComponents(is_open.astype(np.uint8), connectivity=8, ltype=cv2.CV_32S)
+    reached = np.zeros(int(labels.max()) + 1, np.bool_)
+    reached[labels[starts[:, 0], starts[:, 1]]] = True
+    part = labels[::LATTICE, ::LATTICE]
+    return np.argwhere(reached[part] & (part > 0)) * LATTICE
+
+
+def _shortest(first: NDArray[np.float64], second: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the lengths of the shortest paths of two pieces, (n, k) of (n, m) and (m, k)."""
+    return np.asarray((first[:, :, None] + second[None]).min(axis=1))
 
 
 def costs_of(rest: Rest, robot: int, picks: list[int | None]) -> NDArray[np.float64]:
