@@ -30,6 +30,9 @@ from lidarium.mapping.prediction.predictors import (
 PREDICTED = "predicted"
 """Sent elsewhere than where tours begin, by what is predicted."""
 
+LEAST_SAVED = 0.5
+"""Robots depart from tours if that saves so much [m]; one that the rest does not need keeps to them."""
+
 
 class PredictedTours(TourFrontier):
     """Explorers on tours past what is probably left.
@@ -93,7 +96,9 @@ class PredictedTours(TourFrontier):
                 picks.append(first)
                 continue
             costs = costs_of(rest, robot, picks)
-            picks.append(int(np.argmin(costs)) if np.isfinite(costs).any() else None)
+            is_good = first is not None and first not in picks and costs[first] <= costs.min() + LEAST_SAVED
+            best = int(np.argmin(costs)) if np.isfinite(costs).any() else None
+            picks.append(first if is_good else best)
             if picks[robot] != first:
                 self._sent_by[agents[robot]] = PREDICTED
         return picks
