@@ -216,7 +216,15 @@ class TrainingSettings:
         return asdict(self)
 
 
-def read_training(path: Path) -> TrainingSettings | PredictionSettings:
+def read_training(path: Path) -> TrainingSettings:
+    """Read the settings of a training of explorers from a TOML file."""
+    settings = read_any_training(path)
+    if not isinstance(settings, TrainingSettings):
+        raise ValueError(f"{path} has a table [prediction], and is no training of explorers")
+    return settings
+
+
+def read_any_training(path: Path) -> TrainingSettings | PredictionSettings:
     """Read the settings of a training from a TOML file; with a table ``[prediction]`` that of a map predictor."""
     path = Path(path)
     if not path.exists():

@@ -43,11 +43,11 @@ class FloorPredictor:
         rows, columns = -(-laser.solid.shape[0] // multiple), -(-laser.solid.shape[1] // multiple)
         solid = np.zeros((rows * multiple, columns * multiple), np.bool_)
         solid[: laser.solid.shape[0], : laser.solid.shape[1]] = laser.solid != 0
-        solid = solid.reshape(rows, multiple, columns, multiple).any(axis=(1, 3))
+        pooled = np.asarray(solid.reshape(rows, multiple, columns, multiple).any(axis=(1, 3)))
         gap = np.round((np.array(laser.origin) - beliefs.origins[row]) / resolution).astype(np.int64)
         shape = beliefs.log_odds[row].shape
         free = free_squares(
-            _shifted(counted, shape, gap[::-1]), _shifted(solid, shape, gap[::-1]), round(partial.side / resolution)
+            _shifted(counted, shape, gap[::-1]), _shifted(pooled, shape, gap[::-1]), round(partial.side / resolution)
         )
         return free.astype(np.float32)
 

@@ -69,7 +69,7 @@ def free_squares(free: NDArray[np.bool_], solid: NDArray[np.bool_], factor: int)
     factor : int
         Number of cells along a square.
     """
-    return (2 * _counts(free, factor) >= factor * factor) & (_counts(solid, factor) == 0)
+    return np.asarray((2 * _counts(free, factor) >= factor * factor) & (_counts(solid, factor) == 0))
 
 
 def _counts(cells: NDArray[np.bool_], factor: int) -> NDArray[np.int64]:

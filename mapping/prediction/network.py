@@ -101,7 +101,7 @@ class MapNetwork:
             deep = self._layer(f"deep{scale}", x).repeat(2, axis=1).repeat(2, axis=2)
             deep += self._layer(f"skip{scale}", kept[scale])
             x = self._residual(f"merge{scale}", np.maximum(deep, 0.0, out=deep))
-        return _to_pixels(self._layer("out", x))[0]
+        return np.asarray(_to_pixels(self._layer("out", x))[0])
 
     def _residual(self, name: str, x: NDArray[np.float32], dilation: int = 1) -> NDArray[np.float32]:
         change = self._layer(name, x, dilation=dilation)

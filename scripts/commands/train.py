@@ -61,9 +61,9 @@ def execute(command: _Train) -> Answer:
             f"seed = {command.seed} at the top of {command.config}"
         )
     from lidarium.training.prediction.settings import PredictionSettings
-    from lidarium.training.settings import read_training
+    from lidarium.training.settings import read_any_training
 
-    settings = read_training(command.config)
+    settings = read_any_training(command.config)
     is_prediction = isinstance(settings, PredictionSettings)
     _check_extra(EXTRA[:1] if is_prediction else EXTRA)
     if command.device != "cpu" and not is_prediction:

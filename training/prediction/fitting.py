@@ -175,7 +175,7 @@ class Fitting:
         weights = self._square_weights(seen)
         loss = (found * weights).sum() / weights.sum().clamp(min=1.0)
         self._optimizer.zero_grad()
-        loss.backward()
+        torch.autograd.backward(loss)
         torch.nn.utils.clip_grad_norm_(self.network.parameters(), 1.0)
         self._optimizer.step()
         decay = min(MEAN_DECAY, (self._step + 1.0) / (self._step + 10.0))

@@ -82,4 +82,5 @@ class QualityTally:
         """Return the errors so far."""
         squares = max(self._counts[0], 1.0)
         gaps = np.abs(self._bins[1] - self._bins[2]).sum() / squares
-        return Quality(int(self._counts[0]), *(float(each / squares) for each in self._counts[1:]), float(gaps))
+        wrong, all_free, nearest = (float(each / squares) for each in self._counts[1:])
+        return Quality(int(self._counts[0]), wrong, all_free, nearest, float(gaps))

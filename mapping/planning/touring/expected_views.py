@@ -52,7 +52,9 @@ def cover(
     (m,) int64, (m,) float64
         Numbers of the places, and the area that each shows [cells].
     """
-    return _cover(free, unseen.copy(), places, (_rays(GAIN_RAYS), _rays(MARK_RAYS)), reach, least, spare, most)
+    rays = _rays(GAIN_RAYS), _rays(MARK_RAYS)
+    chosen, gains = _cover(free, unseen.copy(), places, rays, reach, least, spare, most)
+    return chosen, gains
 
 
 def shares_left(
@@ -66,7 +68,7 @@ def shares_left(
 
     ``stops`` (m, 2) and ``views`` (n, 2) int64 are cells (row, column); the others as in ``cover``.
     """
-    return _shares_left(free, unseen, stops, views, (_rays(GAIN_RAYS), _rays(MARK_RAYS)), reach)
+    return np.asarray(_shares_left(free, unseen, stops, views, (_rays(GAIN_RAYS), _rays(MARK_RAYS)), reach))
 
 
 def _rays(count: int) -> NDArray[np.float64]:
@@ -90,7 +92,7 @@ def _area(free: Array, worth: Array, row: int, column: int, rays: Array, reach: 
             passed *= free[at_row, at_column]
             if passed < DIMMEST:
                 break
-    return area * (2.0 * math.pi / rays.shape[0])
+    return float(area * (2.0 * math.pi / rays.shape[0]))
 
 
 @kernel

@@ -15,7 +15,7 @@ from lidarium.training.prediction.maps import FloorMaps, read_maps, write_maps
 from lidarium.training.prediction.quality import QualityTally
 from lidarium.training.prediction.settings import PredictionSettings
 from lidarium.training.prediction.training import PredictionTraining, held_out
-from lidarium.training.settings import read_training
+from lidarium.training.settings import read_any_training
 
 SETTINGS = PredictionSettings(floors=2, maps=1, kinds={"apartment": 1.0}, batch=2, steps=2, checkpoint=1)
 
@@ -23,7 +23,7 @@ SETTINGS = PredictionSettings(floors=2, maps=1, kinds={"apartment": 1.0}, batch=
 def read(tmp_path, text):
     path = tmp_path / "training.toml"
     path.write_text(text)
-    return read_training(path)
+    return read_any_training(path)
 
 
 def test_a_table_of_predictions_asks_for_this_training(tmp_path):
