@@ -148,6 +148,9 @@ def leave_at_the_next(code: int) -> None:
             signal.signal(number, leave)
 
 
+CLEANUP_IS_UNSAFE = threading.Event()
+"""Set if Python would crash on its way out of this process, which then leaves without cleaning up."""
+
 END_GRACE_S = 2.0
 """Wall time in which a process that was asked to end may do so [s]."""
 

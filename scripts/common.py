@@ -12,6 +12,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
+from lidarium.registry import registry
+
 if TYPE_CHECKING:
     from lidarium.envs.faces.parallel import ExplorationEnv
 
@@ -49,12 +51,12 @@ class TeamCommand(Command):
 
     robot: str = "kobuki"
     """body of the robots; `lidarium show robots` lists them"""
-    lidar: str = "urg"
-    """laser of the robots; `lidarium show lidars` lists them"""
+    lidar: str | None = None
+    """laser of the robots, urg unless realism sets it; `lidarium show lidars` lists them"""
     camera: str | None = None
     """depth camera of the robots; `lidarium show cameras` lists them"""
     realism: str = "ideal"
-    """how real the world is: ideal, lab or field; the options below change parts of it"""
+    """how real the world is: ideal, lab, field or fast; the options below change parts of it"""
     backend: str | None = None
     """simulation of the bodies: kinematic or bullet; `lidarium show backends` lists them"""
     noise: str | None = None
@@ -80,8 +82,8 @@ class TeamCommand(Command):
     """
     unknown_starts: bool = False
     """robots do not know their start poses, nor those of the others"""
-    map_resolution: float = 0.025
-    """side of a cell of the maps, a whole multiple of 0.025 [m]"""
+    map_resolution: float | None = None
+    """side of a cell of the maps, a whole multiple of 0.025 [m]; 0.025 unless realism sets it"""
     merging: bool = False
     """robots in reach of each other exchange and merge their maps every few seconds"""
     plans_sparsely: bool = False
@@ -104,19 +106,19 @@ class TeamCommand(Command):
         """
         given = {
             name: getattr(self, name)
-            for name in ("camera", "backend", "noise", "odometry", "localization", "radio", "battery")
+            for name in ("lidar", "camera", "backend", "noise", "odometry", "localization", "radio", "battery")
             if getattr(self, name) is not None
         }
         starts = {"known_starts": False} if self.unknown_starts else {}
         pauses = {"pauses_when_blocked": True} if self.pauses_when_blocked else {}
+        if self.map_resolution is not None or "resolution" not in registry("realism")[self.realism]:
+            given["resolution"] = 0.025 if self.map_resolution is None else self.map_resolution
         return {
             "robot": self.robot,
-            "lidar": self.lidar,
             "realism": self.realism,
             **given,
             **starts,
             **pauses,
-            "resolution": self.map_resolution,
             **({"assigned": self.set} if self.set else {}),
         }
 

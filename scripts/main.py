@@ -42,7 +42,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     0 is done, 2 bad input, 3 no solution found, 4 done but probably wrong, 130 interrupted by Ctrl-C, 143 by SIGTERM
     (finished parts are kept), 1 a defect of lidarium. The arguments are those of the process by default.
     """
-    from lidarium.evaluation.processes import end_workers, heard_termination, leave_at_the_next
+    from lidarium.evaluation.processes import CLEANUP_IS_UNSAFE, end_workers, heard_termination, leave_at_the_next
 
     is_process = arguments is None
     if is_process:
@@ -60,6 +60,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             end_workers()
     if is_process:
         _flush_streams()
+        if CLEANUP_IS_UNSAFE.is_set():
+            os._exit(code)
     return code
 
 

@@ -15,6 +15,7 @@ from pathlib import Path
 import pytest
 
 import lidarium
+from lidarium.extras import install_command
 
 ROOT = Path(__file__).resolve().parents[1]
 FOLDERS = ("mapping", "envs", "agents", "evaluation", "training", "benchmarks", "scripts")
@@ -197,5 +198,5 @@ def test_policies_are_made_by_name_from_the_top():
 def test_without_stable_baselines_the_error_says_how_to_install_it(monkeypatch):
     monkeypatch.setitem(sys.modules, "stable_baselines3.common.vec_env", None)
     monkeypatch.delitem(sys.modules, "lidarium.envs.faces.stable_baselines", raising=False)
-    with pytest.raises(ImportError, match=r'pip install "lidarium\[rl\]"'):
+    with pytest.raises(ImportError, match=re.escape(install_command("rl"))):
         lidarium.sb3_vec_env(1)

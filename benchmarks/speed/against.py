@@ -20,7 +20,14 @@ import numpy as np
 
 import lidarium
 
-KINDS = ("all observations", "without egocentric maps", "one environment", "waypoint decisions")
+KINDS = (
+    "all observations",
+    "without egocentric maps",
+    "one environment",
+    "waypoint decisions",
+    "frontier decisions",
+    "frontier decisions of three",
+)
 FLOOR = "building:3"
 STEPS = 20
 """Steps of a block."""
@@ -46,6 +53,12 @@ def serve(threads: int) -> None:
         KINDS[1]: lidarium.vector_env(64, FLOOR, threads=threads, copy=False, observe=plain, **preset),
         KINDS[2]: lidarium.parallel_env(FLOOR, **{**preset, "robots": 3}),
         KINDS[3]: lidarium.vector_env(64, FLOOR, threads=threads, level="waypoint", copy=False, **preset),
+        **{
+            kind: lidarium.vector_env(
+                16, "set:validation", threads=threads, level="frontier", copy=False, robots=robots, resolution=0.05
+            )
+            for kind, robots in ((KINDS[4], 1), (KINDS[5], 3))
+        },
     }
     generator = np.random.default_rng(0)
     for line in sys.stdin:
@@ -53,10 +66,14 @@ def serve(threads: int) -> None:
         env = rows[kind]
         if place:
             env.reset(seed=int(place))
-        steps = 3 if kind == KINDS[3] else STEPS
+        steps = 3 if kind in KINDS[3:] else STEPS
         if kind == KINDS[2]:
             agents = env.possible_agents
             actions = [dict.fromkeys(agents, action) for action in generator.uniform(-0.5, 1.0, (steps, 2))]
+        elif kind in KINDS[4:]:
+            # Each robot takes the cheapest of its frontiers.
+            agents = range(env.num_envs)
+            actions = [np.zeros(env.num_envs, np.int64)] * steps
         else:
             agents = range(env.num_envs)
             bounds = (-1.0, 1.0) if kind == KINDS[3] else (-0.5, 1.0)

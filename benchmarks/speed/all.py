@@ -24,6 +24,7 @@ from lidarium.benchmarks.speed.cases import (
     map_update,
     range_error,
     ray_casting,
+    thread_scaling,
     waypoint_decision,
 )
 from lidarium.benchmarks.speed.cases.learners import (
@@ -53,6 +54,7 @@ _MODULES: tuple[ModuleType, ...] = (
     exploration_projects,
     environment_step,
     batch_step,
+    thread_scaling,
     learning_preset,
     waypoint_decision,
     frontier_decision,

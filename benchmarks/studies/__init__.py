@@ -10,6 +10,7 @@ _PACKAGE = "lidarium.benchmarks.studies"
 for _name, _module, _summary in (
     ("bounds", "bounds", "what a team that knows the floor needs, how tight that is, and explorers beside it"),
     ("dungeons", "dungeons", "ways on public dungeon maps, beside those of other planners there"),
+    ("fast", "fast", "explorers in the world for learners, realism fast, beside the full world"),
     ("floors", "floors", "every real floor, dungeons and 200 generated floors explored with 1 to 3 robots"),
     ("interval_coverage", "interval_coverage", "how often the intervals of reports hold a known truth"),
     ("leaderboard", "leaderboard.study", "all policies on generated and real floors, 1 to 3 robots, known starts"),

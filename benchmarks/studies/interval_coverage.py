@@ -18,6 +18,7 @@ from lidarium.evaluation.statistics import (
     CensoredTimes,
     Interval,
     interquartile_mean_interval,
+    mean_bands,
     mean_interval,
     median_interval,
     paired_difference,
@@ -145,6 +146,9 @@ def cases(resamples: int) -> Iterator[Case]:
         for is_random in (False, True):
             for family in FAMILIES if compare is None else ASKED_FOR:
                 yield _restricted(family, is_random, compare, draws)
+    for is_simultaneous in (True, False):
+        for kind in _CURVES:
+            yield _band(kind, is_simultaneous, resamples)
     for share in (0.5, 0.8, 0.95):
         yield Case("success rate", f"true rate {share:g}", share, partial(_share, share), is_asked_for=False)
 
@@ -196,6 +200,53 @@ def _restricted(
     }[compare]
     data = f"{family.name}, 20 % cut {'at random' if is_random else 'by the horizon'}"
     return Case(figure, data, truth, interval, family.is_asked_for)
+
+
+def _smooth(generator: np.random.Generator, size: int) -> Values:
+    places, waves = np.linspace(0.0, 1.0, _POINTS), np.arange(1, 9)
+    cosines, sines = generator.standard_normal((2, size, len(waves))) / waves
+    angles = np.pi * np.outer(waves, places)
+    return np.asarray(cosines @ np.cos(angles) + sines @ np.sin(angles))
+
+
+def _walk(generator: np.random.Generator, size: int) -> Values:
+    return 0.3 * generator.standard_normal((size, 1)) + _steps(generator, size)
+
+
+def _steps(generator: np.random.Generator, size: int) -> Values:
+    return np.asarray(generator.standard_normal((size, _POINTS)).cumsum(axis=1) / np.sqrt(_POINTS))
+
+
+def _skewed(generator: np.random.Generator, size: int) -> Values:
+    logarithms = 0.5 * generator.standard_normal((size, 1)) + 0.5 * _steps(generator, size)
+    return np.asarray(np.exp(logarithms) - np.exp(0.125 + 0.125 * np.arange(1, _POINTS + 1) / _POINTS))
+
+
+_POINTS = 50
+_CURVES: dict[str, Callable[[np.random.Generator, int], Values]] = {
+    "smooth curves": _smooth,
+    "random walks": _walk,
+    "noise": lambda generator, size: generator.standard_normal((size, _POINTS)),
+    "skewed random walks": _skewed,
+}
+"""Curves whose true mean is zero at all points."""
+
+
+def _band(kind: str, is_simultaneous: bool, resamples: int) -> Case:
+    """Return a case of mean curves: a trial holds the truth if its band does everywhere."""
+
+    def interval(generator: np.random.Generator, size: int, seed: int) -> Interval:
+        curves = _CURVES[kind](generator, size)
+        if is_simultaneous:
+            mean, low, high = mean_bands(curves, seed=seed, draws=resamples)
+        else:
+            mean = curves.mean(axis=0)
+            width = stats.t.ppf(0.975, size - 1) * curves.std(axis=0, ddof=1) / np.sqrt(size)
+            low, high = mean - width, mean + width
+        return Interval(float(mean.mean()), float(low.max()), float(high.min()), 0.95, size)
+
+    figure = "band of a mean curve" if is_simultaneous else "intervals at each point of a mean curve (for comparison)"
+    return Case(figure, kind, 0.0, interval, is_simultaneous and kind != "skewed random walks")
 
 
 def _share(share: float, generator: np.random.Generator, size: int, _seed: int) -> Interval:

@@ -21,8 +21,15 @@ from lidarium.evaluation.suites.suite import Suite
 
 NODES = ("nearest_node", "utility_node")
 WAYPOINTS = ("nearest_frontier", "utility_frontier", "explore_lite", "tour_frontier", "learned")
-POLICIES = {"dare": NODES + WAYPOINTS, "ariadne": NODES + WAYPOINTS, "mapex": (*WAYPOINTS, "srt")}
-"""Policies by preset; the first is the one that others are compared with."""
+ARIADNE = {"ariadne": "test100", "ariadne_easy": "easy", "ariadne_medium": "medium"}
+"""Folder of each of ARiADNE's sets of maps."""
+
+POLICIES = {
+    "dare": NODES + WAYPOINTS,
+    **dict.fromkeys(ARIADNE, NODES + WAYPOINTS),
+    "mapex": (*WAYPOINTS, "srt"),
+}
+"""Policies by part; the first is the one that others are compared with."""
 
 TABLE_I = {
     "nearest": (652, 76),
@@ -59,12 +66,10 @@ robots have to visit: with an exact laser, its own nearest and utility planners 
 
 ## ARiADNE
 
-{ariadne_floors} test maps of [ARiADNE](https://github.com/marmotlab/ARiADNE) (MIT), in pixels of 0.1 m. Robots move
-between nodes and scan 8 m around at nodes only; an episode ends when at most 250 free cells are unseen, or after 128
-decisions. The figures of its paper are not at hand.
+Maps of [ARiADNE](https://github.com/marmotlab/ARiADNE) (MIT), in pixels of 0.1 m. Robots move between nodes and scan
+8 m around at nodes only; an episode ends when at most 250 free cells are unseen, or after 128 decisions. The figures of
+its paper are not at hand.
 
-| policy | ended so | way [m] | over `nearest_node` |
-|---|---:|---:|---:|
 {ariadne}
 
 ## MapEx
@@ -83,8 +88,12 @@ def suites(data: Path | None, every: int = 1) -> dict[str, Suite]:
     """Return the suites of presets; none without the folder of data."""
     if data is None:
         return {}
-    found = {name: preset_suite(name, policies, (0,), data) for name, policies in POLICIES.items()}
-    return {name: _part(suite, every) for name, suite in found.items()}
+    found = {}
+    for name, policies in POLICIES.items():
+        folder = data / "floorplans" / "ariadne" / ARIADNE.get(name, "")
+        floors = tuple(str(path) for path in sorted(folder.glob("*.png"))) if name != "ariadne" else ()
+        found[name] = _part(preset_suite(name.partition("_")[0], policies, (0,), data, floors), every)
+    return found
 
 
 def _part(suite: Suite, every: int) -> Suite:
@@ -95,12 +104,12 @@ def _part(suite: Suite, every: int) -> Suite:
 def page(folder: Path) -> str:
     """Return the results as markdown."""
     episodes = {name: by_policy(name, folder / name / EPISODES_FILE) for name in POLICIES}
-    counts = {f"{name}_floors": len(next(iter(found.values()), {})) for name, found in episodes.items()}
     return PAGE.format(
-        **counts,
+        dare_floors=_count(episodes["dare"]),
+        mapex_floors=_count(episodes["mapex"]),
         printed=_printed(),
         dare=_dare(episodes["dare"]),
-        ariadne=_ariadne(episodes["ariadne"]),
+        ariadne="\n".join(_ariadne(name, episodes[name]) for name in ARIADNE),
         mapex=_mapex(episodes["mapex"]),
         mapex_printed=MAPEX_OVER_NEAREST,
     )
@@ -138,14 +147,17 @@ def _dare(ours: Episodes) -> str:
     return "\n".join(rows) or "| not run | - | - |"
 
 
-def _ariadne(ours: Episodes) -> str:
+def _ariadne(name: str, ours: Episodes) -> str:
+    """Return the table of one of ARiADNE's sets of maps."""
     rows, limit = [], PRESETS["ariadne"].stop
     for policy, episodes in ours.items():
         ways = [_way(each) for each in episodes.values()]
         if ways and limit is not None:
             ended = sum(each["decisions"] < limit["decisions"] for each in episodes.values())
             rows.append(f"| `{policy}` | {ended} of {len(ways)} | {np.mean(ways):.1f} | {_over(ours, policy, _way)} |")
-    return "\n".join(rows) or "| not run | - | - | - |"
+    title = f"### {(name.partition('_')[2] or 'test').capitalize()} maps"
+    header = ["| policy | ended so | way [m] | over `nearest_node` |", "|---|---:|---:|---:|"]
+    return "\n".join([title, "", *header, *(rows or ["| not run | - | - | - |"]), ""])
 
 
 def _mapex(ours: Episodes) -> str:
@@ -157,6 +169,11 @@ def _mapex(ours: Episodes) -> str:
             cells = f"{np.mean(known):.3f} | {np.mean(areas):.3f} | {_over(ours, policy, _area)}"
             rows.append(f"| `{policy}` | {cells} |")
     return "\n".join(rows) or "| not run | - | - | - |"
+
+
+def _count(ours: Episodes) -> int:
+    """Return the number of floors and starts that all policies ran from."""
+    return len(next(iter(ours.values()), {}))
 
 
 def _way(episode: Mapping[str, Any]) -> float:

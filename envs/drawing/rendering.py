@@ -199,10 +199,10 @@ def classify(
 
 
 def _draw_fans(frame: Frame, scene: Scene, view: View, colours: list[Colour]) -> None:
-    ranges = scene.simulation.ranges[scene.rows]
+    ranges, poses = scene.simulation.ranges[scene.rows], scene.simulation.scan_poses[scene.rows]
     tinted = frame.copy()
     for robot, (lidar, colour) in enumerate(zip(scene.settings.team_lidars, colours, strict=True)):
-        x, y, theta = scene.poses[robot]
+        x, y, theta = poses[robot]
         # No return is drawn to the greatest range, an invalid beam not at all.
         lengths = np.clip(
             np.nan_to_num(ranges[robot].astype(np.float64), nan=0.0, posinf=lidar.range_max),

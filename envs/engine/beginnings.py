@@ -81,7 +81,13 @@ def _check_height(floor: Floor, height: float) -> None:
 
 def make_simulation(settings: ExplorationSettings, episodes: int = 1) -> Simulation:
     """Return the simulation of that many episodes, by the backend of the settings."""
-    return BACKENDS[settings.backend](settings, episodes)
+    simulation = BACKENDS[settings.backend](settings, episodes)
+    if simulation.scan_steps != settings.scan_steps:
+        raise ValueError(
+            f"backend {settings.backend!r} scans every {simulation.scan_steps} steps, scan_period_s asks for "
+            f"{settings.scan_steps}; want scan_period_s None, or a backend that follows settings.scan_steps"
+        )
+    return simulation
 
 
 def map_frames(beginning: EpisodeStart, settings: ExplorationSettings) -> NDArray[np.float64]:

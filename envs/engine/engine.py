@@ -191,7 +191,14 @@ class Engine:
         ``shares_map`` and ``decision_period_s`` are those of `Level`.
         """
         check_level(self.settings.observe, name)
-        self.level: Level = LEVELS[name](self.perception, self.settings, shares_map, decision_period_s)
+        level = LEVELS[name](self.perception, self.settings, shares_map, decision_period_s)
+        period = self.settings.scan_period_s
+        if level.driver is not None and period is not None and period > level.period_s + 1e-9:
+            raise ValueError(
+                f"scan_period_s is {period} s, longer than a decision of {level.period_s} s at "
+                f"level {name!r}; want at most that"
+            )
+        self.level: Level = level
         self.level_name = name
         self.operating.attach(self.level.driver, self.level.make_driver)
         known = observation_space(self.settings, self.has_goal).spaces

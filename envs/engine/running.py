@@ -85,7 +85,9 @@ def follow_some(
     for episode in range(decides.shape[0]):
         if decides[episode]:
             first, last = episode * robots, (episode + 1) * robots
-            follow_team(drives, following, first, last, world.believed, world.measured, world.ranges, commands)
+            follow_team(
+                drives, following, first, last, world.believed, world.measured, world.ranges, world.scanned, commands
+            )
 
 
 @kernel
@@ -110,7 +112,9 @@ def _run_episode(run: Run, episode: int, drives: Drives, following: Following, r
         mark_waiting(drives, first, last, run.waiting)
     for _ in range(run.longest if mode == DECIDES else 1):
         if mode == DECIDES:
-            follow_team(drives, following, first, last, world.believed, world.measured, world.ranges, commands)
+            follow_team(
+                drives, following, first, last, world.believed, world.measured, world.ranges, world.scanned, commands
+            )
         step_episode(run.table, episode, robots, commands, mode != SENSES, True)
         if _ends(world, episode, robots, drives, rules, run.waiting, mode == DECIDES):
             break

@@ -17,11 +17,12 @@ from lidarium.envs.faces.teams import make_rows
 from lidarium.envs.faces.vector_env import batch_text, check_render_mode
 from lidarium.envs.floors.floor_choice import Floors
 from lidarium.envs.settings.reset_options import Curriculum, ResetOptions, read_options
+from lidarium.extras import install_command
 
 try:
     from stable_baselines3.common.vec_env import VecEnv
 except ImportError as error:
-    raise ImportError('sb3_vec_env needs stable-baselines3; install it with: pip install "lidarium[rl]"') from error
+    raise ImportError(f"sb3_vec_env needs stable-baselines3: {install_command('rl')}") from error
 
 Infos = list[dict[str, Any]]
 

@@ -50,7 +50,7 @@ def ray_directions() -> NDArray[np.float64]:
     return np.stack([np.sin(angles), np.cos(angles)], axis=1)
 
 
-@kernel
+@kernel(nrt=False)
 def expected_gain(log_odds: Array, row: int, column: int, rays: Array, reach: int) -> float:
     """Return the unknown area in view of a cell [cells], by rays that end at occupied cells.
 
@@ -80,7 +80,7 @@ def expected_gain(log_odds: Array, row: int, column: int, rays: Array, reach: in
     return float(area * (2.0 * math.pi / rays.shape[0]))
 
 
-@kernel
+@kernel(nrt=False)
 def _rank(values: Array, is_wanted: Array, ranked: Array, first: int, last: int) -> int:
     """Write wanted clusters to ``ranked[first:last]``, the highest value first; return the end of the list.
 
@@ -99,7 +99,7 @@ def _rank(values: Array, is_wanted: Array, ranked: Array, first: int, last: int)
     return first
 
 
-@kernel
+@kernel(nrt=False)
 def choose_offers(left: Array, sizes: Array, is_wanted: Array, by_size: int, ranked: Array) -> int:
     """Choose which clusters are offered, and return how many.
 
@@ -247,7 +247,7 @@ class Renewal(NamedTuple):
     memory: NDArray[np.int64]
 
 
-@kernel
+@kernel(nrt=False)
 def _why_in_vain(planning: Planning, drives: Drives, choices: Choices, row: int, time: float) -> int:
     """Return the reason why a chosen frontier is not worth more driving, or 0.
 

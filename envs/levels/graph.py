@@ -188,6 +188,8 @@ class GraphLevel(Level):
         step = self.settings.time_step * self.settings.robot.cruise_speed
         steps = max(math.ceil(longest / step - 1e-9), 1) if ends else self._wait
         taken, horizon = self.perception.world.steps, self.settings.horizon_steps
+        # Robots wait for the next scan: their nodes follow from it.
+        steps += int(-(taken[episode] + steps) % self.settings.scan_steps)
         if horizon is not None and taken[episode] + steps > horizon:  # nobody arrives before the episode is cut
             ends, steps = {}, horizon - int(taken[episode])
         for row, end in ends.items():

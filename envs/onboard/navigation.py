@@ -174,7 +174,7 @@ def refresh_map(record: Array, limit: int, stamp: Array, window: Array) -> None:
     take_in(record, limit, stamp, inside, changed_cells(log_odds_of(record), closeness_of(record), limit, inside))
 
 
-@kernel
+@kernel(nrt=False)
 def is_inside(record: Array, window: Array) -> Window:
     """Return the part of a window (4,) that lies within a map."""
     return max(window[0], 0), min(window[1], record[ROWS]), max(window[2], 0), min(window[3], record[COLUMNS])
@@ -194,7 +194,7 @@ def take_in(record: Array, limit: int, stamp: Array, inside: Window, changed: Ar
         update_frontiers(log_odds_of(record), flags_of(record), tiles_of(record), inside)
 
 
-@kernel
+@kernel(nrt=False)
 def extend_window(known: Array, window: Array) -> None:
     """Extend a window (4,) to hold another one that is not empty (kernel)."""
     if window[0] < window[1] and window[2] < window[3]:

@@ -31,22 +31,32 @@ class DepthCamera:
 
     Attributes
     ----------
-    columns, rows : int
-        Size of an image [pixels].
+    columns : int
+        Width of an image [pixels].
+    rows : int
+        Height of an image [pixels].
     field_of_view : float
         Horizontal angle that an image covers [rad]; pixels are square.
-    depth_min, depth_max : float
-        Minimum and maximum depth that is measured [m].
+    depth_min : float
+        Minimum depth that is measured [m].
+    depth_max : float
+        Maximum depth that is measured [m].
     height : float
         Height of the optical centre above the floor [m].
-    forward, left : float
-        Position of the optical centre from the centre of the robot [m].
-    pitch, pan : float
-        Downward and leftward angle of the axis from the robot's heading [rad].
+    forward : float
+        Position of the optical centre in front of the centre of the robot [m].
+    left : float
+        Position of the optical centre to the left of the centre of the robot [m].
+    pitch : float
+        Angle by which the axis points below the robot's heading [rad].
+    pan : float
+        Angle by which the axis points to the left of the robot's heading [rad].
     rate_hz : float
         Images per second; at most one a time step is taken [1/s].
-    noise_floor, noise_share : float
-        Standard deviation of the noise: noise_floor + noise_share * (depth - depth_min)^2 [m, 1/m].
+    noise_floor : float
+        Standard deviation of the noise at ``depth_min`` [m].
+    noise_share : float
+        Growth of the standard deviation with the square of the depth beyond ``depth_min`` [1/m].
     disparity_step : float
         Step of the inverse depth that is measured [1/m]; 0 for exact depths.
     """

@@ -45,8 +45,10 @@ class SparseMapSettings:
         Codes of an image, at most, of floor and obstacles together.
     most_boxes : int
         A map with more boxes merges them with a larger slack.
-    least_motion_m, least_turn : float
-        An image is coded if the robot has moved or turned this far since the last one [m, rad].
+    least_motion_m : float
+        An image is coded if the robot has moved this far since the last one [m].
+    least_turn : float
+        An image is coded if the robot has turned this far since the last one [rad].
     cell_m : float
         Side of the cells of seen ground [m].
     margin_m : float
@@ -145,6 +147,9 @@ class ExplorationSettings:
         The world: ``kinematic``, ``bullet`` or another that is registered.
     time_step : float
         Simulated time of a step [s].
+    scan_period_s : float or None
+        Time from scan to scan, a multiple of ``time_step`` and at most the decision period; maps and score follow
+        scans [s]. None scans in each step. Longer ones need true poses or odometry, and no camera.
     horizon_s : float or None
         Simulated time after which the episode is truncated [s]; None for no horizon.
     stop_coverage : float or None
@@ -207,6 +212,7 @@ class ExplorationSettings:
     pauses_when_blocked: bool = False
     backend: str = "kinematic"
     time_step: Annotated[float, within(1e-4, 10.0)] = 0.1
+    scan_period_s: Annotated[float, above(0.0, 1e6)] | None = None
     horizon_s: Annotated[float, above(0.0, 1e8)] | None = 600.0
     stop_coverage: Annotated[float, share(has_minimum=False)] | None = 0.99
     stop_on_contact: bool = False
@@ -269,6 +275,8 @@ class ExplorationSettings:
             )
         if self.camera is not None:
             self._check_camera(self.camera)
+        if self.scan_period_s is not None:
+            self._check_scan_period(self.scan_period_s)
         check_sensed(self)
         check_workload(self)
 
@@ -283,6 +291,25 @@ class ExplorationSettings:
             raise ValueError(
                 f"height of the camera is {camera.height} m, above the robot's height of "
                 f"{self.robot.height} m, where furniture may be; want at most that, or a higher robot"
+            )
+
+    def _check_scan_period(self, period: float) -> None:
+        steps = period / self.time_step
+        if round(steps) < 1 or abs(steps - round(steps)) > 1e-6:
+            raise ValueError(
+                f"scan_period_s is {period} s; want a whole multiple of the time step of {self.time_step} s"
+            )
+        if self.scan_steps == 1:
+            return
+        if self.camera is not None:
+            raise ValueError(
+                f"scan_period_s is {period} s, but the robots have a camera, whose images need a scan in each step; "
+                "want no camera, or scan_period_s None (realism other than 'fast')"
+            )
+        if self.localization not in KERNEL_LOCALIZATIONS:
+            raise ValueError(
+                f"scan_period_s is {period} s, but localizer {self.localization!r} needs a scan in each step; want "
+                f"localization {' or '.join(KERNEL_LOCALIZATIONS)}, or scan_period_s None"
             )
 
     def _check_localizer(self) -> None:
@@ -333,6 +360,11 @@ class ExplorationSettings:
     def horizon_steps(self) -> int | None:
         """Steps until the horizon, or None."""
         return None if self.horizon_s is None else max(round(self.horizon_s / self.time_step), 1)
+
+    @property
+    def scan_steps(self) -> int:
+        """Steps from scan to scan."""
+        return 1 if self.scan_period_s is None else round(self.scan_period_s / self.time_step)
 
     @property
     def decision_steps(self) -> int:

@@ -44,8 +44,10 @@ class Fault:
         When it begins [s].
     lasts_s : float or None
         Duration [s]; None (default) for permanent. A dead robot stays dead.
-    bearing, width : float
-        Middle and width of the blind sector against the heading [rad].
+    bearing : float
+        Middle of the blind sector against the heading [rad].
+    width : float
+        Width of the blind sector [rad].
     wheel : str
         Which wheel sticks: ``left`` or ``right``.
     place : (x, y, theta) or None
@@ -84,8 +86,18 @@ class FaultSettings:
     ----------
     schedule : tuple of Fault
         Faults at set times.
-    laser_dropout, blind_sector, stuck_wheel, kidnapping, dead_robot, dead_radio : float
-        Mean rate of each kind of fault per robot [1/h].
+    laser_dropout : float
+        Mean rate at which a robot's laser sees nothing for a while [1/h].
+    blind_sector : float
+        Mean rate at which a sector of a robot's laser goes blind [1/h].
+    stuck_wheel : float
+        Mean rate at which a wheel of a robot sticks [1/h].
+    kidnapping : float
+        Mean rate at which a robot is carried elsewhere [1/h].
+    dead_robot : float
+        Mean rate at which a robot stops for good [1/h].
+    dead_radio : float
+        Mean rate at which a robot's radio fails [1/h].
     lasts_s : float
         Mean duration of temporary faults [s].
     """

@@ -19,8 +19,10 @@ class Lidar(ScanGeometry):
 
     Attributes
     ----------
-    noise_floor, noise_share : float
-        Standard deviation of the range noise: max(noise_floor, noise_share * range) [m, 1].
+    noise_floor : float
+        Minimum standard deviation of the range noise [m].
+    noise_share : float
+        Standard deviation of the range noise as a share of the range, above ``noise_floor`` [1].
     height : float
         Height of the laser's plane above the floor [m].
     """

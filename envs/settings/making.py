@@ -26,7 +26,14 @@ REALISM: Registry[Mapping[str, Any]] = Registry("realism")
 
 REALISM.register(
     "ideal",
-    {"noise": "none", "odometry": "ideal", "localization": "truth", "radio": "all", "faults": NO_FAULTS},
+    {
+        "noise": "none",
+        "odometry": "ideal",
+        "localization": "truth",
+        "radio": "all",
+        "faults": NO_FAULTS,
+        "scan_period_s": None,
+    },
     "perfect sensors, poses, radio, robots",
 )
 REALISM.register(
@@ -37,6 +44,7 @@ REALISM.register(
         "localization": "slam",
         "radio": "all",
         "faults": NO_FAULTS,
+        "scan_period_s": None,
     },
     "noisy sensors with SLAM on board, perfect radio",
 )
@@ -48,8 +56,19 @@ REALISM.register(
         "localization": "slam",
         "radio": RadioSettings(kind="signal", shadowing=4.0, loss=0.05, latency_s=0.2),
         "faults": FaultSettings(laser_dropout=6.0, blind_sector=6.0, stuck_wheel=2.0, dead_radio=1.0),
+        "scan_period_s": None,
     },
     "noisy sensors, poor wheels, lossy radio, faults",
+)
+REALISM.register(
+    "fast",
+    {
+        **REALISM["ideal"],
+        "scan_period_s": 0.4,
+        "resolution": 0.1,
+        "lidar": {"beams": 182},
+    },
+    "ideal, with fewer scans of fewer beams and coarser maps, for learners",
 )
 
 
@@ -79,7 +98,8 @@ def make_settings(settings: ExplorationSettings | None = None, **options: Any) -
         A list as ``lidar`` has the laser of each robot.
         ``noise`` ("none", "datasheet" or "thesis") sets the noise of the laser, ``resolution`` the cell of
         the maps [m], ``max_cycles`` the horizon in steps instead of ``horizon_s``. ``realism`` ("ideal",
-        "lab" or "field") sets noise, odometry, localization, radio and faults unless they are given.
+        "lab", "field" or "fast") sets noise, odometry, localization, radio, faults and ``scan_period_s`` unless they
+        are given; "fast" also the laser and the maps' resolution.
         ``assigned`` sets single values last, as ``["lidar.beams=180"]``.
 
     Returns

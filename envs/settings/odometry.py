@@ -16,21 +16,26 @@ class OdometrySettings:
 
     Attributes
     ----------
-    distance_bias, turn_bias : float
-        Share by which distances and turns are measured too long or too short all through an episode [1].
+    distance_bias : float
+        Share by which distances are measured too long or too short all through an episode [1].
+    turn_bias : float
+        Share by which turns are measured too large or too small all through an episode [1].
     drift : float
         Turn that a metre feigns, to the left or to the right all through an episode [rad/m].
-    turn_noise_of_turn, turn_noise_of_distance : float
-        Standard deviation of a turn, from the root of the turn and the root of the distance [rad^(1/2),
-        rad/m^(1/2)].
-    distance_noise_of_distance, distance_noise_of_turn : float
-        Standard deviation of a distance, from the root of the distance and the root of the turn [m^(1/2),
-        m/rad^(1/2)].
+    turn_noise_of_turn : float
+        Standard deviation of a turn, from the root of the turn [rad^(1/2)].
+    turn_noise_of_distance : float
+        Standard deviation of a turn, from the root of the distance [rad/m^(1/2)].
+    distance_noise_of_distance : float
+        Standard deviation of a distance, from the root of the distance [m^(1/2)].
+    distance_noise_of_turn : float
+        Standard deviation of a distance, from the root of the turn [m/rad^(1/2)].
     counts_ticks : bool
         Whether encoders count whole ticks; how many make a metre is the robot's.
-    speed_noise, turn_rate_noise : float
-        Standard deviation of the speed and the turn rate that the drive makes of a command, as a share of it
-        [1].
+    speed_noise : float
+        Standard deviation of the speed that the drive makes of a command, as a share of it [1].
+    turn_rate_noise : float
+        Standard deviation of the turn rate that the drive makes of a command, as a share of it [1].
     """
 
     distance_bias: Annotated[float, share(has_maximum=False)] = 0.0

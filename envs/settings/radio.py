@@ -27,12 +27,18 @@ class RadioSettings:
         between) or ``signal`` (``power`` less the path loss is above ``threshold``).
     reach : float
         Of ``range`` and ``line_of_sight`` [m].
-    power, threshold : float
-        Power of the sender, and power that the receiver needs [dBm].
-    reference_distance, reference_loss : float
-        Distance at which the loss in free space is known [m], and that loss [dB].
-    free_exponent, wall_exponent : float
-        Growth of the loss with the free path and with the path through solids [1].
+    power : float
+        Power of the sender [dBm].
+    threshold : float
+        Power that the receiver needs [dBm].
+    reference_distance : float
+        Distance at which the loss in free space is known [m].
+    reference_loss : float
+        Loss at that distance [dB].
+    free_exponent : float
+        Growth of the loss with the path through free space [1].
+    wall_exponent : float
+        Growth of the loss with the path through solids [1].
     wall_loss : float
         Loss if any solid is between [dB].
     shadowing : float

@@ -41,14 +41,18 @@ class Build:
         Height of the base's centre of mass above the ground [m].
     clearance : float
         Gap between the body and the ground [m].
-    wheel_radius, wheel_width : float
-        Radius and width of a driven wheel [m].
+    wheel_radius : float
+        Radius of a driven wheel [m].
+    wheel_width : float
+        Width of a driven wheel [m].
     caster_radius : float
         Radius of a caster [m].
     caster_offset : float
         Distance of the casters from the middle of the robot [m].
-    wheel_friction, caster_friction : float
-        Friction of the wheels and of the casters on the ground [1].
+    wheel_friction : float
+        Friction of the driven wheels on the ground [1].
+    caster_friction : float
+        Friction of the casters on the ground [1].
     body_friction : float
         Friction between the body and objects that it touches [1].
     motor_torque : float
@@ -82,18 +86,24 @@ class Robot:
         Radius of the body [m].
     height : float
         Height of the body [m]; solids and other robots' lasers below it meet the body.
-    cruise_speed, max_speed : float
-        Speed that its own driving keeps to, and the limit of the drive [m/s].
+    cruise_speed : float
+        Speed that its own driving keeps to [m/s].
+    max_speed : float
+        Limit of the speed of the drive [m/s].
     max_turn_rate : float
         Limit of the turn rate [rad/s].
-    max_acceleration, max_turn_acceleration : float
-        Limits of the drive [m/s2, rad/s2].
+    max_acceleration : float
+        Limit of the acceleration [m/s2].
+    max_turn_acceleration : float
+        Limit of the turn acceleration [rad/s2].
     wheel_base : float
         Distance between the driven wheels [m].
     ticks_per_metre : float
         Ticks that the encoder of a wheel counts on a metre [1/m].
-    length, width : float
-        Outline of the body [m].
+    length : float
+        Length of the body's outline [m].
+    width : float
+        Width of the body's outline [m].
     build : Build
         Masses, wheels, casters and friction; only worlds with forces know them.
     """

@@ -25,6 +25,7 @@ def kinematic_world(settings: ExplorationSettings, episodes: int = 1) -> Kinemat
         settings.localization != "truth",
         settings.faults,
         settings.horizon_s,
+        settings.scan_steps,
     )
 
 
@@ -39,6 +40,7 @@ def simulation_of(world: World, settings: ExplorationSettings, kind: type[Simula
         settings.egocentric_scales,
         reward_weights(settings),
         PoseSources(settings.localization, settings.radio.is_ideal),
+        settings.scan_steps,
     )
     if settings.camera is not None:
         simulation.mount(settings.camera)

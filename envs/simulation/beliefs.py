@@ -109,11 +109,15 @@ class Beliefs:
         Scales at which maps are pooled for observations [cells].
     is_true : bool
         Whether robots know their true poses, so that their maps have the floor's lattice and its size.
+    scans_each_step : bool
+        Whether robots scan in each step.
 
     Attributes
     ----------
     believed : (rows, 3) float64
         Poses as the localizers believe, in the floor's axes if starts are known [m, rad].
+    scanned : (rows, 3) float64
+        Believed poses at the last scans; ``believed`` itself if robots scan in each step [m, rad].
     log_odds : list of (map rows, map columns) int8
         The map of each robot.
     origins : (rows, 2) float64
@@ -132,11 +136,18 @@ class Beliefs:
     """
 
     def __init__(
-        self, rows: int, robots: int, occupancy: OccupancySettings, scales: Sequence[int], is_true: bool
+        self,
+        rows: int,
+        robots: int,
+        occupancy: OccupancySettings,
+        scales: Sequence[int],
+        is_true: bool,
+        scans_each_step: bool = True,
     ) -> None:
         self.occupancy, self.scales = occupancy, tuple(scales)
         self.increments, self._is_true = occupancy.increments, is_true
         self.believed, self.origins = np.zeros((rows, 3)), np.zeros((rows, 2))
+        self.scanned = self.believed if scans_each_step else np.zeros((rows, 3))
         self.log_odds: list[NDArray[np.int8]] = [np.zeros((0, WORD), np.int8)] * rows
         self.windows, self.belief_rows = np.zeros((rows, 4), np.int64), np.zeros((rows, 5), np.int64)
         self.pool_rows = np.zeros((rows, len(self.scales), 3), np.int64)

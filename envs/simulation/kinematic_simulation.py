@@ -39,6 +39,7 @@ class KinematicSimulation(Simulation):
             **{name: options.pop(name) for name in ("localization", "knows_teammates") if name in options}
         )
         has_odometry = pose_sources.localization != "truth"
+        of_world["scan_steps"] = options.get("scan_steps", 1)
         world = KinematicWorld(robots, lidar, time_step, episodes, has_odometry=has_odometry, **of_world)
         return cls(world, lidar, occupancy, time_step, pose_sources=pose_sources, **options)
 

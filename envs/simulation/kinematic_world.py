@@ -40,6 +40,8 @@ class KinematicWorld:
         Faults of the robots.
     horizon_s : float or None
         For how long faults are drawn [s].
+    scan_steps : int
+        Steps from scan to scan.
     """
 
     def __init__(
@@ -52,6 +54,7 @@ class KinematicWorld:
         has_odometry: bool = False,
         faults: FaultSettings = NO_FAULTS,
         horizon_s: float | None = None,
+        scan_steps: int = 1,
     ) -> None:
         self.robots, self.episodes, self.time_step = len(robots), episodes, time_step
         self.lidars = by_robot(lidar, self.robots)
@@ -81,7 +84,7 @@ class KinematicWorld:
         )
         # Wheels that measure exactly measure the true velocities.
         self.measured = self.velocities if is_plain else np.zeros((rows, 2))
-        self.noise_table, self.sensor = GAUSSIAN_TABLE, sensor_numbers(self.lidars, time_step, 1.0)
+        self.noise_table, self.sensor = GAUSSIAN_TABLE, sensor_numbers(self.lidars, time_step, 1.0, scan_steps)
         self.unit_vectors = np.concatenate([each.unit_vectors for each in self.lidars])
         self._everywhere = np.ones(episodes, np.bool_)
         self._table = table_of_owners(self)

@@ -33,6 +33,7 @@ from lidarium.envs.simulation.kernels.stepping import (
     score_and_localize,
 )
 from lidarium.envs.simulation.score import Score
+from lidarium.mapping.geometry.rigid import composed, relative
 from lidarium.mapping.grids.occupancy import OccupancySettings
 from lidarium.mapping.grids.scan_integration import WORD
 from lidarium.mapping.kernels.compilation import available_threads, use_threads
@@ -94,6 +95,8 @@ class Simulation:
         Weights of ``scoring.rewards.TERMS``; nothing if None.
     pose_sources : PoseSources
         Sources of the robots' pose information.
+    scan_steps : int
+        Steps from scan to scan; those of the world.
 
     Attributes
     ----------
@@ -116,16 +119,18 @@ class Simulation:
         scales: Sequence[int] = (),
         reward_weights: NDArray[np.float64] | None = None,
         pose_sources: PoseSources = PoseSources(),
+        scan_steps: int = 1,
     ) -> None:
         self.world, self.robots, self.episodes = world, world.robots, world.episodes
         localization = pose_sources.localization
         rows, is_true = self.robots * self.episodes, localization == "truth"
-        self.beliefs = Beliefs(rows, self.robots, occupancy, scales, is_true)
+        self.beliefs = Beliefs(rows, self.robots, occupancy, scales, is_true, scan_steps == 1)
         self.score = Score(self.robots, self.episodes, reward_weights)
         self.lidars, self.occupancy, self.time_step = by_robot(lidar, self.robots), occupancy, time_step
+        self.scan_steps = scan_steps
         self._flags = {"truth": TRUE_POSE, "odometry": DEAD_RECKONING}.get(localization, 0)
         self._teammate_flag = KNOWN_TEAMMATES if pose_sources.knows_teammates else SOME_TEAMMATES
-        self.sensor = sensor_numbers(self.lidars, time_step, occupancy.resolution)
+        self.sensor = sensor_numbers(self.lidars, time_step, occupancy.resolution, scan_steps)
         self.unit_vectors = np.concatenate([each.unit_vectors for each in self.lidars])
         self.noise_table = GAUSSIAN_TABLE
         sensors = world.sensors
@@ -148,6 +153,12 @@ class Simulation:
         """Last measurements by sensor name: those of the world, and ``depth`` of the cameras."""
         sensors = self.world.sensors
         return sensors if self.camera is None else {**sensors, "depth": self.camera.frames}
+
+    @property
+    def scan_poses(self) -> NDArray[np.float64]:
+        """True poses at which robots took their last scans, as their beliefs since then tell, (rows, 3) [m, rad]."""
+        poses, beliefs = self.world.poses, self.beliefs
+        return poses if self.scan_steps == 1 else composed(poses, relative(beliefs.believed, beliefs.scanned))
 
     def place(
         self,

@@ -124,6 +124,7 @@ def collect(
         rows, wrong = _as_frozen(task, own)
         remarks += wrong
         theirs = [row for row in shipped.get(task.name, ()) if _floor_of(row) in task.floors_of(size)]
+        remarks += _repeated(task, rows, theirs)
         mine = {row["policy"] for row in rows}
         standings += _standings(task, size, rows, [row for row in theirs if row["policy"] not in mine])
         everything += [*rows, *(row for row in theirs if row["policy"] not in mine)]
@@ -174,6 +175,22 @@ def _as_frozen(task: BenchmarkTask, rows: Sequence[Row]) -> tuple[list[Row], lis
         f"{task.name}, {policy}: {len(found)} runs left out, for their {what} have other hashes, first on {found[0]}."
         for (policy, what), found in wrong.items()
     ]
+
+
+def _repeated(task: BenchmarkTask, rows: Sequence[Row], shipped: Sequence[Row]) -> list[str]:
+    """Return how the rows of reference policies that ran here compare with those shipped."""
+    known = {row[KEY]: row for row in shipped}
+    pairs = [(row, known[row[KEY]]) for row in rows if row[KEY] in known]
+    others = [(row, other) for row, other in pairs if packed([row]) != packed([other])]
+    if not others:
+        return [f"{task.name}: {len(pairs)} rows ran again, all as shipped."] if pairs else []
+    horizon_s = float(task.settings["horizon_s"])
+    times = [[next(iter(_times([row], horizon_s).values())) for row in pair] for pair in others]
+    worst = max(abs(here / there - 1.0) for here, there in times)
+    told = f"{task.name}: {len(pairs)} rows ran again, {len(others)} not as shipped; times differ by up to {worst:.1%}"
+    if worst <= task.tolerance:
+        return [f"{told}, within the task's tolerance of {task.tolerance:.0%} between processors."]
+    return [f"{told}: this version, or a library below it, does not run the task as published."]
 
 
 def _standings(task: BenchmarkTask, size: Size, own: Sequence[Row], theirs: Sequence[Row]) -> list[Standing]:
@@ -275,7 +292,7 @@ def table_of(tasks: Sequence[BenchmarkTask], results: BenchmarkResults) -> str:
 
 def card_of(found: Benchmark, tasks: Sequence[BenchmarkTask], results: BenchmarkResults) -> str:
     """Return the card: tasks, rules, floors and licences, how to cite, and what ran."""
-    header = ("id", "task", "robots", "floors, easy / full", "baseline", "settings")
+    header = ("id", "task", "robots", "floors, easy / full", "baseline", "equal on all processors", "settings")
     rows = [
         (
             f"`{task.id}`",
@@ -283,6 +300,7 @@ def card_of(found: Benchmark, tasks: Sequence[BenchmarkTask], results: Benchmark
             str(task.robots),
             f"{task.easy} / {len(task.floors)}",
             f"`{task.baseline}`",
+            f"within {task.tolerance:.0%}" if task.tolerance else "to the bit",
             "" if task.hashes is None else f"`{task.hashes.settings}`",
         )
         for task in tasks

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.evaluation.bounds.view_graph import ViewGraph, count, reached
+from lidarium.extras import install_command
 
 SUM_WEIGHT = 0.05
 """Weight of the sum of all tours against the longest one."""
@@ -176,7 +177,7 @@ def ordered(graph: ViewGraph, stops: Stops) -> Stops:
     try:
         from ortools.constraint_solver import pywrapcp, routing_enums_pb2
     except ImportError as error:
-        raise ValueError('bounds need OR-Tools; install it with: pip install "lidarium[bounds]"') from error
+        raise ValueError(f"bounds need OR-Tools: {install_command('bounds')}") from error
     places = sorted({stop for tour in stops for stop in tour})
     if len(places) < 2:
         return stops

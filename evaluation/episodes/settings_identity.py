@@ -36,6 +36,7 @@ LATER = (
     "state_cells",
     "pyramid_cells",
     "pyramid_levels",
+    "scan_period_s",
 )
 """Settings that older records do not have."""
 

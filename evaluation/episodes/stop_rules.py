@@ -3,6 +3,7 @@
 They apply in addition to the environment's settings.
 """
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any
@@ -38,7 +39,8 @@ class StopRule:
     at_least, above, at_most : float or None
         Bound of the figure; one of them.
     decisions : int or None
-        After how many decisions the episode ends in any case.
+        After how many decisions the episode ends in any case. At the levels ``velocity`` and ``waypoint`` each
+        decision period of the settings counts as one, however often the policy decides.
     """
 
     figure: str | None = None
@@ -72,6 +74,10 @@ class StopRule:
         return value > self.above if self.above is not None else value <= (self.at_most or 0.0)
 
 
+_CLOCKED = frozenset({"velocity", "waypoint"})
+"""Levels at which decisions are as long as policies want; otherwise a decision is a move."""
+
+
 class Stopper:
     """Stops all robots of an episode by a rule.
 
@@ -84,6 +90,8 @@ class Stopper:
     def __call__(self, env: ExplorationEnv) -> None:
         """Look at the episode after its reset and after every decision."""
         self._decisions += 1
+        if env.level in _CLOCKED:
+            self._decisions = math.floor(env.scorer.time / env.settings.decision_period_s + 1e-9)
         if env.agents and self._rule.is_met(env, self._history, self._decisions):
             for agent in env.agents:
                 env.stop(agent, STOP_REASON)

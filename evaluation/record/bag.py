@@ -84,7 +84,8 @@ class _BagRecorder(Watcher):
             self._writer.transform(MAP_FRAME, odom, time_s, odom_on_map[row])
             self._writer.transform(odom, base, time_s, reckoned[row])
             self._writer.odometry(f"/{robot}/odom", odom, base, time_s, reckoned[row])
-            self._writer.scan(f"/{robot}/scan", f"{robot}/laser", time_s, env.simulation.ranges[row], lidars[row])
+            if steps % env.settings.scan_steps == 0:
+                self._writer.scan(f"/{robot}/scan", f"{robot}/laser", time_s, env.simulation.ranges[row], lidars[row])
         if _is_due(env, steps, PATH_STEP_S):
             self._times.append(time_s)
             self._poses.append(poses.copy())

@@ -80,7 +80,9 @@ class MapSampler:
         self._buffer = np.empty((self.shape[0] * self.shape[1], 3), np.uint64)
         # Between two samples a robot gets no farther from both positions than half of its maximum path.
         self._reach = (
-            settings.lidar.range_max + 0.5 * settings.speed_limits[:, 0].max() * period_s + 4 * self._resolution
+            settings.lidar.range_max
+            + settings.speed_limits[:, 0].max() * (0.5 * period_s + (settings.scan_steps - 1) * settings.time_step)
+            + 4 * self._resolution
         )
         self._last = env.beliefs.believed[:, :2].copy()
         self._is_overlaid = not settings.known_starts

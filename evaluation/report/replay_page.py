@@ -95,7 +95,9 @@ class ReplaySampler(Watcher):
         self._reach = settings.lidar.range_max + settings.speed_limits[:, 0].max() * self._map_period + 0.5
         self._renderings = env.beliefs.renderings.copy()
         self._steps_of_map = max(round(self._map_period / settings.time_step), 1)
-        self._steps_of_scan = max(round(self._scan_period / settings.time_step), 1)
+        steps = max(round(self._scan_period / settings.time_step), 1)
+        # Samples are of steps in which robots scan.
+        self._steps_of_scan = -(-steps // settings.scan_steps) * settings.scan_steps
         self._choose_beams(settings)
         self._last = self._places(env)
         self._sample_maps(env, is_whole=True)

@@ -6,6 +6,7 @@ Pure functions on arrays. Which interval belongs to which figure, and how often 
 docs/reference/statistics.md and docs/results/interval_coverage.md.
 """
 
+from lidarium.evaluation.statistics.bands import FEWEST_FOR_BANDS, mean_bands
 from lidarium.evaluation.statistics.estimates import (
     interquartile_mean,
     interquartile_mean_interval,
@@ -31,6 +32,7 @@ from lidarium.evaluation.statistics.restricted import (
 from lidarium.evaluation.statistics.samples import FEWEST_FOR_INTERVAL, FEWEST_FOR_NOMINAL, Interval
 
 __all__ = [
+    "FEWEST_FOR_BANDS",
     "FEWEST_FOR_INTERVAL",
     "FEWEST_FOR_NOMINAL",
     "CensoredTimes",
@@ -40,6 +42,7 @@ __all__ = [
     "interquartile_mean",
     "interquartile_mean_interval",
     "kaplan_meier",
+    "mean_bands",
     "mean_interval",
     "mean_share_interval",
     "median_bands",

@@ -3,12 +3,14 @@
 A task with a lost worker or machine is repeated elsewhere; its result arrives once.
 """
 
+import atexit
 import logging
 import os
 import signal
 import socket
 import tempfile
 import threading
+import time
 from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import closing, contextmanager
 from itertools import islice
@@ -16,9 +18,11 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import lidarium
+from lidarium.evaluation.processes import CLEANUP_IS_UNSAFE
 from lidarium.evaluation.suites.suite import Suite
 from lidarium.evaluation.suites.trial import Trial
 from lidarium.evaluation.suites.trial_run import run_trial, write_record_bytes
+from lidarium.extras import install_command
 from lidarium.registry import IMPORTS_VARIABLE, import_own
 
 Task = TypeVar("Task")
@@ -33,12 +37,20 @@ WAITING_PER_CORE = 2
 POLL_S = 0.5
 """Wall time after which an interrupt is acted on at the latest [s]."""
 
+LOST_S = 20.0
+"""A cluster whose head has not answered for this long is lost [s]. Ray itself ends the process after 60 s."""
+
+
+class ClusterLostError(ConnectionError):
+    """Raised if the head of a Ray cluster no longer answers."""
+
 
 def on_ray(
     work: Callable[[Task], Result], tasks: Iterable[Task], address: str
 ) -> Generator[tuple[Task, Result | Exception], None, None]:
     """Do tasks on a Ray cluster; yield each with its result when ready."""
     ray = _connected(address)
+    head = _Head(ray.get_runtime_context().gcs_address)
     try:
         # Lost workers and machines are no fault of a task: it is tried until it has an end.
         remote = ray.remote(max_retries=-1, num_cpus=1)(_done)
@@ -47,6 +59,7 @@ def on_ray(
         version, imports = lidarium.__version__, os.environ.get(IMPORTS_VARIABLE, "")
         running = {remote.remote(work, task, version, imports): task for task in islice(pending, window)}
         while running:
+            head.check()
             for ready in ray.wait(list(running), num_returns=1, timeout=POLL_S)[0]:
                 task = running.pop(ready)
                 result = _result(ray, ready)
@@ -56,7 +69,39 @@ def on_ray(
                 for following in islice(pending, 1):
                     running[remote.remote(work, following, version, imports)] = following
     finally:
-        ray.shutdown()
+        if head.is_lost:
+            # Ray's own way out waits for the head, and crashes.
+            atexit.unregister(ray.shutdown)
+            CLEANUP_IS_UNSAFE.set()
+        else:
+            ray.shutdown()
+
+
+class _Head:
+    """The head of a cluster, and since when it does not answer."""
+
+    def __init__(self, address: str) -> None:
+        self._address = address
+        self._answered_s = self._asked_s = time.monotonic()
+        self.is_lost = False
+
+    def check(self) -> None:
+        """Ask the head, every few seconds, whether it is there."""
+        now = time.monotonic()
+        if now - self._asked_s < LOST_S / 5.0:
+            return
+        host, _, port = self._address.rpartition(":")
+        try:
+            socket.create_connection((host.strip("[]"), int(port)), LOST_S / 5.0).close()
+            self._answered_s = now
+        except OSError as error:
+            self.is_lost = now - self._answered_s >= LOST_S
+            if self.is_lost:
+                raise ClusterLostError(
+                    f"the head of the Ray cluster at {self._address} has not answered for {LOST_S:g} s ({error}); "
+                    "finished episodes are kept: start the cluster again, and the same command goes on after them"
+                ) from error
+        self._asked_s = time.monotonic()
 
 
 class OtherVersionError(RuntimeError):
@@ -68,7 +113,7 @@ def _connected(address: str) -> Any:  # noqa: ANN401
     try:
         import ray
     except ModuleNotFoundError as error:
-        raise ValueError("a Ray cluster needs the extra ray: pip install 'lidarium[ray]'") from error
+        raise ValueError(f"a Ray cluster needs Ray: {install_command('ray')}") from error
     if address != "auto":
         host, colon, port = address.rpartition(":")
         if not (colon and host and port.isascii() and port.isdigit() and 0 < int(port) < 65536):

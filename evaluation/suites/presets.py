@@ -39,7 +39,7 @@ class _Preset:
     settings : dict
         Options of ``lidarium.parallel_env``.
     stop : dict or None
-        As ``StopRule``; ``decisions`` may be by the number of robots.
+        As ``StopRule``; ``decisions`` may be by the number of robots. None if only the settings end episodes.
     figures : tuple of str
         Keys of an episode's line that the project prints.
     files : tuple of str
@@ -293,7 +293,7 @@ PRESETS: dict[str, _Preset] = {
             "stop_coverage": None,
             "horizon_s": 1000.0,
         },
-        stop={"decisions": 1000},
+        stop=None,
         figures=("c_valid_final", "iou_occupied", "time_s"),
         files=("floorplans/mapex/*.png",),
         image_resolution=0.1,

@@ -10,6 +10,7 @@ from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.simulation.depth.point_cloud import point_cloud
 from lidarium.evaluation.episodes.watching import WatchedExploration
 from lidarium.evaluation.truth.beliefs import believed_on_floor
+from lidarium.mapping.geometry.rigid import Transform, relative
 
 MOST_TRAIL, MOST_BEAMS, MOST_POINTS = 1500, 360, 6000
 """Maximum number of points of a driven path, of a scan, and of a depth image's cloud."""
@@ -153,6 +154,10 @@ def _scan(env: ExplorationEnv, row: int) -> tuple[NDArray[np.float64], NDArray[n
     lengths = np.clip(np.nan_to_num(ranges, nan=0.0, posinf=lidar.range_max), 0.0, lidar.range_max)
     angles = lidar.angles[::stride]
     ends = np.column_stack([lengths * np.cos(angles), lengths * np.sin(angles), np.full(len(angles), lidar.height)])
+    if env.simulation.scan_steps > 1:
+        # The robot may have moved since its last scan.
+        since = relative(env.beliefs.believed[row], env.beliefs.scanned[row])
+        ends[:, :2] = Transform(*since.tolist()).apply(ends[:, :2])
     return ends, is_hit
 
 

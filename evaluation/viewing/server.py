@@ -10,6 +10,8 @@ from contextlib import contextmanager
 from http import HTTPStatus
 from typing import TYPE_CHECKING, Any
 
+from lidarium.extras import install_command
+
 if TYPE_CHECKING:
     from viser import ViserServer
 
@@ -19,8 +21,6 @@ HOST = "127.0.0.1"
 LONGEST_STOP_S = 1.0
 """Maximum wait for the end of a server [s]."""
 
-MISSING = 'a view needs the package viser; pip install "lidarium[viewer]"'
-
 
 @contextmanager
 def view_server(port: int) -> Iterator["ViserServer"]:
@@ -29,7 +29,7 @@ def view_server(port: int) -> Iterator["ViserServer"]:
         import rich
         import viser
     except ImportError as error:
-        raise ValueError(MISSING) from error
+        raise ValueError(f"a view needs the package viser: {install_command('viewer')}") from error
     _check_free(port)
     console = rich.get_console()
     was_quiet, console.quiet = console.quiet, True  # viser writes to standard output as results do

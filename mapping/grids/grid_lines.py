@@ -67,7 +67,7 @@ def _visible(
     return seen
 
 
-@kernel
+@kernel(nrt=False)
 def line_is_open(log_odds: NDArray[np.int8], row: int, column: int, to_row: int, to_column: int) -> bool:
     """Whether no occupied cell lies strictly between two cells (kernel)."""
     row_step = 1 if to_row > row else -1
@@ -93,7 +93,7 @@ def line_is_open(log_odds: NDArray[np.int8], row: int, column: int, to_row: int,
     return True
 
 
-@kernel
+@kernel(nrt=False)
 def line_is_free(log_odds: NDArray[np.int8], row: int, column: int, to_row: int, to_column: int) -> bool:
     """Whether all cells from one to another, the last included, are known to be free (kernel)."""
     row_step = 1 if to_row > row else -1

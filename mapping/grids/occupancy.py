@@ -40,11 +40,14 @@ class OccupancySettings:
     ----------
     resolution : float
         Side of a cell [m].
-    hit, miss : float
-        Added to a cell in which a beam ended, and subtracted from a cell that the scan saw [log-odds,
-        positive].
-    minimum, maximum : float
-        Bounds of a cell's value [log-odds].
+    hit : float
+        Added to a cell in which a beam ended [log-odds, positive].
+    miss : float
+        Subtracted from a cell that the scan saw [log-odds, positive].
+    minimum : float
+        Lower bound of a cell's value [log-odds].
+    maximum : float
+        Upper bound of a cell's value [log-odds].
     """
 
     resolution: Resolution = 0.05

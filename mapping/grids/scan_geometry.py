@@ -28,8 +28,10 @@ class ScanGeometry:
     field_of_view : float
         Angle between the first and the last beam, or the full circle 2 pi, whose last beam does not repeat
         the first [rad].
-    range_min, range_max : float
-        Shortest and longest measured range [m].
+    range_min : float
+        Minimum range that is measured [m].
+    range_max : float
+        Maximum range that is measured [m].
     """
 
     beams: Annotated[int, within(1, MAX_BEAMS)] = 727

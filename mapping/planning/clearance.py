@@ -56,7 +56,7 @@ class _Sweep(NamedTuple):
     largest: int
 
 
-@kernel
+@kernel(nrt=False)
 def _count_rows(log_odds: Array, sweep: _Sweep, column: int, steps: Array, fewest: Array, lane: int) -> None:
     """Apply ``count_rows`` to the columns from ``column`` on; beyond the grid nothing is occupied.
 
@@ -145,7 +145,7 @@ STAMPS_PER_CELL = 1.0 / 200.0
 """Stamping one disc costs about as much as computing 200 cells again."""
 
 
-@kernel
+@kernel(nrt=False)
 def grown_window(window: Window, margin: int, shape: tuple[int, int]) -> Window:
     """Grow a window by ``margin`` cells on each side, clipped to the grid (kernel)."""
     row_low, row_high, column_low, column_high = window
@@ -285,7 +285,7 @@ def list_cells(listed: Array, count: int, word: np.uint64, row: int, column: int
     return listed, count
 
 
-@kernel
+@kernel(nrt=False)
 def _that_differ(log_odds: Array, closeness: Array, limit: int, index: int, cells: int) -> np.uint64:
     """Return which of up to 64 cells, from an index of the grid on, became occupied or free."""
     if index + BLOCK <= log_odds.size:
@@ -297,7 +297,7 @@ def _that_differ(log_odds: Array, closeness: Array, limit: int, index: int, cell
     return differing
 
 
-@kernel
+@kernel(nrt=False)
 def _box_of(log_odds: Array, cells: Array) -> Window:
     """Bound cells by a window."""
     row_low, row_high, column_low, column_high = log_odds.shape[0], 0, log_odds.shape[1], 0
@@ -307,7 +307,7 @@ def _box_of(log_odds: Array, cells: Array) -> Window:
     return row_low, row_high, column_low, column_high
 
 
-@kernel
+@kernel(nrt=False)
 def _stamp_at(closeness: Array, stamp: Array, row: int, column: int) -> None:
     """Raise the closeness around an occupied cell."""
     (rows, columns), reach = closeness.shape, stamp.shape[0] // 2

@@ -62,7 +62,7 @@ def kept_places(path: Array, terrain: Terrain) -> NDArray[np.int64]:
     return kept[:kept_count]
 
 
-@kernel
+@kernel(nrt=False)
 def _nearest_on(path: Array, first: int, end: int, closeness: Array) -> int:
     """Return the maximum closeness of the cells of a piece of a path."""
     nearest = 0
@@ -71,7 +71,7 @@ def _nearest_on(path: Array, first: int, end: int, closeness: Array) -> int:
     return nearest
 
 
-@kernel
+@kernel(nrt=False)
 def _can_replace(path: Array, first: int, last: int, nearest: int, terrain: Terrain) -> bool:
     """Whether a straight line between two cells of a path is as good as the piece that it replaces.
 
@@ -89,7 +89,7 @@ def _can_replace(path: Array, first: int, last: int, nearest: int, terrain: Terr
     )
 
 
-@kernel
+@kernel(nrt=False)
 def _distance_to_piece(
     row: float, column: float, row_a: float, column_a: float, row_b: float, column_b: float
 ) -> float:
@@ -103,13 +103,13 @@ def _distance_to_piece(
     return math.sqrt((row_a + part * rise - row) ** 2 + (column_a + part * run - column) ** 2)
 
 
-@kernel
+@kernel(nrt=False)
 def _distance_to_square(row: float, column: float, centre_row: int, centre_column: int) -> float:
     """Return the distance from a point to the square of a cell."""
     return math.sqrt(max(abs(row - centre_row) - 0.5, 0.0) ** 2 + max(abs(column - centre_column) - 0.5, 0.0) ** 2)
 
 
-@kernel
+@kernel(nrt=False)
 def _piece_is_clear(
     log_odds: Array, row_a: float, column_a: float, row_b: float, column_b: float, needed: float
 ) -> bool:
@@ -143,7 +143,7 @@ def _piece_is_clear(
     return True
 
 
-@kernel
+@kernel(nrt=False)
 def line_is_clear(
     log_odds: Array,
     closeness: Array,

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
+from lidarium.extras import install_command
 from lidarium.mapping.files.guarded_reading import open_guarded, reading
 from lidarium.mapping.point_clouds.columns import Content
 
@@ -45,4 +46,4 @@ def read_e57(path: Path) -> Content:
 
 
 def _missing(what: str, package: str) -> ValueError:
-    return ValueError(f'{what} need the package {package}; pip install "lidarium[clouds]"')
+    return ValueError(f"{what} need the package {package}: {install_command('clouds')}")

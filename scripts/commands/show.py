@@ -168,16 +168,17 @@ def _realism() -> tuple[dict[str, Any], str]:
     from lidarium.envs.settings.faults import KINDS
     from lidarium.envs.settings.making import REALISM, make_settings
 
-    header = ("realism", "noise", "odometry", "localization", "radio", "faults [1/h]")
+    header = ("realism", "noise", "odometry", "localization", "radio", "faults [1/h]", "scan [s]", "beams", "maps [m]")
     rows, values = [], {}
     for name, preset in REALISM.items():
         settings = make_settings(realism=name)
         rates = {kind: rate for kind in KINDS[1:] if (rate := getattr(settings.faults, kind)) > 0.0}
         faults = ", ".join(f"{kind} {rate:g}" for kind, rate in rates.items()) or "none"
-        rows.append((name, preset["noise"], preset["odometry"], settings.localization, settings.radio.kind, faults))
-        values[name] = {
-            part: asdict(settings)[part] for part in ("lidar", "odometry", "localization", "radio", "faults")
-        }
+        detail = (settings.scan_period_s or settings.time_step, settings.lidar.beams, settings.occupancy.resolution)
+        row = (name, preset["noise"], preset["odometry"], settings.localization, settings.radio.kind, faults)
+        rows.append((*row, *(f"{number:g}" for number in detail)))
+        parts = ("lidar", "occupancy", "odometry", "localization", "radio", "faults", "scan_period_s")
+        values[name] = {part: asdict(settings)[part] for part in parts}
     return {"realism": values}, table(rows, header, indent="")
 
 

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from tyro.conf import Positional
 
+from lidarium.extras import install_command
 from lidarium.scripts import first_start
 from lidarium.scripts.common import INTERRUPTED, LINE_PERIOD_S, Answer, Command, notify, table
 
@@ -103,9 +104,7 @@ def _check_extra(packages: Sequence[str]) -> None:
     """Check that the extra is installed, as far as it is needed."""
     missing = [name for name in packages if importlib.util.find_spec(name) is None]
     if missing:
-        raise ValueError(
-            f'training needs {", ".join(missing)}; install the extra: pip install -c constraints.txt "lidarium[rl]"'
-        )
+        raise ValueError(f"training needs {', '.join(missing)}: {install_command('rl')}")
 
 
 class _Shown:

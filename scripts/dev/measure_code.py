@@ -1,66 +1,122 @@
-"""Measure the sources: sizes of modules, functions, parameters, lines, tests at mirrored paths.
+"""Measure the sources: sizes, public names, modules with one importer, words of documents, and the way of a step.
 
 Usage: python scripts/dev/measure_code.py [folder of a checkout]
 """
 
 import ast
+import os
+import subprocess
 import sys
+from collections import defaultdict
+from collections.abc import Callable, Iterator
+from itertools import pairwise
 from pathlib import Path
 
-LAYERS = ("envs", "agents", "mapping", "evaluation", "training", "scripts")
-SKIPS = "fmt: " + "skip"
-LONG_FILE, LONG_FUNCTION, MANY_PARAMETERS, LONG_LINE = 300, 60, 8, 110
+PRODUCT = ("envs", "agents", "mapping", "evaluation", "training", "scripts", "src")
+Row = tuple[str, str]
 
 
-def functions(tree: ast.AST) -> list[ast.FunctionDef]:
-    """Return all functions of a module."""
-    return [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)]
+def sources(root: Path, *folders: str) -> dict[str, str]:
+    """Return the Python files of a checkout that git follows, by path."""
+    listed = subprocess.run(
+        ["git", "-C", str(root), "ls-files", *folders], capture_output=True, text=True, check=True
+    ).stdout.split()
+    return {name: (root / name).read_text() for name in listed if name.endswith(".py")}
 
 
-def length(function: ast.FunctionDef) -> int:
-    """Return the lines of a function without its docstring."""
-    first = function.body[0]
-    assert function.end_lineno is not None
-    assert first.end_lineno is not None
-    documentation = first.end_lineno - first.lineno + 1 if ast.get_docstring(function) else 0
-    return function.end_lineno - function.lineno + 1 - documentation
+def public_names(text: str) -> list[str]:
+    """Return the functions and classes of a module that have no leading underscore."""
+    defined = (node for node in ast.parse(text).body if isinstance(node, (ast.FunctionDef, ast.ClassDef)))
+    return [node.name for node in defined if not node.name.startswith("_")]
 
 
-def parameters(function: ast.FunctionDef) -> int:
-    """Return the number of parameters of a function, without ``self``."""
-    given = function.args.posonlyargs + function.args.args + function.args.kwonlyargs
-    return sum(each.arg not in ("self", "cls") for each in given)
+def imported(text: str) -> Iterator[tuple[str, str]]:
+    """Yield module and name of what a module imports from lidarium."""
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("lidarium."):
+            for name in node.names:
+                yield (node.module or "").removeprefix("lidarium."), name.name
 
 
-def measure(root: Path) -> dict[str, str]:
-    """Return the figures of a checkout by name."""
-    sources = {path: path.read_text() for layer in LAYERS for path in sorted((root / layer).rglob("*.py"))}
-    found = [each for text in sources.values() for each in functions(ast.parse(text))]
-    lengths, counts = [length(each) for each in found], [parameters(each) for each in found]
-    modules = [path for path in sources if path.name != "__init__.py"]
-    tests = root / "tests"
-    mirrored = {path: tests / path.parent.relative_to(root) / f"test_{path.name}" for path in modules}
-    tested = [path for path, test in mirrored.items() if test.exists()]
-    lines = [
-        line
-        for folder in (*LAYERS, "benchmarks", "src", "tests")
-        for path in (root / folder).rglob("*.py")
-        if not any(parent.is_symlink() for parent in path.parents)
-        for line in path.read_text().splitlines()
-    ]
-    return {
-        "files above 300 lines": str(sum(text.count("\n") > LONG_FILE for text in sources.values())),
-        "longest function [lines]": str(max(lengths)),
-        "functions above 60 lines": str(sum(each > LONG_FUNCTION for each in lengths)),
-        "most parameters": str(max(counts)),
-        "functions above 8 parameters": str(sum(each > MANY_PARAMETERS for each in counts)),
-        "lines beyond 110 columns": str(sum(len(line) > LONG_LINE for line in lines)),
-        "calls that skip formatting": str(sum(SKIPS in line for line in lines)),
-        "modules with a test at the mirrored path": f"{len(tested)} of {len(modules)}",
+def sole_importers(files: dict[str, str]) -> dict[str, str]:
+    """Return the modules that exactly one other imports, each with that one."""
+    modules = {
+        name.removesuffix(".py").removeprefix("src/lidarium/").replace("/", "."): text
+        for name, text in files.items()
+        if not name.endswith("__init__.py")
     }
+    importers: dict[str, set[str]] = defaultdict(set)
+    for importer, text in modules.items():
+        for module, name in imported(text):
+            for target in {module, f"{module}.{name}"} & (modules.keys() - {importer}):
+                importers[target].add(importer)
+    return {target: next(iter(them)) for target, them in sorted(importers.items()) if len(them) == 1}
+
+
+def words(root: Path, are_results: bool) -> int:
+    """Return the number of words in README and docs, either those of results or all others."""
+    pages = [root / "README.md", *(root / "docs").rglob("*.md")]
+    return sum(len(page.read_text().split()) for page in pages if ("results" in page.parts) == are_results)
+
+
+def sizes(root: Path) -> list[Row]:
+    """Return the sizes of a checkout."""
+    product, others = sources(root, *PRODUCT), sources(root, "benchmarks", "tests")
+    lines = {name: text.count("\n") for name, text in (product | others).items()}
+    public = [name for text in product.values() for name in public_names(text)]
+    used = {name for text in (product | sources(root, "benchmarks")).values() for _, name in imported(text)}
+
+    def total(folder: str) -> str:
+        return f"{sum(count for name, count in lines.items() if name.startswith(folder)):,}"
+
+    return [
+        ("product: files, lines", f"{len(product)}, {sum(lines[name] for name in product):,}"),
+        ("longest file of the product [lines]", f"{max(lines[name] for name in product)}"),
+        ("benchmarks; tests, lines", f"{total('benchmarks')}; {total('tests')}"),
+        ("public names; of these imported by another module", f"{len(public):,}; {sum(n in used for n in public):,}"),
+        ("modules with one importer", f"{len(sole_importers(product))}"),
+        ("words in README and docs; in results pages", f"{words(root, False):,}; {words(root, True):,}"),
+    ]
+
+
+def way(root: Path, call: Callable[[], object]) -> str:
+    """Return the number of files that Python passes in a call, and how often it changes the file."""
+    folder, seen = str(root.resolve()) + os.sep, []
+
+    def note(frame: object, event: str, _: object) -> None:
+        name = os.path.realpath(frame.f_code.co_filename) if event == "call" else ""  # type: ignore[attr-defined]
+        if name.startswith(folder) and "site-packages" not in name:
+            seen.append(name)
+
+    sys.setprofile(note)
+    try:
+        call()
+    finally:
+        sys.setprofile(None)
+    return f"{len(set(seen))}, {sum(a != b for a, b in pairwise(seen))}"
+
+
+def ways(root: Path) -> list[Row]:
+    """Return the ways of steps and of a reset through the files of the installed checkout."""
+    import numpy as np
+
+    import lidarium
+
+    team, rows = lidarium.parallel_env("apartment", robots=3), lidarium.vector_env(4, "apartment", robots=2)
+    team.reset(seed=0)
+    rows.reset(seed=0)
+    still = {agent: np.zeros(2, np.float32) for agent in team.agents}
+    zeros = np.zeros(rows.action_space.shape or (), np.float32)
+    team.step(still)
+    rows.step(zeros)
+    return [
+        ("`parallel_env.step`: files, changes of file", way(root, lambda: team.step(still))),
+        ("`vector_env.step`: files, changes of file", way(root, lambda: rows.step(zeros))),
+        ("`vector_env.reset`: files, changes of file", way(root, lambda: rows.reset(seed=1))),
+    ]
 
 
 if __name__ == "__main__":
     checkout = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).resolve().parents[2]
-    for what, figure in measure(checkout).items():
+    for what, figure in sizes(checkout) + ways(checkout):
         print(f"| {what} | {figure} |")

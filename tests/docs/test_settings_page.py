@@ -25,3 +25,9 @@ def test_the_page_of_the_camera_holds_the_table_of_its_settings():
     assert table == markdown_table(DepthCamera(), "camera.").strip(), (
         "the table of depth_camera.md is stale; markdown_table(DepthCamera(), 'camera.') makes it"
     )
+
+
+def test_every_setting_has_a_text_of_its_own():
+    for table in (markdown_table(), markdown_table(DepthCamera(), "camera.")):
+        texts = [line.strip("| ").rsplit("|", 1)[-1].strip() for line in table.splitlines()]
+        assert len(set(texts)) == len(texts)

@@ -24,7 +24,7 @@ NAMED = {
     "localization": ("truth", "odometry", "slam", "splines", "splines_ekf"),
     "radio.kind": ("all", "none", "range", "line_of_sight", "signal"),
     "robot": ("kobuki", "pioneer", "service", "point"),
-    "realism": ("ideal", "lab", "field"),
+    "realism": ("ideal", "lab", "field", "fast"),
     "observe": (["scan", "pose", "egocentric_map"], ["map"], ["egocentric_map"]),
 }
 

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import pytest
 
+from lidarium.extras import install_command
 from lidarium.scripts.main import main
 from lidarium.scripts.options import (
     FilmFiles,
@@ -252,7 +253,7 @@ def test_a_port_in_use_is_refused_before_anything_is_written(tmp_path, capsys):
 def test_a_missing_extra_is_named_before_anything_is_written(tmp_path, capsys, monkeypatch):
     monkeypatch.setitem(sys.modules, "viser", None)
     assert main([*SHORT, "--view", "--out", str(tmp_path / "out")]) == 2
-    assert 'pip install "lidarium[viewer]"' in capsys.readouterr().err
+    assert install_command("viewer") in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
 
 

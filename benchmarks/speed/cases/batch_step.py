@@ -8,6 +8,7 @@ two threads, one on one thread, and of the third the kernel alone runs on two th
 
 import time
 from collections.abc import Callable, Mapping
+from typing import Any
 
 import numpy as np
 
@@ -54,7 +55,7 @@ def measure(effort: Effort) -> list[Line]:
     if not can_use(CORES):
         return [needs_threads(title, LEAST_GAIN)]
     floor = straight_floor()
-    options = {"lidar": LIDAR, "resolution": floor.resolution}
+    options: dict[str, Any] = {"lidar": LIDAR, "resolution": floor.resolution}
     batches = {
         name: DrivenBatch(floor, threads, **options) for name, threads in (("two", 2), ("one", 1), ("kernel", 2))
     }

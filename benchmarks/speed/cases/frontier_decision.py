@@ -6,6 +6,7 @@ offered frontiers again. Episodes begin anew where they end, which counts as wel
 
 import statistics
 import time
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,17 +17,20 @@ from lidarium.benchmarks.speed.harness.report import run_alone
 from lidarium.benchmarks.speed.harness.timing import Effort
 
 CORES = 1
-EPISODES, RESOLUTION, FLOORS = 16, 0.05, "set:validation"
+EPISODES, FLOORS = 16, "set:validation"
+WORLDS: dict[str, dict[str, Any]] = {"ideal": {"resolution": 0.05}, "fast": {"realism": "fast"}}
+"""Settings by the name of their realism."""
+
 WARM_DECISIONS = 20
 """Decisions before the clock starts: maps are begun then, and most floors are in memory."""
 
-TO_REACH = {1: 6000.0, 3: 3000.0}
-"""Rows a CPU second by size of the team."""
+TO_REACH = {("ideal", 1): 3500.0, ("ideal", 3): 3000.0, ("fast", 1): 8000.0, ("fast", 3): 6000.0}
+"""Rows a CPU second by realism and size of the team."""
 
 NOTES = (
     f"*Frontier decision*: `lidarium.vector_env` with level `frontier`, {EPISODES} episodes on `{FLOORS}`, "
-    f"maps of {100 * RESOLUTION:g} cm, the default laser and observations, one thread. Each robot takes any "
-    "of its offers with equal chance. A row is a decision of one robot, up to 20 steps, new episodes "
+    'maps of 5 cm, the default laser and observations, one thread; *fast* has `realism="fast"`. Each robot takes '
+    "any of its offers with equal chance. A row is a decision of one robot, up to 20 steps, new episodes "
     "included; time is that of the processor, not of the clock.",
 )
 
@@ -34,15 +38,22 @@ NOTES = (
 class Choosers:
     """A batch whose robots choose among their frontiers at random."""
 
-    def __init__(self, robots: int, threads: int = 1, floors: str | None = None) -> None:
+    def __init__(
+        self,
+        robots: int,
+        threads: int = 1,
+        floors: str | None = None,
+        episodes: int | None = None,
+        realism: str = "ideal",
+    ) -> None:
         self._env = lidarium.vector_env(
-            EPISODES,
+            episodes or EPISODES,
             floors or FLOORS,
             level="frontier",
             robots=robots,
-            resolution=RESOLUTION,
             threads=threads,
             copy=False,
+            **WORLDS[realism],
         )
         self._generator = np.random.default_rng(0)
         self._masks: NDArray[np.int8] = self._env.reset(seed=0)[0]["action_mask"]
@@ -66,12 +77,13 @@ class Choosers:
 
 
 def measure(effort: Effort) -> list[Line]:
-    """Measure teams of one and of three robots."""
+    """Measure teams of one and of three robots, in the full world and in the fast one."""
     lines = []
-    for robots, wanted in TO_REACH.items():
-        choosers = Choosers(robots)
+    for (realism, robots), wanted in TO_REACH.items():
+        choosers = Choosers(robots, realism=realism)
         rate = 1.0 / statistics.median(choosers.run(4.0 * effort.block_s) for _ in range(effort.rounds))
         name = f"frontier decision, {EPISODES} episodes x {robots} robot{'s' if robots > 1 else ''}"
+        name += ", fast" if realism == "fast" else ""
         unit = "rows/CPU s"
         lines.append(Line(name, f"{shown(rate)} {unit}", "-", None, wanted, figure=rate, unit=unit))
     return lines

@@ -4,6 +4,7 @@ VMAS has few rays on the same floor; both use two threads.
 """
 
 import math
+from typing import Any
 
 from lidarium.benchmarks.speed.harness.batches import EPISODES, OBSERVED, ROBOTS, DrivenBatch, can_use
 from lidarium.benchmarks.speed.harness.lines import Line, faster, needs_threads
@@ -51,7 +52,7 @@ def measure(effort: Effort) -> list[Line]:
     if not can_use(CORES):
         return [needs_threads(title, WANTED)]
     floor = straight_floor()
-    preset = {"lidar": "lidar_360_6m", "resolution": 0.05}
+    preset: dict[str, Any] = {"lidar": "lidar_360_6m", "resolution": 0.05}
     batch = DrivenBatch(floor, CORES, **preset)
     plain = DrivenBatch(floor, CORES, **preset, observe=tuple(name for name in OBSERVED if name != "egocentric_map"))
     reach = batch.env.settings.lidar.range_max

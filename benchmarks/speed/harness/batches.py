@@ -23,14 +23,20 @@ def can_use(threads: int) -> bool:
 
 
 class DrivenBatch:
-    """A batch of 64 episodes of 2 robots that drive at drawn commands.
+    """A batch of episodes of 2 robots that drive at drawn commands.
 
     Each speed and turn rate is held for 2 s.
 
     `env`: the environment; `agents`: robots of all episodes.
     """
 
-    def __init__(self, floor: BenchFloor, threads: int, **options: Any) -> None:  # noqa: ANN401
+    def __init__(
+        self,
+        floor: BenchFloor,
+        threads: int,
+        episodes: int = EPISODES,
+        **options: Any,  # noqa: ANN401
+    ) -> None:
         chosen = {
             "horizon_s": None,
             "stop_coverage": None,
@@ -39,12 +45,12 @@ class DrivenBatch:
             "egocentric_scales": (1, 4),
         }
         self.env = lidarium.vector_env(
-            EPISODES, floor.floor(), robots=ROBOTS, threads=threads, copy=False, **{**chosen, **options}
+            episodes, floor.floor(), robots=ROBOTS, threads=threads, copy=False, **{**chosen, **options}
         )
         self.agents = self.env.num_envs
         robot = self.env.settings.robot
         self._limits = np.array([robot.max_speed, robot.max_turn_rate])
-        self._modes, self._nobody = np.full(EPISODES, STEPS, np.int8), np.zeros(self.agents, np.bool_)
+        self._modes, self._nobody = np.full(episodes, STEPS, np.int8), np.zeros(self.agents, np.bool_)
         self._count = 0
 
     def start(self, beginning: int) -> None:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from functools import partial
 
 from lidarium.benchmarks.speed.peers import f1tenth_scans, vmas_peer
+from lidarium.extras import install_command
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,10 +26,10 @@ def _is_installed(module: str) -> bool:
 
 
 PEERS = (
-    Peer("IR-SIM", partial(_is_installed, "irsim"), 'pip install "lidarium[bench]"'),
-    Peer("PyBullet", partial(_is_installed, "pybullet"), 'pip install "lidarium[bench]" (Python 3.11)'),
-    Peer("scikit-learn", partial(_is_installed, "sklearn"), 'pip install "lidarium[bench]"'),
-    Peer("faiss", partial(_is_installed, "faiss"), 'pip install "lidarium[bench]"'),
+    Peer("IR-SIM", partial(_is_installed, "irsim"), install_command("bench")),
+    Peer("PyBullet", partial(_is_installed, "pybullet"), f"{install_command('bench')} (Python 3.11)"),
+    Peer("scikit-learn", partial(_is_installed, "sklearn"), install_command("bench")),
+    Peer("faiss", partial(_is_installed, "faiss"), install_command("bench")),
     Peer(
         "VMAS",
         vmas_peer.is_there,

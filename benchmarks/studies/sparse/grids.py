@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.benchmarks.studies.sparse.places import BODY, Frame, Place
+from lidarium.extras import install_command
 from lidarium.mapping.planning.clearance import ClearanceField
 from lidarium.mapping.planning.footprint import Footprint
 from lidarium.mapping.planning.grid_planning import cells_of, centres_of, plan
@@ -92,7 +93,7 @@ class OctoMap:
 
     def __init__(self) -> None:
         if importlib.util.find_spec("octomap") is None:
-            raise ModuleNotFoundError("the library octomap is missing; want pip install 'lidarium[bench]'")
+            raise ModuleNotFoundError(f"the library octomap is missing: {install_command('bench')}")
         library: Any = importlib.import_module("octomap")
         self._tree: Any = library.OcTree(RESOLUTION_M)
 

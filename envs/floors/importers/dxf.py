@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from lidarium.envs.floors.floor import MAX_COORDINATE_M, Floor
 from lidarium.envs.floors.importers.common import MAX_POINTS, MAX_TEXT_BYTES, floor_of_lines
+from lidarium.extras import install_command
 from lidarium.mapping.files.guarded_reading import READING_ERRORS, read_bytes, shortened
 
 KINDS = frozenset(("LINE", "LWPOLYLINE", "POLYLINE", "ARC", "CIRCLE", "ELLIPSE", "SPLINE"))
@@ -270,7 +271,7 @@ def _document(path: Path, sifted: _Sifted) -> Any:  # noqa: ANN401
         from ezdxf import recover
         from ezdxf.lldxf.const import DXFError
     except ImportError as error:
-        raise ValueError('DXF drawings need ezdxf; pip install "lidarium[dxf]"') from error
+        raise ValueError(f"DXF drawings need ezdxf: {install_command('dxf')}") from error
     try:
         # Repairs take twice as long as reading an undamaged file.
         return ezdxf.read(io.StringIO(sifted.text))

@@ -201,6 +201,7 @@ def follow_team(
     believed: Array,
     velocities: Array,
     ranges: Array,
+    scanned: Array,
     commands: Array,
 ) -> None:
     """Give each robot of a team the speed and turn rate to follow its path.
@@ -212,6 +213,7 @@ def follow_team(
             believed[first:last],
             velocities[first:last],
             ranges[first:last],
+            scanned[first:last],
             following.contact[first:last],
             following.heard[first:last],
         ),
@@ -239,7 +241,13 @@ def follow_team(
 
 @kernel
 def follow_teams(
-    drives: Drives, following: Following, believed: Array, velocities: Array, ranges: Array, commands: Array
+    drives: Drives,
+    following: Following,
+    believed: Array,
+    velocities: Array,
+    ranges: Array,
+    scanned: Array,
+    commands: Array,
 ) -> None:
     """Give the robots of all teams the speed and turn rate to follow paths.
 
@@ -247,4 +255,4 @@ def follow_teams(
     """
     robots = len(following.radii)
     for first in range(0, len(believed), robots):
-        follow_team(drives, following, first, first + robots, believed, velocities, ranges, commands)
+        follow_team(drives, following, first, first + robots, believed, velocities, ranges, scanned, commands)

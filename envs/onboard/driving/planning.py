@@ -107,7 +107,7 @@ def passage_in(planning: Planning) -> Passage:
     return Passage(planning.limit, planning.half_costs, planning.roomy, planning.least_clearance, planning.preferred)
 
 
-@kernel
+@kernel(nrt=False)
 def _place_along(first: int, last: int, step: int, steps: int, is_straight: bool) -> int:
     """Return the cell at one of the steps from a cell to another.
 
@@ -120,7 +120,7 @@ def _place_along(first: int, last: int, step: int, steps: int, is_straight: bool
     return int(np.rint(way + first))
 
 
-@kernel
+@kernel(nrt=False)
 def _room_before(cells: Array, k: int, closeness: Array, planning: Planning) -> float:
     """Minimum room around the body on the piece of a path that leads to its point k [m]."""
     before = max(k - 1, 0)
@@ -206,7 +206,7 @@ def _write_points(planning: Planning, drives: Drives, row: int, path: Array, ter
     return count
 
 
-@kernel
+@kernel(nrt=False)
 def _end_within_cell(
     planning: Planning, drives: Drives, row: int, last: int, closeness: Array, destination: Destination
 ) -> None:
@@ -221,7 +221,7 @@ def _end_within_cell(
             points[last, 0], points[last, 1] = destination.x, destination.y
 
 
-@kernel
+@kernel(nrt=False)
 def _path_is_clear(planning: Planning, drives: Drives, row: int) -> bool:
     """Whether the rest of a robot's path is still clear on the current map."""
     record = planning.records[row // planning.sharing]

@@ -48,6 +48,8 @@ class Sensed(NamedTuple):
         Believed poses and velocities [m, rad, m/s, rad/s].
     ranges : (robots, beams) float32
         Scans [m].
+    scanned : (robots, 3) float64
+        Believed poses at which these were taken [m, rad].
     contact, heard : (robots, robots) uint8, (robots, robots * 3) float64
         If not all teammates' poses are known: from which robots each heard lately, and their poses then [m, rad].
     """
@@ -55,6 +57,7 @@ class Sensed(NamedTuple):
     poses: NDArray[np.float64]
     velocities: NDArray[np.float64]
     ranges: NDArray[np.float32]
+    scanned: NDArray[np.float64]
     contact: NDArray[np.uint8]
     heard: NDArray[np.float64]
 
@@ -87,15 +90,25 @@ class Bodies(NamedTuple):
 
 
 @kernel(nrt=False)
-def _gap_in_scan(ranges: Array, unit_vectors: Array, radius: float) -> float:
-    """Distance that the disc can move straight ahead before it meets a return [m]."""
+def _gap_in_scan(ranges: Array, unit_vectors: Array, radius: float, scanned: Array, pose: Array) -> float:
+    """Distance that the disc can move straight ahead before it meets a return [m].
+
+    It moves from ``pose``; the scan was taken at ``scanned``.
+    """
     gap = np.inf
+    # 1, 0, 0 and 0 for a scan that was taken here, which changes no bit of a return.
+    cosine, sine = math.cos(scanned[2] - pose[2]), math.sin(scanned[2] - pose[2])
+    along_x, along_y = scanned[0] - pose[0], scanned[1] - pose[1]
+    ahead = along_x * math.cos(pose[2]) + along_y * math.sin(pose[2])
+    aside = along_y * math.cos(pose[2]) - along_x * math.sin(pose[2])
     for beam in range(ranges.shape[0]):
         distance = ranges[beam]
         if not distance < np.inf:
             continue
-        y = distance * unit_vectors[1, beam]
-        x = distance * unit_vectors[0, beam]
+        left = distance * unit_vectors[1, beam]
+        front = distance * unit_vectors[0, beam]
+        y = sine * front + cosine * left + aside
+        x = cosine * front - sine * left + ahead
         if x > 0.0 and -radius < y < radius:
             gap = min(gap, x - math.sqrt(radius * radius - y * y))
     return gap
@@ -166,7 +179,8 @@ def safe_speed(sensed: Sensed, bodies: Bodies, robot: int) -> float:
     """
     braking, time_step = bodies.limits[BRAKING], bodies.limits[TIME_STEP]
     own, speed = bodies.radii[robot] + SIDE_GAP, sensed.velocities[robot, 0]
-    gap = _gap_in_scan(sensed.ranges[robot], bodies.unit_vectors[robot], own)
+    ranges, scanned, pose = sensed.ranges[robot], sensed.scanned[robot], sensed.poses[robot]
+    gap = _gap_in_scan(ranges, bodies.unit_vectors[robot], own, scanned, pose)
     allowed = math.sqrt(2.0 * braking * max(gap - STANDSTILL - 0.5 * time_step * speed, 0.0))
     if bodies.knows_teammates:
         teammate_gap = _gap_to_teammates(robot, sensed.poses, sensed.velocities, bodies, bodies.present)

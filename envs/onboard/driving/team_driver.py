@@ -222,6 +222,7 @@ class TeamDriver:
             simulation.beliefs.believed,
             simulation.measured,
             simulation.ranges,
+            simulation.beliefs.scanned,
             self._commands,
         )
         return self._commands

@@ -63,7 +63,7 @@ class BulletWorld(KinematicWorld):
 
     Parameters
     ----------
-    robots, lidar, time_step, episodes, odometry, faults, horizon_s
+    robots, lidar, time_step, episodes, odometry, faults, horizon_s, scan_steps
         As for ``KinematicWorld``.
 
     Raises
@@ -81,8 +81,10 @@ class BulletWorld(KinematicWorld):
         odometry: OdometrySettings = ODOMETRY["ideal"],
         faults: FaultSettings = NO_FAULTS,
         horizon_s: float | None = None,
+        scan_steps: int = 1,
     ) -> None:
-        super().__init__(robots, lidar, time_step, episodes, odometry, True, faults, horizon_s)
+        super().__init__(robots, lidar, time_step, episodes, odometry, True, faults, horizon_s, scan_steps)
+        self._scan_steps = scan_steps
         self.team = list(robots)
         self._attitudes = np.zeros((self.robots * episodes, 3))
         self._physics = [Bodies(self.team, time_step) for _ in range(episodes)]
@@ -129,7 +131,7 @@ class BulletWorld(KinematicWorld):
                 self._move(episode, kidnapped)
             encode(self._table, self.robots, self._wheel_velocities, chosen)
         sense(self._table, self.robots, chosen)
-        self._sense_leaning(chosen)
+        self._sense_leaning(chosen & ((self.steps + 1) % self._scan_steps == 0))
 
     def show(self) -> bool:
         """Show the bodies of the first episode in PyBullet's window; False if there is no display."""

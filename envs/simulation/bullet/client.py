@@ -8,9 +8,7 @@ import weakref
 from pathlib import Path
 from typing import Any
 
-MISSING = (
-    'backend "bullet" needs PyBullet; install it with: pip install "lidarium[bullet]" (its wheels end at CPython 3.11)'
-)
+from lidarium.extras import install_command
 
 
 class _MissingBulletError(ImportError, ValueError):
@@ -22,7 +20,10 @@ def _load_bullet() -> Any:  # noqa: ANN401
     try:
         return importlib.import_module("pybullet")
     except ImportError as error:
-        raise _MissingBulletError(MISSING) from error
+        command = install_command("bullet")
+        raise _MissingBulletError(
+            f'backend "bullet" needs PyBullet, whose wheels end at CPython 3.11: {command}'
+        ) from error
 
 
 def has_display() -> bool:

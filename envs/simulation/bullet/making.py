@@ -16,5 +16,6 @@ def make_bullet(settings: ExplorationSettings, episodes: int = 1) -> Simulation:
         settings.odometry,
         settings.faults,
         settings.horizon_s,
+        settings.scan_steps,
     )
     return simulation_of(world, settings)

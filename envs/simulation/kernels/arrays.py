@@ -38,8 +38,9 @@ DEAD, BROKEN_PHYSICS = 1, 2
     LASER_HEIGHT,
     MAP_RESOLUTION,
     TIME_STEP,
-) = range(10)
-"""Columns of ``sensor``."""
+    SCAN_STEPS,
+) = range(11)
+"""Columns of ``sensor``; steps from scan to scan are those of the first robot."""
 
 (
     SQUARES,
@@ -72,8 +73,8 @@ class WorldArrays(NamedTuple):
     ----------
     bodies : (robots, 8) float64
         ``Robot.numbers`` of each robot of a team.
-    sensor : (robots, 10) float64
-        Numbers of each robot's laser, the maps and the step, see ``sensor_numbers``.
+    sensor : (robots, 11) float64
+        Numbers of each robot's laser, the maps and the steps, see ``sensor_numbers``.
     unit_vectors : (2 * robots, beams) float64
         Directions of the beams against the heading: cosines, then sines, of each robot; see ``beams_of``.
     noise_table : (4096,) float32
@@ -90,6 +91,8 @@ class WorldArrays(NamedTuple):
         Whether the robot drives, and its flags.
     poses, velocities, starts, believed : (rows, 3), (rows, 2), (rows, 3), (rows, 3) float64
         True poses and velocities, poses at the start, and poses as the localizers believe.
+    scanned : (rows, 3) float64
+        Believed poses at the last scans; ``believed`` itself if robots scan in each step.
     ranges, true_ranges : (rows, beams) float32
         Scans as measured, and without noise if stages run one by one [m]; inf for no return.
     belief_rows, origins : (rows, 5) int64, (rows, 2) float64
@@ -144,6 +147,7 @@ class WorldArrays(NamedTuple):
     velocities: Annotated[Array, np.float64, 2]
     starts: Annotated[Array, np.float64, 2]
     believed: Annotated[Array, np.float64, 2]
+    scanned: Annotated[Array, np.float64, 2]
     ranges: Annotated[Array, np.float32, 2]
     true_ranges: Annotated[Array, np.float32, 2]
     belief_rows: Annotated[Array, np.int64, 2]
@@ -184,6 +188,12 @@ def beams_of(world: WorldArrays, robot: int) -> Array:
     return world.unit_vectors[2 * robot : 2 * robot + 2]
 
 
+@kernel(inline="always")
+def is_scanning(world: WorldArrays, episode: int) -> bool:
+    """Whether robots scan in the step of an episode that runs and is not counted yet."""
+    return bool((world.steps[episode] + 1) % int(world.sensor[0, SCAN_STEPS]) == 0)
+
+
 def table_of_owners(*owners: object) -> NDArray[np.int64]:
     """Return the table of a world's arrays, each an attribute of the first owner that has it.
 
@@ -205,13 +215,16 @@ def table_of_owners(*owners: object) -> NDArray[np.int64]:
     return table_of(arrays)
 
 
-def sensor_numbers(lidars: Sequence[Lidar], time_step: float, map_resolution: float) -> NDArray[np.float64]:
-    """Return the parameters of each laser, the step [s] and the maps' cells [m] for kernels, shape (robots, 10)."""
-    numbers = np.zeros((len(lidars), 10))
+def sensor_numbers(
+    lidars: Sequence[Lidar], time_step: float, map_resolution: float, scan_steps: int = 1
+) -> NDArray[np.float64]:
+    """Return numbers for kernels, (robots, 11): each laser, the maps' cells [m], a step [s], steps between scans."""
+    numbers = np.zeros((len(lidars), 11))
     for row, lidar in zip(numbers, lidars, strict=True):
         row[ANGLE_FIRST], row[ANGLE_INCREMENT] = lidar.angle_first, lidar.angle_increment
         row[FULL_CIRCLE] = float(lidar.is_full_circle)
         row[RANGE_MIN], row[RANGE_MAX] = lidar.range_min, lidar.range_max
         row[NOISE_FLOOR], row[NOISE_SHARE] = lidar.noise_floor, lidar.noise_share
         row[LASER_HEIGHT], row[MAP_RESOLUTION], row[TIME_STEP] = lidar.height, map_resolution, time_step
+        row[SCAN_STEPS] = scan_steps
     return numbers

@@ -16,6 +16,7 @@ from lidarium.envs.simulation.kernels.arrays import (
     MASK_WORDS,
     OWN_MASK,
     RANGE_MAX,
+    SCAN_STEPS,
     WorldArrays,
     beams_of,
 )
@@ -118,10 +119,10 @@ def footprint(
     """
     sensor, beams = world.sensor[row - first], world.ranges.shape[1]
     directions, lengths, ends = np.empty((4, beams)), np.empty(beams), np.empty((2, beams))
-    if is_noisy(sensor):
+    if is_noisy(sensor) or world.sensor[0, SCAN_STEPS] > 1.0:
         measure(world, row, first, robots, directions, np.empty(beams, np.float32), lengths)
     else:
-        # The sensor measured the true ranges: nothing has to be cast again.
+        # The sensor measured the true ranges from here: nothing has to be cast again.
         beam_directions(world.poses[row, 2], beams_of(world, row - first), directions)
         true_lengths(world.ranges[row], sensor, lengths)
     return _seen_area(world, row, first, robots, lengths, directions, ends, bits)  # type: ignore[no-any-return]

@@ -28,11 +28,13 @@ from lidarium.envs.simulation.kernels.arrays import (
     MASK_WORDS,
     OWN_FRAME,
     OWN_MASK,
+    SCAN_STEPS,
     SOME_TEAMMATES,
     TEAM_MASK,
     TIME_STEP,
     TRUE_POSE,
     WorldArrays,
+    is_scanning,
     world_at,
 )
 from lidarium.envs.simulation.kernels.map_updates import (
@@ -129,7 +131,11 @@ def _move(world: WorldArrays, episode: int, robots: int, commands: Array, moves_
 
 @kernel(inline="always")
 def _localize(world: WorldArrays, episode: int, robots: int) -> None:
-    """Localize the robots with a localizer in the kernels, and clear the changes of the last step."""
+    """Localize the robots with a localizer in the kernels, and clear the changes of the last step.
+
+    If they scan in this step, note where they believe to do so.
+    """
+    scans = is_scanning(world, episode)
     for row in range(episode * robots, (episode + 1) * robots):
         world.boxes[row] = 0
         is_relative = world.flags[row] & OWN_FRAME != 0
@@ -137,6 +143,9 @@ def _localize(world: WorldArrays, episode: int, robots: int) -> None:
             _believe_truth(world.poses[row], world.starts[row], is_relative, world.believed[row])
         elif world.flags[row] & DEAD_RECKONING:
             _believe_odometry(world.odometry[row], world.starts[row], is_relative, world.believed[row])
+        if scans:
+            for axis in range(3):
+                world.scanned[row, axis] = world.believed[row, axis]
 
 
 @kernel(inline="always")
@@ -169,14 +178,15 @@ def _share(world: WorldArrays, episode: int, robots: int) -> None:
 
 @kernel
 def step_episode(table: Array, episode: int, robots: int, commands: Array, moves_bodies: bool, perceives: bool) -> None:
-    """Run a step of one episode: move, sense, score and (if ``perceives``) map."""
+    """Run a step of one episode: move, and if robots scan in it, sense, score and (if ``perceives``) map."""
     world = world_at(table)
     _move(world, episode, robots, commands, moves_bodies)
     _localize(world, episode, robots)
-    scratch = scan_scratch(world)
-    for row in range(episode * robots, (episode + 1) * robots):
-        if not world.flags[row] & ENDED:
-            sense_and_perceive(world, row, episode * robots, robots, perceives, scratch)
+    if is_scanning(world, episode):
+        scratch = scan_scratch(world)
+        for row in range(episode * robots, (episode + 1) * robots):
+            if not world.flags[row] & ENDED:
+                sense_and_perceive(world, row, episode * robots, robots, perceives, scratch)
     _share(world, episode, robots)
 
 
@@ -194,16 +204,18 @@ def _share_episode(table: Array, episode: int, robots: int) -> None:
 
 @kernel
 def _step_row(table: Array, row: int, robots: int, perceives: bool) -> None:
-    """Run both stages for the robot of a row, if it has not ended."""
+    """Run both stages for the robot of a row, if it scans in this step and has not ended."""
     world = world_at(table)
-    if not world.flags[row] & ENDED:
+    if is_scanning(world, row // robots) and not world.flags[row] & ENDED:
         sense_and_perceive(world, row, row // robots * robots, robots, perceives, scan_scratch(world))
 
 
 @kernel
 def _perceive_row(table: Array, row: int, robots: int, runs: Array) -> None:
-    world = world_at(table)
-    if runs[row // robots] and not world.flags[row] & ENDED:
+    world, episode = world_at(table), row // robots
+    # The step is counted.
+    scanned = world.steps[episode] % int(world.sensor[0, SCAN_STEPS]) == 0
+    if runs[episode] and scanned and not world.flags[row] & ENDED:
         perceive_robot(world, row, row // robots * robots, robots, scan_scratch(world))
 
 
@@ -230,11 +242,11 @@ def encode(table: Array, robots: int, velocities: Array, runs: Array) -> None:
 
 @kernel
 def sense(table: Array, robots: int, runs: Array) -> None:
-    """Take the scans of all robots that have not ended, at their current poses."""
+    """Take the scans of all robots that scan in this step and have not ended, at their current poses."""
     world = world_at(table)
     scratch = scan_scratch(world)
     for episode in range(runs.shape[0]):
-        if not runs[episode]:
+        if not runs[episode] or not is_scanning(world, episode):
             continue
         for row in range(episode * robots, (episode + 1) * robots):
             if not world.flags[row] & ENDED:
@@ -250,13 +262,15 @@ def disturb_scan(table: Array, row: int, robots: int) -> None:
 
 @kernel
 def move_and_sense(table: Array, robots: int, commands: Array, runs: Array, moves_bodies: bool) -> None:
-    """Move the bodies of the episodes with ``runs`` (episodes,), then take the scans of their robots."""
+    """Move the bodies of the episodes with ``runs`` (episodes,), then take the scans that are due."""
     world = world_at(table)
     scratch = scan_scratch(world)
     for episode in range(runs.shape[0]):
         if not runs[episode]:
             continue
         _move(world, episode, robots, commands, moves_bodies)
+        if not is_scanning(world, episode):
+            continue
         for row in range(episode * robots, (episode + 1) * robots):
             if not world.flags[row] & ENDED:
                 sense_robot(world, row, episode * robots, robots, scratch)
@@ -264,16 +278,17 @@ def move_and_sense(table: Array, robots: int, commands: Array, runs: Array, move
 
 @kernel
 def score_and_localize(table: Array, robots: int, runs: Array) -> None:
-    """Localize the robots of the episodes with ``runs``, score their measurements, and count the step."""
+    """Localize the robots of the episodes with ``runs``, score the scans of the step, and count it."""
     world = world_at(table)
     scratch = scan_scratch(world)
     for episode in range(runs.shape[0]):
         if not runs[episode]:
             continue
         _localize(world, episode, robots)
-        for row in range(episode * robots, (episode + 1) * robots):
-            if not world.flags[row] & ENDED:
-                score_robot(world, row, episode * robots, robots, scratch)
+        if is_scanning(world, episode):
+            for row in range(episode * robots, (episode + 1) * robots):
+                if not world.flags[row] & ENDED:
+                    score_robot(world, row, episode * robots, robots, scratch)
         _share(world, episode, robots)
 
 

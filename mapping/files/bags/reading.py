@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from lidarium.extras import install_command
 from lidarium.mapping.files.bags.frames import Frames, Mounting
 from lidarium.mapping.files.bags.messages import BAG_SUFFIXES, LASER_SCAN, ODOMETRY, TRANSFORMS, decoder
 from lidarium.mapping.files.beams import (
@@ -66,7 +67,7 @@ def read_bag_log(path: Path, topic: str | None = None) -> LaserLog:
     try:
         from lidarium.mapping.files.bags.storages import STORAGE_ERRORS, WANTED
     except ImportError as error:
-        raise ValueError(f'bags need the package {error.name}; pip install "lidarium[bags]"') from error
+        raise ValueError(f"bags need the package {error.name}: {install_command('bags')}") from error
     with reading(path, "a whole bag", WANTED):
         try:
             messages = _messages(path, topic)

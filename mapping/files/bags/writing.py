@@ -13,6 +13,7 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from lidarium.extras import install_command
 from lidarium.mapping.files.bags.messages import GRID, LASER_SCAN, ODOMETRY, PATH, TRANSFORMS, typestore
 from lidarium.mapping.files.laser_logs import LaserLog
 from lidarium.mapping.files.output import write_whole
@@ -39,7 +40,7 @@ class BagWriter:
 
             self._store = typestore()
         except ImportError as error:
-            raise ValueError(f'bags need the package {error.name}; pip install "lidarium[bags]"') from error
+            raise ValueError(f"bags need the package {error.name}: {install_command('bags')}") from error
         self._writer: Any = Writer(file)
         self._writer.start(profile="ros2", library="lidarium")
         self._schemas: dict[str, int] = {}

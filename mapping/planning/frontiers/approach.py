@@ -258,17 +258,19 @@ def cheapest_views(
     places, costs = np.full((count, 4), -1, np.int64), np.full(count, FAR, np.int64)
     for k in range(count):
         for i in range(starts[k], starts[k + 1]):
-            costs[k] = _cheapest_view(cells[i], log_odds, swept, spans, costs[k], places[k])
+            costs[k] = _cheapest_view(cells, i, log_odds, swept, spans, costs[k], places, k)
     return places, costs
 
 
 @kernel(nrt=False)
-def _cheapest_view(cell: Array, log_odds: Array, swept: SweptCosts, spans: Array, lowest: int, place: Array) -> int:
-    """Search a cheaper cell near a frontier cell; return the lowest cost.
+def _cheapest_view(
+    cells: Array, i: int, log_odds: Array, swept: SweptCosts, spans: Array, lowest: int, places: Array, k: int
+) -> int:
+    """Search a cheaper cell near frontier cell ``i``; return the lowest cost.
 
-    The cell and the frontier cell are written to ``place`` (4,).
+    The cell and the frontier cell are written to row ``k`` of ``places``.
     """
-    row, column = cell
+    row, column = cells[i, 0], cells[i, 1]
     reach, width = len(spans) // 2, swept.costs.shape[1]
     row_low, column_low = swept.row_low, swept.column_low
     row_end, column_end = row_low + swept.costs.shape[0] - 2, column_low + width - 2 * LANES
@@ -286,6 +288,6 @@ def _cheapest_view(cell: Array, log_odds: Array, swept: SweptCosts, spans: Array
                 cost = swept.costs[at_row - row_low + 1, at_column - column_low + LANES]
                 if cost < lowest and line_is_open(log_odds, at_row, at_column, row, column):
                     lowest = cost
-                    place[0], place[1], place[2], place[3] = at_row, at_column, row, column
+                    places[k, 0], places[k, 1], places[k, 2], places[k, 3] = at_row, at_column, row, column
             first += LANES
     return lowest

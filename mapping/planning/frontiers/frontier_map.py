@@ -34,7 +34,7 @@ IGNORED_MARK = np.uint8(IGNORED)
 TILE = 1 << TILE_SHIFT
 
 
-@kernel
+@kernel(nrt=False)
 def update_frontiers(log_odds: Array, flags: Array, tiles: Array, window: Window) -> None:
     """Recompute the flags in and next to a changed window, and the counts of its tiles (kernel).
 
@@ -70,7 +70,7 @@ def update_frontiers(log_odds: Array, flags: Array, tiles: Array, window: Window
             tiles[tile_row, tile_column] = count
 
 
-@kernel
+@kernel(nrt=False)
 def ignore_frontiers_near(flags: Array, tiles: Array, row: int, column: int, reach: float) -> int:
     """Ignore the frontier cells within ``reach`` cells of a cell, itself included (kernel).
 
@@ -137,7 +137,7 @@ def _clustered(
         if flags[cells[i, 0], cells[i, 1]] != FRONTIER:
             continue
         first = count
-        ordered[count] = cells[i]
+        ordered[count, 0], ordered[count, 1] = cells[i, 0], cells[i, 1]
         flags[cells[i, 0], cells[i, 1]] = VISITED
         count += 1
         head = first

@@ -223,7 +223,7 @@ def find_path(
     return cost if is_there or is_reached else -1, cells
 
 
-@kernel
+@kernel(nrt=False)
 def _can_enter(terrain: Terrain, row: int, column: int) -> bool:
     """Whether the body fits into a cell outside of all discs."""
     discs = terrain.discs

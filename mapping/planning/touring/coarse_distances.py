@@ -161,7 +161,7 @@ def _joined(fits: NDArray[np.bool_], starts: NDArray[np.int64], reach: int) -> N
 
     All cells, if nothing fits there.
     """
-    count, labels = cv2.connectedComponents(fits.astype(np.uint8), connectivity=8, ltype=cv2.CV_32S)
+    count, labels = cv2.connectedComponents(fits.astype(np.uint8), connectivity=4, ltype=cv2.CV_32S)
     is_kept = np.zeros(count, np.bool_)
     for row, column in starts:
         part = labels[max(row - reach, 0) : row + reach + 1, max(column - reach, 0) : column + reach + 1]

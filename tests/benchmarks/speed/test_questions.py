@@ -61,7 +61,8 @@ def test_decisions_by_frontiers_are_counted_by_robot(monkeypatch):
     assert choosers.decide() == 6
     assert choosers.run(0.0) > 0.0
     lines = frontier_decision.measure(LEAST)
-    assert [line.to_reach for line in lines] == [6000.0, 3000.0]
+    assert [line.to_reach for line in lines] == [3500.0, 3000.0, 8000.0, 6000.0]
+    assert [line.name.endswith(", fast") for line in lines] == [False, False, True, True]
     assert all(line.judged > 0.0 and line.unit == "rows/CPU s" for line in lines)
 
 

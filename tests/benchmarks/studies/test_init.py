@@ -10,6 +10,7 @@ NAMES = (
     *(
         "bounds",
         "dungeons",
+        "fast",
         "floors",
         "interval_coverage",
         "leaderboard",

@@ -163,10 +163,10 @@ def test_realism_is_what_its_preset_says_but_for_what_is_given():
 
 
 def test_unknown_names_are_refused_with_those_that_are_known():
-    with pytest.raises(ValueError, match=r"unknown realism 'moon'.*ideal, lab, field"):
+    with pytest.raises(ValueError, match=r"unknown realism 'moon'.*ideal, lab, field, fast"):
         make_settings(realism="moon")
     with pytest.raises(ValueError, match="unknown odometry 'rusty'"):
         make_settings(odometry="rusty")
     with pytest.raises(ValueError, match="localization is 'gps'; want one of truth, odometry"):
         make_settings(localization="gps")
-    assert set(REALISM) == {"ideal", "lab", "field"}
+    assert set(REALISM) == {"ideal", "lab", "field", "fast"}

@@ -2,6 +2,7 @@
 
 import json
 import lzma
+from dataclasses import replace
 
 import pytest
 
@@ -137,3 +138,22 @@ def test_without_rows_of_the_baseline_nothing_is_compared_and_that_is_said(tiny,
     assert any("no rows of its baseline nearest_frontier" in remark for remark in written["remarks"])
     assert "| baseline |" not in (tmp_path / "mine" / "table.md").read_text()
     assert "baseline\n" not in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("times", "tolerance", "said"),
+    [
+        ((50.0, 20.0), 0.0, "2 rows ran again, all as shipped"),
+        ((51.0, 20.0), 0.05, "1 not as shipped; times differ by up to 2.0%, within the task's tolerance of 5%"),
+        ((51.0, 20.0), 0.0, "does not run the task as published"),
+        ((None, 20.0), 0.05, "times differ by up to 20.0%: this version"),
+    ],
+)
+def test_rows_that_ran_again_are_compared_with_those_shipped(tiny, times, tolerance, said):
+    task = replace(benchmark("tiny").task("Homes-1"), tolerance=tolerance)
+    shipped, again = (
+        [{"key": f"Homes-1 | home:0{k} | 1", "t99_s": time, "wall_s": wall} for k, time in enumerate(found)]
+        for found, wall in (((50.0, 20.0), 1.0), (times, 2.0))
+    )
+    (remark,) = results._repeated(task, again, shipped)
+    assert said in remark

@@ -56,6 +56,15 @@ def test_all_robots_end_by_the_rule_before_the_horizon(rule, holds):
     assert holds(env, history)
 
 
+@pytest.mark.parametrize("policy", ["random_walk", "tour_frontier"])
+def test_policies_that_decide_often_get_as_much_time(policy):
+    history = History()
+    env = WatchedExploration("apartment", make_settings(resolution=0.05, horizon_s=300.0), watchers=[history])
+    run_episode(lidarium.policy(policy), env, 0, on_decision=Stopper(StopRule(decisions=3), history))
+    assert set(env.scorer.ended_because.values()) == {STOP_REASON}
+    assert 6.0 <= env.scorer.time < 6.6
+
+
 @pytest.mark.parametrize(
     ("content", "message"),
     [

@@ -1,6 +1,7 @@
 """The page is served on this machine alone, at the port that was asked for, without a word on stdout."""
 
 import importlib.metadata
+import re
 import socket
 import sys
 import time
@@ -12,6 +13,7 @@ import pytest
 pytest.importorskip("viser", reason="viser is not installed: extra [viewer]")
 
 from lidarium.evaluation.viewing.server import HOST, address_of, view_server
+from lidarium.extras import install_command
 
 PATIENCE_S = 120.0
 """How long a busy machine may take [s]."""
@@ -114,7 +116,7 @@ def test_a_port_in_use_is_named():
 
 def test_a_missing_package_is_named_with_its_extra(monkeypatch):
     monkeypatch.setitem(sys.modules, "viser", None)
-    with pytest.raises(ValueError, match=r"needs the package viser; pip install \"lidarium\[viewer\]\""):
+    with pytest.raises(ValueError, match=re.escape(f"needs the package viser: {install_command('viewer')}")):
         view_server(0).__enter__()
 
 

@@ -7,6 +7,7 @@ import cv2
 import numpy as np
 import pytest
 
+from lidarium.extras import install_command
 from lidarium.scripts.main import main
 
 
@@ -26,7 +27,7 @@ def test_without_the_extra_the_message_names_it(monkeypatch, capsys, tmp_path):
     monkeypatch.setenv("LIDARIUM_FLOOR_STORE", "off")
     out = tmp_path / "out"
     assert main(["bound", "apartment:3", "--map-resolution", "0.05", "--rounds", "0", "--out", str(out)]) == 2
-    assert 'pip install "lidarium[bounds]"' in capsys.readouterr().err
+    assert install_command("bounds") in capsys.readouterr().err
     assert not out.exists() or not list(out.iterdir())
 
 

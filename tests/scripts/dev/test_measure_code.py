@@ -1,42 +1,36 @@
 """Figures of the sources are counted as a reader would count them."""
 
-import ast
+import subprocess
 
-from lidarium.scripts.dev.measure_code import LAYERS, functions, length, measure, parameters
+from lidarium.scripts.dev.measure_code import public_names, sizes, sole_importers, way, words
 
-SOURCE = '''
-def long(a, /, b, *, c):
-    """Say what it does.
-
-    In three lines.
-    """
-    first = a
-
-    return first
-
-
-class Thing:
-    def method(self, a):
-        return a
-'''
-
-
-def test_docstrings_and_self_do_not_count():
-    outer, method = functions(ast.parse(SOURCE))
-    assert (length(outer), parameters(outer)) == (4, 3)
-    assert (length(method), parameters(method)) == (2, 1)
+ONE = "from lidarium.mapping.two import thing\n\ndef shown():\n    return thing()\n\ndef _hidden():\n    pass\n"
+TWO = "def thing():\n    return 1\n\nclass Other:\n    pass\n"
 
 
 def test_a_checkout_is_measured(tmp_path):
-    for folder in (*LAYERS, "benchmarks", "src", "tests/envs"):
-        (tmp_path / folder).mkdir(parents=True)
-    (tmp_path / "envs" / "one.py").write_text(SOURCE)
-    (tmp_path / "envs" / "__init__.py").write_text("")
-    (tmp_path / "mapping" / "two.py").write_text("x = 1\n" * 301 + "# " + "y" * 109 + "\n")
-    (tmp_path / "tests" / "envs" / "test_one.py").write_text("")
-    found = measure(tmp_path)
-    assert found["files above 300 lines"] == "1"
-    assert found["longest function [lines]"] == "4"
-    assert found["most parameters"] == "3"
-    assert found["lines beyond 110 columns"] == "1"
-    assert found["modules with a test at the mirrored path"] == "1 of 2"
+    for name, text in {"envs/one.py": ONE, "mapping/two.py": TWO, "tests/test_one.py": "x = 1\n"}.items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text(text)
+    (tmp_path / "README.md").write_text("three short words")
+    subprocess.run(["git", "init", "-q", str(tmp_path)], check=True)
+    subprocess.run(["git", "-C", str(tmp_path), "add", "."], check=True)
+    found = dict(sizes(tmp_path))
+    assert found["product: files, lines"] == "2, 12"
+    assert found["public names; of these imported by another module"] == "3; 1"
+    assert found["modules with one importer"] == "1"
+    assert words(tmp_path, are_results=False) == 3
+
+
+def test_names_with_an_underscore_and_modules_of_two_importers_do_not_count():
+    assert public_names(ONE) == ["shown"]
+    assert sole_importers({"envs/one.py": ONE, "mapping/two.py": TWO}) == {"mapping.two": "envs.one"}
+    assert not sole_importers({"envs/one.py": ONE, "envs/three.py": ONE, "mapping/two.py": TWO})
+
+
+def test_the_way_of_a_call_has_the_files_of_the_checkout_alone(tmp_path):
+    (tmp_path / "part.py").write_text("def passed():\n    return 1\n")
+    scope = {}
+    exec(compile((tmp_path / "part.py").read_text(), str(tmp_path / "part.py"), "exec"), scope)
+    assert way(tmp_path, scope["passed"]) == "1, 0"
+    assert way(tmp_path, lambda: None) == "0, 0"

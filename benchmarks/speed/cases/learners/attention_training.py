@@ -6,6 +6,7 @@ from lidarium.benchmarks.speed.cases.learners.masked_training import ALL_MIB, FL
 from lidarium.benchmarks.speed.harness.lines import Line, shown
 from lidarium.benchmarks.speed.harness.report import run_alone
 from lidarium.benchmarks.speed.harness.timing import Effort
+from lidarium.extras import install_command
 
 CORES = 2
 TO_REACH, MOST_SHARE = 2000.0, 0.6
@@ -22,7 +23,7 @@ def measure(effort: Effort) -> list[Line]:
     """Measure decisions a second and the simulator's share, floors in memory as usual and all of them."""
     name = "attention to frontiers, two cores"
     if not is_there():
-        return [Line(name, "-", 'not measured: pip install "lidarium[rl]"', None, TO_REACH, unit="decisions/s")]
+        return [Line(name, "-", f"not measured: {install_command('rl')}", None, TO_REACH, unit="decisions/s")]
     from lidarium.training.reinforcement.frontier_policy import FrontierPolicy
 
     learner, lines = FrontierLearner(FrontierPolicy, EPISODES, ROLLOUT, BATCH, EPOCHS, threads=2), []

@@ -13,6 +13,7 @@ from lidarium.benchmarks.speed.cases.learners.masked_training import timed
 from lidarium.benchmarks.speed.harness.lines import Line, shown
 from lidarium.benchmarks.speed.harness.report import run_alone
 from lidarium.benchmarks.speed.harness.timing import Effort
+from lidarium.extras import install_command
 
 CORES = 2
 TO_REACH, MOST_SHARE = 2000.0, 0.6
@@ -45,7 +46,7 @@ def measure(effort: Effort) -> list[Line]:
     """Measure decisions a second, and how much of the time the simulator takes."""
     names = "training by rewards, two cores", "training by rewards, the simulator's share"
     if importlib.util.find_spec("sb3_contrib") is None:
-        missing = 'not measured: pip install "lidarium[rl]"'
+        missing = f"not measured: {install_command('rl')}"
         return [Line(name, "-", missing, None, goal) for name, goal in zip(names, (TO_REACH, 1), strict=True)]
     rate = statistics.median(1.0 / seconds for seconds, _ in _decisions(effort.rounds, 2))
     share = statistics.median(inside / seconds for seconds, inside in _decisions(1, 1))

@@ -13,6 +13,7 @@ from lidarium.benchmarks.speed.harness.lines import Line, shown
 from lidarium.benchmarks.speed.harness.report import run_alone
 from lidarium.benchmarks.speed.harness.timing import Effort
 from lidarium.envs.simulation.kernels.floor_cache import DEFAULT_MIB, SIZE_VARIABLE
+from lidarium.extras import install_command
 
 FLOORS = "set:train:300"
 ROBOT = {"level": "frontier", "observe": ["frontiers", "time_left"], "robots": 1, "horizon_s": 60.0}
@@ -119,7 +120,7 @@ def measure(effort: Effort) -> list[Line]:
     """Measure training with as many floors in memory as usual, and with all of them."""
     name = f"MaskablePPO, {LEARNER.episodes} episodes, two cores"
     if not is_there():
-        return [Line(name, "-", 'not measured: pip install "lidarium[rl]"', None, TO_REACH, unit="steps/s")]
+        return [Line(name, "-", f"not measured: {install_command('rl')}", None, TO_REACH, unit="steps/s")]
     lines = []
     for title, mebibytes in ((name, None), (f"{name}, all floors in memory", ALL_MIB)):
         rate = statistics.median(rate for rate, _ in timings(LEARNER, effort.rounds, mebibytes))

@@ -65,6 +65,7 @@ class Drive:
                     simulation.beliefs.believed,
                     simulation.world.velocities,
                     simulation.ranges,
+                    simulation.beliefs.scanned,
                     simulation.beliefs.contact,
                     simulation.beliefs.heard,
                 ),

@@ -16,11 +16,12 @@ from lidarium.envs.onboard.driving.safety_stop import (
     _gap_to_teammates,
     safe_speed,
 )
+from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.kernels.compilation import kernel
 
 BEAMS = np.radians(np.linspace(-120.0, 120.0, 241))
 UNIT = np.stack([np.cos(BEAMS), np.sin(BEAMS)])
-RADIUS = 0.2
+RADIUS, HERE = 0.2, np.zeros(3)
 
 
 def bodies_of(robots, knows_teammates=True):
@@ -36,7 +37,7 @@ def sensed_of(poses, ranges=None, contact=None):
     if ranges is not None:
         scans[0] = ranges
     contact = np.zeros((robots, robots), np.uint8) if contact is None else contact
-    return Sensed(poses, np.zeros((robots, 2)), scans, contact, np.tile(poses.ravel(), (robots, 1)))
+    return Sensed(poses, np.zeros((robots, 2)), scans, poses, contact, np.tile(poses.ravel(), (robots, 1)))
 
 
 @kernel
@@ -48,8 +49,10 @@ def speed_of(sensed, bodies, robot):
 def test_the_gap_in_a_scan_is_how_far_the_disc_can_be_pushed(seed):
     ranges = np.random.default_rng(seed).uniform(0.3, 3.0, len(BEAMS)).astype(np.float32)
     ranges[::7] = np.inf
-    found = _gap_in_scan(ranges, UNIT, RADIUS)
-    hits = (ranges * UNIT)[:, np.isfinite(ranges)].T
+    # The robot has moved on since the scan in the second case.
+    pose = np.zeros(3) if seed % 2 else np.array([0.1, -0.05, 0.4])
+    found = _gap_in_scan(ranges, UNIT, RADIUS, HERE, pose)
+    hits = Transform(*pose).inverse().apply((ranges * UNIT)[:, np.isfinite(ranges)].T)
 
     def is_clear(way):
         return (np.hypot(hits[:, 0] - way, hits[:, 1]) > RADIUS).all()
@@ -61,7 +64,7 @@ def test_the_gap_in_a_scan_is_how_far_the_disc_can_be_pushed(seed):
 def test_nothing_ahead_is_no_limit():
     ranges = np.full(len(BEAMS), np.inf, np.float32)
     ranges[np.abs(BEAMS) > math.pi / 2] = 0.3
-    assert _gap_in_scan(ranges, UNIT, RADIUS) == math.inf
+    assert _gap_in_scan(ranges, UNIT, RADIUS, HERE, HERE) == math.inf
     assert speed_of(sensed_of([(0, 0, 0)], ranges), bodies_of(1), 0) == math.inf
 
 

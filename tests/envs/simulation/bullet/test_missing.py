@@ -13,7 +13,7 @@ from lidarium.scripts.commands.run import Run
 def test_the_error_names_the_extra_before_anything_starts(monkeypatch):
     monkeypatch.setitem(sys.modules, "pybullet", None)
     settings = make_settings(backend="bullet")
-    with pytest.raises(ValueError, match=r'PyBullet; install it with: pip install "lidarium\[bullet\]"'):
+    with pytest.raises(ValueError, match=r"PyBullet, whose wheels end at CPython 3.11: pip install"):
         ExplorationEnv("apartment", settings)
 
 
