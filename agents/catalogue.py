@@ -60,6 +60,11 @@ POLICIES.register(
     "the team shares out all frontiers as tours past places from which much is seen",
 )
 POLICIES.register(
+    "predicted_tours",
+    "lidarium.agents.predicted.policy:PredictedTours",
+    "tours of the team, chosen by what is left to see on a map whose unknown part is predicted",
+)
+POLICIES.register(
     "learned",
     "lidarium.agents.learned.policy:Learned",
     "tours of the team, of which a trained network chooses where each robot sets out",

@@ -11,6 +11,7 @@ from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.settings.making import make_settings
 from lidarium.mapping.files.guarded_reading import read_text, reading
 from lidarium.mapping.geometry.bounds import above, check_settings, share, shown, within
+from lidarium.training.prediction.settings import PredictionSettings
 
 MOST_BYTES = 1 << 20
 """Files of settings are no larger."""
@@ -216,7 +217,15 @@ class TrainingSettings:
 
 
 def read_training(path: Path) -> TrainingSettings:
-    """Read the settings of a training from a TOML file."""
+    """Read the settings of a training of explorers from a TOML file."""
+    settings = read_any_training(path)
+    if not isinstance(settings, TrainingSettings):
+        raise ValueError(f"{path} has a table [prediction], and is no training of explorers")
+    return settings
+
+
+def read_any_training(path: Path) -> TrainingSettings | PredictionSettings:
+    """Read the settings of a training from a TOML file; with a table ``[prediction]`` that of a map predictor."""
     path = Path(path)
     if not path.exists():
         raise FileNotFoundError(f"no training {path}; want a TOML file, as docs/tutorials/train_a_team.md shows one")
@@ -224,7 +233,20 @@ def read_training(path: Path) -> TrainingSettings:
     with reading(path, "TOML"):
         content = tomllib.loads(text)
     with reading(path, "a training that can be used"):
+        if "prediction" in content:
+            return _prediction_of(content)
         return training_of(content)
+
+
+def _prediction_of(content: Mapping[str, Any]) -> PredictionSettings:
+    """Make settings of a file with a table ``[prediction]``."""
+    others = sorted(set(content) - {"prediction", "seed"})
+    if others:
+        raise ValueError(f"a training of predictions has no {shown(others[0])}; it has seed and [prediction]")
+    table = content["prediction"]
+    if isinstance(table, Mapping) and "seed" in content:
+        table = {"seed": content["seed"], **table}
+    return _made(PredictionSettings, table, "prediction")
 
 
 def training_of(content: Mapping[str, Any]) -> TrainingSettings:

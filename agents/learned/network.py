@@ -8,25 +8,17 @@ A. Vaswani et al., "Attention is all you need", 2017; normalisation before each 
 layer normalization in the transformer architecture", 2020.
 """
 
-import hashlib
-import json
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
-from importlib import resources
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from safetensors import SafetensorError
-from safetensors.numpy import load, save
 
 from lidarium.agents.learned.decision import CROP_SIDE, Decision
 from lidarium.agents.learned.features import OPTION_FEATURES, SITUATION_FEATURES, TEAMMATE_FEATURES
-from lidarium.mapping.files.guarded_reading import read_bytes, reason
-from lidarium.mapping.files.output import write_whole
-from lidarium.mapping.geometry.bounds import shown
+from lidarium.mapping.files.weight_files import WeightFiles, Weights
 from lidarium.mapping.planning.touring.map_crops import FREE, OCCUPIED
 
 WIDTH, HEADS, LAYERS, INNER, CROP_WIDTH = 64, 4, 2, 128, 48
@@ -35,7 +27,8 @@ WIDTH, HEADS, LAYERS, INNER, CROP_WIDTH = 64, 4, 2, 128, 48
 EPSILON = 1e-5
 """Added to variances before they divide."""
 
-Weights = Mapping[str, NDArray[np.float32]]
+SHIPPED, CARD = "learned.safetensors", "learned.json"
+"""The weights that the package has, and what is said of them."""
 
 
 def _shapes() -> dict[str, tuple[int, ...]]:
@@ -117,70 +110,17 @@ class Network:
         return np.asarray(scaled * self.weights[f"{name}.weight"] + self.weights[f"{name}.bias"])
 
 
-def _check_weights(weights: Weights, name: str) -> None:
-    """Check that weights are those of this network."""
-    wanted = _shapes()
-    for key in sorted({*weights, *wanted}):
-        if key not in weights or key not in wanted:
-            what = "lacks" if key not in weights else "has"
-            raise ValueError(f"{name} {what} the array {key!r}; it is of another network or version")
-        array = weights[key]
-        if array.shape != wanted[key] or array.dtype != np.float32:
-            raise ValueError(
-                f"{name} holds {key!r} as {array.dtype} {array.shape}; want float32 {wanted[key]}: "
-                "it is of another network or version"
-            )
-        if not np.isfinite(array).all():
-            raise ValueError(f"{name} holds {key!r} with numbers that are not finite; train again")
+FILES = WeightFiles(_shapes(), "lidarium.agents.learned", SHIPPED, CARD)
+"""Files of this network's weights."""
 
-
-MAX_BYTES = 5_000_000
-"""Files of weights are no larger."""
-
-SHIPPED, CARD = "learned.safetensors", "learned.json"
-"""The weights that the package has, and what is said of them."""
+save_weights, _check_weights = FILES.save, FILES.check
 
 
 def load_weights(path: str | Path = "") -> dict[str, NDArray[np.float32]]:
     """Return the weights of a file; if ``path`` is empty, the package's."""
-    if not isinstance(path, str | Path):
-        raise ValueError(f"weights is {shown(path)}; want the name of a file")
-    if not str(path):
-        return dict(_shipped())
-    return _weights_from(read_bytes(Path(path), MAX_BYTES), str(path))
-
-
-def _weights_from(content: bytes, name: str) -> dict[str, NDArray[np.float32]]:
-    """Return the weights of a file's content; ``name`` is its name in messages."""
-    try:
-        weights: dict[str, NDArray[np.float32]] = load(content)
-    except (SafetensorError, ValueError, KeyError, TypeError) as error:
-        raise ValueError(f"{name} is no file of weights, or is truncated: {error}") from error
-    _check_weights(weights, name)
-    return weights
-
-
-def save_weights(path: Path, weights: Weights) -> str:
-    """Write weights to a file, whole or not at all, and return its SHA-256."""
-    _check_weights(weights, "what was trained")
-    content = save({name: np.ascontiguousarray(array) for name, array in weights.items()})
-    path.parent.mkdir(parents=True, exist_ok=True)
-    write_whole(path, content)
-    return hashlib.sha256(content).hexdigest()
+    return FILES.load(path) if path != "" else dict(_shipped())
 
 
 @lru_cache(maxsize=1)
 def _shipped() -> dict[str, NDArray[np.float32]]:
-    """Return the package's weights, checked against the hash that their card names."""
-    folder = resources.files("lidarium.agents.learned") / "data"
-    try:
-        content = (folder / SHIPPED).read_bytes()
-        wanted = json.loads((folder / CARD).read_text(encoding="utf-8"))["sha256"]
-    except (OSError, ValueError, LookupError, TypeError) as error:
-        raise ValueError(
-            f"{SHIPPED} of the package or its card {CARD} cannot be read ({reason(error)}); install the "
-            "package again, or name a file of weights: weights=FILE"
-        ) from error
-    if hashlib.sha256(content).hexdigest() != wanted:
-        raise ValueError(f"{SHIPPED} is not what its card {CARD} names; install the package again")
-    return _weights_from(content, SHIPPED)
+    return FILES.load()

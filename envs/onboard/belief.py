@@ -9,6 +9,8 @@ from lidarium.envs.onboard.perception import Perception
 from lidarium.envs.onboard.sparse_belief import SparseBelief
 from lidarium.envs.settings.lidar import Lidar
 from lidarium.envs.settings.robots import Robot
+from lidarium.mapping.prediction.levels import factor_of, levels_of
+from lidarium.mapping.prediction.predictors import PartialMap, make_predictor, predicted
 
 
 class Belief:
@@ -89,6 +91,19 @@ class Belief:
         With unknown starts None until the robot is sent the knowledge of others.
         """
         return self._perception.shared_map(self._row)
+
+    @property
+    def predicted_map(self) -> NDArray[np.float32]:
+        """Probability that each square of the own map is free, by the network of the package, (rows, columns).
+
+        Squares of 0.2 m begin at ``map_origin``; 1 and 0 where the map is known. It takes 12 ms for each 32 x 32 m.
+        """
+        navigation = self.map
+        factor = factor_of(navigation.resolution)
+        side = factor * navigation.resolution
+        found = predicted(make_predictor("network"), PartialMap(levels_of(navigation.log_odds, factor), side))
+        assert found is not None
+        return found
 
     @property
     def sparse_map(self) -> SparseBelief:

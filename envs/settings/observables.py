@@ -72,6 +72,12 @@ SENSED.register(
     "the whole known map around the robot in pictures that show more and more, (levels, P, P)",
 )
 
+SENSED.register(
+    "predicted_map",
+    "lidarium.envs.observing.predicted_map:PREDICTED_MAP",
+    "probability that squares of 0.2 m within 16 m of the robot are free, (160, 160)",
+)
+
 
 def check_sensed(settings: Any) -> None:  # noqa: ANN401
     """Check that the sensors which are observed are there."""

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from lidarium.mapping.geometry.small_matrices import product
+
 
 @dataclass(frozen=True, slots=True)
 class Transform:
@@ -46,7 +48,8 @@ class Transform:
 
     def difference(self, other: "Transform", at: ArrayLike = (0.0, 0.0)) -> tuple[float, float]:
         """Return by how much two transforms differ at a point [m, rad]: between its images, and in angle."""
-        return float(np.linalg.norm(self.apply(at) - other.apply(at))), abs(wrapped(self.theta - other.theta))
+        x, y = (self.apply(at) - other.apply(at)).tolist()
+        return math.hypot(x, y), abs(wrapped(self.theta - other.theta))
 
 
 def wrapped(angle: float) -> float:
@@ -117,4 +120,4 @@ def turned(matrix: NDArray[np.float64], angle: float) -> NDArray[np.float64]:
     """
     cosine, sine = math.cos(angle), math.sin(angle)
     turn = np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
-    return np.asarray(turn @ matrix @ turn.T, np.float64)
+    return product(turn, matrix, turn.T)

@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.mapping.geometry.rigid import composed, relative
+from lidarium.mapping.geometry.small_matrices import product
 from lidarium.mapping.grids.scan_geometry import ScanGeometry
 from lidarium.mapping.localization.localizer import KeyScans, Sensing
 from lidarium.mapping.localization.settings import OdometryUncertainty
@@ -76,4 +77,4 @@ def compounded(
     lever = np.eye(3)
     lever[0, 2] = -(sine * motion[0] + cosine * motion[1])
     lever[1, 2] = cosine * motion[0] - sine * motion[1]
-    return np.asarray(lever @ covariance @ lever.T + turned @ growth @ turned.T)
+    return product(lever, covariance, lever.T) + product(turned, growth, turned.T)

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from lidarium.mapping.geometry.bounds import Distance, FromZero, Turn, check_settings, share, within
 from lidarium.mapping.geometry.rigid import Transform
+from lidarium.mapping.geometry.small_matrices import eigenvalues
 from lidarium.mapping.grids.occupancy import FREE, UNKNOWN
 from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.merging.described_map import FACING_DISTANCE_M, DescribedMap, faces_away
@@ -328,7 +329,7 @@ def agreement_of(
     met = hits + soft + hard
     score = 1.0 - OCCUPIED_WEIGHT * hard / (both + (OCCUPIED_WEIGHT - 1.0) * met) if both + met > 0.0 else 0.0
     centre = (float(area[1]) / both, float(area[2]) / both) if both > 0.0 else (0.0, 0.0)
-    across = 0.5 * side * sum(float(np.linalg.eigvalsh([[xx, xy], [xy, yy]])[0]) for xx, xy, yy in facing)
+    across = 0.5 * side * sum(float(eigenvalues([[xx, xy], [xy, yy]])[0]) for xx, xy, yy in facing)
     return Agreement(both * side**2, centre, 0.5 * hits * side, 0.5 * met * side, across, hard * side, score)
 
 
@@ -418,7 +419,7 @@ def _distinct_walls(a: DescribedMap, b: DescribedMap, a_from_b: Transform, hit_d
     for direction in range(DIRECTIONS):
         angle = first + direction * step
         chosen = walls[facing == direction]
-        distances = np.sort(chosen @ np.array([math.cos(angle), math.sin(angle)]))
+        distances = np.sort(chosen[:, 0] * math.cos(angle) + chosen[:, 1] * math.sin(angle))
         lengths = np.diff(np.flatnonzero(np.diff(distances) > APART_M), prepend=-1, append=len(distances) - 1)
         count += int(np.count_nonzero(lengths * b.resolution >= MIN_M - 1e-9))
     return count

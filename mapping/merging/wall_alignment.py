@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.mapping.geometry.rigid import Transform
+from lidarium.mapping.geometry.small_matrices import solved
 from lidarium.mapping.grids.occupancy import FREE, OCCUPIED
 from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.merging.described_map import FACING_DISTANCE_M, DescribedMap, faces_away
@@ -159,7 +160,8 @@ def _best_move(places: Array, facing: Array, gaps: Array, centre_x: float, centr
     # Damped a little, so that what no wall holds stays where it is.
     damping = 1e-3 * gaps.shape[0]
     hessian = np.array([[xx + damping, xy, xt], [xy, yy + damping, yt], [xt, yt, tt * 1.001 + damping]])
-    return np.linalg.solve(hessian, np.array([bx, by, bt]))
+    move: Array = solved(hessian, np.array([[bx], [by], [bt]]))[:, 0]
+    return move
 
 
 @kernel(forceinline=True)

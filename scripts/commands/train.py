@@ -1,11 +1,12 @@
 """`lidarium train`: train explorers by a teacher and by rewards, into a folder."""
 
 import importlib.util
+import json
 import os
 import shlex
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -17,7 +18,11 @@ from lidarium.scripts import first_start
 from lidarium.scripts.common import INTERRUPTED, LINE_PERIOD_S, Answer, Command, notify, table
 
 if TYPE_CHECKING:
+    from lidarium.training.prediction.settings import PredictionSettings
+    from lidarium.training.prediction.training import PredictionTraining
     from lidarium.training.progress import Progress
+    from lidarium.training.settings import TrainingSettings
+    from lidarium.training.training import Training
 
 DEFAULT_FOLDER = Path("runs/training")
 
@@ -27,10 +32,11 @@ EXTRA = ("torch", "stable_baselines3", "sb3_contrib", "tensorboard")
 
 @dataclass(frozen=True, kw_only=True)
 class _Train(Command):
-    """Train explorers by the settings of a TOML file.
+    """Train explorers, or a network that predicts maps, by the settings of a TOML file.
 
     A teacher that knows the floors rates each choice, a network is fitted to that, and goes on by rewards if
-    the file says so. Finished parts are kept, and the same command continues after the last one. The best weights
+    the file says so. If the file has a table [prediction], robots explore floors, and a network learns what their
+    partial maps hide. Finished parts are kept, and the same command continues after the last one. The best weights
     and a card with all that made them are written to --out, runs/training by default.
     """
 
@@ -40,6 +46,8 @@ class _Train(Command):
     """TOML file of the training, with its seed; docs/tutorials/train_a_team.md shows one"""
     workers: int = 0
     """processes; 0 for as many as there are cores"""
+    device: str = "cpu"
+    """where a network that predicts maps is fitted: cpu or cuda"""
 
 
 def execute(command: _Train) -> Answer:
@@ -53,15 +61,18 @@ def execute(command: _Train) -> Answer:
             f"--seed is {command.seed}, and a training draws from the seed of its file; write "
             f"seed = {command.seed} at the top of {command.config}"
         )
-    _check_extra()
-    from lidarium.training.settings import read_training
-    from lidarium.training.training import Training
+    from lidarium.training.prediction.settings import PredictionSettings
+    from lidarium.training.settings import read_any_training
 
-    settings = read_training(command.config)
+    settings = read_any_training(command.config)
+    is_prediction = isinstance(settings, PredictionSettings)
+    _check_extra(EXTRA[:1] if is_prediction else EXTRA)
+    if command.device != "cpu" and not is_prediction:
+        raise ValueError(f"--device is {command.device}, and explorers are trained on the cpu; leave it out")
     folder = command.out or DEFAULT_FOLDER
     check_writable(folder)
     first_start.compile_first(command.json)
-    training = Training(settings, folder, command.workers or len(os.sched_getaffinity(0)))
+    training = _training_of(settings, folder, command.workers or len(os.sched_getaffinity(0)), command.device)
     steps, show, is_interrupted = training.run(), _Shown(command.json), False
     try:
         for step in steps:
@@ -71,12 +82,27 @@ def execute(command: _Train) -> Answer:
     finally:
         steps.close()
         show.close()
-    return _answer(folder, is_interrupted)
+    return _predictor_answer(folder, is_interrupted) if is_prediction else _answer(folder, is_interrupted)
 
 
-def _check_extra() -> None:
-    """Check that the extra is installed."""
-    missing = [name for name in EXTRA if importlib.util.find_spec(name) is None]
+def _training_of(
+    settings: "TrainingSettings | PredictionSettings", folder: Path, workers: int, device: str
+) -> "Training | PredictionTraining":
+    """Return what a file asks for: the training of explorers, or of a network that predicts maps."""
+    from lidarium.training.settings import TrainingSettings
+
+    if isinstance(settings, TrainingSettings):
+        from lidarium.training.training import Training
+
+        return Training(settings, folder, workers)
+    from lidarium.training.prediction.training import PredictionTraining
+
+    return PredictionTraining(settings, folder, workers, device)
+
+
+def _check_extra(packages: Sequence[str]) -> None:
+    """Check that the extra is installed, as far as it is needed."""
+    missing = [name for name in packages if importlib.util.find_spec(name) is None]
     if missing:
         raise ValueError(f"training needs {', '.join(missing)}: {install_command('rl')}")
 
@@ -136,9 +162,31 @@ def _span(seconds: float) -> str:
     return f"{seconds / 60.0:.0f} min" if seconds < 5400.0 else f"{seconds / 3600.0:.1f} h"
 
 
-def _answer(folder: Path, is_interrupted: bool) -> Answer:
-    import json
+def _predictor_answer(folder: Path, is_interrupted: bool) -> Answer:
+    from lidarium.mapping.files.guarded_reading import read_text
+    from lidarium.training.prediction.training import CARD_FILE, MOST_BYTES, WEIGHTS_FILE
 
+    if is_interrupted or not (folder / CARD_FILE).exists():
+        text = f"interrupted; what is finished is in {folder}, and the same command goes on there"
+        return Answer({"folder": str(folder), "interrupted": True}, text, INTERRUPTED)
+    card = json.loads(read_text(folder / CARD_FILE, MOST_BYTES))
+    found = card["held_out"]
+    lines = [
+        f"weights of {card['steps']:,} steps on {card['maps']:,} maps of {card['floors']:,} floors in "
+        f"{folder / WEIGHTS_FILE}",
+        f"on {card['held_out_floors']:,} other floors {100 * found['wrong']:.1f} % of the unknown squares near known "
+        f"ones are wrong; {100 * found['wrong_all_free']:.1f} % if all were free, "
+        f"{100 * found['wrong_nearest']:.1f} % if each were as the nearest known one; calibration error "
+        f"{found['calibration']:.3f}",
+    ]
+    if found["wrong"] >= min(found["wrong_all_free"], found["wrong_nearest"]):
+        lines.append("it is no better than a guess without a network; want more floors or steps")
+    weights = shlex.quote(f"weights={folder / WEIGHTS_FILE}")
+    lines.append(f"use them: lidarium run --policy predicted_tours --policy-set {weights}")
+    return Answer({"folder": str(folder), "interrupted": False, **card}, "\n".join(lines))
+
+
+def _answer(folder: Path, is_interrupted: bool) -> Answer:
     from lidarium.mapping.files.guarded_reading import read_text
     from lidarium.training.settings import MOST_BYTES
     from lidarium.training.training import CARD_FILE, WEIGHTS_FILE

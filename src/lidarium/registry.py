@@ -28,6 +28,7 @@ REGISTRIES: dict[str, str] = {
     "realism": "lidarium.envs.settings.making:REALISM",
     "level": "lidarium.envs.levels:LEVELS",
     "localizer": "lidarium.mapping.localization.registry:LOCALIZERS",
+    "predictor": "lidarium.mapping.prediction.predictors:PREDICTORS",
     "floor_format": "lidarium.envs.floors.importers:FORMATS",
     "study": "lidarium.benchmarks.studies:STUDIES",
     "reward_term": "lidarium.envs.engine.reward_terms:REWARD_TERMS",

@@ -5,6 +5,7 @@ that agrees nearly as well, and if it would move the robot far, or farther than 
 only together with others that say the same.
 """
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -12,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.mapping.geometry.rigid import composed, relative, turned, wrapped
+from lidarium.mapping.geometry.small_matrices import eigenvalues, inverse, squared
 from lidarium.mapping.localization.matching.branch_and_bound import Pyramid, place, pyramid
 from lidarium.mapping.localization.matching.local_mapping import Finished
 from lidarium.mapping.localization.matching.scan_matching import Match, refine
@@ -89,7 +91,7 @@ class ClosureFinder:
             Agreement of matches of late.
         """
         settings = self._settings
-        variances = np.linalg.eigvalsh(covariance[:2, :2])
+        variances = eigenvalues(covariance[:2, :2])
         reach_m = min(max(settings.deviations * float(np.sqrt(variances[-1])), settings.search_m), settings.most_m)
         reach_angle = min(
             max(settings.deviations * float(np.sqrt(covariance[2, 2])), settings.search_angle),
@@ -209,7 +211,7 @@ class ClosureFinder:
         """
         settings = self._settings
         move = (closure.measured - relative(poses[closure.old], poses[closure.new]))[:2]
-        deviations = float(np.sqrt(move @ np.linalg.solve((covariance + closure.covariance)[:2, :2], move)))
+        deviations = math.sqrt(squared(inverse((covariance + closure.covariance)[:2, :2]), move))
         is_improbable = deviations > settings.confirmed_beyond_deviations
         if np.hypot(move[0], move[1]) <= settings.confirmed_beyond_m and not is_improbable:
             return [closure]

@@ -4,7 +4,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.mapping.geometry.rigid import composed, relative, wrapped
+from lidarium.mapping.geometry.small_matrices import inverse
 from lidarium.mapping.grids.growing_array import GrowingArray
+from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.localization.graph.closures import Closure
 from lidarium.mapping.localization.graph.pose_graph import Edges, optimised, residuals
 from lidarium.mapping.localization.matching.wall_compass import WallCompass
@@ -82,7 +84,7 @@ class NodeGraph:
         levers[:, 0, 0], levers[:, 0, 1], levers[:, 0, 2] = cosine, -sine, -rest[:, 1]
         levers[:, 1, 0], levers[:, 1, 1], levers[:, 1, 2] = sine, cosine, rest[:, 0]
         levers[:, 2, 2] = 1.0
-        return np.asarray((levers @ self._covariances.rows[node:] @ levers.transpose(0, 2, 1)).sum(axis=0))
+        return np.asarray(_carried(levers, self._covariances.rows[node:]))
 
     def close(self, closures: list[Closure]) -> bool:
         """Take in closures, at least one.
@@ -90,7 +92,7 @@ class NodeGraph:
         Return whether poses are to be settled: they contradict some, or enough of them wait.
         """
         self._closures += [
-            (closure.old, closure.new, closure.measured, _inverse(closure.covariance), True) for closure in closures
+            (closure.old, closure.new, closure.measured, inverse(closure.covariance), True) for closure in closures
         ]
         self._waiting += len(closures)
         rest = np.abs(residuals(self.nodes, _arrays(self._closures[-len(closures) :])))
@@ -114,7 +116,7 @@ class NodeGraph:
             numbers,
             numbers + 1,
             self._motions.rows,
-            _inverse(self._covariances.rows),
+            np.reshape([inverse(covariance) for covariance in self._covariances.rows], (-1, 3, 3)),
             np.zeros(len(numbers), np.bool_),
         )
         edges = _joined([_arrays(walls), motions, _arrays(self._closures)])
@@ -143,5 +145,14 @@ def _joined(parts: list[Edges]) -> Edges:
     return Edges(a, b, measured, information, is_robust)
 
 
-def _inverse(covariance: NDArray[np.float64]) -> NDArray[np.float64]:
-    return np.asarray(np.linalg.inv(covariance), np.float64)
+@kernel
+def _carried(levers: Array, covariances: Array) -> Array:
+    """Return the sum of ``L C L^T`` over levers and covariances (n, 3, 3)."""
+    found = np.zeros((3, 3))
+    for n in range(len(levers)):
+        for i in range(3):
+            for j in range(3):
+                for k in range(3):
+                    for m in range(3):
+                        found[i, j] += levers[n, i, k] * covariances[n, k, m] * levers[n, j, m]
+    return found

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.mapping.geometry.rigid import relative, turned
+from lidarium.mapping.geometry.small_matrices import inverse
 from lidarium.mapping.grids.scan_geometry import ScanGeometry
 from lidarium.mapping.localization.matching.branch_and_bound import place, pyramid
 from lidarium.mapping.localization.matching.scan_matching import Match, refine
@@ -212,7 +213,7 @@ class _LocalMatcher:
             settings.search_angle + settings.search_deviations * float(spread[2]),
             max(settings.search_angle, settings.blind_angle),
         )
-        information = turned(np.asarray(np.linalg.inv(uncertainty), np.float64), float(predicted[2]))
+        information = turned(inverse(uncertainty), float(predicted[2]))
         weight = settings.weight(len(points))
         start = search(grid, points, predicted, reach_m, reach_angle, information, weight, settings.unseen)
         return refine(grid, points, start, predicted, information, weight, settings.unseen, settings.surface_m)

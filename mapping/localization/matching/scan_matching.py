@@ -18,6 +18,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from lidarium.mapping.geometry.small_matrices import inverse, solved, squared
 from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.localization.matching.submaps import FREE_LEVEL, FULL_LEVEL, UNSEEN, AgreementGrid
 
@@ -259,7 +260,7 @@ class Match:
 
         At most a metre and a radian, for unmeasured directions.
         """
-        return np.asarray(np.linalg.inv(self.information + self.prior + np.eye(3)), np.float64)
+        return inverse(self.information + self.prior + np.eye(3))
 
 
 def refine(
@@ -328,19 +329,23 @@ def _descend(objective: _Objective, pose: Array, hessian: Array) -> None:
     """Move a pose to the minimum of the cost (Levenberg and Marquardt)."""
     prior, information, weight = objective.prior, objective.information, objective.weight
     gradient, trial_gradient, trial_hessian = np.empty(3), np.empty(3), np.empty((3, 3))
-    trial = np.empty(3)
+    trial, right = np.empty(3), np.empty((3, 1))
     away = pose - prior
-    cost = weight * _normal_equations(objective, pose, hessian, gradient) + away @ information @ away
+    cost = weight * _normal_equations(objective, pose, hessian, gradient) + squared(information, away)
     damping = FIRST_DAMPING
     for _ in range(MAX_STEPS):
         whole = weight * hessian + information
         for k in range(3):
             whole[k, k] += damping * whole[k, k] + MIN_CURVATURE
-        move = np.linalg.solve(whole, weight * gradient - information @ away)
+        for i in range(3):
+            right[i, 0] = weight * gradient[i]
+            for k in range(3):
+                right[i, 0] -= information[i, k] * away[k]
+        move = solved(whole, right)[:, 0]
         trial[:] = pose + move
         trial_away = trial - prior
         trial_cost = weight * _normal_equations(objective, trial, trial_hessian, trial_gradient)
-        trial_cost += trial_away @ information @ trial_away
+        trial_cost += squared(information, trial_away)
         if trial_cost < cost:
             pose[:], away[:] = trial, trial_away
             hessian[:], gradient[:] = trial_hessian, trial_gradient

@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from lidarium.mapping.geometry.small_matrices import squared
 from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.localization.matching.submaps import FULL_LEVEL, UNSEEN, AgreementGrid
 
@@ -126,7 +127,7 @@ def _search(
         for i in range(width):
             for j in range(width):
                 away[0], away[1], away[2] = (j - steps) * side, (i - steps) * side, turn * step
-                cost = scale * sums[i, j] + away @ information @ away
+                cost = scale * sums[i, j] + squared(information, away)
                 if cost < least:
                     least = cost
                     found[:] = around + away

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.mapping.geometry.rigid import Transform, composed, relative
+from lidarium.mapping.geometry.small_matrices import product
 from lidarium.mapping.grids.growing_array import GrowingArray
 from lidarium.mapping.grids.occupancy import OccupancyGrid, OccupancySettings
 from lidarium.mapping.grids.scan_geometry import ScanGeometry
@@ -369,7 +370,7 @@ class MappedPath:
         turned = np.eye(3)
         cosine, sine = np.cos(self.at_node[2]), np.sin(self.at_node[2])
         turned[:2, :2] = [[cosine, sine], [-sine, cosine]]
-        return np.asarray(np.diag([along, along, graph.deviation_angle**2]) + turned @ matched @ turned.T)
+        return np.diag([along, along, graph.deviation_angle**2]) + product(turned, matched, turned.T)
 
     def note_key(self, ranges: NDArray[np.float32], time_s: float) -> None:
         """Keep a scan for the map, at the robot's pose."""

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.mapping.geometry.rigid import relative
+from lidarium.mapping.geometry.small_matrices import inverse, product, pseudo_inverse
 from lidarium.mapping.localization.localizer import Sensing
 from lidarium.mapping.localization.settings import OdometryUncertainty, SlamSettings
 
@@ -64,7 +65,7 @@ class OdometryCalibration:
         The motion consists of a distance (negative backwards) and a turn.
         """
         lever = _lever(distance, turn)
-        return np.asarray(self._settings.noise(distance, turn) + lever @ self.covariance @ lever.T)
+        return self._settings.noise(distance, turn) + product(lever, self.covariance, lever.T)
 
     def learn(
         self,
@@ -90,17 +91,16 @@ class OdometryCalibration:
         settings = self._settings
         lever = _lever(distance, turn)
         # The last match was no better than this one, and what is left of a motion is its noise.
-        share = np.linalg.inv(
-            np.eye(3) + information @ (settings.noise(distance, turn) + np.linalg.pinv(information + prior))
-        )
-        weighted = share @ information
-        seen = share @ (information + prior) @ difference
+        spread = settings.noise(distance, turn) + pseudo_inverse(information + prior)
+        share = inverse(np.eye(3) + product(information, spread))
+        weighted = product(share, information)
+        seen = product(share, information + prior, difference)
         faded = 1.0 - (1.0 - settings.fading) ** (abs(distance) + abs(turn))
         grown = (1.0 - faded) * self.covariance + faded * self._at_first()
-        before = np.linalg.inv(grown)
-        after = before + lever.T @ weighted @ lever
-        self.covariance = np.asarray(np.linalg.inv(0.5 * (after + after.T)), np.float64)
-        self.errors = self.errors + self.covariance @ (lever.T @ seen)
+        before = inverse(grown)
+        after = before + product(lever.T, weighted, lever)
+        self.covariance = inverse(0.5 * (after + after.T))
+        self.errors = self.errors + product(self.covariance, lever.T, seen)
         bound = settings.most_deviations * np.sqrt(np.diag(self._at_first()))
         self.errors = np.clip(self.errors, -bound, bound)
 

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from lidarium.mapping.geometry.bounds import Count, Distance, FromZero, check_settings, within
 from lidarium.mapping.geometry.rigid import Transform
+from lidarium.mapping.geometry.small_matrices import inverse, product
 from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.merging.described_map import DescribedMap
 from lidarium.mapping.merging.wall_alignment import gap_to_wall, wall_sample
@@ -385,5 +386,5 @@ def _covariance(
     """
     turns = places[:, 0] * normals[:, 1] - places[:, 1] * normals[:, 0]
     rows = np.column_stack([normals, turns])
-    information = rows.T @ rows * (wall_m / INDEPENDENT_M / variance)
-    return np.asarray(np.linalg.inv(information + 1e-6 * np.eye(3)))
+    information = product(rows.T, rows) * (wall_m / INDEPENDENT_M / variance)
+    return inverse(information + 1e-6 * np.eye(3))

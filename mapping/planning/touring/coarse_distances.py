@@ -7,7 +7,6 @@ body may stand anywhere in it; lengths are those over open cells, straight and d
 import math
 from typing import NamedTuple
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -82,7 +81,8 @@ def coarse_grid(
     max_closeness = clearance.limit - limit_of(radius, clearance.resolution)
     fits = (log_odds < 0) & (clearance.closeness <= max_closeness)
     if starts is not None:
-        fits = _joined(fits, starts, math.ceil(NEAR_START / clearance.resolution))
+        reach = math.ceil(NEAR_START / clearance.resolution)
+        fits = _joined(log_odds, clearance.closeness, max_closeness, np.asarray(starts, np.int64), reach, fits)
     is_open, row, column = _opened(log_odds, fits, factor)
     return CoarseGrid(is_open, factor, int(row), int(column), factor * clearance.resolution, max_closeness)
 
@@ -156,18 +156,45 @@ def distances_among(
     return upper + np.triu(between, 1).T, lengths
 
 
-def _joined(fits: NDArray[np.bool_], starts: NDArray[np.int64], reach: int) -> NDArray[np.bool_]:
-    """Return the cells connected to those that fit within ``reach`` cells of a start.
+@kernel
+def _joined(
+    log_odds: Array, closeness: Array, max_closeness: int, starts: Array, reach: int, fits: Array
+) -> NDArray[np.bool_]:
+    """Return the cells joined to those that fit within ``reach`` cells of a start, all if none fits there.
 
-    All cells, if nothing fits there.
+    Diagonal steps keep the body's clearance, as those of the path planner in ``grid_search`` do.
     """
-    count, labels = cv2.connectedComponents(fits.astype(np.uint8), connectivity=4, ltype=cv2.CV_32S)
-    is_kept = np.zeros(count, np.bool_)
-    for row, column in starts:
-        part = labels[max(row - reach, 0) : row + reach + 1, max(column - reach, 0) : column + reach + 1]
-        is_kept[np.unique(part)] = True
-    is_kept[0] = False
-    return np.asarray(is_kept[labels]) if is_kept.any() else fits
+    rows, columns = fits.shape
+    is_joined = np.zeros(fits.shape, np.bool_)
+    queue = np.empty((fits.sum(), 2), np.int32)
+    count = 0
+    for k in range(len(starts)):
+        for row in range(max(starts[k, 0] - reach, 0), min(starts[k, 0] + reach + 1, rows)):
+            for column in range(max(starts[k, 1] - reach, 0), min(starts[k, 1] + reach + 1, columns)):
+                if fits[row, column] and not is_joined[row, column]:
+                    is_joined[row, column] = True
+                    queue[count, 0], queue[count, 1] = row, column
+                    count += 1
+    if count == 0:
+        return np.asarray(fits)
+    head = 0
+    while head < count:
+        row, column = queue[head]
+        head += 1
+        for other in range(max(row - 1, 0), min(row + 2, rows)):
+            for another in range(max(column - 1, 0), min(column + 2, columns)):
+                if not fits[other, another] or is_joined[other, another]:
+                    continue
+                if other != row and another != column:
+                    if max(closeness[row, column], closeness[other, another]) <= max_closeness - 2:
+                        if log_odds[row, another] >= 0 and log_odds[other, column] >= 0:
+                            continue
+                    elif not (fits[row, another] and fits[other, column]):
+                        continue
+                is_joined[other, another] = True
+                queue[count, 0], queue[count, 1] = other, another
+                count += 1
+    return is_joined
 
 
 @kernel

@@ -13,6 +13,7 @@ from drawn_decisions import drawn_decision
 
 from lidarium.agents.learned import network
 from lidarium.agents.learned.network import CARD, SHIPPED, Network, _check_weights, _shapes, load_weights, save_weights
+from lidarium.mapping.files import weight_files
 
 
 def weights(scale=0.1, seed=0):
@@ -131,7 +132,7 @@ def test_weights_of_another_network_are_not_written(tmp_path):
 @pytest.fixture
 def package(tmp_path, monkeypatch):
     """A package whose weights are in another folder."""
-    monkeypatch.setattr(network.resources, "files", lambda name: tmp_path)
+    monkeypatch.setattr(weight_files.resources, "files", lambda name: tmp_path)
     network._shipped.cache_clear()
     digest = save_weights(tmp_path / "data" / SHIPPED, drawn())
     (tmp_path / "data" / CARD).write_text(json.dumps({"sha256": digest}))

@@ -18,7 +18,7 @@ NAMES = (
         "machines",
         "merging",
     ),
-    *("parity", "printed", "realism", "slam", "sparse", "splines", "srt", "supervisor"),
+    *("parity", "prediction", "printed", "realism", "slam", "sparse", "splines", "srt", "supervisor"),
 )
 
 

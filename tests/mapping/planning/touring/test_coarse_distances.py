@@ -7,6 +7,9 @@ import numpy as np
 import pytest
 
 from lidarium.mapping.planning.clearance import ClearanceField
+from lidarium.mapping.planning.footprint import Footprint
+from lidarium.mapping.planning.grid_planning import search
+from lidarium.mapping.planning.search.path_search import SearchSpace
 from lidarium.mapping.planning.touring.coarse_distances import (
     UNREACHED,
     coarse_grid,
@@ -127,3 +130,24 @@ def test_what_the_fine_cells_do_not_join_is_left_out():
     assert both.is_open[:, 30:].any()
     # A start in a wall joins what fits beside it; far from all that fits nothing is left out.
     assert coarse_grid(log_odds, field, 0.18, starts=np.array([[30, 60]])).is_open.sum() == both.is_open.sum()
+
+
+@pytest.mark.parametrize("radius", [0.012, 0.12, 0.25])
+def test_cells_are_joined_as_the_path_planner_joins_them(radius):
+    """A body that fits between the corners of two cells does not fit past them."""
+    generator = np.random.default_rng(3)
+    log_odds = np.full((40, 60), -20, np.int8)
+    log_odds[generator.random(log_odds.shape) < 0.3] = 0
+    log_odds[generator.random(log_odds.shape) < (0.2 if radius < 0.1 else 0.03)] = 20
+    log_odds[18:23, 28:33] = -20
+    field = ClearanceField(log_odds.shape, 0.2, 0.6)
+    field.update(log_odds)
+    found = search(
+        SearchSpace(log_odds.shape, 0.2), log_odds, field, (20, 30), Footprint(radius, max(radius, 0.16), 3.0)
+    )
+    grid = coarse_grid(log_odds, field, radius, starts=np.array([[20, 30]]))
+    is_open = np.zeros(log_odds.shape, bool)
+    is_open[grid.row : grid.row + len(grid.is_open), grid.column : grid.column + grid.is_open.shape[1]] = grid.is_open
+    reached = np.isfinite([[found.cost((row, column)) for column in range(60)] for row in range(40)])
+    assert 25 < reached.sum() < (log_odds < 0).sum()
+    np.testing.assert_array_equal(is_open, reached)

@@ -1,0 +1,168 @@
+"""Costs of the options of tours on a predicted map: what is left to drive where each comes first."""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.agents.tours.planning import NO_PATH, TourOptions
+from lidarium.mapping.planning.touring.coarse_distances import STRAIGHT, UNREACHED, CoarseGrid, distances_from
+from lidarium.mapping.planning.touring.expected_views import cover, shares_left
+from lidarium.mapping.planning.touring.tours import TourWeights, team_tours, tours_cost
+
+LATTICE = 3
+"""Stops are places of a lattice of so many squares."""
+
+MOST_COVER, MOST_NEAR, MOST_STOPS = 60, 24, 16
+"""Maximum number of stops that cover what is left, of those nearest as the crow flies, and of those on tours."""
+
+LEAST_STOPS = ((0.4, 1.0), (0.2, 0.5), (0.08, 0.0))
+"""Stops that show less than the first are left out [m2], and so is the second's share of what may stay unseen. If no
+stop is left, the next ones hold: squares are too coarse to tell when enough is seen."""
+
+KEPT_SHARE = 0.15
+"""A stop is left out if an option shows all but this share of its area."""
+
+VISIT_M = 0.5
+"""Cost of slowing down, turning and setting out at each stop [m]."""
+
+WEIGHTS = TourWeights(1.0, 0.4, 0.0)
+"""Weights of tours past stops: the longest, the sum, and nothing for waiting."""
+
+
+@dataclass(frozen=True, slots=True)
+class Rest:
+    """What is left to see on a predicted map, and stops that show it.
+
+    Attributes
+    ----------
+    options : TourOptions
+        The options of the robots.
+    robots : (robots, stops) float64
+        Lengths of the paths from each robot to each stop [m].
+    lengths : (options, stops) float64
+        And from each option.
+    between : (stops, stops) float64
+        And between stops.
+    left : (options, stops) float64
+        Share of each stop's area that an option does not show.
+    """
+
+    options: TourOptions
+    robots: NDArray[np.float64]
+    lengths: NDArray[np.float64]
+    between: NDArray[np.float64]
+    left: NDArray[np.float64]
+
+
+def rest_of(
+    options: TourOptions,
+    free: NDArray[np.float32],
+    unseen: NDArray[np.float32],
+    squares: tuple[float, int],
+    sensor_range: float,
+    enough: float,
+) -> Rest | None:
+    """Return what is left to see, None if that is too little for a stop.
+
+    Parameters
+    ----------
+    free, unseen : (rows, columns) float32
+        Probability that a square is free, and that it is free and not seen.
+    squares : (float, int)
+        Side of a square [m], and cells of the map along it.
+    sensor_range : float
+        How far the lasers see [m].
+    enough : float
+        Share of the free area that has to be seen.
+    """
+    (side, factor), is_open = squares, free > 0.5
+    poses = np.array([[robot.pose[1], robot.pose[0]] for robot in options.robots])
+    corner = np.array([options.grid.row, options.grid.column])
+    cells = corner + (options.places + 0.5) * options.grid.factor
+    robots, views = _squares_of(poses / side, free.shape), _squares_of(cells / factor, free.shape)
+    # Bodies stand there, even if a square of theirs has a part of a wall.
+    is_open[robots[:, 0], robots[:, 1]] = is_open[views[:, 0], views[:, 1]] = True
+    places = _places(is_open, np.concatenate([robots, views]))
+    reach, spare = round(sensor_range / side), (1.0 - enough) * float(free.sum())
+    for least, share in LEAST_STOPS:
+        chosen, _ = cover(free, unseen, places, reach, least / side**2, share * spare, MOST_COVER)
+        if len(chosen):
+            break
+    else:
+        return None
+    stops = places[chosen]
+    gaps = np.abs(stops[:, None] - robots[None]).max(axis=2).min(axis=1)
+    stops = stops[np.argsort(gaps, kind="stable")[:MOST_NEAR]]
+    fields = distances_from(CoarseGrid(is_open, factor, 0, 0, side, 0), stops)
+    # Squares close gaps that bodies fit through: in known space, paths between options are those of finer cells.
+    lengths = _metres(fields[:, views[:, 0], views[:, 1]].T, side)
+    from_options = np.minimum(lengths, _shortest(options.between, lengths))
+    from_robots = np.minimum(
+        _metres(fields[:, robots[:, 0], robots[:, 1]].T, side), _shortest(options.lengths, lengths)
+    )
+    between = np.minimum(
+        _metres(fields[:, stops[:, 0], stops[:, 1]], side), _shortest(np.ascontiguousarray(lengths.T), from_options)
+    )
+    nearest = np.argsort(from_robots.min(axis=0), kind="stable")[:MOST_STOPS]
+    stops = stops[nearest]
+    return Rest(
+        options,
+        from_robots[:, nearest],
+        from_options[:, nearest],
+        between[np.ix_(nearest, nearest)],
+        shares_left(free, unseen, stops, views, reach),
+    )
+
+
+def _squares_of(places: NDArray[np.float64], shape: tuple[int, ...]) -> NDArray[np.int64]:
+    """Return the squares of places (n, 2), row and column in squares."""
+    return np.clip(np.floor(places), 0, np.array(shape) - 1).astype(np.int64)
+
+
+def _places(is_open: NDArray[np.bool_], starts: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return the open squares of a lattice that are connected to any of some starts, (n, 2)."""
+    _, labels = cv2.connectedComponents(is_open.astype(np.uint8), connectivity=8, ltype=cv2.CV_32S)
+    reached = np.zeros(int(labels.max()) + 1, np.bool_)
+    reached[labels[starts[:, 0], starts[:, 1]]] = True
+    part = labels[::LATTICE, ::LATTICE]
+    return np.argwhere(reached[part] & (part > 0)) * LATTICE
+
+
+def _shortest(first: NDArray[np.float64], second: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the lengths of the shortest paths of two pieces, (n, k) of (n, m) and (m, k)."""
+    return np.asarray((first[:, :, None] + second[None]).min(axis=1))
+
+
+def costs_of(rest: Rest, robot: int, picks: list[int | None]) -> NDArray[np.float64]:
+    """Return the cost of all tours if a robot sets out to each option, (options,) [m]; inf if it cannot.
+
+    ``picks`` are the options of the robots before it.
+    """
+    options = rest.options
+    mask = options.is_reached[robot].copy()
+    mask[[pick for pick in picks if pick is not None]] = False
+    costs = np.full(len(mask), np.inf)
+    begin, left = rest.robots.copy(), np.ones(rest.left.shape[1])
+    for other, pick in enumerate(picks):
+        if pick is not None:
+            begin[other] = options.first[other, pick] + rest.lengths[pick]
+            left = left * rest.left[pick]
+    for option in np.flatnonzero(mask):
+        first = float(options.first[robot, option])
+        wanted = left * rest.left[option] > KEPT_SHARE
+        begin[robot] = first + rest.lengths[option]
+        if not wanted.any():
+            costs[option] = first * (WEIGHTS.longest + WEIGHTS.total)
+            continue
+        starts = np.minimum(begin[:, wanted], NO_PATH) + VISIT_M
+        between = np.ascontiguousarray(rest.between[wanted][:, wanted]) + VISIT_M
+        worth = np.zeros(int(wanted.sum()))
+        tours = team_tours(starts, between, worth, WEIGHTS)
+        costs[option] = tours_cost(tours, starts, between, worth, WEIGHTS)
+    return costs
+
+
+def _metres(lengths: NDArray[np.int32], side: float) -> NDArray[np.float64]:
+    return np.where(lengths == UNREACHED, NO_PATH, lengths * (side / STRAIGHT))

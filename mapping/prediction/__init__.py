@@ -1,0 +1,1 @@
+"""Predicted maps: which unknown cells of a partial map are probably free."""

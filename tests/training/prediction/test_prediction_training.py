@@ -1,0 +1,108 @@
+"""The training of a network that predicts maps: floors, windows, resuming, and its card."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+pytest.importorskip("torch")
+
+from lidarium.mapping.prediction.levels import FREE, OCCUPIED, UNKNOWN
+from lidarium.mapping.prediction.network import WINDOW, load_weights
+from lidarium.training.prediction.fitting import Windows
+from lidarium.training.prediction.maps import FloorMaps, read_maps, write_maps
+from lidarium.training.prediction.quality import QualityTally
+from lidarium.training.prediction.settings import PredictionSettings
+from lidarium.training.prediction.training import PredictionTraining, held_out
+from lidarium.training.settings import read_any_training
+
+SETTINGS = PredictionSettings(floors=2, maps=1, kinds={"apartment": 1.0}, batch=2, steps=2, checkpoint=1)
+
+
+def read(tmp_path, text):
+    path = tmp_path / "training.toml"
+    path.write_text(text)
+    return read_any_training(path)
+
+
+def test_a_table_of_predictions_asks_for_this_training(tmp_path):
+    assert read(tmp_path, "seed = 3\n[prediction]\nfloors = 7\n") == PredictionSettings(seed=3, floors=7)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("[prediction]\nflors = 7\n", "prediction has no 'flors'"),
+        ("[prediction]\n[fit]\nepochs = 3\n", "has no 'fit'"),
+        ("prediction = 3\n", "want a table"),
+        ("[prediction]\nkinds = { castle = 1.0 }\n", "kinds has 'castle'"),
+        ("[prediction]\nbatch = 0\n", "batch"),
+    ],
+)
+def test_bad_tables_are_refused(tmp_path, text, message):
+    with pytest.raises(ValueError, match=message):
+        read(tmp_path, text)
+
+
+def test_an_interrupted_training_gives_the_same_weights(tmp_path):
+    whole, parts = tmp_path / "whole", tmp_path / "parts"
+    list(PredictionTraining(SETTINGS, whole).run())
+    for part in ("fit", "fit", "weights"):
+        steps = PredictionTraining(SETTINGS, parts).run()
+        for step in steps:
+            if step.part == part:
+                break
+        steps.close()
+    found = load_weights(parts / "weights.safetensors")
+    for name, array in load_weights(whole / "weights.safetensors").items():
+        np.testing.assert_array_equal(found[name], array)
+    card = json.loads((whole / "card.json").read_text())
+    assert card["steps"] == 2
+    assert card["floors"] + card["held_out_floors"] == 2
+    with pytest.raises(ValueError, match="holds a training with steps = 2"):
+        list(PredictionTraining(replace(SETTINGS, steps=5), whole).run())
+
+
+def test_maps_are_read_as_they_were_written(tmp_path):
+    maps = FloorMaps(np.array([[[FREE, UNKNOWN]]], np.int8), np.array([[True, False]]))
+    write_maps(tmp_path / "a.npz", maps)
+    np.testing.assert_array_equal(read_maps(tmp_path / "a.npz").levels, maps.levels)
+    (tmp_path / "a.npz").write_bytes((tmp_path / "a.npz").read_bytes()[:60])
+    with pytest.raises(ValueError, match="remove it"):
+        read_maps(tmp_path / "a.npz")
+
+
+def test_windows_are_pieces_of_maps_with_their_truth():
+    levels = np.zeros((1, 60, 90), np.int8)
+    levels[0, 20:40, 20:70] = FREE
+    levels[0, 30, 30:40] = OCCUPIED
+    windows = Windows([FloorMaps(levels, levels[0] == FREE)])
+    seen, truth = windows.drawn(20, np.random.default_rng(0))
+    assert seen.shape == truth.shape == (20, WINDOW, WINDOW)
+    assert (seen == FREE).any(axis=(1, 2)).all()
+    assert (truth[seen == FREE]).all()
+    again, _ = windows.drawn(20, np.random.default_rng(0))
+    np.testing.assert_array_equal(seen, again)
+
+
+def test_floors_that_are_held_out_stay_so():
+    few, many = held_out(list(range(40)), 0.2), held_out(list(range(80)), 0.2)
+    assert many[:40] == few
+    assert 0 < sum(few) < 40
+    assert sum(held_out([0, 1], 0.0)) == 1
+
+
+def test_quality_counts_near_unknown_squares():
+    levels = np.full((1, 40), UNKNOWN, np.int8)
+    levels[0, :5], levels[0, 30] = FREE, OCCUPIED
+    is_free = np.zeros((1, 40), np.bool_)
+    is_free[0, :12] = True
+    tally = QualityTally()
+    tally.add(np.where(is_free, 0.9, 0.1).astype(np.float32), levels, is_free)
+    found = tally.quality()
+    assert found.wrong == 0.0
+    assert found.squares == 15 + 9 + 10  # 3 m of 0.2 m behind the free ones, and on both sides of the wall
+    assert found.wrong_all_free == pytest.approx((found.squares - 7) / found.squares)
+    assert found.wrong_nearest == pytest.approx(6 / found.squares)
+    assert found.calibration == pytest.approx(0.1, abs=1e-6)

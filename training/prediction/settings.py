@@ -1,0 +1,76 @@
+"""Settings of the training of a network that predicts maps: the table ``[prediction]`` of a TOML file."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Annotated
+
+from lidarium.envs.floors.generation.buildings import KINDS
+from lidarium.mapping.geometry.bounds import above, check_settings, share, shown, within
+
+DUNGEON = "dungeon"
+"""Kind of the floors of rooms and tunnels that are drawn for this training."""
+
+MAP_KINDS = (*KINDS, DUNGEON)
+"""Kinds of floors to learn from."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PredictionSettings:
+    """How a network that predicts maps is trained.
+
+    Attributes
+    ----------
+    seed : int
+        Seed of all draws.
+    floors : int
+        Number of floors that robots explore; each gives several partial maps.
+    maps : int
+        Partial maps of a floor.
+    kinds : dict of float
+        How often each kind of floor comes, besides the others.
+    bare_share, noisy_share : float
+        So many of the buildings have no furniture, and so many of the runs noisy lasers.
+    floors_minutes, fit_minutes : float
+        Exploring and fitting end after so long, over all interrupted calls; 0 for no limit. With a limit the
+        result depends on the speed of the machine.
+    steps : int
+        Steps of gradients.
+    batch : int
+        Windows of a step.
+    learning_rate, weight_decay : float
+        Of AdamW; the rate falls to 0 as a half cosine.
+    held_out : float
+        Share of the floors that judge the network and are not fitted.
+    far_weight : float
+        Weight of unknown squares more than 3 m from what is known, besides nearer ones.
+    checkpoint : int
+        Steps from one checkpoint to the next.
+    """
+
+    seed: Annotated[int, within(0, 2**31 - 1)] = 0
+    floors: Annotated[int, within(2, 9_000)] = 3000
+    maps: Annotated[int, within(1, 100)] = 8
+    kinds: Mapping[str, float] = field(
+        default_factory=lambda: {"apartment": 0.4, "office": 0.25, "corridors": 0.15, DUNGEON: 0.2}
+    )
+    bare_share: Annotated[float, share()] = 0.35
+    noisy_share: Annotated[float, share()] = 0.3
+    floors_minutes: Annotated[float, within(0.0, 10_000.0)] = 0.0
+    fit_minutes: Annotated[float, within(0.0, 10_000.0)] = 0.0
+    steps: Annotated[int, within(1, 10_000_000)] = 20_000
+    batch: Annotated[int, within(1, 100_000)] = 128
+    learning_rate: Annotated[float, above(0.0, 1.0)] = 1e-3
+    weight_decay: Annotated[float, within(0.0, 10.0)] = 0.01
+    held_out: Annotated[float, share()] = 0.05
+    far_weight: Annotated[float, share()] = 0.3
+    checkpoint: Annotated[int, within(1, 10_000_000)] = 250
+
+    def __post_init__(self) -> None:
+        check_settings(self, "prediction")
+        for kind, often in self.kinds.items():
+            if kind not in MAP_KINDS:
+                raise ValueError(f"kinds has {shown(kind)}; want some of {', '.join(MAP_KINDS)}")
+            if isinstance(often, bool) or not isinstance(often, int | float) or not 0.0 <= often <= 1e6:
+                raise ValueError(f"kinds.{kind} is {shown(often)}; want a number of 0 or more")
+        if not sum(self.kinds.values()) > 0.0:
+            raise ValueError(f"kinds is {shown(dict(self.kinds))}; want at least one above 0")
