@@ -54,8 +54,6 @@ class BenchmarkTask:
         As the options of ``lidarium.parallel_env``.
     policies : tuple of str
         Reference policies; ``baseline``, one of them, is what ratios are of.
-    tolerance : float
-        Share by which the time of an episode may differ between processors; 0 if rows are equal to the bit.
     hashes : TaskHashes or None
         None before they are frozen.
     """
@@ -68,7 +66,6 @@ class BenchmarkTask:
     settings: Mapping[str, Any]
     policies: tuple[str, ...]
     baseline: str
-    tolerance: float
     hashes: TaskHashes | None
 
     @property
@@ -158,7 +155,6 @@ def benchmark(name: str) -> Benchmark:
             settings={**common, **_flat(given.get("settings", {}))},
             policies=tuple(given.get("policies", content["policies"])),
             baseline=given.get("baseline", content["baseline"]),
-            tolerance=given.get("tolerance", 0.0),
             hashes=TaskHashes(known["settings"], tuple(known["floors"]), tuple(known["starts"])) if known else None,
         )
     return Benchmark(name, content["about"], tasks)
