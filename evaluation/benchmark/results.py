@@ -188,8 +188,8 @@ def _repeated(task: BenchmarkTask, rows: Sequence[Row], shipped: Sequence[Row]) 
     times = [[next(iter(_times([row], horizon_s).values())) for row in pair] for pair in others]
     worst = max(abs(here / there - 1.0) for here, there in times)
     return [
-        f"{task.name}: {len(pairs)} rows ran again, {len(others)} not as shipped; times differ by up to {worst:.1%}: this "
-        "version, or a library below it, does not run the task as published."
+        f"{task.name}: {len(pairs)} rows ran again, {len(others)} not as shipped; times differ by up to {worst:.1%}: "
+        "this version, or a library below it, does not run the task as published."
     ]
 
 
