@@ -95,6 +95,7 @@ def test_policies_read_beliefs_and_never_the_truth():
         "lidar",
         "map",
         "map_origin",
+        "predicted_map",
         "shared_map",
         "sparse_map",
         "shared_sparse_map",

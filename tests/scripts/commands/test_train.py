@@ -11,6 +11,7 @@ import time
 import pytest
 
 from lidarium.agents.learned.network import load_weights
+from lidarium.extras import install_command
 from lidarium.scripts.commands.train import _Shown, _span
 from lidarium.scripts.main import main
 from lidarium.training.progress import Progress
@@ -75,7 +76,7 @@ def test_numbers_that_cannot_be_used_are_refused(config, tmp_path, capsys):
 def test_a_missing_extra_is_named(config, tmp_path, capsys, monkeypatch, missing):
     find = importlib.util.find_spec
     monkeypatch.setattr(importlib.util, "find_spec", lambda name, *rest: None if name == missing else find(name, *rest))
-    refused([config], tmp_path / "out", capsys, f"training needs {missing}", '"lidarium[rl]"')
+    refused([config], tmp_path / "out", capsys, f"training needs {missing}", install_command("rl"))
 
 
 def test_a_folder_of_other_files_is_left_as_it_is(config, tmp_path, capsys):
