@@ -15,6 +15,7 @@ from lidarium.benchmarks.speed.cases.learners import (
 )
 from lidarium.benchmarks.speed.harness.timing import Effort
 from lidarium.envs.simulation.kernels.floor_cache import SIZE_VARIABLE
+from lidarium.extras import install_command
 
 LEAST = Effort(rounds=1, block_s=0.0)
 
@@ -84,7 +85,7 @@ def test_without_the_extra_a_training_is_not_measured(monkeypatch):
         monkeypatch.setattr(case, "is_there", lambda: False)
         (line,) = case.measure(LEAST)
         assert line.figure is None
-        assert "lidarium[rl]" in line.peer
+        assert install_command("rl") in line.peer
 
 
 def test_a_first_reset_begins_with_empty_caches(monkeypatch):
@@ -116,4 +117,4 @@ def test_a_training_by_rewards_is_measured_with_the_simulators_share(monkeypatch
 
 def test_without_the_extra_a_training_by_rewards_is_not_measured(monkeypatch):
     monkeypatch.setattr(learned_training.importlib.util, "find_spec", lambda name: None)
-    assert ["lidarium[rl]" in line.peer for line in learned_training.measure(LEAST)] == [True, True]
+    assert [install_command("rl") in line.peer for line in learned_training.measure(LEAST)] == [True, True]
