@@ -62,7 +62,6 @@ def test_items_are_passed_on_and_counted_every_few_seconds(capsys):
 def test_options_that_were_left_out_are_left_to_the_realism():
     assert TeamCommand().team_options == {
         "robot": "kobuki",
-        "lidar": "urg",
         "realism": "ideal",
         "resolution": 0.025,
     }
