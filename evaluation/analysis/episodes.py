@@ -62,6 +62,10 @@ class Episodes:
     warnings: tuple[str, ...] = ()
 
 
+class NoEpisodesError(ValueError):
+    """Raised for a folder in which no episode has finished."""
+
+
 def read_episodes(directory: Path) -> Episodes:
     """Read ``episodes.jsonl``."""
     path = Path(directory) / FILE
@@ -78,7 +82,7 @@ def read_episodes(directory: Path) -> Episodes:
         _check_row(row, f"{path}, line {number}")
     kept, doubled = _without_doubles(numbered, path)
     if not kept:
-        raise ValueError(f"{path} has no finished episode; run `lidarium evaluate` on")
+        raise NoEpisodesError(f"{path} has no finished episode; run `lidarium evaluate` on")
     _check_alike(kept, path)
     return Episodes(tuple(row for _, row in kept), str(kept[0][1]["version"]), (*warnings, *doubled))
 

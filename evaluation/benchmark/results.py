@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import lidarium
-from lidarium.evaluation.analysis.episodes import Row, read_episodes
+from lidarium.evaluation.analysis.episodes import NoEpisodesError, Row, read_episodes
 from lidarium.evaluation.analysis.groups import times_to
 from lidarium.evaluation.benchmark.tasks import DATA, Benchmark, BenchmarkTask, Size, starts_hash
 from lidarium.evaluation.report.report import jsonable, write_report
@@ -118,9 +118,7 @@ def collect(
     """
     shipped, everything, standings, remarks = reference_rows(found.name), [], [], []
     for task in tasks:
-        path = folder / task.name
-        own = list(read_episodes(path).rows) if (path / EPISODES_FILE).is_file() else []
-        own = [row for row in own if _floor_of(row) in task.floors_of(size)]
+        own = [row for row in _rows_in(folder / task.name) if _floor_of(row) in task.floors_of(size)]
         rows, wrong = _as_frozen(task, own)
         remarks += wrong
         theirs = [row for row in shipped.get(task.name, ()) if _floor_of(row) in task.floors_of(size)]
@@ -149,6 +147,14 @@ def collect(
     )
     _write(found, tasks, results, everything, folder)
     return results
+
+
+def _rows_in(folder: Path) -> list[Row]:
+    """Return the finished episodes in a folder; none if it is missing, or if all of them failed."""
+    try:
+        return list(read_episodes(folder).rows)
+    except (FileNotFoundError, NoEpisodesError):
+        return []
 
 
 def _as_frozen(task: BenchmarkTask, rows: Sequence[Row]) -> tuple[list[Row], list[str]]:

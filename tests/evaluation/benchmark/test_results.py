@@ -101,6 +101,16 @@ def test_a_policy_that_cannot_run_in_one_task_fails_there_alone(tiny, tmp_path, 
 
 
 @pytest.mark.usefixtures("without_page")
+def test_a_task_in_which_all_episodes_failed_leaves_the_others(tiny, tmp_path):
+    folder = tmp_path / "mine" / "Homes-1"
+    folder.mkdir(parents=True)
+    (folder / "episodes.jsonl").write_text("")
+    code, written = answer(tmp_path / "mine", "--quick")
+    assert code == 0
+    assert {task for task, _ in by_name(written)} == {"Homes-1", "Seen-1"}
+
+
+@pytest.mark.usefixtures("without_page")
 def test_rows_of_another_version_are_said_to_be(tiny, tmp_path):
     rows = [{**row, "version": "0.0.9"} for kept in reference_rows("tiny").values() for row in kept]
     (tiny / "tiny.jsonl.xz").write_bytes(packed(rows))
