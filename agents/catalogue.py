@@ -62,7 +62,7 @@ POLICIES.register(
 POLICIES.register(
     "predicted_tours",
     "lidarium.agents.predicted.policy:PredictedTours",
-    "tours of the team, chosen by what is left to see on a map whose unknown part is predicted",
+    "tours of the team on a map whose unknown part a network predicts",
 )
 POLICIES.register(
     "learned",

@@ -28,7 +28,7 @@ EPSILON = 1e-5
 """Added to variances before they divide."""
 
 SHIPPED, CARD = "learned.safetensors", "learned.json"
-"""The weights that the package has, and what is said of them."""
+"""Shipped weights and their card."""
 
 
 def _shapes() -> dict[str, tuple[int, ...]]:

@@ -1,4 +1,4 @@
-"""Costs of the options of tours on a predicted map: what is left to drive where each comes first."""
+"""Costs of the options of tours on a predicted map: the remaining path if a robot takes that option first."""
 
 from dataclasses import dataclass
 
@@ -12,10 +12,10 @@ from lidarium.mapping.planning.touring.expected_views import cover, shares_left
 from lidarium.mapping.planning.touring.tours import TourWeights, team_tours, tours_cost
 
 LATTICE = 3
-"""Stops are places of a lattice of so many squares."""
+"""Distance between stops, which lie on a lattice [squares]."""
 
 MOST_COVER, MOST_NEAR, MOST_STOPS = 60, 24, 16
-"""Maximum number of stops that cover what is left, of those nearest as the crow flies, and of those on tours."""
+"""Maximum number of stops that cover the unseen area, of those nearest in a straight line, and of those on tours."""
 
 LEAST_STOPS = ((0.4, 1.0), (0.2, 0.5), (0.08, 0.0))
 """Stops that show less than the first are left out [m2], and so is the second's share of what may stay unseen. If no
@@ -33,7 +33,7 @@ WEIGHTS = TourWeights(1.0, 0.4, 0.0)
 
 @dataclass(frozen=True, slots=True)
 class Rest:
-    """What is left to see on a predicted map, and stops that show it.
+    """The unseen area of a predicted map, and the stops from which it is seen.
 
     Attributes
     ----------

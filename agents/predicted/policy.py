@@ -28,7 +28,7 @@ from lidarium.mapping.prediction.predictors import (
 )
 
 PREDICTED = "predicted"
-"""Sent elsewhere than where tours begin, by what is predicted."""
+"""Sent by the prediction to an option other than the first of the tour."""
 
 LEAST_SAVED = 0.5
 """Robots depart from tours if that saves so much [m]; one that the rest does not need keeps to them."""

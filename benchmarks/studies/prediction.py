@@ -20,7 +20,7 @@ from lidarium.evaluation.suites.trial import DEFAULT_VARIANT
 
 TOURS = "tour_frontier"
 PREDICTORS = {"predicted": "network", "true": "truth"}
-"""Names of the policies beside tours, and their predictors."""
+"""Predictors by the names of the policies that use them."""
 
 TEAMS = (1, 2, 3)
 HORIZON_S = 1800.0
@@ -46,8 +46,8 @@ COVERAGES = (0.15, 0.3, 0.5, 0.7, 0.85)
 
 PAGE = """# Predicted maps
 
-What the [network](../reference/prediction.md) that the package has knows about the unknown part of a map, and what
-`predicted_tours` wins by that over `tour_frontier`. With the truth in place of the prediction it bounds what any
+How well the shipped [network](../reference/prediction.md) predicts the unknown part of a map, and how much time
+`predicted_tours` saves by it over `tour_frontier`. With the truth in place of the prediction it bounds what any
 predictor can win in this way. No floor here was trained on.
 
 ## Predictions

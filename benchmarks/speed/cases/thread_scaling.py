@@ -1,4 +1,4 @@
-"""Batches on 2, 4, 8 and more threads beside one: whole steps of the learning preset, and decisions by frontiers."""
+"""Speed of batches on 2, 4, 8 and more threads over one: steps of the learning preset, and frontier decisions."""
 
 from collections.abc import Callable
 
@@ -25,7 +25,7 @@ NOTES = (
 
 
 def _lines(title: str, steps: dict[int, Callable[[], object]], rows: int, effort: Effort, unit: str) -> list[Line]:
-    """Return a line for each number of threads beside one."""
+    """Return a line for each number of threads, relative to one thread."""
     named = {str(threads): step for threads, step in steps.items()}
     run_in_turn(named, 0.0)
     rounds = [run_in_turn(named, effort.block_s) for _ in range(effort.rounds)]
@@ -59,4 +59,4 @@ def measure(effort: Effort) -> list[Line]:
 
 
 if __name__ == "__main__":
-    run_alone(measure, "Batches on more threads beside one.", CORES)
+    run_alone(measure, "Speed of batches on more threads over one.", CORES)
