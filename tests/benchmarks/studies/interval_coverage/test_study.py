@@ -1,7 +1,5 @@
 """The study of intervals: its cases, a tiny share of them, and the table."""
 
-from itertools import islice
-
 import pytest
 from published_pages import assert_published
 
@@ -9,32 +7,34 @@ from lidarium.benchmarks.studies import STUDIES
 from lidarium.benchmarks.studies import interval_coverage as coverage
 from lidarium.benchmarks.studies.interval_coverage import cases
 
-FEW = 6
-
 
 @pytest.fixture
 def tiny(monkeypatch):
-    monkeypatch.setattr(coverage, "cases", lambda resamples: islice(cases(resamples), FEW))
-    monkeypatch.setattr(coverage, "TRIALS", 20)
+    """Measure the first case of each figure with few trials."""
+
+    def firsts(resamples):
+        seen = set()
+        return [case for case in cases(resamples) if not (case.figure in seen or seen.add(case.figure))]
+
+    monkeypatch.setattr(coverage, "cases", firsts)
+    monkeypatch.setattr(coverage, "TRIALS", 2)
     monkeypatch.setattr(coverage, "RESAMPLES", 19)
 
 
 def test_a_tiny_share_runs_and_is_not_run_again(tiny, tmp_path):
     study = STUDIES["interval_coverage"]
-    done = list(study.work(tmp_path, None, 4, 1))
-    assert done == [("cases", 1, 2), ("cases", 2, 2)]
-    assert list(study.work(tmp_path, None, 4, 1)) == []
+    figures = len(coverage.cases(19))
+    assert list(study.work(tmp_path, None, 1, 1)) == [("cases", done + 1, figures) for done in range(figures)]
+    assert list(study.work(tmp_path, None, 1, 1)) == []
     page = study.page(tmp_path)
-    absent = ("Mean", "Inter", "Paired", "Restricted", "Success", "Median between")
-    assert_published("interval_coverage", page, tmp_path, absent)
-    assert "## Median" in page
+    assert_published("interval_coverage", page, tmp_path)
     assert "| normal, mean 100, sd 15 | " in page
-    assert "Share of 20 trials" in page
+    assert "Share of 2 trials" in page
 
 
 def test_every_case_has_a_name_of_its_own():
-    keys = [case.key for case in islice(cases(19), FEW)]
-    assert len(set(keys)) == FEW
+    keys = [case.key for case in cases(19)]
+    assert len(set(keys)) == len(keys)
 
 
 def test_a_case_is_reached_by_its_larger_sizes_alone():
