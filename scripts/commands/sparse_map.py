@@ -231,6 +231,7 @@ def _clouds(
     x, y, z = numbers_of("--up", command.up, (3,))
     levelling: NDArray[np.float64] | None = None
     own, inverse = FrameAgreement(), FrameAgreement()
+    focal = {factor: FrameAgreement(1.0 / factor) for factor in FOCAL_FACTORS if command.intrinsics}
     least = command.least_motion if command.least_motion is not None else 0.3 * command.clouds[0].is_dir()
     last: NDArray[np.float64] | None = None
     for place, (path, given) in enumerate(zip(frames.files, frames.poses, strict=True)):
@@ -244,6 +245,8 @@ def _clouds(
         if len(frames.files) > 1:
             own.add(points, given)
             inverse.add(points, inverse_of(given))
+            for agreement in focal.values():
+                agreement.add(points, given)
         pose[:3, 3] += pose[:3, :3] @ cloud.offset
         if place == 0 and np.abs(pose[:3, 3]).max() > FAR:
             told.offset = (np.rint(pose[:3, 3] / 100.0) * 100.0).tolist()
@@ -259,6 +262,7 @@ def _clouds(
         yield points, pose if levelling is None else levelling @ pose
     if len(frames.files) > 1:
         _check_agreement(own, inverse, told)
+        _check_focal_length(own, focal, told)
 
 
 LEAST_TURN = 0.436
@@ -266,6 +270,13 @@ LEAST_TURN = 0.436
 
 LEAST_AGREEMENT, DOUBTFUL_AGREEMENT = 0.90, 0.98
 """Shares of what frames see twice that have to agree: frames below the first are refused, below the second doubted."""
+
+
+FOCAL_FACTORS = (0.75, 0.85, 0.92, 1.08, 1.18, 1.33)
+"""Factors of the focal length that are tried beside the given one."""
+
+CLEARLY_NEARER = 0.8
+"""Share of the mean distance of frames below which another focal length is clearly better."""
 
 
 def _is_near(last: "NDArray[np.float64]", pose: "NDArray[np.float64]", least: float) -> bool:
@@ -292,6 +303,23 @@ def _check_agreement(own: "FrameAgreement", inverse: "FrameAgreement", told: _To
         if own.share < LEAST_AGREEMENT:
             raise ValueError(message)
         told.remarks.append(f"the map is probably wrong: {message}")
+        told.is_doubtful = True
+
+
+def _check_focal_length(own: "FrameAgreement", focal: "dict[float, FrameAgreement]", told: _Told) -> None:
+    """Tell if the frames would agree clearly better with another focal length."""
+    distances = {factor: agreement.mean_distance for factor, agreement in focal.items()}
+    known = {factor: distance for factor, distance in distances.items() if distance is not None}
+    given = own.mean_distance
+    if given is None or not known:
+        return
+    best = min(known, key=lambda factor: known[factor])
+    if known[best] < CLEARLY_NEARER * given:
+        change = f"{abs(best - 1.0):.0%} {'longer' if best > 1.0 else 'shorter'}"
+        told.remarks.append(
+            f"the map is probably wrong: the frames differ by {1000 * given:.0f} mm where they see the same, and by "
+            f"{1000 * known[best]:.0f} mm with a focal length {change}; are --intrinsics theirs?"
+        )
         told.is_doubtful = True
 
 

@@ -137,6 +137,17 @@ def test_frames_that_contradict_each_other_are_refused(shared_cases, tmp_path, c
     assert not (tmp_path / "map.smap").exists()
 
 
+@pytest.mark.parametrize(("focal", "change"), [(472.5, "8% longer"), (525.0, None), (577.5, "8% shorter")])
+def test_a_focal_length_that_is_wrong_by_a_tenth_is_told(shared_cases, tmp_path, capsys, focal, change):
+    folder = shared_cases / "cloud-phantom-boxes"
+    clouds, poses = [str(folder / f"depth_{k}.png") for k in "01"], [str(folder / f"pose_{k}.txt") for k in "01"]
+    request = ["sparse-map", *clouds, "--poses", *poses, "--intrinsics", f"{focal},{focal},319.5,239.5"]
+    assert main([*request, "--out", str(tmp_path / "map.smap")]) == (4 if change else 0)
+    told = capsys.readouterr().err
+    assert ("are --intrinsics theirs?" in told) == bool(change)
+    assert not change or f"with a focal length {change}" in told
+
+
 def test_a_folder_of_tum_becomes_a_map(shared_cases, tmp_path, capsys):
     folder, data = shared_cases / "cloud-phantom-boxes", tmp_path / "tum"
     data.mkdir()
