@@ -198,10 +198,10 @@ PRESETS: dict[str, _Preset] = {
         starts=_dare_start,
         differences=(
             "walls keep the pixels of 0.2 m; the project halves its pictures",
-            "the laser sees all free space in sight; the project draws beams as lines of cells, which leave gaps that "
-            "have to be looked at. Its nearest and utility take 671 m and 631 m on its first 27 maps, ours by its "
-            "rules 607 m and 581 m. Its own code, given a laser like ours, takes 580 m and 549 m on twelve of these "
-            "maps, where ours take 586 m and 554 m",
+            "the laser sees all free space in sight; the project walks along lines of cells that end where they pass a "
+            "corner of a wall, so that more has to be looked at. Its nearest and utility take 671 m and 631 m on its "
+            "first 27 maps, ours by its rules 607 m and 581 m. Its own code, given a laser like ours, takes 580 m and "
+            "549 m on twelve of these maps, where ours take 586 m and 554 m",
         ),
     ),
     "chen": _Preset(

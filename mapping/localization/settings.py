@@ -105,6 +105,9 @@ class MatchingSettings:
         Reach of the search around odometry beyond its standard deviation [m, rad].
     search_deviations : float
         How many standard deviations of odometry the search reaches.
+    search_turn : float
+        By how much more the search goes in heading, for each metre of way, if odometry leads nowhere: scans that
+        are a metre apart may hide a turn [rad/m].
     blind_m, blind_angle : float
         Reach of the search if there is no odometry, or odometry leads nowhere [m, rad].
     wide_share : float
@@ -113,8 +116,9 @@ class MatchingSettings:
     blind_overlap : float
         Share of the returns near observed cells of the local map below which a match does not count if
         odometry led nowhere.
-    known_overlap : float
-        The same if a scan seems to see new ground where odometry led.
+    known_overlap, clearer : float
+        The same if a scan seems to see new ground where odometry led, and how many times as much of the scan has to
+        agree elsewhere.
     evaluations : int
         Maximum number of placements, and blocks of them, examined in such a search.
     explained_share : float
@@ -166,12 +170,14 @@ class MatchingSettings:
     least_points: Count = 15
     search_m: Annotated[float, within(0.0, 50.0)] = 0.05
     search_angle: Turn = math.radians(1.0)
+    search_turn: FromZero = 0.0
     search_deviations: Positive = 2.0
     blind_m: Annotated[float, above(0.0, 50.0)] = 1.2
     blind_angle: Angle = math.radians(50.0)
     wide_share: Positive = 0.08
     blind_overlap: Positive = 0.7
-    known_overlap: Positive = 0.5
+    known_overlap: Positive = 0.4
+    clearer: Positive = 4.0
     evaluations: Count = 100_000
     explained_share: Positive = 0.35
     lost_evaluations: Count = 400_000

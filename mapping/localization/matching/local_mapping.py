@@ -86,7 +86,7 @@ class _LocalMatcher:
             unmatched = Match(predicted, near.score, near.overlap, near.contradiction, nothing, near.prior)
             known = None
             if not is_sparse:
-                known = self._beside_odometry(submap, points, predicted, moved)
+                known = self._beside_odometry(submap, points, predicted, moved, near)
                 known = known or self._beyond_odometry(submap, points, predicted)
             return unmatched if known is None else self._noted(known)
         if near is not None and self._is_good(near) and near.score >= settings.convincing_share * self.usual_score:
@@ -115,7 +115,12 @@ class _LocalMatcher:
         return match is not None and match.score * match.overlap >= least
 
     def _beside_odometry(
-        self, submap: Submap, points: NDArray[np.float64], predicted: NDArray[np.float64], moved: NDArray[np.float64]
+        self,
+        submap: Submap,
+        points: NDArray[np.float64],
+        predicted: NDArray[np.float64],
+        moved: NDArray[np.float64],
+        near: Match,
     ) -> Match | None:
         """Return the match of a scan that seems to see new ground, as far as odometry may be wrong, or None.
 
@@ -125,7 +130,9 @@ class _LocalMatcher:
         match = self._match_far(submap, points, predicted, self._reach(moved))
         if match is None or not self._is_good(match) or match.overlap < settings.known_overlap:
             return None
-        if match.score < settings.convincing_share * self.usual_score:
+        # What the map does hold of new ground agrees where odometry leads.
+        agrees = near.score >= settings.convincing_share * self.usual_score
+        if agrees or match.score * match.overlap < settings.clearer * near.score * near.overlap:
             return None
         self.recoveries += 1
         return match
@@ -171,7 +178,10 @@ class _LocalMatcher:
         # Twice the motion and more: also where a robot is that went back while odometry said forth.
         return (
             min(settings.search_m + 2.2 * distance, settings.blind_m),
-            min(settings.search_angle + 2.2 * abs(float(moved[2])), settings.blind_angle),
+            min(
+                settings.search_angle + 2.2 * abs(float(moved[2])) + settings.search_turn * distance,
+                settings.blind_angle,
+            ),
         )
 
     def _noted(self, match: Match) -> Match:

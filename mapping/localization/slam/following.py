@@ -33,6 +33,7 @@ LOG_SETTINGS = SlamSettings(
         deviation=0.25,
         surface_m=0.0,
         unseen=0.5,
+        search_turn=0.5,
     ),
     submaps=SubmapSettings(resolution=0.05, path_m=8.0, behind_share=0.0),
     closures=ClosureSettings(least_overlap=0.6, confirmed_beyond_m=0.4, doubts_one_map=False, agree_m=0.3),
@@ -41,12 +42,12 @@ LOG_SETTINGS = SlamSettings(
 )
 """SLAM settings for recorded logs, in which nearly every scan is matched.
 
-Odometry between scans is often worse than in a robot, and time is plenty. Lasers of logs reach far: a local
-map of a shorter path holds enough, and more of the local maps serve to recognise places. Few returns then
-hold as much information as many, and headings drift less. Where scans are a metre apart, much of each is new,
-which must not outweigh what agrees; headings between them are less certain. Normals are estimated best from
-the nearest two returns. Built walls deviate more from each other than drawn walls. Over the paths of logs,
-robots err by more than walls are thick.
+Odometry between scans is often worse than in a robot, and time is plenty. Lasers of logs reach far: a local map
+of a shorter path holds enough, and more of the local maps serve to recognise places. Few returns then hold as
+much information as many, and headings drift less. Where scans are a metre apart, much of each is new, which
+must not outweigh what agrees; headings between them are less certain, and odometry may have missed a turn.
+Normals are estimated best from the nearest two returns. Built walls deviate more from each other than drawn
+walls. Over the paths of logs, robots err by more than walls are thick.
 """
 
 
