@@ -176,7 +176,7 @@ class ViewOptions:
     """keep the page after the run, until Ctrl-C"""
 
 
-def _check_view(options: ViewOptions) -> None:
+def check_view(options: ViewOptions) -> None:
     """Check the options of a view."""
     if not 0 <= options.view_port <= 65535:
         raise ValueError(f"--view-port is {options.view_port}; want 0 to 65535, 0 for any free port")
@@ -187,7 +187,7 @@ def _check_view(options: ViewOptions) -> None:
 @contextmanager
 def opened_view(options: ViewOptions, policy: "Policy", name: str) -> Iterator["list[LiveView]"]:
     """Serve a page during a run, and afterwards as long as requested."""
-    _check_view(options)
+    check_view(options)
     if not options.view:
         yield []
         return

@@ -19,7 +19,13 @@ class Node(SimpleNamespace):
 
 class Scene:
     def __init__(self):
-        self.nodes = {}
+        self.nodes, self.clicked = {}, None
+
+    def on_click(self):
+        def keep(callback):
+            self.clicked = callback
+
+        return keep
 
     def __getattr__(self, name):
         if name.startswith("add_"):
@@ -60,6 +66,11 @@ class Gui:
 
     def add_button(self, label):
         return self._add(label)
+
+    def add_command(self, label, hotkey):
+        command = self._add(f"key {hotkey}", what=label)
+        command.on_trigger = command.on_click
+        return command
 
     def add_dropdown(self, label, options, initial_value=None):
         return self._add(label, options=options, value=self._choices.get(label) or initial_value or options[0])

@@ -4,7 +4,6 @@ A file has what robots saw; regions and openings are found again from it. Places
 poses: the floor's if they know their starts, else that of the robot's start.
 """
 
-import io
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -16,7 +15,7 @@ from lidarium.agents.srt.safe_region import DIRECTIONS
 from lidarium.agents.srt.settings import SHAPES
 from lidarium.agents.srt.tree import Node, RegionRules, Tree
 from lidarium.mapping.files.guarded_reading import check_file, read_arrays, reading
-from lidarium.mapping.files.output import write_whole
+from lidarium.mapping.files.output import write_arrays
 
 VERSION = 1
 MAX_NODES = 100_000
@@ -47,7 +46,6 @@ def write_tree(
         if other in places and node.number < other
     ]
     flags = [_CLOSED * opening.is_closed + _TRIED * opening.is_tried for node in nodes for opening in node.openings]
-    content = io.BytesIO()
     arrays: dict[str, Any] = {
         "rules": np.array(
             [VERSION, SHAPES.index(common.shape), common.perception, common.turn_room, common.with_blind]
@@ -66,8 +64,7 @@ def write_tree(
         "openings": np.array([len(node.openings) for node in nodes], np.int32),
         "flags": np.array(flags, np.uint8),
     }
-    np.savez_compressed(content, allow_pickle=False, **arrays)
-    write_whole(path, content.getvalue())
+    write_arrays(path, arrays)
 
 
 def read_tree(path: Path, origin: NDArray[np.float64] | None = None) -> Tree:

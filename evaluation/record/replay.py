@@ -5,7 +5,7 @@ A hash of everything that an episode leaves in its world tells whether the end i
 
 import hashlib
 import json
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
@@ -97,8 +97,15 @@ def rerun(
     return env
 
 
+BeforeStep = Callable[[ExplorationEnv, dict[str, Any], NDArray[np.float64]], None]
+"""Takes the environment, the observations at the level of velocities, and the speeds of the next step."""
+
+
 def drive_again(
-    record: EpisodeRecord, floor: str | Path | Floor | None = None, watchers: Iterable[Watcher] = ()
+    record: EpisodeRecord,
+    floor: str | Path | Floor | None = None,
+    watchers: Iterable[Watcher] = (),
+    before_step: BeforeStep | None = None,
 ) -> ExplorationEnv:
     """Run a recorded episode again, as `rerun`, without a check of how it ends."""
     header = record.header
@@ -119,12 +126,19 @@ def drive_again(
     goal = None if header["goal"] is None else (header["goal"][0], header["goal"][1])
     # The recorded speeds have all pauses in them; no station would end a pause of the re-run.
     env = WatchedExploration(there, replace(settings, pauses_when_blocked=False), watchers=watchers)
-    env.start(EpisodeStart(there, tables, np.array(header["starts"], np.float64), header["noise_seed"], goal))
+    if before_step is not None:
+        env.use_level("velocity")
+    start = EpisodeStart(there, tables, np.array(header["starts"], np.float64), header["noise_seed"], goal)
+    observations, _ = env.start(start)
     endings: dict[int, list[tuple[str, str]]] = {}
     for step, agent, reason in header["endings"]:
         endings.setdefault(step, []).append((agent, reason))
     for step, commands in enumerate(np.array(record.commands, np.float64), 1):
+        if before_step is not None:
+            before_step(env, observations, commands)
         env.drive_at(commands)
+        if before_step is not None:
+            observations = env.outcome()[0]
         if step in endings:
             _end(env, endings[step])
     return env

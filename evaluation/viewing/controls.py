@@ -1,7 +1,7 @@
 """The controls of a page: pause, speed, whom to follow, layers, and text."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from enum import Enum
 from typing import TYPE_CHECKING, Any
 
@@ -53,10 +53,20 @@ class Controls:
     ----------
     heights : (float, float)
         Greatest height at which walls can be cut, and the one to begin with [m].
+    speed : str
+        The speed to begin with.
+    more : callable, optional
+        Adds controls of its own, above the layers.
     """
 
     def __init__(
-        self, server: "ViserServer", agents: Sequence[str], has_cameras: bool, heights: tuple[float, float]
+        self,
+        server: "ViserServer",
+        agents: Sequence[str],
+        has_cameras: bool,
+        heights: tuple[float, float],
+        speed: str = FIRST_SPEED,
+        more: Callable[[], None] = lambda: None,
     ) -> None:
         gui = server.gui
         gui.configure_theme(show_logo=False, show_share_button=False)  # sharing would need the network
@@ -65,9 +75,10 @@ class Controls:
         self._pause = gui.add_button(PAUSE)
         self._is_paused = False
         self._pause.on_click(lambda _: self._turn_pause())
-        self._speed = gui.add_dropdown("Speed", tuple(SPEEDS), initial_value=FIRST_SPEED)
+        self._speed = gui.add_dropdown("Speed", tuple(SPEEDS), initial_value=speed)
         self._follow = gui.add_dropdown("Follow", (NOBODY, *agents))
         self._agents = list(agents)
+        more()
         with gui.add_folder("Layers"):
             self._layers: dict[Layer, GuiInputHandle[bool]] = {
                 layer: gui.add_checkbox(layer.value, True) for layer in Layer if has_cameras or layer not in OF_CAMERAS

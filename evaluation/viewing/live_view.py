@@ -17,7 +17,7 @@ from lidarium.envs.onboard.radio.messages import Orders
 from lidarium.evaluation.episodes.events import joined_groups
 from lidarium.evaluation.episodes.watching import WatchedExploration, Watcher
 from lidarium.evaluation.processes import is_end_asked
-from lidarium.evaluation.viewing.controls import Controls, Layer, follow
+from lidarium.evaluation.viewing.controls import FIRST_SPEED, Controls, Layer, follow
 from lidarium.evaluation.viewing.moment import Moment, moment_of
 from lidarium.evaluation.viewing.scene import TeamMaps, TeamScene
 from lidarium.mapping.files.guarded_reading import printable
@@ -70,13 +70,20 @@ MOST_EVENTS = 6
 """Maximum number of events that are listed, the latest first."""
 
 
-def status_text(env: WatchedExploration, policy: str, report: PolicyReport, decisions: int) -> str:
-    """Return the progress of a run: time, coverage, decisions, and states of robots."""
+def status_text(
+    env: WatchedExploration,
+    policy: str,
+    report: PolicyReport,
+    decisions: int,
+    more: Sequence[tuple[str, str]] = (),
+) -> str:
+    """Return the progress of a run: time, coverage, more names and values, decisions, and states of robots."""
     name = "" if env.floor is None else env.floor.name
     joins = [] if report.supervision is None else [join for join in report.supervision.joins if join.is_used]
     rows = [
         ("Time", f"{env.scorer.time:.1f} s"),
         ("Explored", f"{100.0 * env.scorer.coverage:.1f} %"),
+        *more,
         ("Decisions", f"{decisions:,}"),
     ]
     if report.supervision is not None:
@@ -157,7 +164,11 @@ class LiveView(Watcher):
     ----------
     has_ended : bool
         Whether the run has come to its end.
+    first_speed : str
+        The speed to begin with, one of ``SPEEDS``.
     """
+
+    first_speed = FIRST_SPEED
 
     def __init__(
         self,
@@ -183,7 +194,12 @@ class LiveView(Watcher):
         has_cameras = env.simulation.camera is not None
         ceiling = min(env.floor.ceiling, 2.0 * CUT_M)
         self._controls = Controls(
-            self._server, env.possible_agents, has_cameras, (ceiling, CUT_M if has_cameras else LOW_WALLS_M)
+            self._server,
+            env.possible_agents,
+            has_cameras,
+            (ceiling, CUT_M if has_cameras else LOW_WALLS_M),
+            self.first_speed,
+            self._add_controls,
         )
         self._maps = TeamMaps(env)
         self._scene = TeamScene(self._server, env, self._maps)
@@ -248,13 +264,20 @@ class LiveView(Watcher):
         groups = self._shown_groups(joined_groups(report, env.possible_agents)[0])
         levels = self._maps.levels(env, groups)
         self._scene.draw_ground(self._maps.picture(groups, levels), self._maps.frontiers(levels))
-        status = status_text(env, self._name, report, self._decisions)
+        status = status_text(env, self._name, report, self._decisions, self._status())
         self._controls.write(status, events_text(env, report), env.scorer.coverage)
         if env.simulation.camera is not None:
             robot = self._controls.followed or 0
             sensor = env.simulation.camera
             self._controls.show_depth(false_colours(sensor.frames[robot], sensor.camera, DEPTH_SIZE))
         self._maps_due = self._clock() + max(MAPS_S, (self._clock() - began) / MAPS_SHARE)
+
+    def _add_controls(self) -> None:
+        """Add controls to the page, above the layers."""
+
+    def _status(self) -> Sequence[tuple[str, str]]:
+        """Return what else stands beside the progress: names and values."""
+        return ()
 
     def _shown_groups(self, joined: list[set[int]]) -> list[set[int]]:
         """Return the robots whose maps are drawn as one: robots that know their starts need no station."""

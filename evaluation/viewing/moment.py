@@ -138,6 +138,15 @@ def _on_floor(env: ExplorationEnv, row: int, points: NDArray[np.float64]) -> NDA
     return np.asarray(points @ np.array([[cosine, sine], [-sine, cosine]]) + env.world.starts[row, :2])
 
 
+def from_floor(env: ExplorationEnv, row: int, point: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return a point (2,) of the floor, where the page shows what a robot believes, in its map frame [m]."""
+    offset = env.perception.poses.offset(row)
+    if env.settings.known_starts:
+        return np.asarray(point - offset)
+    cosine, sine = np.cos(_turned(env, row)), np.sin(_turned(env, row))
+    return np.asarray((point - env.world.starts[row, :2]) @ np.array([[cosine, -sine], [sine, cosine]]) - offset)
+
+
 def _trails(env: ExplorationEnv) -> NDArray[np.float64]:
     """Return the past positions of the robots, (T, robots, 2), thinned out."""
     track = env.scorer.track

@@ -16,7 +16,6 @@ It is an npz archive with these arrays (times n, beams b), of which the first th
 - ``odometry_of_scan`` (n,): number of the last of these before each scan, -1 for none.
 """
 
-import io
 import math
 from collections.abc import Mapping
 from pathlib import Path
@@ -28,7 +27,7 @@ from numpy.typing import NDArray
 from lidarium.mapping.files.beams import check_metres, marked, symmetric_scans
 from lidarium.mapping.files.guarded_reading import read_arrays, reading
 from lidarium.mapping.files.laser_logs import LaserLog, made_usable
-from lidarium.mapping.files.output import write_whole
+from lidarium.mapping.files.output import write_arrays
 from lidarium.mapping.geometry.bounds import shown
 
 _NEEDED = ("ranges", "angle_min", "angle_increment")
@@ -141,8 +140,4 @@ def write_npz_log(path: Path, log: LaserLog) -> None:
         arrays["pose_odom"] = log.odometry
     if log.corrected is not None:
         arrays["pose_corrected"] = log.corrected
-    content = io.BytesIO()
-    np.savez_compressed(content, **arrays)
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    write_whole(path, content.getvalue())
+    write_arrays(path, arrays)

@@ -1,6 +1,7 @@
 """Files that are there whole or not at all."""
 
 import errno
+import io
 import json
 import os
 import re
@@ -146,6 +147,17 @@ def write_text(path: Path, text: str) -> None:
     """Write a text file (UTF-8)."""
     with whole_file(path) as beside:
         beside.write_text(text, encoding="utf-8")
+
+
+def write_arrays(path: Path, arrays: Mapping[str, Any], *, is_compressed: bool = True) -> None:
+    """Write arrays as a NumPy archive (.npz), without pickles."""
+    import numpy as np
+
+    content = io.BytesIO()
+    save = np.savez_compressed if is_compressed else np.savez
+    save(content, allow_pickle=False, **arrays)
+    Path(path).parent.mkdir(parents=True, exist_ok=True)
+    write_whole(Path(path), content.getvalue())
 
 
 def as_json(content: Mapping[str, Any]) -> str:

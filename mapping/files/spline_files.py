@@ -5,7 +5,6 @@ map's corner in 16 bits, knots as shares of a curve's length in 16 bits, and wei
 curve only the ends are kept.
 """
 
-import io
 import json
 import math
 from pathlib import Path
@@ -15,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.mapping.files.guarded_reading import check_file, read_arrays, read_text, reading
-from lidarium.mapping.files.output import write_whole
+from lidarium.mapping.files.output import write_arrays, write_whole
 from lidarium.mapping.geometry.bounds import Rule, shown, within
 from lidarium.mapping.splines.bspline import ORDER, Spline
 from lidarium.mapping.splines.curve import make_curve
@@ -47,9 +46,7 @@ def write_spline_map(path: Path, spline_map: SplineMap) -> None:
     if path.suffix == ".json":
         write_whole(path, (json.dumps(_as_json(spline_map), indent=1) + "\n").encode())
     elif path.suffix == ".npz":
-        content = io.BytesIO()
-        np.savez(content, allow_pickle=False, **compact_arrays(spline_map))
-        write_whole(path, content.getvalue())
+        write_arrays(path, compact_arrays(spline_map), is_compressed=False)
     else:
         raise ValueError(f"{path} is no name for a spline map; want one that ends in .json or .npz")
 

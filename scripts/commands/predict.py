@@ -42,13 +42,11 @@ class _Predict(Command):
 
 def execute(command: _Predict) -> Answer:
     """Predict a map and write the results."""
-    import io
-
     import numpy as np
 
     from lidarium.evaluation.drawing.prediction_picture import save_prediction_picture
     from lidarium.mapping.files.map_files import read_grey_map, read_ros_map, write_ros_map
-    from lidarium.mapping.files.output import check_writable, write_whole
+    from lidarium.mapping.files.output import check_writable, write_arrays
     from lidarium.mapping.prediction.levels import UNKNOWN
     from lidarium.mapping.prediction.predictors import make_predictor
     from lidarium.mapping.prediction.whole_maps import predict_map
@@ -66,17 +64,13 @@ def execute(command: _Predict) -> Answer:
     options = {} if command.weights is None else {"weights": command.weights}
     found = predict_map(image, make_predictor(command.predictor, **options), command.margin)
     name = file_name(command.map.stem)
-    content = io.BytesIO()
-    np.savez_compressed(
-        content,
-        allow_pickle=False,
-        probability=found.probability,
-        levels=found.levels,
-        origin=np.array(found.image.origin),
-        resolution=np.array(found.image.resolution),
-    )
-    out.mkdir(parents=True, exist_ok=True)
-    write_whole(out / "probability.npz", content.getvalue())
+    arrays = {
+        "probability": found.probability,
+        "levels": found.levels,
+        "origin": np.array(found.image.origin),
+        "resolution": np.array(found.image.resolution),
+    }
+    write_arrays(out / "probability.npz", arrays)
     save_prediction_picture(out / "prediction.png", found, f"{command.map.stem}, predicted")
     written = write_ros_map(out, name, found.image.levels, found.image.origin, found.image.resolution)
     is_unknown = found.levels == UNKNOWN

@@ -48,6 +48,8 @@ class _Replay(FilmFiles, Command):
     """
     mcap: Path | None = None
     """run the record again and write the sensor data as a bag of ROS 2 (extra bags)"""
+    demonstrations: Path | None = None
+    """run the record again and write observations and actions of each robot (.npz), to imitate"""
 
 
 def execute(command: _Replay) -> Answer:
@@ -55,7 +57,8 @@ def execute(command: _Replay) -> Answer:
     from lidarium.evaluation.record import read_record
     from lidarium.mapping.files.output import check_writable, write_json
 
-    files = [path for path in (command.picture, command.html, command.mcap) if path is not None]
+    given = (command.picture, command.html, command.mcap, command.demonstrations)
+    files = [path for path in given if path is not None]
     for folder in (command.out, *(path.parent for path in files)):
         if folder is not None:
             check_writable(folder)
@@ -94,6 +97,11 @@ def _drawn(command: _Replay, record: "EpisodeRecord") -> Answer:
 
         write_bag(command.mcap, record, command.floor)
         files.append(str(command.mcap))
+    if command.demonstrations is not None:
+        from lidarium.evaluation.record.demonstrations import write_demonstrations
+
+        write_demonstrations(command.demonstrations, record, command.floor)
+        files.append(str(command.demonstrations))
     display = record.display
     result = {
         **_about(command, record),

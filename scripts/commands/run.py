@@ -126,18 +126,18 @@ def execute(command: Run) -> Answer:
     if "depth" in policy.observes and command.camera is None:
         command = replace(command, camera=CAMERA)
     with opened_view(command, policy, command.chosen_policy) as views:
-        return _answer(command, policy, options, views)
+        return answer(command, policy, options, views)
 
 
-def _answer(command: Run, policy: "Policy", options: dict[str, Any], views: "Sequence[Watcher]") -> Answer:
+def answer(command: Run, policy: "Policy", options: dict[str, Any], views: "Sequence[Watcher]") -> Answer:
     """Run the watched episode and write its results."""
     recorder = _recorder(command)
-    env, history = _environment(command, policy, recorder)
+    env, history = environment(command, policy, recorder)
     env.watchers += views
-    starts = None if command.starts is None else _parsed_starts(command.starts, command.robots)
+    options_of_reset = reset_options(command)
     films = RunFilms(env, policy, command.films, command.film_shows, command.film_settings)
     first_start.compile_first(command.json)
-    episode = _explore(command, policy, env, films, {} if starts is None else {"starts": starts})
+    episode = _explore(command, policy, env, films, options_of_reset)
     assert env.floor is not None
     folder = _folder(command, env.floor.name)
     from lidarium.envs.floors.catalogue.names import describe_reach
@@ -153,7 +153,7 @@ def _answer(command: Run, policy: "Policy", options: dict[str, Any], views: "Seq
         notify(f"{env.floor.name}: {reach['remark']}{share}")
         result |= {f"floor_{name}": value for name, value in reach.items()}
     # Starts that were chosen say which area is meant.
-    exit_code = verdict_of_reach(reach) if starts is None or isinstance(starts, str) else DONE
+    exit_code = verdict_of_reach(reach) if isinstance(options_of_reset.get("starts", ""), str) else DONE
     files = write_run(folder, episode, result, recorder, command.chosen_policy, command.films)
     return Answer(
         result,
@@ -210,7 +210,8 @@ def _recorder(command: Run) -> "Recorder | None":
     return Recorder(command.chosen_policy, command.seed, command.floor, command.resolution)
 
 
-def _environment(command: Run, policy: "Policy", recorder: "Recorder | None") -> "tuple[WatchedExploration, History]":
+def environment(command: Run, policy: "Policy", recorder: "Recorder | None") -> "tuple[WatchedExploration, History]":
+    """Return the environment of a command and what is kept of its metrics over time."""
     from lidarium.evaluation.episodes.history import History
     from lidarium.evaluation.episodes.watching import WatchedExploration, Watcher
 
@@ -219,6 +220,11 @@ def _environment(command: Run, policy: "Policy", recorder: "Recorder | None") ->
     return WatchedExploration(
         command.floor, _settings(command, policy), image_resolution=command.resolution, watchers=watchers
     ), history
+
+
+def reset_options(command: Run) -> dict[str, Any]:
+    """Return the options of the reset of a command's environment."""
+    return {} if command.starts is None else {"starts": _parsed_starts(command.starts, command.robots)}
 
 
 def _parsed_starts(text: str, robots: int) -> "NDArray[np.float64] | str":

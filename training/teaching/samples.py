@@ -1,6 +1,5 @@
 """Lessons as arrays, in files."""
 
-import io
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
@@ -10,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.mapping.files.guarded_reading import GuardedArchive, read_bytes, reading
-from lidarium.mapping.files.output import write_whole
+from lidarium.mapping.files.output import write_arrays
 from lidarium.training.decisions import MOST_OPTIONS, MOST_TEAMMATES, PER_OPTION, Decisions, stacked
 from lidarium.training.teaching.teacher import Lesson
 
@@ -96,9 +95,7 @@ def write_samples(path: Path, samples: Samples) -> None:
     """Write samples to a file, whole or not at all."""
     arrays = {field.name: getattr(samples.decisions, field.name) for field in fields(Decisions)}
     arrays["regrets"] = samples.regrets
-    content = io.BytesIO()
-    np.savez_compressed(content, allow_pickle=False, **arrays)
-    write_whole(path, content.getvalue())
+    write_arrays(path, arrays)
 
 
 def read_samples(path: Path) -> Samples:
