@@ -281,12 +281,18 @@ class _Pace:
 
 def check_observed(policy: Policy, name: str, observe: Sequence[str]) -> None:
     """Check that robots observe everything that a policy reads."""
-    missing = [each for each in policy.observes if each not in observe]
+    missing = _missing(policy, observe)
     if missing:
         camera = ", with a depth camera: camera='xtion_tilted'" if "depth" in missing else ""
         raise ValueError(
             f"{name} needs {', '.join(missing)}, which the robots do not observe; add to settings.observe{camera}"
         )
+
+
+def _missing(policy: Policy, observe: Sequence[str]) -> tuple[str, ...]:
+    """Return what a policy reads and robots do not observe; the level of frontiers always shows what it offers."""
+    shown = ("frontiers", "action_mask") if policy.level == "frontier" else ()
+    return tuple(each for each in policy.observes if each not in (*observe, *shown))
 
 
 def settings_for(policy: Policy, settings: ExplorationSettings) -> ExplorationSettings:
@@ -297,7 +303,7 @@ def settings_for(policy: Policy, settings: ExplorationSettings) -> ExplorationSe
     ValueError
         If they lack a sensor for it; the message tells how to add it.
     """
-    missing = tuple(each for each in policy.observes if each not in settings.observe)
+    missing = _missing(policy, settings.observe)
     return replace(settings, observe=(*settings.observe, *missing)) if missing else settings
 
 

@@ -19,6 +19,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from tqdm import tqdm
+
 import lidarium
 from lidarium.agents.catalogue import source_of
 from lidarium.envs.floors.catalogue.names import is_file_name, load_floor
@@ -97,6 +99,10 @@ class Campaign:
         return trials_on_ray(self.suite, missing, records, self.cluster)
 
 
+class Rows(list[dict[str, Any]]):
+    """Rows of episodes; notebooks show them as a table of policies."""
+
+
 def evaluate(
     policies: str | Sequence[str],
     floors: str | Sequence[str] = "apartment",
@@ -108,7 +114,8 @@ def evaluate(
     workers: int = 1,
     records: bool = False,
     bounds: bool = False,
-) -> list[dict[str, Any]]:
+    progress: bool = False,
+) -> Rows:
     """Run policies on floors with teams and seeds, as the command ``lidarium evaluate`` does.
 
     Episodes of the same floor, team and seed have the same starts for every policy. Finished episodes are
@@ -136,6 +143,8 @@ def evaluate(
     bounds : bool, optional
         Whether each episode is compared with the bound of a team that has the floor plan; False by default.
         Needs the extra ``bounds``.
+    progress : bool, optional
+        Whether a progress bar is shown, in a notebook as a widget or as text; False by default.
 
     Returns
     -------
@@ -169,19 +178,20 @@ def evaluate(
     )
     if out is None:
         with TemporaryDirectory(prefix="lidarium-") as folder:
-            return _rows_of(Campaign(suite, Path(folder), workers, records))
-    return _rows_of(Campaign(suite, Path(out), workers, records))
+            return _rows_of(Campaign(suite, Path(folder), workers, records), progress)
+    return _rows_of(Campaign(suite, Path(out), workers, records), progress)
 
 
-def _rows_of(campaign: Campaign) -> list[dict[str, Any]]:
+def _rows_of(campaign: Campaign, shows_progress: bool) -> Rows:
     """Run a campaign, and return its rows in the order of its trials."""
-    for _ in campaign.run():
+    total = sum(1 for _ in campaign.suite.trials())
+    for _ in tqdm(campaign.run(), total=total, unit=" episodes", disable=not shows_progress):
         pass
     for trial, error in campaign.failures:
         message = f"{len(campaign.failures)} of {campaign.total} episodes failed, first {trial.key}: {error}"
         raise RuntimeError(message) from error
     rows = {row[KEY]: row for row in read_episodes(campaign.folder / EPISODES_FILE)}
-    return [rows[trial.key] for trial in campaign.suite.trials()]
+    return Rows(rows[trial.key] for trial in campaign.suite.trials())
 
 
 def _inputs_of(suite: Suite) -> dict[str, str]:

@@ -243,3 +243,11 @@ def _register_task(task: str, robots: int) -> None:
 for _name, _teams in _TASKS.items():
     for _robots in _teams:
         _register_task(f"{_name}-{_robots}", _robots)
+
+if "IPython" in sys.modules:
+    from IPython import get_ipython
+
+    from lidarium.notebooks import show_pictures
+
+    if (_shell := get_ipython()) is not None:
+        show_pictures(_shell)

@@ -250,3 +250,22 @@ def test_an_interrupted_episode_is_passed_on_or_kept_as_far_as_it_came():
     episode = run_episode(Interrupts(), env, 1, raise_interrupt=False)
     assert episode.is_interrupted
     assert episode.env.scorer.time > 2.0
+
+
+def test_a_policy_of_frontiers_may_say_that_it_reads_them():
+    class Reads(lidarium.Policy):
+        level, observes = "frontier", ("frontiers", "time_left")
+
+        def reset(self, team, seed=0):
+            pass
+
+        def act(self, observations):
+            assert all({"frontiers", "time_left"} <= set(seen) for seen in observations.values())
+            return dict.fromkeys(observations, 0)
+
+    lidarium.register_policy("reads_frontiers", Reads, "takes the first one")
+    try:
+        (row,) = lidarium.evaluate("reads_frontiers", seeds=1, settings={"horizon_s": 4.0})
+    finally:
+        lidarium.registry("policy").unregister("reads_frontiers")
+    assert row["time_s"] == 4.0
