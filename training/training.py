@@ -20,6 +20,7 @@ from lidarium.agents.learned.network import load_weights, save_weights
 from lidarium.mapping.files.guarded_reading import read_text, reading
 from lidarium.mapping.files.output import clear_unfinished, only_writer, remove_unfinished, write_json
 from lidarium.mapping.geometry.bounds import shown
+from lidarium.training.loggers import flattened
 from lidarium.training.progress import Progress
 from lidarium.training.settings import MOST_BYTES, TrainingSettings
 from lidarium.training.teaching.rounds import FIT, LESSONS, RoundFolder, run_round
@@ -117,8 +118,8 @@ class Training:
             write_json(path, asked)
             return
         with reading(path, "what a training was asked for"):
-            kept = _flat(dict(json.loads(read_text(path, MOST_BYTES))))
-        asked = _flat(asked)
+            kept = flattened(dict(json.loads(read_text(path, MOST_BYTES))))
+        asked = flattened(asked)
         for name in sorted({*kept, *asked}):
             before, now = kept.get(name, "nothing"), asked.get(name, "nothing")
             if before != now:
@@ -215,14 +216,3 @@ def _fitted(folder: RoundFolder) -> dict[str, Any]:
     path = folder.path / FIT
     with reading(path, "how a fit went"):
         return dict(json.loads(read_text(path, MOST_BYTES)))
-
-
-def _flat(content: Any, name: str = "") -> dict[str, Any]:  # noqa: ANN401
-    """Return the values of tables and lists by dotted names, such as ``rounds.0.floors``."""
-    if not isinstance(content, dict | list):
-        return {name: content}
-    parts = content.items() if isinstance(content, dict) else enumerate(content)
-    found: dict[str, Any] = {}
-    for key, part in parts:
-        found |= _flat(part, f"{name}.{key}" if name else str(key))
-    return found

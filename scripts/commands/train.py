@@ -7,7 +7,7 @@ import shlex
 import sys
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -18,6 +18,7 @@ from lidarium.scripts import first_start
 from lidarium.scripts.common import INTERRUPTED, LINE_PERIOD_S, Answer, Command, notify, table
 
 if TYPE_CHECKING:
+    from lidarium.training.loggers import Logger
     from lidarium.training.prediction.settings import PredictionSettings
     from lidarium.training.prediction.training import PredictionTraining
     from lidarium.training.progress import Progress
@@ -48,6 +49,8 @@ class _Train(Command):
     """processes; 0 for as many as there are cores"""
     device: str = "cpu"
     """where a network that predicts maps is fitted: cpu or cuda"""
+    log: tuple[str, ...] = ()
+    """where curves are logged as well: wandb or mlflow (extra loggers); a training that goes on continues its run"""
 
 
 def execute(command: _Train) -> Answer:
@@ -73,16 +76,29 @@ def execute(command: _Train) -> Answer:
     check_writable(folder)
     first_start.compile_first(command.json)
     training = _training_of(settings, folder, command.workers or len(os.sched_getaffinity(0)), command.device)
-    steps, show, is_interrupted = training.run(), _Shown(command.json), False
+    loggers = _loggers(command.log, folder, settings)
+    steps, show, is_interrupted, is_whole = training.run(), _Shown(command.json), False, False
     try:
         for step in steps:
             show(step)
+            for logger in loggers:
+                logger.log(step)
+        is_whole = True
     except KeyboardInterrupt:
         is_interrupted = True
     finally:
         steps.close()
         show.close()
+        for logger in loggers:
+            logger.close(is_whole)
     return _predictor_answer(folder, is_interrupted) if is_prediction else _answer(folder, is_interrupted)
+
+
+def _loggers(names: Sequence[str], folder: Path, settings: "TrainingSettings | PredictionSettings") -> "list[Logger]":
+    """Return the loggers of a training, each once."""
+    from lidarium.training.loggers import flattened, make_logger
+
+    return [make_logger(name, folder, flattened(asdict(settings))) for name in dict.fromkeys(names)]
 
 
 def _training_of(
