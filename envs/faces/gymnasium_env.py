@@ -86,6 +86,23 @@ class SoloExploration(gymnasium.Env[Observation, Any]):
         masks: NDArray[np.bool_] = self.parallel.unwrapped.action_masks(AGENT)
         return masks
 
+    def get_keys_to_action(self) -> dict[tuple[int, ...], NDArray[np.float32]]:
+        """Return the actions of keys W, A, S and D, alone or two together, for ``gymnasium.utils.play``.
+
+        Raises
+        ------
+        AttributeError
+            At other levels than that of velocities.
+        """
+        if self.parallel.unwrapped.level != "velocity":
+            raise AttributeError("keys are speeds and turn rates; want level='velocity'")
+        actions = {}
+        for ahead, speed in ((ord("w"), 1.0), (ord("s"), -0.5), (None, 0.0)):
+            for aside, turn in ((ord("a"), 0.5), (ord("d"), -0.5), (None, 0.0)):
+                keys = tuple(sorted(key for key in (ahead, aside) if key is not None))
+                actions[keys] = np.array([speed, turn], np.float32)
+        return actions
+
     def stop(self, reason: str) -> None:
         """End the episode at the next step, with a reason."""
         self.parallel.stop(AGENT, reason)

@@ -3,6 +3,7 @@
 import importlib
 import math
 import sys
+import warnings
 
 import gymnasium
 import numpy as np
@@ -128,3 +129,29 @@ def test_random_actions_never_break_the_bounds_of_velocity_and_heading():
         for observation in observations.values():
             assert abs(observation["velocity"][0]) <= np.float32(0.77)
             assert abs(observation["pose"][2]) <= math.pi + 1e-6
+
+
+def test_gymnasium_plays_it_by_keys(monkeypatch):
+    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of pygame, about its own packages
+        pygame = pytest.importorskip("pygame", reason="pygame is not installed: pip install pygame")
+        from gymnasium.utils.play import play
+    env = gymnasium.make("lidarium/Exploration-v1", render_mode="rgb_array", horizon_s=60.0, resolution=0.05)
+    taken = []
+
+    def press(before, after, action, *outcome):
+        taken.append(np.array(action).tolist())
+        event = {1: (pygame.KEYDOWN, "w"), 2: (pygame.KEYDOWN, "a"), 3: (pygame.KEYUP, "w")}.get(len(taken))
+        if event is not None:
+            pygame.event.post(pygame.event.Event(event[0], key=ord(event[1])))
+        if len(taken) == 5:
+            pygame.event.post(pygame.event.Event(pygame.QUIT))
+
+    play(env, callback=press, seed=0, fps=1000)
+    assert taken[0] == [0.0, 0.0]
+    assert [1.0, 0.0] in taken
+    assert [1.0, 0.5] in taken
+    assert taken[-1] == [0.0, 0.5]
+    with pytest.raises(AttributeError, match="want level='velocity'"):
+        gymnasium.make("lidarium/FrontierExploration-v1").unwrapped.get_keys_to_action()
