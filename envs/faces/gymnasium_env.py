@@ -89,6 +89,8 @@ class SoloExploration(gymnasium.Env[Observation, Any]):
     def get_keys_to_action(self) -> dict[tuple[int, ...], NDArray[np.float32]]:
         """Return the actions of keys W, A, S and D, alone or two together, for ``gymnasium.utils.play``.
 
+        Its ``noop`` has to be ``np.zeros(2, np.float32)``: no key is no action that can be listed.
+
         Raises
         ------
         AttributeError
@@ -100,7 +102,8 @@ class SoloExploration(gymnasium.Env[Observation, Any]):
         for ahead, speed in ((ord("w"), 1.0), (ord("s"), -0.5), (None, 0.0)):
             for aside, turn in ((ord("a"), 0.5), (ord("d"), -0.5), (None, 0.0)):
                 keys = tuple(sorted(key for key in (ahead, aside) if key is not None))
-                actions[keys] = np.array([speed, turn], np.float32)
+                if keys:
+                    actions[keys] = np.array([speed, turn], np.float32)
         return actions
 
     def stop(self, reason: str) -> None:

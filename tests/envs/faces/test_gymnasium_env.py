@@ -148,7 +148,7 @@ def test_gymnasium_plays_it_by_keys(monkeypatch):
         if len(taken) == 5:
             pygame.event.post(pygame.event.Event(pygame.QUIT))
 
-    play(env, callback=press, seed=0, fps=1000)
+    play(env, callback=press, seed=0, fps=1000, noop=np.zeros(2, np.float32))
     assert taken[0] == [0.0, 0.0]
     assert [1.0, 0.0] in taken
     assert [1.0, 0.5] in taken
