@@ -116,9 +116,11 @@ class MatchingSettings:
     blind_overlap : float
         Share of the returns near observed cells of the local map below which a match does not count if
         odometry led nowhere.
-    known_overlap, clearer : float
-        The same if a scan seems to see new ground where odometry led, and how many times as much of the scan has to
-        agree elsewhere.
+    known_overlap : float
+        The same if a scan seems to see new ground where odometry led.
+    clearer_overlap, clearer : float
+        The same if the little that is known there does not agree, and how many times as much of the scan has to agree
+        elsewhere.
     evaluations : int
         Maximum number of placements, and blocks of them, examined in such a search.
     explained_share : float
@@ -176,7 +178,8 @@ class MatchingSettings:
     blind_angle: Angle = math.radians(50.0)
     wide_share: Positive = 0.08
     blind_overlap: Positive = 0.7
-    known_overlap: Positive = 0.4
+    known_overlap: Positive = 0.5
+    clearer_overlap: Positive = 0.4
     clearer: Positive = 4.0
     evaluations: Count = 100_000
     explained_share: Positive = 0.35

@@ -128,11 +128,14 @@ class _LocalMatcher:
         """
         settings = self._matching
         match = self._match_far(submap, points, predicted, self._reach(moved))
-        if match is None or not self._is_good(match) or match.overlap < settings.known_overlap:
+        if match is None or not self._is_good(match):
             return None
+        alike = settings.convincing_share * self.usual_score
+        is_known = match.score >= alike and match.overlap >= settings.known_overlap
         # What the map does hold of new ground agrees where odometry leads.
-        agrees = near.score >= settings.convincing_share * self.usual_score
-        if agrees or match.score * match.overlap < settings.clearer * near.score * near.overlap:
+        contradicts = near.score < alike and match.overlap >= settings.clearer_overlap
+        is_clearer = match.score * match.overlap >= settings.clearer * near.score * near.overlap
+        if not (is_known or (contradicts and is_clearer)):
             return None
         self.recoveries += 1
         return match

@@ -33,7 +33,7 @@ LOG_SETTINGS = SlamSettings(
         deviation=0.25,
         surface_m=0.0,
         unseen=0.5,
-        search_turn=0.5,
+        search_turn=0.3,
     ),
     submaps=SubmapSettings(resolution=0.05, path_m=8.0, behind_share=0.0),
     closures=ClosureSettings(least_overlap=0.6, confirmed_beyond_m=0.4, doubts_one_map=False, agree_m=0.3),
