@@ -6,9 +6,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.agents.tours.planning import NO_PATH, TourOptions
+from lidarium.agents.tours.planning import TourOptions
 from lidarium.mapping.planning.touring.coarse_distances import STRAIGHT, UNREACHED, CoarseGrid, distances_from
 from lidarium.mapping.planning.touring.expected_views import cover, shares_left
+from lidarium.mapping.planning.touring.map_tours import NO_PATH
 from lidarium.mapping.planning.touring.tours import TourWeights, team_tours, tours_cost
 
 LATTICE = 3

@@ -25,7 +25,17 @@ from lidarium.agents.frontier.frontier import FrontierExplorer
 from lidarium.agents.frontier.reach import Choice
 from lidarium.agents.intent import Intent
 from lidarium.agents.policy import Team
-from lidarium.agents.tours.planning import Leg, Tourist, TourOptions, TourSettings, first_options, leg_to, tour_options
+from lidarium.agents.tours.planning import (
+    Leg,
+    Tourist,
+    TourOptions,
+    TourRequest,
+    TourSettings,
+    first_options,
+    leg_to,
+    memory_of,
+    tour_options,
+)
 from lidarium.envs.onboard.belief import Belief
 from lidarium.envs.onboard.navigation import NavigationMap
 from lidarium.mapping.geometry.rigid import wrapped
@@ -34,6 +44,7 @@ from lidarium.mapping.planning.frontiers.approach import nearest_frontier
 from lidarium.mapping.planning.frontiers.frontier_map import FRONTIER, Clusters
 from lidarium.mapping.planning.frontiers.views import gain_at
 from lidarium.mapping.planning.grid_planning import centres_of
+from lidarium.mapping.planning.touring.map_tours import TourMemory
 from lidarium.registry import unknown
 
 SIGHT_MARGIN = 0.5
@@ -74,6 +85,7 @@ class TourFrontier(FrontierExplorer):
         self._rules = self.settings.rules(min(team.belief(agent).lidar.range_max for agent in team.agents))
         self._legs: dict[Choice, Leg] = {}
         self._intents = {agent: Intent() for agent in team.agents}
+        self._memories: dict[int, TourMemory] = {}
         self._in_vain: dict[int, NDArray[np.bool_]] = {}
         self._sent_by = dict.fromkeys(team.agents, TOURS)
         self._decided_by = Counter()
@@ -110,7 +122,10 @@ class TourFrontier(FrontierExplorer):
         least = max(math.ceil(self.settings.minimum_size / navigation.resolution - 1e-9), 1)
         clusters = self._without_vain(navigation, least)
         robots = [self._tourist(agent, agent) for agent in agents] + self._others(agents)
-        options = tour_options(navigation, clusters, robots, self.footprint.radius, self.settings, self._rules)
+        memory = self._memories.setdefault(id(navigation), memory_of(navigation, self.settings))
+        (options,) = tour_options(
+            [TourRequest(navigation, clusters, robots, memory)], self.footprint.radius, self.settings, self._rules
+        )
         if options is not None:
             self._sent_by |= dict.fromkeys(agents, TOURS)
             wanted = self.pick(agents, options)
