@@ -110,7 +110,7 @@ def _rays() -> NDArray[np.float64]:
     return np.stack([np.sin(angles), np.cos(angles)], axis=1)
 
 
-@kernel
+@kernel(nrt=False)
 def view_gain(log_odds: Array, row: int, column: int, frame: ViewFrame) -> float:
     """Return the unknown area in view of a cell [m2] (kernel)."""
     area = 0

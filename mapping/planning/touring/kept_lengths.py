@@ -25,7 +25,7 @@ WHOLE = UNREACHED - 2 * BUCKETS
 """Horizon of a field in which all cells that can be reached are."""
 
 
-@kernel
+@kernel(nrt=False)
 def begin_field(field: Array, is_open: Array, bounds: Array, start: int) -> None:
     """Write a field of which only the start is reached (kernel).
 
@@ -154,7 +154,7 @@ def _lose(field: Array, steps: Array, start: int, closed: Array, queues: Array, 
     return lost[:lost_count]
 
 
-@kernel
+@kernel(nrt=False)
 def _ask(field: Array, steps: Array, cell: int, length: int, queues: Array, counts: Array) -> int:
     """List the neighbours of a cell that had this length whose shortest path may have come over it."""
     asked = 0
@@ -168,7 +168,7 @@ def _ask(field: Array, steps: Array, cell: int, length: int, queues: Array, coun
     return asked
 
 
-@kernel
+@kernel(nrt=False)
 def _settle(field: Array, steps: Array, length: int, horizon: int, queues: Array, counts: Array) -> int:
     """Shorten the lengths of the neighbours of all cells of a length up to a horizon; return how many are listed."""
     bucket = length % BUCKETS
@@ -187,7 +187,7 @@ def _settle(field: Array, steps: Array, length: int, horizon: int, queues: Array
     return int(counts[straight] + counts[diagonal] - listed)
 
 
-@kernel(forceinline=True)
+@kernel(forceinline=True, nrt=False)
 def _reach(field: Array, cell: int, steps: Array, further: int, queue: Array, count: int) -> int:
     """Shorten the lengths of four neighbours to ``further`` and list those; return the length of the list."""
     for k in range(4):

@@ -319,7 +319,7 @@ def _forget_gains(kept: _Kept, window: Array, rules: PlanRules) -> None:
                 ] = np.nan
 
 
-@kernel
+@kernel(nrt=False)
 def _note_changes(kept: _Kept, row: int, column: int) -> bool:
     """Note the signs of the map in a square of cells; return whether one of them has changed."""
     changed, end = np.int8(0), min(column + _TILE, kept.levels.shape[1])
@@ -389,7 +389,7 @@ def _view_all(
     return views, gains
 
 
-@kernel
+@kernel(nrt=False)
 def _look(
     kept: _Kept,
     robots: int,
@@ -499,13 +499,13 @@ def _lengths_between(kept: _Kept, places: Array, starts: Array, side: float, bet
     return slots
 
 
-@kernel
+@kernel(nrt=False)
 def _metres(length: int, side: float) -> float:
     """Return a length of a field in metres."""
     return NO_PATH if length in (CLOSED, UNREACHED) else (length - 1) * (side / STRAIGHT)
 
 
-@kernel
+@kernel(nrt=False)
 def _turn(field: Array, columns: int, pose: Array, start: Array, frame: Array, rules: PlanRules) -> float:
     """Return by how much a robot turns to set out to the start of a field [rad]."""
     reach = max(round(AHEAD / rules.side), 1)
@@ -524,7 +524,7 @@ def _turn(field: Array, columns: int, pose: Array, start: Array, frame: Array, r
     return abs((math.atan2(y, x) - pose[2] + math.pi) % (2.0 * math.pi) - math.pi)
 
 
-@kernel
+@kernel(nrt=False)
 def _is_near(kept: _Kept, number: int, goal: Array, reach: float) -> bool:
     """Whether a frontier has a cell near to a goal."""
     for i in range(kept.starts[number], kept.starts[number + 1]):
@@ -533,7 +533,7 @@ def _is_near(kept: _Kept, number: int, goal: Array, reach: float) -> bool:
     return False
 
 
-@kernel
+@kernel(nrt=False)
 def _roomiest(kept: _Kept, row: int, column: int, factor: int, cell: Array) -> None:
     """Write the cell of the map with maximum clearance in a coarse cell."""
     least = np.int64(1 << 30)

@@ -136,7 +136,7 @@ def _runs_of(
     return runs[:count], starts_of_rows, (row_low, row_high, column_low, column_high)
 
 
-@kernel
+@kernel(nrt=False)
 def _root(parents: Array, run: int) -> int:
     while parents[run] != run:
         parents[run] = parents[parents[run]]
@@ -144,7 +144,7 @@ def _root(parents: Array, run: int) -> int:
     return run
 
 
-@kernel
+@kernel(nrt=False)
 def _join(
     log_odds: Array,
     closeness: Array,
@@ -177,7 +177,7 @@ def _join(
             other += 1
 
 
-@kernel
+@kernel(nrt=False)
 def _is_step(
     log_odds: Array, closeness: Array, row: int, column: int, other: int, another: int, standing: Standing
 ) -> bool:

@@ -157,7 +157,7 @@ class _State(NamedTuple):
     waiting: float
 
 
-@kernel(forceinline=True)
+@kernel(forceinline=True, nrt=False)
 def _visit(state: _State, place: int, costs: _Costs) -> _State:
     """Return the state after another number of a sequence."""
     robot, last, length, longest, total, waiting = state
@@ -167,26 +167,26 @@ def _visit(state: _State, place: int, costs: _Costs) -> _State:
     return _State(robot, place, length, longest, total, waiting + costs.worth[place] * length)
 
 
-@kernel(forceinline=True)
+@kernel(forceinline=True, nrt=False)
 def _total(state: _State, weights: TourWeights) -> float:
     """Return the cost of the tours so far."""
     longest, total = max(state.longest, state.length), state.total + state.length
     return weights.longest * longest + weights.total * total + weights.waiting * state.waiting
 
 
-@kernel(forceinline=True)
+@kernel(forceinline=True, nrt=False)
 def _is_over(state: _State, costs: _Costs, limit: float) -> bool:
     """Whether tours that begin thus cost a limit or more."""
     return costs.can_stop and _total(state, costs.weights) >= limit
 
 
-@kernel
+@kernel(nrt=False)
 def _begin() -> _State:
     """Return the state before the first number of a sequence."""
     return _State(np.int64(0), np.int64(-1), 0.0, 0.0, 0.0, 0.0)  # type: ignore[arg-type]
 
 
-@kernel
+@kernel(nrt=False)
 def _visit_all(state: _State, sequence: Array, first: int, last: int, costs: _Costs, limit: float) -> _State:
     """Return the state after a part of a sequence, or earlier once the tours cost a limit or more."""
     for k in range(first, last):
@@ -227,12 +227,12 @@ def team_tours(
     for robot in range(robots - 1):
         sequence[robot] = count + robot
     costs = _Costs(first, between, worth, weights, count == 0 or first.min() >= 0.0)
-    _insert_all(sequence, costs)
-    rest = np.empty_like(sequence)
+    _insert_all(sequence, np.ones(count, np.bool_), costs)
+    rest, piece = np.empty_like(sequence), np.empty(_LONGEST_PIECE, np.int64)
     cost = _cost(sequence, len(sequence), first, between, worth, weights)
     while True:
         better = _turn_pieces(sequence, costs, cost)
-        better = _move_pieces(sequence, rest, costs, better)
+        better = _move_pieces(sequence, rest, piece, costs, better)
         if better >= cost - _LESS:
             return sequence
         cost = better
@@ -302,19 +302,18 @@ def with_first(sequence: NDArray[np.int64], robot: int, place: int, count: int) 
     return changed
 
 
-@kernel
+@kernel(nrt=False)
 def _cost(sequence: Array, size: int, first: Array, between: Array, worth: Array, weights: TourWeights) -> float:
     """Return the cost of the tours of the first ``size`` numbers of a sequence."""
     costs = _Costs(first, between, worth, weights, False)
     return float(_total(_visit_all(_begin(), sequence, 0, size, costs, np.inf), weights))
 
 
-@kernel
-def _insert_all(sequence: Array, costs: _Costs) -> None:
+@kernel(nrt=False)
+def _insert_all(sequence: Array, is_left: Array, costs: _Costs) -> None:
     """Insert all places into empty tours, each time the one with the lowest cost."""
     robots, count = costs.first.shape
     size = robots - 1
-    is_left = np.ones(count, np.bool_)
     for _ in range(count):
         minimum, chosen, at = np.inf, -1, 0
         for place in range(count):
@@ -335,7 +334,7 @@ def _insert_all(sequence: Array, costs: _Costs) -> None:
         size += 1
 
 
-@kernel
+@kernel(nrt=False)
 def _turn_pieces(sequence: Array, costs: _Costs, cost: float) -> float:
     """Reverse every piece that makes the tours better; return their cost."""
     size = sequence.shape[0]
@@ -351,21 +350,24 @@ def _turn_pieces(sequence: Array, costs: _Costs, cost: float) -> float:
                 state = _visit_all(state, sequence, end, size, costs, limit)
             better = _total(state, costs.weights)
             if better < limit:
-                sequence[start:end] = sequence[start:end][::-1].copy()
+                for k in range((end - start) // 2):
+                    other = end - 1 - k
+                    sequence[start + k], sequence[other] = sequence[other], sequence[start + k]
                 cost = better
         before = _visit(before, sequence[start], costs)
     return cost
 
 
-@kernel
-def _move_pieces(sequence: Array, rest: Array, costs: _Costs, cost: float) -> float:
+@kernel(nrt=False)
+def _move_pieces(sequence: Array, rest: Array, piece: Array, costs: _Costs, cost: float) -> float:
     """Move short pieces to positions that make the tours better; return their cost."""
     size = sequence.shape[0]
     for length in range(1, min(_LONGEST_PIECE, size - 1) + 1):
         for start in range(size - length + 1):
-            piece = sequence[start : start + length].copy()
             left = size - length
-            rest[:start], rest[start:left] = sequence[:start], sequence[start + length :]
+            _copy(sequence, start, length, piece, 0)
+            _copy(sequence, 0, start, rest, 0)
+            _copy(sequence, start + length, left - start, rest, start)
             before = _begin()
             for position in range(left + 1):
                 limit = cost - _LESS
@@ -374,9 +376,18 @@ def _move_pieces(sequence: Array, rest: Array, costs: _Costs, cost: float) -> fl
                     state = _visit_all(state, rest, position, left, costs, limit)
                 better = _total(state, costs.weights)
                 if better < limit:
-                    sequence[:position], sequence[position : position + length] = rest[:position], piece
-                    sequence[position + length :], cost = rest[position:left], better
+                    _copy(rest, 0, position, sequence, 0)
+                    _copy(piece, 0, length, sequence, position)
+                    _copy(rest, position, left - position, sequence, position + length)
+                    cost = better
                     break
                 if position < left:
                     before = _visit(before, rest[position], costs)
     return cost
+
+
+@kernel(forceinline=True, nrt=False)
+def _copy(source: Array, first: int, count: int, target: Array, at: int) -> None:
+    """Copy some numbers of a sequence to another one."""
+    for k in range(count):
+        target[at + k] = source[first + k]
