@@ -25,7 +25,6 @@ from lidarium.mapping.planning.touring.map_tours import (
     plan_parallel,
     plan_serial,
 )
-from lidarium.mapping.planning.touring.open_cells import Standing
 from lidarium.mapping.planning.touring.tours import TourWeights
 
 Length = Annotated[float, within(0.0, 1000.0)]
@@ -288,11 +287,13 @@ def tour_options(
     plan_rules = PlanRules(
         resolution,
         factor * resolution,
-        Standing(factor, clearance.limit - limit_of(radius, resolution), math.ceil(NEAR_START / resolution)),
+        factor,
+        clearance.limit - limit_of(radius, resolution),
+        math.ceil(NEAR_START / resolution),
         frame_of(rules, resolution, factor * resolution),
         settings.least_gain,
         settings.turn_length,
-        settings.weights,
+        *settings.weights,
     )
     plan = plan_parallel if threads > 1 and maps > 1 else plan_serial
     plan(
@@ -338,7 +339,7 @@ def _robots_of(requests: Sequence[TourRequest]) -> Robots:
 
 def _options_of(request: TourRequest, k: int, plans: Plans, rules: PlanRules) -> TourOptions | None:
     """Return the options on one map of several."""
-    n, robots, factor = int(plans.counts[k]), len(request.robots), rules.standing.factor
+    n, robots, factor = int(plans.counts[k]), len(request.robots), rules.factor
     if n == 0:
         return None
     low_row, high_row, low_column, high_column = plans.frames[k].tolist()

@@ -122,13 +122,15 @@ def view_gain(log_odds: Array, row: int, column: int, frame: ViewFrame) -> float
 @kernel(nrt=False)
 def _seen_along(log_odds: Array, row: int, column: int, frame: ViewFrame, ray: int) -> int:
     """Return the sum of the distances of unknown cells along a ray [cells], up to the depth behind what is known."""
-    rows, columns = log_odds.shape
+    (rows, columns), margin = log_odds.shape, frame.reach + 1
+    is_inside = margin <= row < rows - margin and margin <= column < columns - margin
+    cells = log_odds.reshape(-1)
     seen, unknown = 0, 0
     for step in range(frame.steps.shape[1]):
         at_row, at_column = row + frame.steps[ray, step, 0], column + frame.steps[ray, step, 1]
-        if not (0 <= at_row < rows and 0 <= at_column < columns):
+        if not (is_inside or (0 <= at_row < rows and 0 <= at_column < columns)):
             break
-        level = log_odds[np.uint64(at_row), np.uint64(at_column)]
+        level = cells[np.uint64(at_row * columns + at_column)]
         if level > 0:
             break
         if level == 0:

@@ -64,8 +64,13 @@ class _Kept(NamedTuple):
         Lengths from robots.
     queues : (BUCKETS, size) int32
         Scratch.
-    bounds : (4,) int64
-        Rows and columns of the grid with its border that have ever been open, the last exclusive.
+    changes : (2, size) int64
+        Scratch: cells that have closed and opened.
+    tried : (rows, columns) int64
+        Scratch: the last frontier that was looked at from each coarse cell, counted over all plans.
+    bounds : (5,) int64
+        Rows and columns of the grid with its border that have ever been open, the last exclusive, and the number of
+        frontiers that were looked at.
     log_odds, closeness : (map rows, map columns) int8, uint16
         The map and its clearance.
     cells, starts : (N, 2), (K + 1,) int64
@@ -80,6 +85,8 @@ class _Kept(NamedTuple):
     slots: Annotated[Array, np.int64, 2]
     from_robots: Annotated[Array, np.int32, 2]
     queues: Annotated[Array, np.int32, 2]
+    changes: Annotated[Array, np.int64, 2]
+    tried: Annotated[Array, np.int64, 2]
     bounds: Annotated[Array, np.int64, 1]
     log_odds: Annotated[Array, np.int8, 2]
     closeness: Annotated[Array, np.uint16, 2]
@@ -94,25 +101,29 @@ class PlanRules(NamedTuple):
     ----------
     resolution, side : float
         Side of a cell of the map, and of a coarse cell [m].
-    standing : Standing
-        Where bodies stand.
+    factor, max_closeness, near_start : int
+        Where bodies stand, see ``Standing``.
     sight : ViewFrame
         How views are measured.
     least_gain : float
         Frontiers that show less are left out [m2].
     turn_length : float
         Length of path that a radian of turning costs [m/rad].
-    weights : TourWeights
-        Weights of tours.
+    longest, total, waiting : float
+        Weights of tours, see ``TourWeights``. Parallel kernels take no tuples of one type within others.
     """
 
     resolution: float
     side: float
-    standing: Standing
+    factor: int
+    max_closeness: int
+    near_start: int
     sight: ViewFrame
     least_gain: float
     turn_length: float
-    weights: TourWeights
+    longest: float
+    total: float
+    waiting: float
 
 
 class Robots(NamedTuple):
@@ -206,7 +217,9 @@ class TourMemory:
             np.full((most, 2), -1, np.int64),
             np.zeros((1, size), np.int32),
             np.zeros((BUCKETS, size), np.int32),
-            np.array([rows + 2, 0, columns + 2, 0], np.int64),
+            np.zeros((2, size), np.int64),
+            np.zeros((rows, columns), np.int64),
+            np.array([rows + 2, 0, columns + 2, 0, 0], np.int64),
         ]
 
     def arrays(self, robots: int) -> list[NDArray[Any]]:
@@ -251,13 +264,18 @@ def _plan_one(kept: _Kept, robots: Robots, rules: PlanRules, plans: Plans, numbe
         starts[k, 1] = math.floor(robots.poses[number, k, 0] / rules.resolution)
     frame = plans.frames[number]
     frame[0], frame[1], frame[2], frame[3] = open_cells(
-        kept.log_odds, kept.closeness, robots.windows[number], starts, rules.standing, kept.opening
+        kept.log_odds,
+        kept.closeness,
+        robots.windows[number],
+        starts,
+        Standing(rules.factor, rules.max_closeness, rules.near_start),
+        kept.opening,
     )
     _renew_fields(kept, frame)
     at = np.empty(count, np.int64)
     for k in range(count):
-        row = min(max(starts[k, 0] // rules.standing.factor, frame[0]), frame[1] - 1)
-        column = min(max(starts[k, 1] // rules.standing.factor, frame[2]), frame[3] - 1)
+        row = min(max(starts[k, 0] // rules.factor, frame[0]), frame[1] - 1)
+        column = min(max(starts[k, 1] // rules.factor, frame[2]), frame[3] - 1)
         starts[k, 0], starts[k, 1] = row, column
         at[k] = (row + 1) * columns + column + 1
         begin_field(kept.from_robots[k], kept.is_open, kept.bounds, at[k])
@@ -272,7 +290,7 @@ def _plan_one(kept: _Kept, robots: Robots, rules: PlanRules, plans: Plans, numbe
         plans.numbers[number, i], plans.gains[number, i] = chosen[i], gains[chosen[i]]
         row, column = places[i] // columns - 1, places[i] % columns - 1
         plans.places[number, i, 0], plans.places[number, i, 1] = row - frame[0], column - frame[2]
-        _roomiest(kept, row, column, rules.standing.factor, plans.cells[number, i])
+        _roomiest(kept, row, column, rules.factor, plans.cells[number, i])
     slots = _lengths_between(kept, places, at, rules.side, plans.between[number])
     first = plans.first[number]
     for k in range(count):
@@ -288,7 +306,7 @@ def _plan_one(kept: _Kept, robots: Robots, rules: PlanRules, plans: Plans, numbe
         first[:count, :n].copy(),
         plans.between[number, :n, :n].copy(),
         plans.gains[number, :n].copy(),
-        rules.weights,
+        TourWeights(rules.longest, rules.total, rules.waiting),
     )
 
 
@@ -308,7 +326,7 @@ def _forget_gains(kept: _Kept, window: Array, rules: PlanRules) -> None:
                     max(row - reach - low_row, 0) : row + reach + 1 - low_row,
                     max(column - reach - low_column, 0) : column + reach + 1 - low_column,
                 ] = True
-    factor, (coarse_rows, coarse_columns) = rules.standing.factor, kept.gains.shape
+    factor, (coarse_rows, coarse_columns) = rules.factor, kept.gains.shape
     for i in range(is_stale.shape[0]):
         for j in range(is_stale.shape[1]):
             if is_stale[i, j]:
@@ -339,8 +357,7 @@ def _renew_fields(kept: _Kept, frame: Array) -> None:
     bounds[0], bounds[1] = min(bounds[0], frame[0] + 1), max(bounds[1], frame[1] + 1)
     bounds[2], bounds[3] = min(bounds[2], frame[2] + 1), max(bounds[3], frame[3] + 1)
     columns, closed_count, opened_count = is_open.shape[1], 0, 0
-    most = (bounds[1] - bounds[0]) * (bounds[3] - bounds[2])
-    closed, opened = np.empty(most, np.int64), np.empty(most, np.int64)
+    closed, opened = kept.changes[0], kept.changes[1]
     for row in range(bounds[0], bounds[1]):
         for column in range(bounds[2], bounds[3]):
             if is_open[row, column] != opening[row, column]:
@@ -375,10 +392,9 @@ def _view_all(
     """
     count, columns = len(kept.starts) - 1, kept.is_open.shape[1]
     views, gains = np.full(count, -1, np.int64), np.zeros(count)
-    tried = np.full((frame[1] - frame[0], frame[3] - frame[2]), -1, np.int32)
     places, shown, lengths = np.empty(_MOST_PLACES, np.int64), np.empty(_MOST_PLACES), np.empty(_MOST_PLACES, np.int64)
     for k in range(count):
-        number = _look(kept, robots, k, frame, rules, tried, (places, shown, lengths))
+        number = _look(kept, robots, k, frame, rules, (places, shown, lengths))
         if number == 0:
             continue
         wanted, least = rules.sight.kept_share * shown[:number].max(), np.int64(UNREACHED)
@@ -396,13 +412,14 @@ def _look(
     number: int,
     frame: Array,
     rules: PlanRules,
-    tried: Array,
     found: tuple[Array, Array, Array],
 ) -> int:
     """Write the coarse cells that see a frontier, their gains [m2] and the paths there; return how many there are."""
     places, shown, lengths = found
-    view, factor, columns = rules.sight, rules.standing.factor, kept.is_open.shape[1]
-    rows, width = tried.shape
+    view, factor, columns = rules.sight, rules.factor, kept.is_open.shape[1]
+    rows, width = frame[1] - frame[0], frame[3] - frame[2]
+    kept.bounds[4] += 1
+    turn = kept.bounds[4]
     cells = kept.cells[kept.starts[number] : kept.starts[number + 1]]
     count, step = 0, max(view.spacing * factor, 1)
     for i in range((len(cells) % step) // 2, len(cells), step):
@@ -413,9 +430,9 @@ def _look(
             if at % view.spacing != 0:
                 continue
             for across in range(max(middle_column - view.around, 0), min(middle_column + view.around + 1, width)):
-                if across % view.spacing != 0 or tried[at, across] == number or count == len(places):
-                    continue
                 at_row, at_column = frame[0] + at, frame[2] + across
+                if across % view.spacing != 0 or kept.tried[at_row, at_column] == turn or count == len(places):
+                    continue
                 length = UNREACHED
                 for k in range(robots):
                     reached = kept.from_robots[k, (at_row + 1) * columns + at_column + 1]
@@ -426,7 +443,7 @@ def _look(
                 place_row, place_column = at_row * factor + factor // 2, at_column * factor + factor // 2
                 if not line_is_open(kept.log_odds, place_row, place_column, row, column):
                     continue
-                tried[at, across] = number
+                kept.tried[at_row, at_column] = turn
                 gain = kept.gains[at_row, at_column]
                 if math.isnan(gain):
                     gain = view_gain(kept.log_odds, place_row, place_column, view)
@@ -516,7 +533,7 @@ def _turn(field: Array, columns: int, pose: Array, start: Array, frame: Array, r
             length = field[(row + 1) * columns + column + 1]
             if length != CLOSED and length < least:
                 least, at_row, at_column = np.int64(length), row, column
-    factor = rules.standing.factor
+    factor = rules.factor
     x = (at_column + 0.5) * factor * rules.resolution - pose[0]
     y = (at_row + 0.5) * factor * rules.resolution - pose[1]
     if math.hypot(x, y) <= rules.side:
