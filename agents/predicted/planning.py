@@ -96,7 +96,7 @@ def rest_of(
     stops = places[chosen]
     gaps = np.abs(stops[:, None] - robots[None]).max(axis=2).min(axis=1)
     stops = stops[np.argsort(gaps, kind="stable")[:MOST_NEAR]]
-    fields = distances_from(CoarseGrid(is_open, factor, 0, 0, side, 0), stops)
+    fields = distances_from(CoarseGrid(is_open, factor, 0, 0, side), stops)
     # Squares close gaps that bodies fit through: in known space, paths between options are those of finer cells.
     lengths = _metres(fields[:, views[:, 0], views[:, 1]].T, side)
     from_options = np.minimum(lengths, _shortest(options.between, lengths))

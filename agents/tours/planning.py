@@ -290,7 +290,6 @@ def tour_options(
         factor,
         clearance.limit - limit_of(radius, resolution),
         math.ceil(NEAR_START / resolution),
-        frame_of(rules, resolution, factor * resolution),
         settings.least_gain,
         settings.turn_length,
         *settings.weights,
@@ -300,6 +299,7 @@ def tour_options(
         np.stack([_table_of(each) for each in due]),
         robots,
         plan_rules,
+        frame_of(rules, resolution, factor * resolution),
         plans,
         new_work(np.arange(maps), min(threads, maps)),
     )

@@ -103,8 +103,6 @@ class PlanRules(NamedTuple):
         Side of a cell of the map, and of a coarse cell [m].
     factor, max_closeness, near_start : int
         Where bodies stand, see ``Standing``.
-    sight : ViewFrame
-        How views are measured.
     least_gain : float
         Frontiers that show less are left out [m2].
     turn_length : float
@@ -118,7 +116,6 @@ class PlanRules(NamedTuple):
     factor: int
     max_closeness: int
     near_start: int
-    sight: ViewFrame
     least_gain: float
     turn_length: float
     longest: float
@@ -233,31 +230,33 @@ class TourMemory:
 
 
 @kernel
-def _plan(tables: Array, robots: Robots, rules: PlanRules, plans: Plans, work: Work) -> None:
+def _plan(tables: Array, robots: Robots, rules: PlanRules, sight: ViewFrame, plans: Plans, work: Work) -> None:
     """Plan the tours of the maps that are left."""
     item = take_next(work.taken)
     while item < len(work.items):
         number = work.items[item]
-        _plan_one(arrays_at(tables[number], _Kept), robots, rules, plans, number)
+        _plan_one(arrays_at(tables[number], _Kept), robots, rules, sight, plans, number)
         item = take_next(work.taken)
 
 
 @kernel(parallel=True)
-def _plan_on_threads(address: int, tables: Array, robots: Robots, rules: PlanRules, plans: Plans, work: Work) -> None:
+def _plan_on_threads(
+    address: int, tables: Array, robots: Robots, rules: PlanRules, sight: ViewFrame, plans: Plans, work: Work
+) -> None:
     for thread in numba.prange(work.threads):
-        call_at(address, (tables, robots, rules, plans, share_of(work, thread)))
+        call_at(address, (tables, robots, rules, sight, plans, share_of(work, thread)))
 
 
 plan_serial, plan_parallel = _plan, on_threads(_plan, _plan_on_threads)
-"""Plan the tours of maps (kernels): tables (M, fields of ``_Kept``, 3), robots, rules, plans (written) and the work."""
+"""Plan the tours of maps (kernels): tables (M, fields of ``_Kept``, 3), robots, rules, sight, plans (written), work."""
 
 
 @kernel
-def _plan_one(kept: _Kept, robots: Robots, rules: PlanRules, plans: Plans, number: int) -> None:
+def _plan_one(kept: _Kept, robots: Robots, rules: PlanRules, sight: ViewFrame, plans: Plans, number: int) -> None:
     """Plan the tours on a map."""
     count, columns = robots.counts[number], kept.is_open.shape[1]
     plans.counts[number] = 0
-    _forget_gains(kept, robots.windows[number], rules)
+    _forget_gains(kept, robots.windows[number], rules.factor, sight.reach)
     starts = np.empty((count, 2), np.int64)
     for k in range(count):
         starts[k, 0] = math.floor(robots.poses[number, k, 1] / rules.resolution)
@@ -280,7 +279,7 @@ def _plan_one(kept: _Kept, robots: Robots, rules: PlanRules, plans: Plans, numbe
         at[k] = (row + 1) * columns + column + 1
         begin_field(kept.from_robots[k], kept.is_open, kept.bounds, at[k])
         extend_field(kept.from_robots[k], columns, kept.bounds, 1, np.full(1, -1), kept.queues)
-    views, gains = _view_all(kept, count, frame, rules)
+    views, gains = _view_all(kept, count, frame, rules.factor, sight)
     chosen = _nearest(kept, count, views, gains, plans.numbers.shape[1], rules.least_gain)
     if len(chosen) == 0:
         return
@@ -311,9 +310,9 @@ def _plan_one(kept: _Kept, robots: Robots, rules: PlanRules, plans: Plans, numbe
 
 
 @kernel
-def _forget_gains(kept: _Kept, window: Array, rules: PlanRules) -> None:
+def _forget_gains(kept: _Kept, window: Array, factor: int, reach: int) -> None:
     """Forget the gains of views within reach of changes, and note the map as it is now."""
-    reach = -(-(rules.sight.reach + 2) // _TILE)
+    reach = -(-(reach + 2) // _TILE)
     rows, columns = kept.levels.shape
     low_row, end_row = max(window[0] // _TILE - reach, 0), min((window[1] - 1) // _TILE + reach + 1, -(-rows // _TILE))
     low_column = max(window[2] // _TILE - reach, 0)
@@ -326,7 +325,7 @@ def _forget_gains(kept: _Kept, window: Array, rules: PlanRules) -> None:
                     max(row - reach - low_row, 0) : row + reach + 1 - low_row,
                     max(column - reach - low_column, 0) : column + reach + 1 - low_column,
                 ] = True
-    factor, (coarse_rows, coarse_columns) = rules.factor, kept.gains.shape
+    coarse_rows, coarse_columns = kept.gains.shape
     for i in range(is_stale.shape[0]):
         for j in range(is_stale.shape[1]):
             if is_stale[i, j]:
@@ -384,7 +383,7 @@ def _renew_fields(kept: _Kept, frame: Array) -> None:
 
 @kernel
 def _view_all(
-    kept: _Kept, robots: int, frame: Array, rules: PlanRules
+    kept: _Kept, robots: int, frame: Array, factor: int, sight: ViewFrame
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """Return the view of each frontier as a cell of the grid with its border, -1 for none, and its gain [m2].
 
@@ -394,10 +393,10 @@ def _view_all(
     views, gains = np.full(count, -1, np.int64), np.zeros(count)
     places, shown, lengths = np.empty(_MOST_PLACES, np.int64), np.empty(_MOST_PLACES), np.empty(_MOST_PLACES, np.int64)
     for k in range(count):
-        number = _look(kept, robots, k, frame, rules, (places, shown, lengths))
+        number = _look(kept, robots, k, frame, factor, sight, (places, shown, lengths))
         if number == 0:
             continue
-        wanted, least = rules.sight.kept_share * shown[:number].max(), np.int64(UNREACHED)
+        wanted, least = sight.kept_share * shown[:number].max(), np.int64(UNREACHED)
         for i in range(number):
             if shown[i] >= wanted and lengths[i] < least:
                 row, column = places[i] // columns, places[i] % columns
@@ -411,27 +410,28 @@ def _look(
     robots: int,
     number: int,
     frame: Array,
-    rules: PlanRules,
+    factor: int,
+    sight: ViewFrame,
     found: tuple[Array, Array, Array],
 ) -> int:
     """Write the coarse cells that see a frontier, their gains [m2] and the paths there; return how many there are."""
     places, shown, lengths = found
-    view, factor, columns = rules.sight, rules.factor, kept.is_open.shape[1]
+    columns = kept.is_open.shape[1]
     rows, width = frame[1] - frame[0], frame[3] - frame[2]
     kept.bounds[4] += 1
     turn = kept.bounds[4]
     cells = kept.cells[kept.starts[number] : kept.starts[number + 1]]
-    count, step = 0, max(view.spacing * factor, 1)
+    count, step = 0, max(sight.spacing * factor, 1)
     for i in range((len(cells) % step) // 2, len(cells), step):
         row, column = cells[i, 0], cells[i, 1]
         middle_row = (row - frame[0] * factor) // factor
         middle_column = (column - frame[2] * factor) // factor
-        for at in range(max(middle_row - view.around, 0), min(middle_row + view.around + 1, rows)):
-            if at % view.spacing != 0:
+        for at in range(max(middle_row - sight.around, 0), min(middle_row + sight.around + 1, rows)):
+            if at % sight.spacing != 0:
                 continue
-            for across in range(max(middle_column - view.around, 0), min(middle_column + view.around + 1, width)):
+            for across in range(max(middle_column - sight.around, 0), min(middle_column + sight.around + 1, width)):
                 at_row, at_column = frame[0] + at, frame[2] + across
-                if across % view.spacing != 0 or kept.tried[at_row, at_column] == turn or count == len(places):
+                if across % sight.spacing != 0 or kept.tried[at_row, at_column] == turn or count == len(places):
                     continue
                 length = UNREACHED
                 for k in range(robots):
@@ -446,7 +446,7 @@ def _look(
                 kept.tried[at_row, at_column] = turn
                 gain = kept.gains[at_row, at_column]
                 if math.isnan(gain):
-                    gain = view_gain(kept.log_odds, place_row, place_column, view)
+                    gain = view_gain(kept.log_odds, place_row, place_column, sight)
                     kept.gains[at_row, at_column] = gain
                 places[count], shown[count], lengths[count] = at_row * columns + at_column, gain, length
                 count += 1
