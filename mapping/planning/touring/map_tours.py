@@ -519,7 +519,8 @@ def _lengths_between(kept: _Kept, places: Array, starts: Array, side: float, bet
 @kernel(nrt=False)
 def _metres(length: int, side: float) -> float:
     """Return a length of a field in metres."""
-    return NO_PATH if length in (CLOSED, UNREACHED) else (length - 1) * (side / STRAIGHT)
+    metres: float = NO_PATH if length in (CLOSED, UNREACHED) else (length - 1) * (side / STRAIGHT)
+    return metres
 
 
 @kernel(nrt=False)
