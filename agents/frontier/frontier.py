@@ -66,17 +66,24 @@ class FrontierExplorer(Policy):
     def act(self, observations: Mapping[str, Observation]) -> dict[str, Action]:
         """Send every robot to its frontier, or to rest if it has none."""
         agents = list(observations)
+        open_agents = self.review(agents)
+        if open_agents or self.replans():
+            self.take(self.choose(agents, open_agents))
+        if all(self._work[agent].choice is None for agent in agents):
+            return {agent: Stop(self.reason(agent)) for agent in agents}
+        return {agent: self.target(agent) for agent in agents}
+
+    def review(self, agents: list[str]) -> list[str]:
+        """Drop the choices that stand no more; return the agents that have none."""
         for agent in agents:
             self._review(agent)
-        open_agents = [agent for agent in agents if self._work[agent].choice is None]
-        if open_agents or self.replans():
-            chosen = self.choose(agents, open_agents)
-            for agent, choice in chosen.items():
-                if choice != self._work[agent].choice:
-                    self._begin(agent, choice)
-        if all(self._work[agent].choice is None for agent in agents):
-            return {agent: Stop(self._reason(agent)) for agent in agents}
-        return {agent: self._target(agent) for agent in agents}
+        return [agent for agent in agents if self._work[agent].choice is None]
+
+    def take(self, chosen: Mapping[str, Choice | None]) -> None:
+        """Let agents begin what was chosen for them; one that goes on has no new beginning."""
+        for agent, choice in chosen.items():
+            if choice != self._work[agent].choice:
+                self._begin(agent, choice)
 
     @property
     def given_up(self) -> list[GivenUp]:
@@ -161,7 +168,8 @@ class FrontierExplorer(Policy):
         entry = GivenUp(agent, float(x), float(y), count * navigation.resolution, reason)
         self._given_up.append((entry, navigation, choice.frontier_cell))
 
-    def _target(self, agent: str) -> Target | None:
+    def target(self, agent: str) -> Target | None:
+        """Return where an agent drives to, None if it has no choice."""
         choice = self._work[agent].choice
         if choice is None:
             return None
@@ -186,7 +194,7 @@ class FrontierExplorer(Policy):
         towards = np.mean(beside, axis=0) if beside else np.asarray(choice.frontier_cell)
         return math.atan2(towards[0] - choice.cell[0], towards[1] - choice.cell[1])
 
-    def _reason(self, agent: str) -> str:
+    def reason(self, agent: str) -> str:
         """Report why an agent has no work, and the frontiers that are left."""
         navigation, belief = self.navigation(agent), self.team.belief(agent)
         clusters = navigation.frontiers.clusters(belief.map_origin)

@@ -16,11 +16,11 @@ from lidarium.agents.learned.features import (
     table_of,
     teammate_features,
 )
-from lidarium.agents.tours.planning import NO_PATH, TourOptions
+from lidarium.agents.tours.planning import TourOptions
 from lidarium.envs.onboard.navigation import NavigationMap
 from lidarium.mapping.planning.grid_planning import centres_of
-from lidarium.mapping.planning.touring.coarse_distances import place_in
 from lidarium.mapping.planning.touring.map_crops import OCCUPIED, UNKNOWN, map_crops
+from lidarium.mapping.planning.touring.map_tours import NO_PATH
 from lidarium.mapping.planning.touring.tours import TourWeights, costs_of_firsts
 
 CROP_SIDE, CROP_STEP = 24, 0.25
@@ -133,18 +133,12 @@ def scene_of(
         ``time``, ``known`` and ``rate``, see ``SITUATION_FEATURES``.
     """
     log_odds, resolution = navigation.log_odds, navigation.resolution
-    cells = np.array(
-        [
-            place_in(options.grid, log_odds, navigation.clearance, (int(row), int(column)))
-            for row, column in options.places
-        ],
-        np.int64,
-    )
+    cells = options.cells
     gains, directions = far_gains(log_odds, resolution, cells, reach)
     crops = map_crops(log_odds, resolution, cells, directions, CROP_SIDE, CROP_STEP)
     positions = np.asarray(centres_of(cells, (0.0, 0.0), resolution), np.float64)
     sizes = [len(options.cells_of(k)) * resolution for k in range(len(cells))]
-    rows, columns = options.grid.is_open.shape
+    rows, columns = options.grid.shape
     rim = np.minimum(options.places, np.array([rows, columns]) - 1 - options.places).min(axis=1)
     shared = {
         "far_gain": gains,

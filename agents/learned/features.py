@@ -9,9 +9,10 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.agents.tours.planning import NO_PATH, Tourist, TourOptions
+from lidarium.agents.tours.planning import Tourist, TourOptions
 from lidarium.mapping.geometry.rigid import wrapped
-from lidarium.mapping.planning.frontiers.views import ViewRules, gain_at
+from lidarium.mapping.planning.frontiers.views import ViewRules, gains_at
+from lidarium.mapping.planning.touring.map_tours import NO_PATH
 
 NEAR_M, AROUND_M = 3.0, 6.0
 """Options within these paths of an option lie near and around it [m]."""
@@ -151,9 +152,7 @@ def far_gains(
         How far the laser sees [m].
     """
     rules = ViewRules(reach=min(FAR_REACH, reach), depth=FAR_DEPTH)
-    seen = [gain_at(log_odds, resolution, (int(row), int(column)), rules) for row, column in cells]
-    table = np.array(seen).reshape(-1, 2)
-    return table[:, 0], table[:, 1]
+    return gains_at(log_odds, resolution, cells, rules)
 
 
 def teammate_features(

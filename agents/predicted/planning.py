@@ -6,9 +6,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.agents.tours.planning import NO_PATH, TourOptions
+from lidarium.agents.tours.planning import TourOptions
 from lidarium.mapping.planning.touring.coarse_distances import STRAIGHT, UNREACHED, CoarseGrid, distances_from
 from lidarium.mapping.planning.touring.expected_views import cover, shares_left
+from lidarium.mapping.planning.touring.map_tours import NO_PATH
 from lidarium.mapping.planning.touring.tours import TourWeights, team_tours, tours_cost
 
 LATTICE = 3
@@ -95,7 +96,7 @@ def rest_of(
     stops = places[chosen]
     gaps = np.abs(stops[:, None] - robots[None]).max(axis=2).min(axis=1)
     stops = stops[np.argsort(gaps, kind="stable")[:MOST_NEAR]]
-    fields = distances_from(CoarseGrid(is_open, factor, 0, 0, side, 0), stops)
+    fields = distances_from(CoarseGrid(is_open, factor, 0, 0, side), stops)
     # Squares close gaps that bodies fit through: in known space, paths between options are those of finer cells.
     lengths = _metres(fields[:, views[:, 0], views[:, 1]].T, side)
     from_options = np.minimum(lengths, _shortest(options.between, lengths))

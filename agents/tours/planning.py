@@ -3,26 +3,29 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.envs.onboard.navigation import NavigationMap
+from lidarium.envs.onboard.navigation import ROW_LOW, NavigationMap
 from lidarium.mapping.geometry.bounds import above, check_settings, share, within
+from lidarium.mapping.kernels.views import table_of
+from lidarium.mapping.kernels.work_queue import new_work
+from lidarium.mapping.planning.clearance import limit_of
 from lidarium.mapping.planning.frontiers.frontier_map import Clusters
-from lidarium.mapping.planning.frontiers.views import ViewRules, gain_at, views_of
+from lidarium.mapping.planning.frontiers.views import ViewRules, frame_of, gain_at
 from lidarium.mapping.planning.grid_planning import Cell
-from lidarium.mapping.planning.touring.coarse_distances import (
-    STRAIGHT,
-    UNREACHED,
-    CoarseGrid,
-    coarse_grid,
-    distances_among,
-    distances_from,
-    place_in,
+from lidarium.mapping.planning.touring.map_tours import (
+    NO_PATH,
+    PlanRules,
+    Plans,
+    Robots,
+    TourMemory,
+    plan_parallel,
+    plan_serial,
 )
-from lidarium.mapping.planning.touring.tours import TourWeights, team_tours
+from lidarium.mapping.planning.touring.tours import TourWeights
 
 Length = Annotated[float, within(0.0, 1000.0)]
 
@@ -83,14 +86,12 @@ class TourSettings:
         return TourWeights(1.0, self.total, self.waiting)
 
 
-AHEAD = 0.5
-"""The direction in which a path begins is that of a place about so far along it [m]."""
+SIDE = 0.1
+"""Side of a coarse cell [m], rounded to whole cells of the map. As bodies keep their radius from both sides of a wall,
+coarse cells of less than half a body's width never join the two sides of a wall."""
 
-SAME = 0.5
-"""Frontiers nearer than this to what a robot drives to are what it drives to [m]."""
-
-NO_PATH = 1e4
-"""Length of a path that there is none of [m]."""
+NEAR_START = 0.2
+"""Bodies start from the nearest cells in which they fit, up to this distance [m]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,6 +138,28 @@ class Leg:
     direction: float
 
 
+class CoarseFrame(NamedTuple):
+    """The coarse cells around all that is free.
+
+    Attributes
+    ----------
+    row, column : int
+        The map's cell at which coarse cell (0, 0) begins.
+    shape : (rows, columns)
+        Number of coarse cells.
+    factor : int
+        Side of a coarse cell [cells of the map].
+    side : float
+        The same [m].
+    """
+
+    row: int
+    column: int
+    shape: tuple[int, int]
+    factor: int
+    side: float
+
+
 @dataclass(frozen=True, slots=True)
 class TourOptions:
     """The options of robots on one map: n views of its frontiers, and the costs of getting there.
@@ -147,10 +170,11 @@ class TourOptions:
         Who visits them.
     clusters : Clusters
         The frontiers that may be visited.
-    grid : CoarseGrid
-        Cells free for the bodies.
-    places : (n, 2) int64
-        Coarse cells (row, column) of the views, the nearest to any robot first.
+    grid : CoarseFrame
+        The coarse cells on which paths are measured.
+    places, cells : (n, 2) int64
+        Coarse cells (row, column) of the views, the nearest to any robot first, and the map's cell with maximum
+        clearance in each.
     numbers : (n,) int64
         Numbers of their clusters.
     gains : (n,) float64
@@ -171,8 +195,9 @@ class TourOptions:
 
     robots: Sequence[Tourist]
     clusters: Clusters
-    grid: CoarseGrid
+    grid: CoarseFrame
     places: NDArray[np.int64]
+    cells: NDArray[np.int64]
     numbers: NDArray[np.int64]
     gains: NDArray[np.float64]
     lengths: NDArray[np.float64]
@@ -192,17 +217,11 @@ class TourOptions:
         return self.lengths < NO_PATH
 
 
-def tour_options(
-    navigation: NavigationMap,
-    clusters: Clusters,
-    robots: Sequence[Tourist],
-    radius: float,
-    settings: TourSettings,
-    rules: ViewRules,
-) -> TourOptions | None:
-    """Return the options of robots on one map, None if nothing is left for any.
+@dataclass(frozen=True, slots=True)
+class TourRequest:
+    """A map on which tours are to be planned.
 
-    Parameters
+    Attributes
     ----------
     navigation : NavigationMap
         The map.
@@ -210,41 +229,132 @@ def tour_options(
         Its frontiers that may be visited.
     robots : sequence of Tourist
         Who visits them.
+    memory : TourMemory
+        What is kept of the map, see `memory_of`.
+    """
+
+    navigation: NavigationMap
+    clusters: Clusters
+    robots: Sequence[Tourist]
+    memory: TourMemory
+
+
+def memory_of(navigation: NavigationMap, settings: TourSettings) -> TourMemory:
+    """Return the memory of a map on which no tours have been planned yet."""
+    return TourMemory(navigation.log_odds.shape, _factor_of(navigation.resolution), settings.most)
+
+
+def _factor_of(resolution: float) -> int:
+    return max(round(SIDE / resolution), 1)
+
+
+def tour_options(
+    requests: Sequence[TourRequest], radius: float, settings: TourSettings, rules: ViewRules, threads: int = 1
+) -> list[TourOptions | None]:
+    """Return the options of the robots on each of some maps of one resolution, None if nothing is left for any.
+
+    Parameters
+    ----------
+    requests : sequence of TourRequest
+        The maps, each of them once.
     radius : float
-        Radius of their bodies [m].
+        Radius of the robots' bodies [m].
     settings : TourSettings
         How tours are planned.
     rules : ViewRules
         How views are measured.
+    threads : int, optional
+        Number of threads, see ``use_threads``; the result does not depend on it. 1 by default.
     """
-    if not len(clusters):
-        return None
-    resolution = navigation.resolution
-    cells = np.array([_cell_at(robot.pose, resolution) for robot in robots])
-    grid = coarse_grid(navigation.log_odds, navigation.clearance, radius, starts=cells)
-    starts = np.array([grid.cell_of((int(row), int(column))) for row, column in cells])
-    lengths = distances_from(grid, starts)
-    groups = (clusters.cells, clusters.starts)
-    views = views_of(navigation.log_odds, resolution, grid, lengths.min(axis=0), groups, rules)
-    is_seen = views.lengths < UNREACHED
-    reached = np.where(is_seen, lengths[:, views.cells[:, 0], views.cells[:, 1]], UNREACHED)
-    chosen = _nearest(reached, views.gains, settings)
-    if not len(chosen):
-        return None
-    positions = views.cells[chosen]
-    paths = _metres(lengths[:, positions[:, 0], positions[:, 1]], grid)
-    among, fields = distances_among(grid, positions, starts)
-    between = _metres(among, grid)
-    turns = np.stack(
-        [_turns(robot.pose, start, fields, grid, resolution) for robot, start in zip(robots, starts, strict=True)]
+    due = [each for each in requests if len(each.clusters)]
+    if not due:
+        return [None] * len(requests)
+    robots = _robots_of(due)
+    (maps, width), most = robots.kept.shape, settings.most
+    plans = Plans(
+        np.zeros(maps, np.int64),
+        np.zeros((maps, 4), np.int64),
+        *(np.zeros((maps, most, 2), np.int64) for _ in range(2)),
+        np.zeros((maps, most), np.int64),
+        np.zeros((maps, most)),
+        *(np.zeros((maps, width, most)) for _ in range(3)),
+        np.zeros((maps, width, most), np.bool_),
+        np.zeros((maps, most, most)),
+        np.zeros((maps, most + width - 1), np.int64),
     )
-    is_kept = np.stack([_are_kept(robot, clusters, chosen, resolution) for robot in robots])
-    kept = np.array([[robot.kept] for robot in robots])
-    first = paths + settings.turn_length * turns - kept * is_kept
-    gains = views.gains[chosen]
-    sequence = team_tours(first, between, gains, settings.weights)
+    resolution, clearance = due[0].navigation.resolution, due[0].navigation.clearance
+    factor = _factor_of(resolution)
+    plan_rules = PlanRules(
+        resolution,
+        factor * resolution,
+        factor,
+        clearance.limit - limit_of(radius, resolution),
+        math.ceil(NEAR_START / resolution),
+        settings.least_gain,
+        settings.turn_length,
+        *settings.weights,
+    )
+    plan = plan_parallel if threads > 1 and maps > 1 else plan_serial
+    plan(
+        np.stack([_table_of(each) for each in due]),
+        robots,
+        plan_rules,
+        frame_of(rules, resolution, factor * resolution),
+        plans,
+        new_work(np.arange(maps), min(threads, maps)),
+    )
+    found = iter([_options_of(each, k, plans, plan_rules) for k, each in enumerate(due)])
+    return [next(found) if len(each.clusters) else None for each in requests]
+
+
+def _table_of(request: TourRequest) -> NDArray[np.int64]:
+    navigation, clusters = request.navigation, request.clusters
+    return table_of(
+        [
+            *request.memory.arrays(len(request.robots)),
+            navigation.log_odds,
+            navigation.clearance.closeness,
+            clusters.cells,
+            clusters.starts,
+        ]
+    )
+
+
+def _robots_of(requests: Sequence[TourRequest]) -> Robots:
+    shape = len(requests), max(len(each.robots) for each in requests)
+    robots = Robots(
+        np.array([len(each.robots) for each in requests], np.int64),
+        np.array([each.navigation.record[ROW_LOW:] for each in requests], np.int64),
+        np.zeros((*shape, 3)),
+        np.full((*shape, 2), -1, np.int64),
+        np.zeros(shape),
+    )
+    for k, each in enumerate(requests):
+        for robot, tourist in enumerate(each.robots):
+            robots.poses[k, robot], robots.kept[k, robot] = tourist.pose, tourist.kept
+            if tourist.kept_cell is not None:
+                robots.kept_cells[k, robot] = tourist.kept_cell
+    return robots
+
+
+def _options_of(request: TourRequest, k: int, plans: Plans, rules: PlanRules) -> TourOptions | None:
+    """Return the options on one map of several."""
+    n, robots, factor = int(plans.counts[k]), len(request.robots), rules.factor
+    if n == 0:
+        return None
+    low_row, high_row, low_column, high_column = plans.frames[k].tolist()
     return TourOptions(
-        robots, clusters, grid, positions, chosen, gains, paths, turns, is_kept, first, between, sequence
+        request.robots,
+        request.clusters,
+        CoarseFrame(
+            low_row * factor, low_column * factor, (high_row - low_row, high_column - low_column), factor, rules.side
+        ),
+        *(array[k, :n] for array in (plans.places, plans.cells, plans.numbers, plans.gains)),
+        *(np.ascontiguousarray(table[k, :robots, :n]) for table in (plans.lengths, plans.turns)),
+        np.ascontiguousarray(plans.is_kept[k, :robots, :n]),
+        np.ascontiguousarray(plans.first[k, :robots, :n]),
+        np.ascontiguousarray(plans.between[k, :n, :n]),
+        plans.sequences[k, : n + robots - 1],
     )
 
 
@@ -273,65 +383,10 @@ def _first_places(sequence: NDArray[np.int64], count: int) -> list[int | None]:
     return firsts
 
 
-def _cell_at(pose: NDArray[np.float64], resolution: float) -> Cell:
-    return math.floor(pose[1] / resolution), math.floor(pose[0] / resolution)
-
-
-def _nearest(lengths: NDArray[np.int32], gains: NDArray[np.float64], settings: TourSettings) -> NDArray[np.int64]:
-    """Return the numbers of the frontiers to visit, the nearest to any robot first.
-
-    Each robot in turn takes its nearest: a team that is spread out has something to visit everywhere.
-    ``lengths`` (robots, frontiers) are those of the paths there.
-    """
-    is_wanted = (lengths < UNREACHED) & (gains >= settings.least_gain)
-    robots = len(lengths)
-    ranks = np.where(is_wanted, lengths, UNREACHED).argsort(axis=1, kind="stable").argsort(axis=1)
-    turns = np.where(is_wanted, ranks * robots + np.arange(robots)[:, None], UNREACHED).min(axis=0)
-    chosen = turns.argsort(kind="stable")[: settings.most]
-    chosen = np.sort(chosen[turns[chosen] < UNREACHED])
-    nearest = lengths[:, chosen].min(axis=0)
-    return np.asarray(chosen[np.argsort(nearest, kind="stable")])
-
-
-def _metres(lengths: NDArray[np.int32], grid: CoarseGrid) -> NDArray[np.float64]:
-    return np.where(lengths == UNREACHED, NO_PATH, lengths * (grid.side / STRAIGHT))
-
-
-def _turns(
-    pose: NDArray[np.float64],
-    start: NDArray[np.int64],
-    fields: NDArray[np.int32],
-    grid: CoarseGrid,
-    resolution: float,
-) -> NDArray[np.float64]:
-    """Return by how much a robot turns to set out to each of n places, (n,) [rad].
-
-    ``fields`` (n, rows, columns) are lengths of paths from each place.
-    """
-    reach = max(round(AHEAD / grid.side), 1)
-    low = np.maximum(start - reach, 0)
-    part = fields[:, low[0] : start[0] + reach + 1, low[1] : start[1] + reach + 1]
-    nearest = part.reshape(len(fields), -1).argmin(axis=1)
-    rows, columns = np.unravel_index(nearest, part.shape[1:])
-    x = (grid.column + (low[1] + columns + 0.5) * grid.factor) * resolution - pose[0]
-    y = (grid.row + (low[0] + rows + 0.5) * grid.factor) * resolution - pose[1]
-    turns = np.abs((np.arctan2(y, x) - pose[2] + math.pi) % (2.0 * math.pi) - math.pi)
-    return np.where(np.hypot(x, y) > grid.side, turns, 0.0)
-
-
-def _are_kept(robot: Tourist, clusters: Clusters, chosen: NDArray[np.int64], resolution: float) -> NDArray[np.bool_]:
-    """Return which of the chosen frontiers a robot drives to already."""
-    if robot.kept_cell is None:
-        return np.zeros(len(chosen), np.bool_)
-    at, reach = np.asarray(robot.kept_cell), SAME / resolution
-    return np.array([np.abs(clusters.of(int(k)) - at).max(axis=1).min() < reach for k in chosen])
-
-
 def leg_to(option: int, options: TourOptions, navigation: NavigationMap, rules: ViewRules) -> Leg:
     """Return the leg that ends at an option."""
-    log_odds, position = navigation.log_odds, options.places[option]
-    cells = options.cells_of(option)
-    cell = place_in(options.grid, log_odds, navigation.clearance, (int(position[0]), int(position[1])))
+    cells, (row, column) = options.cells_of(option), options.cells[option].tolist()
+    cell = row, column
     nearest = cells[int(np.argmin(np.hypot(*(cells - np.asarray(cell)).T)))]
-    gain, direction = gain_at(log_odds, navigation.resolution, cell, rules)
+    gain, direction = gain_at(navigation.log_odds, navigation.resolution, cell, rules)
     return Leg(cell, (int(nearest[0]), int(nearest[1])), cells, gain, direction)

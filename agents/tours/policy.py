@@ -25,7 +25,17 @@ from lidarium.agents.frontier.frontier import FrontierExplorer
 from lidarium.agents.frontier.reach import Choice
 from lidarium.agents.intent import Intent
 from lidarium.agents.policy import Team
-from lidarium.agents.tours.planning import Leg, Tourist, TourOptions, TourSettings, first_options, leg_to, tour_options
+from lidarium.agents.tours.planning import (
+    Leg,
+    Tourist,
+    TourOptions,
+    TourRequest,
+    TourSettings,
+    first_options,
+    leg_to,
+    memory_of,
+    tour_options,
+)
 from lidarium.envs.onboard.belief import Belief
 from lidarium.envs.onboard.navigation import NavigationMap
 from lidarium.mapping.geometry.rigid import wrapped
@@ -34,6 +44,7 @@ from lidarium.mapping.planning.frontiers.approach import nearest_frontier
 from lidarium.mapping.planning.frontiers.frontier_map import FRONTIER, Clusters
 from lidarium.mapping.planning.frontiers.views import gain_at
 from lidarium.mapping.planning.grid_planning import centres_of
+from lidarium.mapping.planning.touring.map_tours import TourMemory
 from lidarium.registry import unknown
 
 SIGHT_MARGIN = 0.5
@@ -71,10 +82,11 @@ class TourFrontier(FrontierExplorer):
         """Begin an episode."""
         super().reset(team, seed)
         # Any robot may take any view, so a view counts what the shortest-range lidar of the team would see.
-        self._rules = self.settings.rules(min(team.belief(agent).lidar.range_max for agent in team.agents))
+        self.rules = self.settings.rules(min(team.belief(agent).lidar.range_max for agent in team.agents))
         self._legs: dict[Choice, Leg] = {}
         self._intents = {agent: Intent() for agent in team.agents}
-        self._in_vain: dict[int, NDArray[np.bool_]] = {}
+        self._memories: dict[NavigationMap, TourMemory] = {}
+        self._in_vain: dict[NavigationMap, NDArray[np.bool_]] = {}
         self._sent_by = dict.fromkeys(team.agents, TOURS)
         self._decided_by = Counter()
 
@@ -90,47 +102,60 @@ class TourFrontier(FrontierExplorer):
             return super().still_stands(navigation, choice)
         if not (navigation.frontiers.flags[leg.cells[:, 0], leg.cells[:, 1]] == FRONTIER).any():
             return False
-        gain, _ = gain_at(navigation.log_odds, navigation.resolution, choice.cell, self._rules)
+        gain, _ = gain_at(navigation.log_odds, navigation.resolution, choice.cell, self.rules)
         return gain >= self.settings.kept_share * leg.gain
 
     def choose(self, agents: list[str], open_agents: list[str]) -> dict[str, Choice | None]:
         """Plan the tours of all robots that explore on one map with an open one."""
-        groups: dict[int, list[str]] = {}
-        for agent in agents:
-            groups.setdefault(id(self.navigation(agent)), []).append(agent)
+        groups = self.groups(agents, open_agents)
+        plans = tour_options(
+            [self.request(members) for members in groups], self.footprint.radius, self.settings, self.rules
+        )
         chosen: dict[str, Choice | None] = {}
-        for members in groups.values():
-            if any(agent in open_agents for agent in members):
-                chosen |= self._share_out(members)
+        for members, options in zip(groups, plans, strict=True):
+            chosen |= self._share_out(members, options)
         return chosen
 
-    def _share_out(self, agents: list[str]) -> dict[str, Choice | None]:
-        """Return the goal of each robot on one map."""
+    def groups(self, agents: list[str], open_agents: list[str]) -> list[list[str]]:
+        """Return the robots of each map on which one is open."""
+        groups: dict[NavigationMap, list[str]] = {}
+        for agent in agents:
+            groups.setdefault(self.navigation(agent), []).append(agent)
+        return [members for members in groups.values() if any(agent in open_agents for agent in members)]
+
+    def request(self, agents: list[str]) -> TourRequest:
+        """Return the map of some robots, its frontiers and who visits them, for a plan."""
         navigation = self.navigation(agents[0])
+        if navigation not in self._memories:
+            self._memories[navigation] = memory_of(navigation, self.settings)
         least = max(math.ceil(self.settings.minimum_size / navigation.resolution - 1e-9), 1)
-        clusters = self._without_vain(navigation, least)
         robots = [self._tourist(agent, agent) for agent in agents] + self._others(agents)
-        options = tour_options(navigation, clusters, robots, self.footprint.radius, self.settings, self._rules)
+        return TourRequest(navigation, self._without_vain(navigation, least), robots, self._memories[navigation])
+
+    def _share_out(self, agents: list[str], options: TourOptions | None) -> dict[str, Choice | None]:
+        """Return the goal of each robot on one map."""
         if options is not None:
             self._sent_by |= dict.fromkeys(agents, TOURS)
             wanted = self.pick(agents, options)
-            legs = [None if k is None else leg_to(k, options, navigation, self._rules) for k in wanted]
-            chosen = {agent: self._begun(agent, leg) for agent, leg in zip(agents, legs, strict=True)}
+            chosen = {
+                agent: None if option is None else self.choice_of(agent, option, options)
+                for agent, option in zip(agents, wanted, strict=True)
+            }
             if any(chosen.values()):
                 return chosen
-        return {agent: self.current(agent) or self._nearest(agent) for agent in agents}
+        return {agent: self.current(agent) or self.nearest(agent) for agent in agents}
 
     def pick(self, agents: list[str], options: TourOptions) -> list[int | None]:
         """Return which option each robot on one map drives to: the first of its tour."""
         return first_options(options)[: len(agents)]
 
-    def _begun(self, agent: str, leg: Leg | None) -> Choice | None:
-        """Return the choice of a robot that begins a leg."""
-        if leg is None:
-            return None
+    def choice_of(self, agent: str, option: int, options: TourOptions) -> Choice:
+        """Return the choice of a robot that sets out to an option."""
+        navigation = self.navigation(agent)
+        leg = leg_to(option, options, navigation, self.rules)
         choice = Choice(leg.cell, leg.frontier_cell)
         self._legs[choice] = leg
-        self._intents[agent].go_for(np.array(leg.frontier_cell) * self.navigation(agent).resolution)
+        self._intents[agent].go_for(np.array(leg.frontier_cell) * navigation.resolution)
         return choice
 
     def _tourist(self, agent: str, viewer: str) -> Tourist:
@@ -151,7 +176,7 @@ class TourFrontier(FrontierExplorer):
             if name not in agents and not teammate.has_ended and teammate.age_s <= FRESH_S
         ]
 
-    def _nearest(self, agent: str) -> Choice | None:
+    def nearest(self, agent: str) -> Choice | None:
         """Return the nearest frontier of any size, to be observed from next to it."""
         navigation, start = self.navigation(agent), self.start_cell(agent)
         if not len(navigation.frontiers):
@@ -178,7 +203,7 @@ class TourFrontier(FrontierExplorer):
 
     def _without_vain(self, navigation: NavigationMap, least: int) -> Clusters:
         """Return the frontiers of at least a number of cells that were not observed in vain."""
-        clusters, vain = navigation.frontiers.clusters(minimum_cells=least), self._in_vain.get(id(navigation))
+        clusters, vain = navigation.frontiers.clusters(minimum_cells=least), self._in_vain.get(navigation)
         return clusters if vain is None else clusters.without(vain, least)
 
     def _give_up_around(self, agent: str, choice: Choice, reason: str) -> None:
@@ -191,10 +216,10 @@ class TourFrontier(FrontierExplorer):
             super()._give_up_around(agent, choice, reason)
             return
         navigation = self.navigation(agent)
-        vain = self._in_vain.setdefault(id(navigation), np.zeros(navigation.frontiers.flags.shape, np.bool_))
+        vain = self._in_vain.setdefault(navigation, np.zeros(navigation.frontiers.flags.shape, np.bool_))
         cells = leg.cells
         if reason == "unseen":
-            reach = self._rules.reach / navigation.resolution
+            reach = self.rules.reach / navigation.resolution
             in_sight = visible(navigation.log_odds, choice.cell, cells, reach)
             cells = cells[in_sight] if in_sight.any() else cells
         vain[cells[:, 0], cells[:, 1]] = True

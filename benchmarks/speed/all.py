@@ -25,6 +25,7 @@ from lidarium.benchmarks.speed.cases import (
     range_error,
     ray_casting,
     thread_scaling,
+    tour_decision,
     waypoint_decision,
 )
 from lidarium.benchmarks.speed.cases.learners import (
@@ -58,6 +59,7 @@ _MODULES: tuple[ModuleType, ...] = (
     learning_preset,
     waypoint_decision,
     frontier_decision,
+    tour_decision,
     frontier_threads,
     masked_training,
     attention_training,

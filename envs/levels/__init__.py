@@ -13,6 +13,7 @@ LEVELS.register("velocity", "lidarium.envs.levels.velocity:VelocityLevel", "spee
 LEVELS.register("waypoint", "lidarium.envs.levels.waypoint:WaypointLevel", "a point to drive to")
 LEVELS.register("frontier", "lidarium.envs.levels.frontier:FrontierLevel", "one of the frontiers in reach")
 LEVELS.register("graph", "lidarium.envs.levels.graph:GraphLevel", "one of the nodes of a graph, seeing at nodes only")
+LEVELS.register("tour", "lidarium.agents.tours.level:TourLevel", "one of the stops of tours past all frontiers")
 
 L = TypeVar("L", bound=type[Level])
 

@@ -201,13 +201,13 @@ class FrontierOffers:
         return "frontier_unreachable" if navigation.frontiers.flags.any() else "no_frontier"
 
 
-class _Picks(NamedTuple):
-    """Frontiers that some robots choose, and targets of the others.
+class Picks(NamedTuple):
+    """Numbers that some robots choose, and targets of the others.
 
     Attributes
     ----------
     numbers : (rows,) int64
-        Numbers of frontiers; that of staying for robots with targets.
+        Numbers of what is on offer; that of staying for robots with targets.
     has_way : (rows,) bool
         Robots with targets, routes or None.
     ways : Ways
@@ -219,7 +219,58 @@ class _Picks(NamedTuple):
     ways: Ways
 
 
-class FrontierLevel(WaypointLevel):
+class OffersLevel(WaypointLevel):
+    """An action is the number of one of some places on offer, the last one to stay; or a ``Target``, ``Route`` or None.
+
+    Attributes
+    ----------
+    noun : str
+        The kind of place, for messages.
+    """
+
+    carries = frozenset({"waypoint"})
+    noun = "frontier"
+
+    def offer(self, count: int) -> None:
+        """Let actions be numbers below ``count``, or ``count`` to stay."""
+        self._stay = count
+        self.action_space = spaces.Discrete(count + 1)
+        self.boxes["action_mask"] = spaces.Box(0, 1, (count + 1,), np.int8)
+
+    def read(  # type: ignore[override]
+        self, actions: Mapping[int, Any], names: list[str]
+    ) -> NDArray[np.int64] | Picks:
+        """Return the numbers that are chosen (rows,), and targets."""
+        numbers = np.full(self.rows, self._stay)
+        ways = {row: action for row, action in actions.items() if is_way(action)}
+        for row, action in actions.items():
+            if row in ways:
+                continue
+            number = _whole_number(action, self._stay)
+            if number is None:
+                raise ValueError(
+                    f"action of {names[row % len(names)]} is {shown(action)}; want a {self.noun} from 0 to "
+                    f"{self._stay - 1}, or {self._stay} to stay"
+                )
+            numbers[row] = number
+        if not ways:
+            return numbers
+        has_way = np.zeros(self.rows, np.bool_)
+        has_way[list(ways)] = True
+        return Picks(numbers, has_way, read_ways(ways, self.rows))
+
+    def read_rows(self, actions: Any, live: Mask) -> NDArray[np.int64]:  # type: ignore[override]  # noqa: ANN401
+        """Return the numbers that are chosen (rows,)."""
+        wanted = f"a whole number from 0 to {self._stay}"
+        numbers = check_rows(actions, (self.rows,), live, wanted)
+        is_bad = live & ((numbers < 0) | (numbers > self._stay) | (numbers != np.floor(numbers)))
+        if is_bad.any():
+            bad = int(np.flatnonzero(is_bad)[0])
+            raise ValueError(f"the action of row {bad} is {numbers[bad]}; want {wanted}, {self._stay} to stay")
+        return np.where(live, numbers, self._stay).astype(np.int64)
+
+
+class FrontierLevel(OffersLevel):
     """An action is the number of a frontier, or a ``Target``, a ``Route`` or None as at the level of waypoints.
 
     Observations have ``frontiers`` float32 (F, 4): position along the axes of the map frame from the believed
@@ -232,8 +283,6 @@ class FrontierLevel(WaypointLevel):
     with ``no_frontier`` or ``frontier_unreachable``.
     """
 
-    carries = frozenset({"waypoint"})
-
     def __init__(
         self,
         perception: Perception,
@@ -243,61 +292,28 @@ class FrontierLevel(WaypointLevel):
     ) -> None:
         super().__init__(perception, settings, shares_map)
         del decision_period_s
-        self._stay = settings.frontiers
-        self.action_space = spaces.Discrete(self._stay + 1)
         self.offers = FrontierOffers(perception, settings, self.driver)
-        high = np.full((self._stay, 4), FARTHEST, np.float32)
-        low = np.tile(np.array([-FARTHEST, -FARTHEST, 0.0, 0.0], np.float32), (self._stay, 1))
+        count = settings.frontiers
+        high = np.full((count, 4), FARTHEST, np.float32)
+        low = np.tile(np.array([-FARTHEST, -FARTHEST, 0.0, 0.0], np.float32), (count, 1))
         if GAINS in settings.observe:
-            self.boxes[GAINS] = spaces.Box(0.0, MOST_GAIN, (self._stay,), np.float32)
+            self.boxes[GAINS] = spaces.Box(0.0, MOST_GAIN, (count,), np.float32)
         self.boxes["frontiers"] = spaces.Box(low, high, dtype=np.float32)
-        self.boxes["action_mask"] = spaces.Box(0, 1, (self._stay + 1,), np.int8)
+        self.offer(count)
 
     def start(self, episode: int) -> None:
         """Begin an episode: nothing is offered."""
         super().start(episode)
         self.offers.start(episode)
 
-    def read(  # type: ignore[override]
-        self, actions: Mapping[int, Any], names: list[str]
-    ) -> NDArray[np.int64] | _Picks:
-        """Return the numbers of frontiers (rows,), and targets."""
-        numbers = np.full(self.rows, self._stay)
-        ways = {row: action for row, action in actions.items() if is_way(action)}
-        for row, action in actions.items():
-            if row in ways:
-                continue
-            number = _whole_number(action, self._stay)
-            if number is None:
-                raise ValueError(
-                    f"action of {names[row % len(names)]} is {shown(action)}; want a frontier from 0 to "
-                    f"{self._stay - 1}, or {self._stay} to stay"
-                )
-            numbers[row] = number
-        if not ways:
-            return numbers
-        has_way = np.zeros(self.rows, np.bool_)
-        has_way[list(ways)] = True
-        return _Picks(numbers, has_way, read_ways(ways, self.rows))
-
-    def read_rows(self, actions: Any, live: Mask) -> NDArray[np.int64]:  # type: ignore[override]  # noqa: ANN401
-        """Return the numbers of frontiers (rows,)."""
-        wanted = f"a whole number from 0 to {self._stay}"
-        numbers = check_rows(actions, (self.rows,), live, wanted)
-        is_bad = live & ((numbers < 0) | (numbers > self._stay) | (numbers != np.floor(numbers)))
-        if is_bad.any():
-            bad = int(np.flatnonzero(is_bad)[0])
-            raise ValueError(f"the action of row {bad} is {numbers[bad]}; want {wanted}, {self._stay} to stay")
-        return np.where(live, numbers, self._stay).astype(np.int64)
-
-    def carry_out(self, decoded: NDArray[np.int64] | _Picks, turn: Turn) -> None:  # type: ignore[override]
+    def carry_out(self, decoded: NDArray[np.int64] | Picks, turn: Turn) -> None:  # type: ignore[override]
         """Drive to the chosen frontiers; end teams of which no robot is offered any or has a target.
 
         A robot that an order sends elsewhere has no choice any more; a paused one keeps its own.
         """
         operating, robots = turn.operating, self.settings.robots
-        picks = decoded if isinstance(decoded, _Picks) else None
-        chosen = decoded.numbers if isinstance(decoded, _Picks) else decoded
+        picks = decoded if isinstance(decoded, Picks) else None
+        chosen = decoded.numbers if isinstance(decoded, Picks) else decoded
         is_sent = np.zeros(self.rows, np.bool_)
         is_sent[list(operating.sent)] = True
         is_stopping = np.zeros(self.rows, np.bool_)

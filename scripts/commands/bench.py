@@ -29,7 +29,7 @@ class _Bench(Command):
     """questions to ask, all by default.
 
     Questions are kernel_step, ray_casting, range_error, map_update, exploration_projects,
-    environment_step, batch_step, thread_scaling, learning_preset, waypoint_decision, frontier_decision,
+    environment_step, batch_step, thread_scaling, learning_preset, waypoint_decision, frontier_decision, tour_decision,
     frontier_threads, masked_training, attention_training, learned_training, first_reset, cached_start,
     bullet_world, depth_image, quantisation, sparse_planning,
     path_server.

@@ -130,6 +130,72 @@ class TourWeights(NamedTuple):
     waiting: float
 
 
+class _Costs(NamedTuple):
+    """Costs of legs as in ``team_tours``.
+
+    Attributes
+    ----------
+    can_stop : bool
+        Whether no leg costs less than nothing: then the cost of a part is no greater than that of the whole.
+    """
+
+    first: NDArray[np.float64]
+    between: NDArray[np.float64]
+    worth: NDArray[np.float64]
+    weights: TourWeights
+    can_stop: bool
+
+
+class _State(NamedTuple):
+    """The robot and its last place on the way along a sequence, its length so far, and those of all before."""
+
+    robot: int
+    last: int
+    length: float
+    longest: float
+    total: float
+    waiting: float
+
+
+@kernel(forceinline=True, nrt=False)
+def _visit(state: _State, place: int, costs: _Costs) -> _State:
+    """Return the state after another number of a sequence."""
+    robot, last, length, longest, total, waiting = state
+    if place >= costs.first.shape[1]:
+        return _State(robot + 1, np.int64(-1), 0.0, max(longest, length), total + length, waiting)  # type: ignore[arg-type]
+    length += costs.first[robot, place] if last < 0 else costs.between[last, place]
+    return _State(robot, place, length, longest, total, waiting + costs.worth[place] * length)
+
+
+@kernel(forceinline=True, nrt=False)
+def _total(state: _State, weights: TourWeights) -> float:
+    """Return the cost of the tours so far."""
+    longest, total = max(state.longest, state.length), state.total + state.length
+    return weights.longest * longest + weights.total * total + weights.waiting * state.waiting
+
+
+@kernel(forceinline=True, nrt=False)
+def _is_over(state: _State, costs: _Costs, limit: float) -> bool:
+    """Whether tours that begin thus cost a limit or more."""
+    return costs.can_stop and _total(state, costs.weights) >= limit
+
+
+@kernel(nrt=False)
+def _begin() -> _State:
+    """Return the state before the first number of a sequence."""
+    return _State(np.int64(0), np.int64(-1), 0.0, 0.0, 0.0, 0.0)  # type: ignore[arg-type]
+
+
+@kernel(nrt=False)
+def _visit_all(state: _State, sequence: Array, first: int, last: int, costs: _Costs, limit: float) -> _State:
+    """Return the state after a part of a sequence, or earlier once the tours cost a limit or more."""
+    for k in range(first, last):
+        state = _visit(state, sequence[k], costs)
+        if _is_over(state, costs, limit):
+            break
+    return state
+
+
 @kernel
 def team_tours(
     first: NDArray[np.float64],
@@ -160,12 +226,13 @@ def team_tours(
     sequence = np.empty(count + robots - 1, np.int64)
     for robot in range(robots - 1):
         sequence[robot] = count + robot
-    _insert_all(sequence, first, between, worth, weights)
-    trial, rest = np.empty_like(sequence), np.empty_like(sequence)
+    costs = _Costs(first, between, worth, weights, count == 0 or first.min() >= 0.0)
+    _insert_all(sequence, np.ones(count, np.bool_), costs)
+    rest, piece = np.empty_like(sequence), np.empty(_LONGEST_PIECE, np.int64)
     cost = _cost(sequence, len(sequence), first, between, worth, weights)
     while True:
-        better = _turn_pieces(sequence, trial, first, between, worth, weights, cost)
-        better = _move_pieces(sequence, (trial, rest), first, between, worth, weights, better)
+        better = _turn_pieces(sequence, costs, cost)
+        better = _move_pieces(sequence, rest, piece, costs, better)
         if better >= cost - _LESS:
             return sequence
         cost = better
@@ -235,96 +302,92 @@ def with_first(sequence: NDArray[np.int64], robot: int, place: int, count: int) 
     return changed
 
 
-@kernel
+@kernel(nrt=False)
 def _cost(sequence: Array, size: int, first: Array, between: Array, worth: Array, weights: TourWeights) -> float:
     """Return the cost of the tours of the first ``size`` numbers of a sequence."""
-    count = first.shape[1]
-    robot, last = 0, -1
-    length, longest, total, waiting = 0.0, 0.0, 0.0, 0.0
-    for k in range(size):
-        place = sequence[k]
-        if place >= count:
-            robot, last = robot + 1, -1
-            longest, total, length = max(longest, length), total + length, 0.0
-            continue
-        length += first[robot, place] if last < 0 else between[last, place]
-        waiting += worth[place] * length
-        last = place
-    longest, total = max(longest, length), total + length
-    return float(weights.longest * longest + weights.total * total + weights.waiting * waiting)
+    costs = _Costs(first, between, worth, weights, False)
+    return float(_total(_visit_all(_begin(), sequence, 0, size, costs, np.inf), weights))
 
 
-@kernel
-def _insert_all(sequence: Array, first: Array, between: Array, worth: Array, weights: TourWeights) -> None:
+@kernel(nrt=False)
+def _insert_all(sequence: Array, is_left: Array, costs: _Costs) -> None:
     """Insert all places into empty tours, each time the one with the lowest cost."""
-    robots, count = first.shape
+    robots, count = costs.first.shape
     size = robots - 1
-    is_left = np.ones(count, np.bool_)
-    trial = np.empty_like(sequence)
     for _ in range(count):
         minimum, chosen, at = np.inf, -1, 0
         for place in range(count):
             if not is_left[place]:
                 continue
+            before = _begin()
             for position in range(size + 1):
-                trial[:position] = sequence[:position]
-                trial[position] = place
-                trial[position + 1 : size + 1] = sequence[position:size]
-                cost = _cost(trial, size + 1, first, between, worth, weights)
-                if cost < minimum - _LESS:
+                limit = minimum - _LESS
+                state = _visit_all(_visit(before, place, costs), sequence, position, size, costs, limit)
+                cost = _total(state, costs.weights)
+                if cost < limit:
                     minimum, chosen, at = cost, place, position
+                if position < size:
+                    before = _visit(before, sequence[position], costs)
         for k in range(size, at, -1):
             sequence[k] = sequence[k - 1]
         sequence[at], is_left[chosen] = chosen, False
         size += 1
 
 
-@kernel
-def _turn_pieces(
-    sequence: Array,
-    trial: Array,
-    first: Array,
-    between: Array,
-    worth: Array,
-    weights: TourWeights,
-    cost: float,
-) -> float:
+@kernel(nrt=False)
+def _turn_pieces(sequence: Array, costs: _Costs, cost: float) -> float:
     """Reverse every piece that makes the tours better; return their cost."""
     size = sequence.shape[0]
+    before = _begin()
     for start in range(size):
         for end in range(start + 2, size + 1):
-            trial[:] = sequence
-            trial[start:end] = sequence[start:end][::-1]
-            better = _cost(trial, size, first, between, worth, weights)
-            if better < cost - _LESS:
-                sequence[:], cost = trial, better
+            state, limit = before, cost - _LESS
+            for k in range(end - 1, start - 1, -1):
+                state = _visit(state, sequence[k], costs)
+                if _is_over(state, costs, limit):
+                    break
+            if not _is_over(state, costs, limit):
+                state = _visit_all(state, sequence, end, size, costs, limit)
+            better = _total(state, costs.weights)
+            if better < limit:
+                for k in range((end - start) // 2):
+                    other = end - 1 - k
+                    sequence[start + k], sequence[other] = sequence[other], sequence[start + k]
+                cost = better
+        before = _visit(before, sequence[start], costs)
     return cost
 
 
-@kernel
-def _move_pieces(
-    sequence: Array,
-    scratch: tuple[Array, Array],
-    first: Array,
-    between: Array,
-    worth: Array,
-    weights: TourWeights,
-    cost: float,
-) -> float:
+@kernel(nrt=False)
+def _move_pieces(sequence: Array, rest: Array, piece: Array, costs: _Costs, cost: float) -> float:
     """Move short pieces to positions that make the tours better; return their cost."""
-    trial, rest = scratch
     size = sequence.shape[0]
     for length in range(1, min(_LONGEST_PIECE, size - 1) + 1):
         for start in range(size - length + 1):
-            piece = sequence[start : start + length].copy()
             left = size - length
-            rest[:start], rest[start:left] = sequence[:start], sequence[start + length :]
+            _copy(sequence, start, length, piece, 0)
+            _copy(sequence, 0, start, rest, 0)
+            _copy(sequence, start + length, left - start, rest, start)
+            before = _begin()
             for position in range(left + 1):
-                trial[:position] = rest[:position]
-                trial[position : position + length] = piece
-                trial[position + length :] = rest[position:left]
-                better = _cost(trial, size, first, between, worth, weights)
-                if better < cost - _LESS:
-                    sequence[:], cost = trial, better
+                limit = cost - _LESS
+                state = _visit_all(before, piece, 0, length, costs, limit)
+                if not _is_over(state, costs, limit):
+                    state = _visit_all(state, rest, position, left, costs, limit)
+                better = _total(state, costs.weights)
+                if better < limit:
+                    _copy(rest, 0, position, sequence, 0)
+                    _copy(piece, 0, length, sequence, position)
+                    _copy(rest, position, left - position, sequence, position + length)
+                    cost = better
                     break
+                if position < left:
+                    before = _visit(before, rest[position], costs)
     return cost
+
+
+@kernel(forceinline=True, nrt=False)
+def _copy(source: Array, first: int, count: int, target: Array, at: int) -> None:
+    """Copy some numbers of a sequence to another one."""
+    for k in range(count):
+        target[at + k] = source[first + k]

@@ -5,7 +5,14 @@ import pytest
 
 from lidarium.agents.learned.decision import _tours_in, decision_of, scene_of
 from lidarium.agents.learned.features import OPTION_FEATURES, SITUATION_FEATURES, TEAMMATE_FEATURES
-from lidarium.agents.tours.planning import Tourist, TourSettings, first_options, tour_options
+from lidarium.agents.tours.planning import (
+    Tourist,
+    TourRequest,
+    TourSettings,
+    first_options,
+    memory_of,
+    tour_options,
+)
 from lidarium.envs.onboard.navigation import NavigationMap
 from lidarium.mapping.planning.touring.tours import with_first
 
@@ -26,7 +33,8 @@ def corridor(row=60, column=100):
 def scene_in(navigation, robots):
     settings = TourSettings()
     clusters = navigation.frontiers.clusters(minimum_cells=6)
-    options = tour_options(navigation, clusters, robots, 0.18, settings, settings.rules(5.6))
+    request = TourRequest(navigation, clusters, robots, memory_of(navigation, settings))
+    (options,) = tour_options([request], 0.18, settings, settings.rules(5.6))
     return scene_of(options, navigation, 5.6, settings.weights, PROGRESS)
 
 

@@ -3,7 +3,16 @@
 import numpy as np
 import pytest
 
-from lidarium.agents.tours.planning import Tourist, TourSettings, _first_places, first_options, leg_to, tour_options
+from lidarium.agents.tours.planning import (
+    Tourist,
+    TourRequest,
+    TourSettings,
+    _first_places,
+    first_options,
+    leg_to,
+    memory_of,
+    tour_options,
+)
 from lidarium.envs.onboard.navigation import NavigationMap
 
 RESOLUTION = 0.05
@@ -32,7 +41,9 @@ def legs_of(navigation, robots, **settings):
     chosen = TourSettings(**settings)
     clusters = navigation.frontiers.clusters(minimum_cells=6)
     rules = chosen.rules(5.6)
-    options = tour_options(navigation, clusters, robots, 0.18, chosen, rules)
+    (options,) = tour_options(
+        [TourRequest(navigation, clusters, robots, memory_of(navigation, chosen))], 0.18, chosen, rules
+    )
     if options is None:
         return [None] * len(robots)
     firsts = first_options(options)
@@ -83,7 +94,8 @@ def test_each_robot_in_turn_has_its_nearest_frontier_on_the_tours():
         ([robot(2.0), robot(9.0)], [20, 259]),
         ([robot(9.0), robot(2.0)], [20, 259]),
     ):
-        options = tour_options(navigation, clusters, robots, 0.18, settings, settings.rules(5.6))
+        request = TourRequest(navigation, clusters, robots, memory_of(navigation, settings))
+        (options,) = tour_options([request], 0.18, settings, settings.rules(5.6))
         found = [float(options.cells_of(k)[:, 1].mean()) for k in range(len(options.numbers))]
         np.testing.assert_allclose(found, columns, atol=10.0)
         # The nearest to any robot comes first.

@@ -7,7 +7,7 @@ import sys
 import numpy as np
 import pytest
 
-from lidarium.benchmarks.speed.cases import cached_start, frontier_decision, waypoint_decision
+from lidarium.benchmarks.speed.cases import cached_start, frontier_decision, tour_decision, waypoint_decision
 from lidarium.benchmarks.speed.cases.waypoint_decision import Deciders
 from lidarium.benchmarks.speed.harness import batches
 from lidarium.benchmarks.speed.harness.batches import DrivenBatch
@@ -64,6 +64,16 @@ def test_decisions_by_frontiers_are_counted_by_robot(monkeypatch):
     assert [line.to_reach for line in lines] == [3500.0, 3000.0, 8000.0, 6000.0]
     assert [line.name.endswith(", fast") for line in lines] == [False, False, True, True]
     assert all(line.judged > 0.0 and line.unit == "rows/CPU s" for line in lines)
+
+
+def test_plans_of_tours_and_decisions_at_their_level_are_measured(monkeypatch):
+    monkeypatch.setattr(tour_decision, "EPISODES", 2)
+    monkeypatch.setattr(tour_decision, "WARM_STEPS", 4)
+    monkeypatch.setattr(tour_decision, "OPTIONS", {**tour_decision.OPTIONS, "stop_coverage": 0.4})
+    plan, decisions = tour_decision.measure(LEAST)
+    assert (plan.to_reach, plan.is_upper_bound, plan.unit) == (1.2, True, "ms")
+    assert (decisions.to_reach, decisions.unit) == (800.0, "decisions/s")
+    assert plan.judged > 0.0
 
 
 def test_the_profile_has_all_parts_and_they_make_up_the_whole(tmp_path):

@@ -110,7 +110,7 @@ def test_agents_have_action_spaces_of_their_own_and_metadata_is_complete(level):
     assert env.action_space("robot_0") is not env.action_space("robot_1")
     assert set(env.metadata) >= {"name", "render_modes", "render_fps", "is_parallelizable"}
     assert env.metadata["render_modes"] == ["human", "rgb_array"]
-    assert env.metadata["render_fps"] == pytest.approx(10 if level == "velocity" else 0.5)
+    assert env.metadata["render_fps"] == pytest.approx({"velocity": 10, "tour": 2}.get(level, 0.5))
 
 
 def test_the_solo_form_has_one_robot_and_says_what_to_use_for_more():

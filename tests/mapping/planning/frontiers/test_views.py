@@ -5,10 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from lidarium.mapping.planning.clearance import ClearanceField
-from lidarium.mapping.planning.frontiers.frontier_map import FrontierMap
-from lidarium.mapping.planning.frontiers.views import RAYS, ViewRules, gain_at, views_of
-from lidarium.mapping.planning.touring.coarse_distances import coarse_grid, distances_from
+from lidarium.agents.tours.planning import Tourist, TourRequest, TourSettings, memory_of, tour_options
+from lidarium.envs.onboard.navigation import NavigationMap
+from lidarium.mapping.planning.frontiers.views import RAYS, ViewRules, gain_at
 
 RESOLUTION = 0.05
 
@@ -47,37 +46,36 @@ def two_rooms():
         spread = (column - 60) // 4
         log_odds[30 - min(spread, 20) : 50 + min(spread, 20), column] = -20
     log_odds[4:76, 120] = 20
-    field = ClearanceField(log_odds.shape, RESOLUTION, 0.6)
-    field.update(log_odds)
-    frontiers = FrontierMap(log_odds.shape, RESOLUTION)
-    frontiers.update(log_odds)
-    return log_odds, field, frontiers
+    return log_odds
+
+
+def views_from(log_odds, cell):
+    """Return the map's frontiers and the views of those that a robot in a cell can see."""
+    navigation, tours = NavigationMap(log_odds, RESOLUTION), TourSettings(least_gain=0.0)
+    navigation.changed((0, log_odds.shape[0], 0, log_odds.shape[1]))
+    clusters = navigation.frontiers.clusters(minimum_cells=6)
+    robot = Tourist(np.array([(cell[1] + 0.5) * RESOLUTION, (cell[0] + 0.5) * RESOLUTION, 0.0]))
+    request = TourRequest(navigation, clusters, [robot], memory_of(navigation, tours))
+    return clusters, tour_options([request], 0.18, tours, ViewRules())[0]
 
 
 @pytest.mark.parametrize("cell", [(40, 20), (40, 70), (20, 50)])
 @pytest.mark.parametrize("rules", [ViewRules(), ViewRules(reach=2.0, depth=0.4)])
 def test_a_view_shows_what_rays_cross(cell, rules):
-    log_odds, _, _ = two_rooms()
+    log_odds = two_rooms()
     assert gain_at(log_odds, RESOLUTION, cell, rules)[0] == pytest.approx(gain_by_rays(log_odds, cell, rules))
 
 
 def test_views_show_more_than_places_beside_the_jambs():
-    log_odds, field, frontiers = two_rooms()
-    grid = coarse_grid(log_odds, field, 0.18)
-    lengths = distances_from(grid, np.array([grid.cell_of((40, 20))]))[0]
-    clusters = frontiers.clusters(minimum_cells=6)
-    rules = ViewRules()
-    views = views_of(log_odds, RESOLUTION, grid, lengths, (clusters.cells, clusters.starts), rules)
+    log_odds, rules = two_rooms(), ViewRules()
+    clusters, views = views_from(log_odds, (40, 20))
     assert len(clusters) == len(views.gains) == 2
     for k in range(2):
-        row, column = views.cells[k]
-        assert lengths[row, column] == views.lengths[k]
-        middle = (
-            grid.row + int(row) * grid.factor + grid.factor // 2,
-            grid.column + int(column) * grid.factor + grid.factor // 2,
-        )
+        row, column = (views.places[k] * views.grid.factor + views.grid.factor // 2).tolist()
+        middle = views.grid.row + row, views.grid.column + column
         assert gain_at(log_odds, RESOLUTION, middle, rules)[0] == pytest.approx(views.gains[k])
-        beside = tuple(int(value) for value in clusters.of(k)[np.argmin(clusters.of(k)[:, 1])])
+        cells = views.cells_of(k)
+        beside = tuple(int(value) for value in cells[np.argmin(cells[:, 1])])
         assert views.gains[k] > 1.2 * gain_at(log_odds, RESOLUTION, (beside[0], 55), rules)[0]
 
 
@@ -90,15 +88,8 @@ def test_the_direction_is_that_of_what_is_unknown():
 
 
 def test_a_frontier_out_of_reach_has_no_view():
-    log_odds, field, frontiers = two_rooms()
+    log_odds = two_rooms()
     log_odds[30:50, 60] = 20
-    field.update(log_odds)
-    frontiers.update(log_odds)
-    grid = coarse_grid(log_odds, field, 0.18)
-    lengths = distances_from(grid, np.array([grid.cell_of((40, 20))]))[0]
-    clusters = frontiers.clusters(minimum_cells=6)
-    views = views_of(log_odds, RESOLUTION, grid, lengths, (clusters.cells, clusters.starts), ViewRules())
-    beyond = clusters.centroids[:, 0] > 60 * RESOLUTION
-    assert beyond.any()
-    assert (views.cells[beyond] == -1).all()
-    assert (views.gains[beyond] == 0.0).all()
+    clusters, views = views_from(log_odds, (40, 20))
+    assert (clusters.centroids[:, 0] > 60 * RESOLUTION).any()
+    assert views is None or (clusters.centroids[views.numbers, 0] <= 60 * RESOLUTION).all()

@@ -5,17 +5,29 @@ import math
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
-from lidarium.mapping.planning.clearance import ClearanceField
+from lidarium.mapping.planning.clearance import ClearanceField, limit_of
 from lidarium.mapping.planning.footprint import Footprint
 from lidarium.mapping.planning.grid_planning import search
 from lidarium.mapping.planning.search.path_search import SearchSpace
-from lidarium.mapping.planning.touring.coarse_distances import (
-    UNREACHED,
-    coarse_grid,
-    distances_among,
-    distances_from,
-)
+from lidarium.mapping.planning.touring.coarse_distances import UNREACHED, CoarseGrid, distances_from
+from lidarium.mapping.planning.touring.kept_lengths import begin_field, change_field, extend_field
+from lidarium.mapping.planning.touring.open_cells import Standing, open_cells
+
+
+def coarse_grid(log_odds, field, radius, starts=()):
+    """Return the open coarse cells of 0.1 m around all that is free, of bodies that start there."""
+    factor = max(round(0.1 / field.resolution), 1)
+    standing = Standing(factor, field.limit - limit_of(radius, field.resolution), round(0.2 / field.resolution))
+    is_open = np.zeros([-(-side // factor) + 2 for side in log_odds.shape], np.uint8)
+    window = np.array([0, log_odds.shape[0], 0, log_odds.shape[1]])
+    starts = np.array(starts, np.int64).reshape(-1, 2)
+    low, high, left, right = open_cells(log_odds, field.closeness, window, starts, standing, is_open)
+    inside = is_open[low + 1 : high + 1, left + 1 : right + 1].astype(bool)
+    assert inside.sum() == is_open.sum()
+    return CoarseGrid(inside, factor, low * factor, left * factor, factor * field.resolution)
 
 
 def lengths_by_heap(is_open, start):
@@ -100,21 +112,35 @@ def test_a_map_without_anything_known_has_one_closed_cell():
     assert math.isclose(grid.side, 0.1)
 
 
-@pytest.mark.parametrize("seed", range(4))
-def test_lengths_among_places_are_those_to_all(seed):
-    log_odds, field = drawn_map(seed)
-    grid = coarse_grid(log_odds, field, 0.18)
+@settings(deadline=None)
+@given(st.integers(0, 10**6))
+def test_kept_lengths_equal_those_from_nothing_however_the_grid_changes(seed):
+    """Cells open and close, the start among them; lengths are exact up to the horizon, unknown beyond it."""
     generator = np.random.default_rng(seed)
-    is_open = np.argwhere(grid.is_open)
-    places, others = generator.choice(is_open, 6, replace=False), generator.choice(is_open, 2, replace=False)
-    whole = distances_from(grid, places)
-    between, fields = distances_among(grid, places, others)
-    np.testing.assert_array_equal(between, whole[:, places[:, 0], places[:, 1]])
-    for k in range(6):
-        farthest = whole[k][others[:, 0], others[:, 1]].max()
-        near = whole[k] <= farthest
-        np.testing.assert_array_equal(fields[k][near], whole[k][near])
-        assert (fields[k] >= whole[k]).all()
+    rows, columns = (int(side) for side in generator.integers(4, 30, 2))
+    is_open = np.zeros((rows + 2, columns + 2), np.uint8)
+    is_open[1:-1, 1:-1] = generator.random((rows, columns)) < 0.7
+    start = tuple(int(generator.integers(1, side + 1)) for side in (rows, columns))
+    field, queues = np.zeros(is_open.size, np.int32), np.zeros((8, is_open.size), np.int32)
+    bounds, horizon = np.array([1, rows + 1, 1, columns + 1]), 1
+    at = start[0] * (columns + 2) + start[1]
+    begin_field(field, is_open, bounds, at)
+    for _ in range(6):
+        targets = generator.choice(np.flatnonzero(is_open.ravel()), 3)
+        horizon = extend_field(field, columns + 2, bounds, horizon, targets, queues)
+        wanted = lengths_by_heap(is_open, start).ravel()
+        reached = (wanted + 1 <= horizon) & ((is_open.ravel() > 0) | (wanted == 0))
+        np.testing.assert_array_equal(field[reached], wanted[reached] + 1)
+        assert (field[~reached & (is_open.ravel() > 0)] == UNREACHED).all()
+        assert (field[~reached & (is_open.ravel() == 0)] == 0).all()
+        assert reached[targets].all() or (field[targets] == UNREACHED).any()
+        changed = np.flatnonzero(generator.random(is_open.size) < generator.choice([0.01, 0.1]))
+        changed = changed[np.isin(changed, np.flatnonzero(np.pad(np.ones((rows, columns)), 1)))]
+        opened, closed = changed[is_open.ravel()[changed] == 0], changed[is_open.ravel()[changed] == 1]
+        is_open.ravel()[changed] ^= 1
+        if not is_open.any():
+            break
+        change_field(field, columns + 2, horizon, at, closed, opened, queues)
 
 
 def test_what_the_fine_cells_do_not_join_is_left_out():

@@ -1,0 +1,84 @@
+"""Plans of `tour_frontier` by the processor's time, and decisions of a batch at the level of tours.
+
+A plan gives all robots of a team their next goals; a decision is that of a robot that has several stops to choose from.
+"""
+
+import statistics
+import time
+
+import numpy as np
+
+import lidarium
+from lidarium.agents.frontier.reach import Choice
+from lidarium.agents.tours.policy import TourFrontier
+from lidarium.benchmarks.speed.harness.lines import Line, shown
+from lidarium.benchmarks.speed.harness.report import run_alone
+from lidarium.benchmarks.speed.harness.timing import Effort
+
+CORES = 2
+ROBOTS, EPISODES, FLOORS = 2, 32, "set:validation"
+WARM_STEPS = 25
+OPTIONS = {"robots": ROBOTS, "resolution": 0.05, "stop_coverage": 0.99, "horizon_s": 1800.0}
+MOST_MS, TO_REACH = 1.2, 800.0
+
+NOTES = (
+    f"*Plan of tours*: all that `tour_frontier` does to choose goals for {ROBOTS} robots, over whole episodes on "
+    f"`{FLOORS}`, by the time of the processor. *Tour decisions*: `lidarium.vector_env` with level `tour`, {EPISODES} "
+    "episodes, two threads, each robot takes one of its stops with equal chance; robots that only go on do not count.",
+)
+
+
+class _Timed(TourFrontier):
+    """Notes how long plans take."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.seconds: list[float] = []
+
+    def choose(self, agents: list[str], open_agents: list[str]) -> dict[str, Choice | None]:
+        """Plan, and note the processor's time."""
+        began = time.process_time()
+        chosen = super().choose(agents, open_agents)
+        self.seconds.append(time.process_time() - began)
+        return chosen
+
+
+def plan_seconds(floors: int) -> float:
+    """Return the mean time of a plan over some floors [s]; the first one warms up."""
+    policy = _Timed()
+    for number, floor in enumerate(lidarium.floor_set(f"{FLOORS}:{floors + 1}")):
+        lidarium.run_episode(policy, lidarium.parallel_env(floor, **OPTIONS), seed=0)
+        if number == 0:
+            policy.seconds.clear()
+    return statistics.mean(policy.seconds)
+
+
+def decisions_a_second(seconds: float) -> float:
+    """Return how many decisions of a batch at the level of tours are made in a second of the clock."""
+    envs = lidarium.vector_env(EPISODES, FLOORS, level="tour", threads=2, copy=False, **OPTIONS)
+    generator = np.random.default_rng(0)
+    mask = envs.reset(seed=0)[0]["action_mask"]
+    count, step, began = 0, 0, 0.0
+    while step <= WARM_STEPS or time.perf_counter() - began < seconds:
+        if step == WARM_STEPS:
+            count, began = 0, time.perf_counter()
+        chances = generator.random(mask.shape) * mask
+        chances[:, -1] *= 1e-6  # to stay only if nothing is offered
+        count += int((mask[:, :-1].sum(axis=1) > 1).sum())
+        mask, step = envs.step(chances.argmax(axis=1))[0]["action_mask"], step + 1
+    return count / (time.perf_counter() - began)
+
+
+def measure(effort: Effort) -> list[Line]:
+    """Measure plans of a team, and decisions at the level of tours."""
+    plan_ms = 1e3 * min(plan_seconds(3) for _ in range(effort.rounds))
+    rate = statistics.median(decisions_a_second(4.0 * effort.block_s) for _ in range(effort.rounds))
+    name, unit = f"plan of tours, {ROBOTS} robots", "decisions/s"
+    return [
+        Line(name, f"{plan_ms:.2f} ms", "-", None, MOST_MS, plan_ms, is_upper_bound=True, unit="ms"),
+        Line("tour decisions, two cores", f"{shown(rate)} {unit}", "-", None, TO_REACH, rate, unit=unit),
+    ]
+
+
+if __name__ == "__main__":
+    run_alone(measure, "Plans of tours, and decisions at their level.", CORES)
