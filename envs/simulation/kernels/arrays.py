@@ -199,8 +199,8 @@ class WorldArrays(NamedTuple):
         The part of each floor on which people walk, and their ways to places on it.
     doors : (episodes * doors, 7) float64
         The doors of each episode.
-    door_beams : (rows, beams) uint8
-        Beams that met a door that opens by itself, which robots recognise; empty without doors.
+    recognised : (rows, beams) uint8
+        Beams that met a person or a door that opens by itself, which robots recognise; empty without any.
     safety : (rows, 11) float64
         Approaches and contacts of robots and people.
     """
@@ -251,7 +251,7 @@ class WorldArrays(NamedTuple):
     walkers: Annotated[Array, np.float64, 2]
     walkways: Annotated[Array, np.int64, 2]
     doors: Annotated[Array, np.float64, 2]
-    door_beams: Annotated[Array, np.uint8, 2]
+    recognised: Annotated[Array, np.uint8, 2]
     safety: Annotated[Array, np.float64, 2]
 
 

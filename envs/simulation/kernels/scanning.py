@@ -32,7 +32,7 @@ from lidarium.envs.simulation.kernels.arrays import (
     walkers_of,
 )
 from lidarium.envs.simulation.kernels.contact import has_leaf, leaf_of
-from lidarium.envs.simulation.kernels.ray_casting import cast_scan, cut_by_disc, cut_by_segment
+from lidarium.envs.simulation.kernels.ray_casting import cast_scan, cut_by_disc, cut_by_person, cut_by_segment
 from lidarium.mapping.grids.scan_geometry import Beams, beam_directions
 from lidarium.mapping.grids.scan_polygon import window_rows, window_words
 from lidarium.mapping.kernels.compilation import Array, kernel
@@ -72,9 +72,8 @@ class ScanScratch(NamedTuple):
 @kernel(nrt=False)
 def _meet_doors(world: WorldArrays, row: int, episode: int, beams: Beams, lengths: Array) -> None:
     """Shorten the beams that meet doors, and mark those that meet one that opens by itself."""
-    doors, frame, marks = doors_of(world, episode), world.frames[episode], world.door_beams[row]
+    doors, frame, marks = doors_of(world, episode), world.frames[episode], world.recognised[row]
     scale = 1.0 / frame[FRAME_RESOLUTION]
-    marks[:] = 0
     for door in range(doors.shape[0]):
         if has_leaf(doors[door]):
             from_x, from_y, to_x, to_y = leaf_of(doors[door])
@@ -95,12 +94,13 @@ def _meet_people(world: WorldArrays, row: int, episode: int, beams: Beams, lengt
     """Shorten the beams that meet people, and note the gap to the nearest person of whom the laser sees a part."""
     walkers, frame = walkers_of(world, episode), world.frames[episode]
     scale, robots = 1.0 / frame[FRAME_RESOLUTION], world.poses.shape[0] // world.steps.shape[0]
-    own, nearest = world.bodies[row - episode * robots, RADIUS], np.inf
+    marks, own = world.recognised[row], world.bodies[row - episode * robots, RADIUS]
+    nearest = np.inf
     for person in range(walkers.shape[0]):
         x = (walkers[person, WALKER_X] - frame[FRAME_X]) * scale
         y = (walkers[person, WALKER_Y] - frame[FRAME_Y]) * scale
         radius = walkers[person, WALKER_RADIUS]
-        if cut_by_disc(beams, x, y, radius * scale, lengths) > 0:
+        if cut_by_person(beams, x, y, radius * scale, lengths, marks):
             apart = math.hypot(x - beams.x, y - beams.y) / scale
             nearest = min(nearest, apart - radius - own)
     world.safety[row, PERSON_GAP] = nearest
@@ -135,7 +135,8 @@ def measure(
             )
             radius = world.bodies[other, RADIUS] / resolution
             cut_by_disc(beams, other_x, other_y, radius, lengths)
-    # People first: of a beam that a person cuts before a door, the door leaves no mark.
+    if world.recognised.shape[0] > 0:
+        world.recognised[row, :] = 0
     if world.walkers.shape[0] > 0:
         _meet_people(world, row, episode, beams, lengths)
     if world.doors.shape[0] > 0:

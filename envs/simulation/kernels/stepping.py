@@ -342,9 +342,9 @@ def render_row(table: Array, row: int, robots: int, poses: Array, ranges: Array)
     # Teammates' poses at that time are not known any more.
     world.flags[row] = flags & ~(KNOWN_TEAMMATES | SOME_TEAMMATES)
     # Those scans have no beams on doors any more, see ``ranges_without_teammates``.
-    marks = world.door_beams[row].copy() if world.door_beams.shape[0] > 0 else np.zeros(0, np.uint8)
-    if world.door_beams.shape[0] > 0:
-        world.door_beams[row, :] = 0
+    marks = world.recognised[row].copy() if world.recognised.shape[0] > 0 else np.zeros(0, np.uint8)
+    if world.recognised.shape[0] > 0:
+        world.recognised[row, :] = 0
     scratch = scan_scratch(world)
     for k in range(poses.shape[0]):
         world.believed[row, 0], world.believed[row, 1], world.believed[row, 2] = (
@@ -355,8 +355,8 @@ def render_row(table: Array, row: int, robots: int, poses: Array, ranges: Array)
         world.ranges[row, :] = ranges[k]
         perceive_robot(world, row, row // robots * robots, robots, scratch)
     world.flags[row] = flags
-    if world.door_beams.shape[0] > 0:
-        world.door_beams[row, :] = marks
+    if world.recognised.shape[0] > 0:
+        world.recognised[row, :] = marks
     world.believed[row, 0], world.believed[row, 1], world.believed[row, 2] = pose[0], pose[1], pose[2]
     world.ranges[row, :] = scan
 
@@ -371,9 +371,9 @@ def ranges_without_teammates(table: Array, row: int, robots: int, ranges: Array)
     ranges[:] = world.ranges[row]
     if world.flags[row] & (KNOWN_TEAMMATES | SOME_TEAMMATES):
         invalidate_teammates(world, row, row // robots * robots, robots, ranges)
-    if world.door_beams.shape[0] > 0:
+    if world.recognised.shape[0] > 0:
         for beam in range(ranges.shape[0]):
-            if world.door_beams[row, beam] != 0:
+            if world.recognised[row, beam] != 0:
                 ranges[beam] = np.float32(np.nan)
 
 

@@ -70,7 +70,7 @@ class Population:
 
     Attributes
     ----------
-    walkers, walkways, doors, door_beams, safety : array
+    walkers, walkways, doors, recognised, safety : array
         See ``kernels.arrays``.
     """
 
@@ -80,7 +80,7 @@ class Population:
         self.walkers = np.zeros((episodes * people, WALKER_NUMBERS))
         self.walkways = np.zeros((episodes, WALKWAY_NUMBERS), np.int64)
         self.doors = np.zeros((episodes * most, DOOR_NUMBERS))
-        self.door_beams = np.zeros((rows if most else 0, beams), np.uint8)
+        self.recognised = np.zeros((rows if most or people else 0, beams), np.uint8)
         self.safety = no_people(rows)
         self._ways: list[Walkways | None] = [None] * episodes
 
@@ -89,9 +89,11 @@ class Population:
         rows = slice(episode * self._robots, (episode + 1) * self._robots)
         self.safety[rows] = no_people(self._robots)
         doors = self.doors_of(episode)
+        if len(self.recognised):
+            self.recognised[rows] = 0
         if self.share > 0.0:
             drawn = self.draw_doors(floor, seed)
-            doors[:], self.door_beams[rows] = 0.0, 0
+            doors[:] = 0.0
             doors[: len(drawn)] = drawn
             # A robot that starts in a doorway finds the door open.
             near = np.hypot(*(middles_of(doors)[:, None] - starts[:, :2]).T).T < SENSOR_M
