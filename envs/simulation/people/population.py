@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from lidarium.envs.floors.floor import Floor
 from lidarium.envs.floors.raster import Raster
+from lidarium.envs.simulation.depth.frames import PERSON_HEIGHT_M
 from lidarium.envs.simulation.disturbances.odometry import RADIUS
 from lidarium.envs.simulation.kernels.arrays import (
     CLOSEST,
@@ -30,9 +31,6 @@ from lidarium.envs.simulation.kernels.arrays import (
 from lidarium.envs.simulation.kernels.floor_cache import LIMITLESS_BODY, FloorTables
 from lidarium.envs.simulation.people.doors import MOST_DOORS, SENSOR_M, draw_doors, middles_of, with_shut_doors
 from lidarium.envs.simulation.people.walkways import WIDEST_M, Walkways, walkways_of
-
-HEIGHT_M = 1.7
-"""Height of people and of the space that they need [m]."""
 
 RADII_M = (0.25, WIDEST_M)
 """Radii of people, drawn uniformly [m]."""
@@ -168,7 +166,7 @@ class Population:
 @lru_cache(maxsize=32)
 def _walkways(body: Raster, floor: Floor | None, doors: tuple[tuple[float, ...], ...]) -> Walkways:
     """Return the ways of people on a floor, of which ``body`` has the cells for robots; those used last are kept."""
-    raster = body if floor is None else floor.raster(body.resolution, LIMITLESS_BODY, HEIGHT_M)
+    raster = body if floor is None else floor.raster(body.resolution, LIMITLESS_BODY, PERSON_HEIGHT_M)
     ways = walkways_of(with_shut_doors(raster, np.array(doors).reshape(-1, DOOR_NUMBERS)))
     if not len(ways.places):
         raise ValueError(f"no person fits on {_named(floor)}: no place is {2.0 * WIDEST_M:g} m wide; want people=0")
