@@ -37,7 +37,7 @@ from lidarium.mapping.kernels.compilation import Array, kernel
 NARROWEST_M, WIDEST_M = 0.65, 1.6
 """Widths of openings in which a door hangs [m]."""
 
-WIDER_M, BESIDE_M = 0.2, (0.25, 0.45)
+WIDER_M, BESIDE_M = 0.08, (0.3, 0.5)
 """On both sides of an opening, that far from its middle, there is so much more room [m]."""
 
 APART_M = 1.0
