@@ -126,6 +126,9 @@ Smallest gap to a person and the robot's speed then [m, m/s], steps with a gap b
 nearest person that the laser sees [m]; whether the robot drove into a person in the last step.
 """
 
+PERSON_BEAM, DOOR_BEAM = 1, 2
+"""Values of ``recognised``."""
+
 NEAR_M = 0.5
 """A gap to a person below this is a near miss [m]."""
 

@@ -21,6 +21,7 @@ from lidarium.envs.simulation.kernels.arrays import (
     FACE_TABLE,
     FLOOR_COLUMNS,
     FLOOR_ROWS,
+    PERSON_BEAM,
     SQUARES,
     TILE_COLUMNS,
 )
@@ -282,7 +283,7 @@ def cut_by_disc(beams: Beams, disc_x: float, disc_y: float, disc_radius: float, 
 
 @kernel(nrt=False)
 def cut_by_person(beams: Beams, disc_x: float, disc_y: float, disc_radius: float, ranges: Array, marks: Array) -> bool:
-    """Shorten the beams that meet a person, set their ``marks`` (beams,) to 1, and return whether any does so first."""
+    """Shorten the beams that meet a person, set their ``marks`` (beams,), and return whether any does so first."""
     directions, increment = beams.directions, beams.increment
     offset_x, offset_y = disc_x - beams.x, disc_y - beams.y
     squared = offset_x * offset_x + offset_y * offset_y
@@ -298,7 +299,7 @@ def cut_by_person(beams: Beams, disc_x: float, disc_y: float, disc_radius: float
             middle = offset_x * directions[0, beam] + offset_y * directions[1, beam]
             inside = middle * middle - gap
             if inside >= 0.0 and middle > 0.0 and middle - math.sqrt(inside) < ranges[beam]:
-                ranges[beam], marks[beam], is_seen = middle - math.sqrt(inside), 1, True
+                ranges[beam], marks[beam], is_seen = middle - math.sqrt(inside), PERSON_BEAM, True
     return is_seen
 
 

@@ -11,6 +11,7 @@ from lidarium.envs.simulation.disturbances.odometry import HEIGHT, RADIUS
 from lidarium.envs.simulation.kernels.arrays import (
     ANGLE_FIRST,
     ANGLE_INCREMENT,
+    DOOR_BEAM,
     DOOR_KIND,
     FRAME_RESOLUTION,
     FRAME_X,
@@ -85,7 +86,7 @@ def _meet_doors(world: WorldArrays, row: int, episode: int, beams: Beams, length
                 (to_y - frame[FRAME_Y]) * scale,
                 lengths,
                 marks,
-                1 if doors[door, DOOR_KIND] == OPENS else 0,
+                DOOR_BEAM if doors[door, DOOR_KIND] == OPENS else 0,
             )
 
 
