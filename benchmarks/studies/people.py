@@ -79,7 +79,7 @@ Episodes end at 99 % of the floor or {horizon:.0f} s. Times that miss 99 % count
 geometric means over pairs with 95 % intervals. *Near* is a gap to a person below 0.5 m, *near misses* are such
 approaches in a run, *near* (time) and *lost* (by yielding) are of a robot in a run, *contacts* by robots and by people.
 
-| policy | runs | pairs | with over without | reached 99 % | contacts | near misses | near [s] | closest [m] | lost [s] |
+| policy | runs | pairs | with over without | 99 % | contacts | near misses | near [s] | closest [m] | lost [s] |
 |---|---:|---:|---:|---:|---:|---:|---:|---:|---:|
 {policies}
 
