@@ -521,7 +521,7 @@ _add(
     "1/km",
     "lower",
 )
-for _key, _column, _text, _unit, _direction in (
+_SAFETY: tuple[tuple[str, int, str, str, Direction], ...] = (
     ("closest_approach_m", CLOSEST, "smallest gap between a robot and a person", "m", "higher"),
     ("speed_at_closest_m_s", CLOSEST_SPEED, "speed of the robot at `closest_approach_m`", "m/s", "lower"),
     ("near_misses", NEAR_MISSES, "how often a gap to a person fell below 0.5 m", "", "lower"),
@@ -530,7 +530,8 @@ for _key, _column, _text, _unit, _direction in (
     ("contacts_by_robot", BY_ROBOT, "contacts of a robot that drove into a person", "", "lower"),
     ("contacts_by_person", BY_PERSON, "contacts of a person who walked into a robot", "", "lower"),
     ("yielding_s", YIELDED, "time that robots lost by slowing down for people, all robots", "s", "lower"),
-):
+)
+for _key, _column, _text, _unit, _direction in _SAFETY:
     _add(_key, partial(_among_people, column=_column), f"{_text}; null without people", _unit, _direction)
 _add(
     "ended_because",

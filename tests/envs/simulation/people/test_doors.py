@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
+from doored_rooms import ROOMS, robot_at_door
 
 from lidarium.envs.faces.parallel import ExplorationEnv
-from lidarium.envs.floors.floor import Floor, Solid
+from lidarium.envs.floors.floor import Floor
 from lidarium.envs.settings.making import make_settings
 from lidarium.envs.simulation.kernels.arrays import (
-    DOOR_HOLD,
     DOOR_KIND,
     DOOR_OPEN,
     OPENS,
@@ -17,24 +17,7 @@ from lidarium.envs.simulation.kernels.arrays import (
 )
 from lidarium.envs.simulation.people.doors import middles_of, openings_of
 
-
-def wall(x, low, high):
-    return Solid(np.array([(x - 0.05, low), (x + 0.05, low), (x + 0.05, high), (x - 0.05, high)]))
-
-
-ROOMS = Floor("rooms", (0.0, 0.0, 8.0, 4.0), (wall(4.0, 0.0, 1.5), wall(4.0, 2.4, 4.0)))
 HALL = Floor("hall", (0.0, 0.0, 6.0, 4.0))
-START = {"starts": [(1.0, 1.95, 0.0)]}
-
-
-def begun(kind=OPENS, **options):
-    """A robot in the left one of two rooms, with a door of a kind between them."""
-    settings = make_settings(**{"robots": 1, "doors": 1.0, "horizon_s": 60.0, "resolution": 0.05, **options})
-    env = ExplorationEnv(ROOMS, settings)
-    env.reset(seed=0, options=START)
-    door = env.simulation.population.doors_of(0)[0]
-    door[DOOR_KIND], door[DOOR_OPEN], door[DOOR_HOLD] = kind, 0.0, 0.0
-    return env, door
 
 
 def test_an_opening_between_walls_is_found_with_its_ends():
@@ -51,7 +34,7 @@ def test_a_door_where_no_opening_is_is_refused():
 
 
 def test_a_door_opens_when_a_robot_comes_and_shuts_behind_it():
-    env, door = begun()
+    env, door = robot_at_door()
     opened, places = [], []
     for _ in range(170):
         env.step({"robot_0": np.array([0.5, 0.0], np.float32)})
@@ -66,7 +49,7 @@ def test_a_door_opens_when_a_robot_comes_and_shuts_behind_it():
 
 
 def test_a_shut_door_stops_a_robot_and_hides_what_is_behind():
-    env, _ = begun(STAYS_SHUT)
+    env, _ = robot_at_door(STAYS_SHUT)
     for _ in range(120):
         env.step({"robot_0": np.array([0.5, 0.0], np.float32)})
     assert env.world.poses[0, 0] == pytest.approx(4.0 - 0.02 - 0.18, abs=0.06)
@@ -76,7 +59,7 @@ def test_a_shut_door_stops_a_robot_and_hides_what_is_behind():
 
 def test_a_door_that_opens_by_itself_is_no_part_of_the_map_and_a_shut_one_is():
     for kind, is_mapped in ((OPENS, False), (STAYS_SHUT, True)):
-        env, door = begun(kind)
+        env, door = robot_at_door(kind)
         for _ in range(10):
             env.step({"robot_0": np.array([0.1, 0.0], np.float32)})
         x, y = middles_of(door[None])[0]
@@ -104,7 +87,7 @@ def _kind(env, seed):
 
 
 def test_people_open_doors_too_and_no_leaf_shuts_on_them():
-    env, door = begun(people=2)
+    env, door = robot_at_door(people=2)
     people = env.simulation.population.people_of(0)
     middle = middles_of(door[None])[0]
     widths = []
