@@ -37,6 +37,7 @@ from lidarium.envs.simulation.kernels.arrays import (
     is_scanning,
     world_at,
 )
+from lidarium.envs.simulation.kernels.doors import move_doors
 from lidarium.envs.simulation.kernels.map_updates import (
     invalidate_teammates,
     perceive_robot,
@@ -45,8 +46,7 @@ from lidarium.envs.simulation.kernels.map_updates import (
 from lidarium.envs.simulation.kernels.masks import score_robot
 from lidarium.envs.simulation.kernels.motion import body_grids, move_robots, team_of
 from lidarium.envs.simulation.kernels.scanning import disturb_robot, scan_scratch, sense_robot
-from lidarium.envs.simulation.people.doors import move_doors
-from lidarium.envs.simulation.people.walking import note_people, walk_people
+from lidarium.envs.simulation.kernels.walking import note_people, walk_people
 from lidarium.envs.simulation.rewards import add_rewards
 from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.kernels.views import grid_at

@@ -1,6 +1,5 @@
 """Doors in the openings of a floor: sliding leaves that open when somebody comes, stand open or stay shut."""
 
-import math
 from functools import lru_cache
 
 import cv2
@@ -15,7 +14,6 @@ from lidarium.envs.floors.raster import Raster
 from lidarium.envs.simulation.kernels.arrays import (
     DOOR_END_X,
     DOOR_END_Y,
-    DOOR_HOLD,
     DOOR_KIND,
     DOOR_NUMBERS,
     DOOR_OPEN,
@@ -24,15 +22,8 @@ from lidarium.envs.simulation.kernels.arrays import (
     OPENS,
     STANDS_OPEN,
     STAYS_SHUT,
-    TIME_STEP,
-    WALKER_X,
-    WALKER_Y,
-    WorldArrays,
-    doors_of,
-    walkers_of,
 )
 from lidarium.envs.simulation.kernels.floor_cache import FloorTables
-from lidarium.mapping.kernels.compilation import Array, kernel
 
 NARROWEST_M, WIDEST_M = 0.65, 1.6
 """Widths of openings in which a door hangs [m]."""
@@ -58,12 +49,6 @@ MOST_DOORS = 64
 
 MOST_CUT_OFF = 0.25
 """A door does not stay shut if it cuts off more than this share of the free space, or a proposed start."""
-
-SENSOR_M = 1.4
-"""Doors open if somebody is this near to their middle [m]."""
-
-OPENING_S, HOLD_S = 1.0, 3.0
-"""Time in which a leaf slides from end to end, and for which it stays open after the last that came [s]."""
 
 DOOR_STREAM = 0x646F6F72
 """Sets the draws of doors apart from others of the same seed."""
@@ -182,36 +167,3 @@ def with_shut_doors(raster: Raster, doors: NDArray[np.float64]) -> Raster:
     solid = raster.solid.copy()
     draw_segments(solid, raster.origin, raster.resolution, shut, 1)
     return Raster(solid, raster.origin, raster.resolution)
-
-
-@kernel(nrt=False)
-def _somebody_is_near(world: WorldArrays, episode: int, robots: int, x: float, y: float) -> bool:
-    """Whether a person, or a robot that has not ended, is near the middle of a door."""
-    walkers = walkers_of(world, episode)
-    for person in range(walkers.shape[0]):
-        if math.hypot(walkers[person, WALKER_X] - x, walkers[person, WALKER_Y] - y) < SENSOR_M:
-            return True
-    for row in range(episode * robots, (episode + 1) * robots):
-        if math.hypot(world.poses[row, 0] - x, world.poses[row, 1] - y) < SENSOR_M:
-            return True
-    return False
-
-
-@kernel(nrt=False)
-def move_doors(world: WorldArrays, episode: int, robots: int) -> None:
-    """Slide the leaves of an episode's doors for one step."""
-    doors: Array = doors_of(world, episode)
-    step_s = world.sensor[0, TIME_STEP]
-    for door in range(doors.shape[0]):
-        if doors[door, DOOR_KIND] != OPENS:
-            continue
-        x = 0.5 * (doors[door, DOOR_X] + doors[door, DOOR_END_X])
-        y = 0.5 * (doors[door, DOOR_Y] + doors[door, DOOR_END_Y])
-        slide = step_s / OPENING_S
-        if _somebody_is_near(world, episode, robots, x, y):
-            doors[door, DOOR_HOLD] = math.ceil(HOLD_S / step_s)
-            doors[door, DOOR_OPEN] = min(doors[door, DOOR_OPEN] + slide, 1.0)
-        elif doors[door, DOOR_HOLD] > 0.0:
-            doors[door, DOOR_HOLD] -= 1.0
-        else:
-            doors[door, DOOR_OPEN] = max(doors[door, DOOR_OPEN] - slide, 0.0)

@@ -28,8 +28,9 @@ from lidarium.envs.simulation.kernels.arrays import (
     WALKER_Y,
     WALKWAY_NUMBERS,
 )
+from lidarium.envs.simulation.kernels.doors import SENSOR_M
 from lidarium.envs.simulation.kernels.floor_cache import LIMITLESS_BODY, FloorTables
-from lidarium.envs.simulation.people.doors import MOST_DOORS, SENSOR_M, draw_doors, middles_of, with_shut_doors
+from lidarium.envs.simulation.people.doors import MOST_DOORS, draw_doors, middles_of, with_shut_doors
 from lidarium.envs.simulation.people.walkways import WIDEST_M, Walkways, walkways_of
 
 RADII_M = (0.25, WIDEST_M)

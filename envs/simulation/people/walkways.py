@@ -15,6 +15,7 @@ from scipy import ndimage
 
 from lidarium.envs.floors.raster import Raster
 from lidarium.envs.simulation.kernels.contact import distance_bound
+from lidarium.envs.simulation.kernels.walking import HEADINGS, NO_WAY
 from lidarium.mapping.kernels.compilation import Array, kernel
 
 LATTICE_M = 0.1
@@ -37,12 +38,6 @@ MOST_PLACES, MOST_FIELD_CELLS = 16, 2_000_000
 
 LOOKAHEAD = 4
 """Headings lead to the cell that is this many cells further along the way."""
-
-NO_WAY = 255
-"""Heading of cells without a way."""
-
-HEADINGS = 255
-"""Number of headings in a turn."""
 
 _UNREACHED = np.int32(2**31 - 1)
 _ROUND = 64

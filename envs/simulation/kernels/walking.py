@@ -57,9 +57,14 @@ from lidarium.envs.simulation.kernels.contact import (
     deepest_person,
     deepest_wall,
 )
-from lidarium.envs.simulation.people.walkways import HEADINGS, NO_WAY
 from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.kernels.views import grid_at, scratch_grid, vector_at
+
+NO_WAY = 255
+"""Heading of cells without a way."""
+
+HEADINGS = 255
+"""Number of headings in a turn."""
 
 HORIZON_S = 2.0
 """People avoid what they would meet within this time [s]."""
