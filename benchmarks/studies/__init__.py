@@ -22,6 +22,7 @@ for _name, _module, _summary in (
     ("machines", "machines", "10^5 episodes, two nodes of a Ray cluster beside one, and nodes that are killed"),
     ("merging", "merging.study", "map merging on a bank of maps that robots made, beside the thesis and ROS map_merge"),
     ("parity", "parity", "random driving in the world of PyBullet beside the kinematic one, on 20 floors"),
+    ("people", "people", "reference policies, SLAM and batches among people and doors, beside the same without"),
     ("prediction", "prediction", "predicted maps: how good they are, and what explorers win by them and by the truth"),
     ("printed", "printed", "policies under the rules of other projects, and the figures that those published"),
     ("realism", "realism", "how well robots know where they are with noise, wheels that slip, and SLAM"),

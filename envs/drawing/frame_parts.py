@@ -12,6 +12,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from lidarium.envs.simulation.people.crowd import Crowd
+
 Frame = NDArray[np.uint8]
 Colour = tuple[int, int, int]
 
@@ -28,6 +30,8 @@ UNEXPLORED: Colour = (214, 220, 229)
 NOT_COUNTED: Colour = (236, 240, 245)
 EXPLORED: Colour = (255, 255, 255)
 WALL: Colour = (38, 50, 66)
+PERSON: Colour = (75, 85, 99)
+DOOR: Colour = (146, 84, 34)
 
 _TEAM: tuple[Colour, ...] = (
     (37, 99, 235),
@@ -179,6 +183,20 @@ def draw_robots(
         cv2.circle(frame, place, round((shown + 1.5) * fixed), EXPLORED, -1, cv2.LINE_AA, SHIFT)
         cv2.circle(frame, place, round(shown * fixed), _paler(colour) if is_over else colour, -1, cv2.LINE_AA, SHIFT)
         cv2.line(frame, place, (int(tip[0]), int(tip[1])), EXPLORED, max(round(shown / 4), 1), cv2.LINE_AA, SHIFT)
+
+
+def draw_crowd(frame: Frame, view: View, crowd: Crowd | None) -> None:
+    """Draw people as discs with a light rim, and the leaves of doors as lines; None draws nothing."""
+    if crowd is None:
+        return
+    thickness = max(round(0.07 * view.scale), 2)
+    for x, y, to_x, to_y in crowd.leaves[crowd.opened < 1.0]:
+        here, there = view.pixels(np.array([(x, y), (to_x, to_y)])).tolist()
+        cv2.line(frame, here, there, DOOR, thickness, cv2.LINE_AA, SHIFT)
+    for x, y, radius in crowd.people:
+        shown, place = max(float(radius) * view.scale, 4.0), view.pixels(np.array([(x, y)]))[0].tolist()
+        cv2.circle(frame, place, round((shown + 1.5) * (1 << SHIFT)), EXPLORED, -1, cv2.LINE_AA, SHIFT)
+        cv2.circle(frame, place, round(shown * (1 << SHIFT)), PERSON, -1, cv2.LINE_AA, SHIFT)
 
 
 def pale(colour: Colour) -> Colour:

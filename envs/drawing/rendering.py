@@ -21,6 +21,7 @@ from lidarium.envs.drawing.frame_parts import (
     Colour,
     Frame,
     View,
+    draw_crowd,
     draw_paths,
     draw_robots,
     enlarged,
@@ -31,6 +32,7 @@ from lidarium.envs.drawing.frame_parts import (
 from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.simulation.coverage import unpack_bits
 from lidarium.envs.simulation.kernels.floor_cache import FloorTables
+from lidarium.envs.simulation.people.crowd import crowd_of
 from lidarium.envs.simulation.simulation import Simulation
 
 _NEAR = 0.125
@@ -110,6 +112,7 @@ def draw_frame(scene: Scene, size: int = SIZE, draw_over: Callable[[Frame, View]
     colours = team_colours(scene.settings.robots)
     _draw_fans(frame, scene, view, colours)
     draw_paths(frame, view, np.stack([poses[:, :2] for poses in (*scene.track, scene.poses)]), colours)
+    draw_crowd(frame, view, crowd_of(scene.simulation.population, scene.episode))
     radii = [robot.radius for robot in scene.settings.team]
     draw_robots(frame, view, scene.poses, radii, scene.has_ended, colours)
     if draw_over is not None:

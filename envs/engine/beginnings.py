@@ -16,6 +16,7 @@ from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.settings.reset_options import Curriculum, ResetOptions, of_curriculum
 from lidarium.envs.simulation.backends import BACKENDS
 from lidarium.envs.simulation.kernels.floor_cache import FloorTables, floor_tables
+from lidarium.envs.simulation.people.doors import draw_doors, with_shut_doors
 from lidarium.envs.simulation.simulation import Simulation
 
 
@@ -56,17 +57,22 @@ def begin(
     radius = settings.robot.radius
     _check_height(floor, settings.robot.height)
     tables = floor_tables(floor, settings.raster_resolution, settings.lidar.height, settings.robot.height)
-    starts = chosen.starts
+    starts, body, seed = chosen.starts, tables.body, None
+    if settings.doors > 0.0:
+        # Doors come from the seed of the episode, and robots do not start beyond one that stays shut.
+        seed = int(generator.integers(2**63))
+        body = with_shut_doors(body, draw_doors(tables, settings.doors, radius, seed))
     if isinstance(starts, np.ndarray):
-        check_starts(tables.body, radius, starts)
+        check_starts(body, radius, starts)
     else:
         how = starts or settings.starts or ("drawn" if choice_here.is_set else "fixed")
         proposed = floor.starts[:0] if how == "drawn" else floor.starts
-        starts = draw_starts(tables.body, radius, settings.robots, generator, proposed)
+        starts = draw_starts(body, radius, settings.robots, generator, proposed)
     goal = (chosen.goal or floor.goal) if choice.has_goal else None
     if goal is not None:
         check_goal(tables.body, goal)
-    seed = int(generator.integers(2**63))
+    if seed is None:
+        seed = int(generator.integers(2**63))
     return EpisodeStart(floor, tables, starts, seed, goal)
 
 

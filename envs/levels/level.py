@@ -121,6 +121,7 @@ class Level(ABC):
             np.zeros((1, 3)),
             np.zeros(1, np.uint8),
             FORESIGHT_TIMES,
+            perception.simulation.safety,
         )
 
     make_driver: Callable[[], TeamDriver] | None = None

@@ -67,6 +67,7 @@ class SparseMapSettings:
 
 
 MAX_ROBOTS = 64
+MAX_PEOPLE = 1000
 MAX_FRONTIERS = 1024
 MAX_PYRAMID_LEVELS = 16
 MAX_MAP_CELLS = 4096
@@ -141,6 +142,11 @@ class ExplorationSettings:
         Faults of the robots.
     battery : Battery
         Battery of each robot.
+    people : int
+        Number of people who walk on the floor.
+    doors : float
+        Share of the openings between rooms that have doors: sliding doors that open when somebody comes, stand open
+        or stay shut.
     pauses_when_blocked : bool
         Whether a robot pauses until it is ordered to resume if its bumper touches anything, or its way is blocked.
     backend : str
@@ -209,6 +215,8 @@ class ExplorationSettings:
     radio: RadioSettings = RADIO["all"]
     faults: FaultSettings = NO_FAULTS
     battery: Battery = BATTERIES["none"]
+    people: Annotated[int, within(0, MAX_PEOPLE)] = 0
+    doors: Annotated[float, share()] = 0.0
     pauses_when_blocked: bool = False
     backend: str = "kinematic"
     time_step: Annotated[float, within(1e-4, 10.0)] = 0.1

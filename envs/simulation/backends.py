@@ -26,6 +26,8 @@ def kinematic_world(settings: ExplorationSettings, episodes: int = 1) -> Kinemat
         settings.faults,
         settings.horizon_s,
         settings.scan_steps,
+        settings.people,
+        settings.doors,
     )
 
 

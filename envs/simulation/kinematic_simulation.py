@@ -34,7 +34,11 @@ class KinematicSimulation(Simulation):
         **options: Any,  # noqa: ANN401
     ) -> "KinematicSimulation":
         """Return the simulation of a team in a kinematic world of its own."""
-        of_world = {name: options.pop(name) for name in ("odometry", "faults", "horizon_s") if name in options}
+        of_world = {
+            name: options.pop(name)
+            for name in ("odometry", "faults", "horizon_s", "people", "doors")
+            if name in options
+        }
         pose_sources = PoseSources(
             **{name: options.pop(name) for name in ("localization", "knows_teammates") if name in options}
         )

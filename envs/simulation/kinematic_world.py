@@ -17,6 +17,7 @@ from lidarium.envs.simulation.disturbances.odometry import RADIUS, WHEEL_NUMBERS
 from lidarium.envs.simulation.kernels.arrays import sensor_numbers, table_of_owners
 from lidarium.envs.simulation.kernels.floor_cache import FloorTables
 from lidarium.envs.simulation.kernels.stepping import move_and_sense
+from lidarium.envs.simulation.people.population import Population
 
 
 class KinematicWorld:
@@ -42,6 +43,15 @@ class KinematicWorld:
         For how long faults are drawn [s].
     scan_steps : int
         Steps from scan to scan.
+    people : int
+        Number of people.
+    doors : float
+        Share of the openings of a floor that have doors.
+
+    Attributes
+    ----------
+    population : Population
+        The people and doors.
     """
 
     def __init__(
@@ -55,6 +65,8 @@ class KinematicWorld:
         faults: FaultSettings = NO_FAULTS,
         horizon_s: float | None = None,
         scan_steps: int = 1,
+        people: int = 0,
+        doors: float = 0.0,
     ) -> None:
         self.robots, self.episodes, self.time_step = len(robots), episodes, time_step
         self.lidars = by_robot(lidar, self.robots)
@@ -87,7 +99,8 @@ class KinematicWorld:
         self.noise_table, self.sensor = GAUSSIAN_TABLE, sensor_numbers(self.lidars, time_step, 1.0, scan_steps)
         self.unit_vectors = np.concatenate([each.unit_vectors for each in self.lidars])
         self._everywhere = np.ones(episodes, np.bool_)
-        self._table = table_of_owners(self)
+        self.population = Population(people, doors, self.bodies, episodes, self.lidars[0].beams)
+        self._table = table_of_owners(self, self.population)
 
     @property
     def sensors(self) -> Mapping[str, NDArray[Any]]:
@@ -125,6 +138,7 @@ class KinematicWorld:
         self.wheels[rows] = begin_wheels(self._odometry, self.robots, seed)
         self.odometry[rows], self.measured[rows], self.failed[rows] = 0.0, 0.0, 0
         self.faults[rows] = self._plan_faults(floor, free, starts, seed)
+        self.population.place(episode, floor, starts, seed)
 
     def move_and_sense(
         self,
@@ -165,4 +179,4 @@ class KinematicWorld:
         for episode, floor in enumerate(self.floors):
             if floor is not None:
                 self.floor_rows[episode] = floor.row
-        self._table = table_of_owners(self)
+        self._table = table_of_owners(self, self.population)

@@ -32,6 +32,8 @@ from lidarium.envs.simulation.kernels.stepping import (
     render_row,
     score_and_localize,
 )
+from lidarium.envs.simulation.people.doors import with_shut_doors
+from lidarium.envs.simulation.people.population import Population, no_people
 from lidarium.envs.simulation.score import Score
 from lidarium.mapping.geometry.rigid import composed, relative
 from lidarium.mapping.grids.occupancy import OccupancySettings
@@ -141,8 +143,14 @@ class Simulation:
         self._pool: ArrayPool | None = None
         self._threads = min(threads, available_threads())
         self._is_parallel = self.threads > 1
-        self._table = table_of_owners(self, world, self.beliefs, self.score)
+        # A world of a user's own may have no people.
+        self.population: Population | None = getattr(world, "population", None)
+        self.safety = no_people(self.robots * self.episodes) if self.population is None else self.population.safety
+        self._table = self._make_table()
         self.camera: DepthSensor | None = None
+
+    def _make_table(self) -> NDArray[np.int64]:
+        return table_of_owners(self, self.world, self.beliefs, self.score, self.population)
 
     def mount(self, camera: DepthCamera) -> None:
         """Put a depth camera on each robot."""
@@ -177,7 +185,10 @@ class Simulation:
         starts = within_half_turns(starts)
         # Area that the laser cannot see does not count, even if a low body could pass below it.
         smallest = float(self.world.bodies[:, RADIUS].min())
-        free = reachable_free_space(floor.body, smallest, starts) & (floor.laser.solid == 0)
+        body = floor.body
+        if self.population is not None:
+            body = with_shut_doors(body, self.population.draw_doors(floor, seed))
+        free = reachable_free_space(body, smallest, starts) & (floor.laser.solid == 0)
         floors = enumerate(self.world.floors)
         same = [other for other, known in floors if other != episode and known is floor]
         counted = self.score.shared(free, multiple, same)
@@ -290,6 +301,6 @@ class Simulation:
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
         self._pool = None
-        self._table = table_of_owners(self, self.world, self.beliefs, self.score)
+        self._table = self._make_table()
         for episode in range(self.episodes):
             self._point_at(episode)

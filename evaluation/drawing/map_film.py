@@ -22,6 +22,7 @@ from lidarium.envs.drawing.frame_parts import (
     Frame,
     View,
     blocks_of,
+    draw_crowd,
     draw_paths,
     draw_robots,
     enlarged,
@@ -34,6 +35,7 @@ from lidarium.envs.drawing.frame_parts import (
 from lidarium.envs.drawing.rendering import view_of
 from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.settings.exploration import ExplorationSettings
+from lidarium.envs.simulation.people.crowd import crowd_of
 from lidarium.evaluation.drawing.joined_maps import overlaid, shades_of
 from lidarium.evaluation.episodes.events import joined_groups
 from lidarium.evaluation.truth.beliefs import maps_on_floor
@@ -201,6 +203,7 @@ def _floor(env: ExplorationEnv, width: int, groups: Sequence[set[int]], joined: 
     for pair in joined:
         first, last = view.pixels(scene.poses[list(pair), :2]).tolist()
         cv2.line(frame, first, last, JOINED, 4, cv2.LINE_AA, SHIFT)
+    draw_crowd(frame, view, crowd_of(env.simulation.population))
     radii = [robot.radius for robot in env.settings.team]
     draw_robots(frame, view, scene.poses, radii, scene.has_ended, colours)
     left = (width - view.width) // 2  # of a tall floor

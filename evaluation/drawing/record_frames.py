@@ -23,6 +23,7 @@ from lidarium.envs.drawing.frame_parts import (
     WALL,
     Frame,
     blocks_of,
+    draw_crowd,
     draw_paths,
     draw_robots,
     enlarged,
@@ -110,6 +111,7 @@ class TrackFrames:
             event["agent"] for event in display.events if event["kind"] == "ended" and event["time_s"] <= time_s + 1e-9
         }
         has_ended = [agent in ended for agent in self._agents]
+        draw_crowd(frame, view, display.crowd_at(time_s))
         draw_robots(frame, view, poses, radius_of(self._record), has_ended, self._colours)
         return frame
 

@@ -17,6 +17,16 @@ from lidarium.agents.report import GivenUp, PolicyReport
 from lidarium.envs.engine.tally import THRESHOLDS
 from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.simulation.coverage import unpack_bits
+from lidarium.envs.simulation.kernels.arrays import (
+    BY_PERSON,
+    BY_ROBOT,
+    CLOSEST,
+    CLOSEST_SPEED,
+    NEAR_MISSES,
+    NEAR_SPEED,
+    NEAR_STEPS,
+    YIELDED,
+)
 from lidarium.evaluation.episodes.events import in_floor_frame, operating_events
 from lidarium.evaluation.episodes.history import WHOLE, History, Milestone
 from lidarium.evaluation.episodes.runner import Episode
@@ -310,6 +320,20 @@ def _relative_errors(data: EpisodeData, part: int) -> list[float | None] | None:
     return [None if error is None else round(error[part], 9) for error in errors]
 
 
+def _among_people(data: EpisodeData, column: int) -> float | int | None:
+    """Return a figure of the robots' safety among people."""
+    if data.settings.people == 0:
+        return None
+    safety, step_s = data.env.simulation.safety, data.settings.time_step
+    if column in (CLOSEST, CLOSEST_SPEED):
+        nearest = safety[int(np.argmin(safety[:, CLOSEST]))]
+        return round(float(nearest[column]), 9) if np.isfinite(nearest[CLOSEST]) else None
+    if column == NEAR_SPEED:
+        return round(float(safety[:, column].max()), 9)
+    total = float(safety[:, column].sum())
+    return round(total * step_s, 6) if column in (NEAR_STEPS, YIELDED) else int(total)
+
+
 def _known(data: EpisodeData) -> NDArray[np.bool_]:
     return np.asarray((data.maps != 0).any(axis=0))
 
@@ -497,6 +521,18 @@ _add(
     "1/km",
     "lower",
 )
+_SAFETY: tuple[tuple[str, int, str, str, Direction], ...] = (
+    ("closest_approach_m", CLOSEST, "smallest gap between a robot and a person", "m", "higher"),
+    ("speed_at_closest_m_s", CLOSEST_SPEED, "speed of the robot at `closest_approach_m`", "m/s", "lower"),
+    ("near_misses", NEAR_MISSES, "how often a gap to a person fell below 0.5 m", "", "lower"),
+    ("time_near_people_s", NEAR_STEPS, "time with a gap to a person below 0.5 m, all robots", "s", "lower"),
+    ("speed_near_people_m_s", NEAR_SPEED, "maximum speed of a robot in that time", "m/s", "lower"),
+    ("contacts_by_robot", BY_ROBOT, "contacts of a robot that drove into a person", "", "lower"),
+    ("contacts_by_person", BY_PERSON, "contacts of a person who walked into a robot", "", "lower"),
+    ("yielding_s", YIELDED, "time that robots lost by slowing down for people, all robots", "s", "lower"),
+)
+for _key, _column, _text, _unit, _direction in _SAFETY:
+    _add(_key, partial(_among_people, column=_column), f"{_text}; null without people", _unit, _direction)
 _add(
     "ended_because",
     lambda data: {agent: data.env.scorer.ended_because.get(agent) for agent in data.env.possible_agents},

@@ -37,6 +37,8 @@ LATER = (
     "pyramid_cells",
     "pyramid_levels",
     "scan_period_s",
+    "people",
+    "doors",
 )
 """Settings that older records do not have."""
 

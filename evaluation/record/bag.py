@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.floors.floor import Floor
+from lidarium.envs.simulation.people.crowd import crowd_of
 from lidarium.evaluation.episodes.watching import Watcher
 from lidarium.evaluation.record.episode_record import EpisodeRecord
 from lidarium.evaluation.record.replay import drive_again, first_difference, is_same
@@ -31,7 +32,8 @@ def write_bag(path: Path, record: EpisodeRecord, floor: str | Floor | None = Non
     Topics are ``/map`` (the sum of all maps), and of each robot ``/robot_0/scan``, ``odom`` (dead reckoning of its
     wheels from its start), ``map`` (its own map) and ``path`` (its true path). ``/tf`` leads
     from ``map`` by ``robot_0/odom`` to ``robot_0/base_link`` at the true pose, ``/tf_static`` from there to
-    ``robot_0/laser``.
+    ``robot_0/laser``. People are frames ``person_0`` below ``map``; ``/door_0`` is a path from end to end of the leaf
+    of a door, written when one moves.
     """
     with bag(path) as writer:
         recorder = _BagRecorder(writer)
@@ -52,6 +54,7 @@ class _BagRecorder(Watcher):
         self._starts = env.world.poses.copy()
         self._times: list[float] = []
         self._poses: list[NDArray[np.float64]] = []
+        self._opened: list[float] = []
         for robot in env.possible_agents:
             self._writer.transform(
                 f"{robot}/base_link",
@@ -86,6 +89,7 @@ class _BagRecorder(Watcher):
             self._writer.odometry(f"/{robot}/odom", odom, base, time_s, reckoned[row])
             if steps % env.settings.scan_steps == 0:
                 self._writer.scan(f"/{robot}/scan", f"{robot}/laser", time_s, env.simulation.ranges[row], lidars[row])
+        self._write_crowd(env, time_s)
         if _is_due(env, steps, PATH_STEP_S):
             self._times.append(time_s)
             self._poses.append(poses.copy())
@@ -93,6 +97,19 @@ class _BagRecorder(Watcher):
             self._write_maps(env, time_s)
         if _is_due(env, steps, PATH_PERIOD_S):
             self._write_paths(env, time_s)
+
+    def _write_crowd(self, env: ExplorationEnv, time_s: float) -> None:
+        """Write where people are, and the ends of the leaves of doors: a leaf that is open has no length."""
+        crowd = crowd_of(env.simulation.population)
+        if crowd is None:
+            return
+        for number, (x, y, _) in enumerate(crowd.people):
+            self._writer.transform(MAP_FRAME, f"person_{number}", time_s, (x, y, 0.0))
+        if crowd.opened.tolist() != self._opened:
+            self._opened = crowd.opened.tolist()
+            for number, leaf in enumerate(crowd.leaves):
+                ends = np.array([(*leaf[:2], 0.0), (*leaf[2:], 0.0)])
+                self._writer.path(f"/door_{number}", MAP_FRAME, time_s, [time_s, time_s], ends)
 
     def _write_maps(self, env: ExplorationEnv, time_s: float) -> None:
         tables, resolution = env.world.floors[0], env.settings.occupancy.resolution

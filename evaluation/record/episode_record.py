@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 import lidarium
 from lidarium.envs.settings.exploration import PARTS, ExplorationSettings, with_parts
+from lidarium.envs.simulation.people.crowd import Crowd
 from lidarium.mapping.files.guarded_reading import reason
 from lidarium.mapping.geometry.bounds import Rule, above, check_values, rules_of, shown, within
 from lidarium.mapping.grids.map_deltas import levels_of_planes
@@ -61,6 +62,33 @@ class MapChanges:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class CrowdTrack:
+    """People and doors of an episode over time.
+
+    Attributes
+    ----------
+    times : (n,) float64
+        When they were sampled: five times a second [s].
+    people : (n, people, 3) float64
+        x, y and radius in the floor's frame, rounded to 1 mm [m].
+    doors : (doors, 4) float64
+        Ends of the openings, rounded alike [m].
+    opened : (n, doors) float64
+        Share by which each is open, rounded to 1 %.
+    """
+
+    times: NDArray[np.float64]
+    people: NDArray[np.float64]
+    doors: NDArray[np.float64]
+    opened: NDArray[np.float64]
+
+    def at(self, time_s: float) -> Crowd:
+        """Return the last sample up to a time; before the first one, the first."""
+        sample = max(int(np.searchsorted(self.times, time_s + 1e-9, side="right")) - 1, 0)
+        return Crowd(self.people[sample], self.doors, self.opened[sample])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class DisplayTrack:
     """Data of an episode that any version can show.
 
@@ -81,6 +109,8 @@ class DisplayTrack:
     events : list of dict
         Each with ``time_s``, ``kind``, ``agent`` and keys of its own, in order of time;
         docs/reference/files.md lists the kinds.
+    crowd : CrowdTrack or None
+        People and doors; None without any.
     """
 
     times: NDArray[np.float64]
@@ -90,6 +120,11 @@ class DisplayTrack:
     resolution: float
     changes: MapChanges
     events: list[dict[str, Any]]
+    crowd: CrowdTrack | None = None
+
+    def crowd_at(self, time_s: float) -> Crowd | None:
+        """Return people and doors at a time; None without any."""
+        return None if self.crowd is None else self.crowd.at(time_s)
 
     def map_at(self, time_s: float) -> NDArray[np.uint8]:
         """Return the team's map of the last sample up to a time.

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from lidarium.evaluation.record.episode_record import (
     TIME,
+    CrowdTrack,
     DisplayTrack,
     EpisodeRecord,
     MapChanges,
@@ -36,6 +37,9 @@ _ARRAYS = (
     "map_known",
     "map_occupied",
 )
+_CROWD = ("crowd_steps", "people", "door_ends", "doors_opened")
+"""Arrays of records with people or doors; others do not have them."""
+
 _EPOCH = (1980, 1, 1, 0, 0, 0)
 MOST_COMMAND = 1e6
 """Highest speed or turn rate that a record may command [m/s, rad/s]."""
@@ -53,7 +57,7 @@ def write_record(path: Path, record: EpisodeRecord) -> None:
     with zipfile.ZipFile(content, "w", zipfile.ZIP_DEFLATED) as archive:
         _add(archive, _HEADER, _json(record.header))
         _add(archive, _EVENTS, _json(record.display.events))
-        for name, array in _packed(record).items():
+        for name, array in {**_packed(record), **_packed_crowd(record)}.items():
             with io.BytesIO() as member:
                 np.lib.format.write_array(member, array, allow_pickle=False)
                 _add(archive, f"{name}.npy", member.getvalue())
@@ -75,7 +79,9 @@ def read_record(path: Path) -> EpisodeRecord:
         events = json.loads(archive.read(_EVENTS))
         # Members are read as a whole first, which checks the checksum: nothing damaged is parsed.
         arrays = {name: archive.array(f"{name}.npy") for name in _ARRAYS}
-        return _unpacked(header, events, arrays)
+        has_crowd = f"{_CROWD[0]}.npy" in archive.names
+        crowd = {name: archive.array(f"{name}.npy") for name in _CROWD} if has_crowd else {}
+        return _unpacked(header, events, arrays, crowd)
 
 
 def _add(archive: zipfile.ZipFile, name: str, content: bytes) -> None:
@@ -119,7 +125,47 @@ def _packed(record: EpisodeRecord) -> dict[str, NDArray[Any]]:
     return {name: np.ascontiguousarray(arrays[name], arrays[name].dtype.newbyteorder("<")) for name in _ARRAYS}
 
 
-def _unpacked(header: dict[str, Any], events: Any, arrays: dict[str, NDArray[Any]]) -> EpisodeRecord:  # noqa: ANN401
+def _packed_crowd(record: EpisodeRecord) -> dict[str, NDArray[Any]]:
+    """Return the arrays of people and doors, whole numbers as those of `_packed`; none without any."""
+    crowd, time_step = record.display.crowd, float(record.header["time_step"])
+    if crowd is None:
+        return {}
+    people = np.rint(crowd.people * _UNITS).astype("<i4")
+    opened = np.rint(crowd.opened * 100.0).astype("<i4")
+    arrays = (
+        _steps(crowd.times, time_step).astype("<i4"),
+        np.diff(people, axis=0, prepend=np.int32(0)),
+        np.rint(crowd.doors * _UNITS).astype("<i4"),
+        np.diff(opened, axis=0, prepend=np.int32(0)),
+    )
+    return {name: np.ascontiguousarray(array) for name, array in zip(_CROWD, arrays, strict=True)}
+
+
+def _unpacked_crowd(arrays: dict[str, NDArray[Any]], time_step: float) -> CrowdTrack | None:
+    if not arrays:
+        return None
+    steps, people, ends, opened = (arrays[name] for name in _CROWD)
+    samples, doors = len(steps), len(ends)
+    is_whole = all(array.dtype == np.int32 for array in arrays.values())
+    if not is_whole or not samples or steps.ndim != 1 or people.ndim != 3:
+        raise ValueError("its people and doors are not whole numbers of samples")
+    shapes = (people.shape, ends.shape, opened.shape)
+    if shapes != ((samples, people.shape[1], 3), (doors, 4), (samples, doors)):
+        raise ValueError(f"its people and doors have shapes {shapes} for {samples} samples")
+    return CrowdTrack(
+        steps * time_step,
+        np.cumsum(people, axis=0, dtype=np.int64) / _UNITS,
+        ends / _UNITS,
+        np.cumsum(opened, axis=0, dtype=np.int64) / 100.0,
+    )
+
+
+def _unpacked(
+    header: dict[str, Any],
+    events: Any,  # noqa: ANN401
+    arrays: dict[str, NDArray[Any]],
+    crowd: dict[str, NDArray[Any]],
+) -> EpisodeRecord:
     """Make a record of the content of a file, checked."""
     steps, robots, time_step = header["steps"], header["robots"], header["time_step"]
     (rows, words), counted = header["map_shape"], max(header["counted_cells"], 1)
@@ -168,6 +214,7 @@ def _unpacked(header: dict[str, Any], events: Any, arrays: dict[str, NDArray[Any
         header["map_resolution"],
         changes,
         events,
+        _unpacked_crowd(crowd, time_step),
     )
     return EpisodeRecord(header, arrays["commands"], display)
 

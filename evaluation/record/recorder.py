@@ -17,16 +17,18 @@ import lidarium
 from lidarium.agents.catalogue import make_policy
 from lidarium.agents.policy import Policy
 from lidarium.agents.report import GivenUp
+from lidarium.envs.engine.tally import TRACK_PERIOD_S
 from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.floors.floor import Floor
 from lidarium.envs.onboard.radio.messages import Orders
 from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.settings.making import make_settings
+from lidarium.envs.simulation.people.crowd import Crowd, crowd_of
 from lidarium.evaluation.episodes.events import operating_events, place_of
 from lidarium.evaluation.episodes.runner import run_episode
 from lidarium.evaluation.episodes.settings_identity import settings_sha256
 from lidarium.evaluation.episodes.watching import WatchedExploration, Watcher
-from lidarium.evaluation.record.episode_record import FORMAT, DisplayTrack, EpisodeRecord, MapChanges
+from lidarium.evaluation.record.episode_record import FORMAT, CrowdTrack, DisplayTrack, EpisodeRecord, MapChanges
 from lidarium.evaluation.record.file import write_record
 from lidarium.evaluation.record.replay import state_sha256
 from lidarium.evaluation.truth.beliefs import cells_beyond
@@ -190,6 +192,8 @@ class Recorder(Watcher):
         self._map_steps = max(round(MAP_PERIOD_S / settings.time_step), 1)
         self._steps_to_sample = self._map_steps
         self._maps = MapSampler(env, MAP_PERIOD_S)
+        self._crowds: list[tuple[float, Crowd]] = []
+        self._note_crowd(env)
 
     def step(self, env: ExplorationEnv, commands: NDArray[np.float64]) -> None:
         """Note how the robots were driven, contacts that began, and the map.
@@ -198,6 +202,7 @@ class Recorder(Watcher):
         """
         self._commands += commands.tobytes()
         world = env.world
+        self._note_crowd(env)
         if world.collisions.tobytes() != self._noted_collisions:
             self._note_contacts(env)
         self._steps_to_sample -= 1
@@ -282,6 +287,26 @@ class Recorder(Watcher):
             env.settings.occupancy.resolution,
             self._maps.changes(),
             sorted([*self._events, *operating_events(env), *ended], key=lambda event: float(event["time_s"])),
+            self._crowd(),
+        )
+
+    def _note_crowd(self, env: ExplorationEnv) -> None:
+        """Sample people and doors as often as poses."""
+        crowd = crowd_of(env.simulation.population)
+        if crowd is not None:
+            step, time_step = int(env.world.steps[0]), env.settings.time_step
+            if step % max(round(TRACK_PERIOD_S / time_step), 1) == 0:
+                self._crowds.append((step * time_step, crowd))
+
+    def _crowd(self) -> CrowdTrack | None:
+        if not self._crowds:
+            return None
+        times, crowds = zip(*self._crowds, strict=True)
+        return CrowdTrack(
+            np.array(times),
+            np.rint(np.stack([crowd.people for crowd in crowds]) * 1e3) / 1e3,
+            np.rint(crowds[0].doors * 1e3) / 1e3,
+            np.rint(np.stack([crowd.opened for crowd in crowds]) * 1e2) / 1e2,
         )
 
     def _note_targets(self, env: ExplorationEnv, orders: Orders, time_s: float) -> None:

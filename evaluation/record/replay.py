@@ -80,7 +80,7 @@ def _add_map(digest: "hashlib._Hash", log_odds: NDArray[np.int8]) -> None:
     _add(digest, "log_odds", log_odds[low:high])
 
 
-ADDED = frozenset({"camera", "graph", "lidars", "localizer", "scan_period_s", "sparse_map"})
+ADDED = frozenset({"camera", "doors", "graph", "lidars", "localizer", "people", "scan_period_s", "sparse_map"})
 """Settings that older records do not have."""
 
 

@@ -14,6 +14,7 @@ from lidarium.envs.floors.floor import Raster
 from lidarium.envs.floors.free_space import reachable_free_space
 from lidarium.envs.simulation.coverage import unpack_bits
 from lidarium.envs.simulation.disturbances.odometry import RADIUS
+from lidarium.envs.simulation.people.doors import with_shut_doors
 from lidarium.envs.simulation.score import counted_cells
 from lidarium.evaluation.metrics.cells import Mask, surface
 
@@ -87,7 +88,9 @@ def occupied_in_truth(env: ExplorationEnv) -> NDArray[np.bool_]:
     """
     tables = env.world.floors[0]
     assert tables is not None
-    raster = tables.laser
+    raster, population = tables.laser, env.simulation.population
+    if population is not None:
+        raster = with_shut_doors(raster, population.doors_of(0))
     multiple = round(env.settings.occupancy.resolution / raster.resolution)
     rows, words = env.score.counted_masks[0].shape
     solid = np.zeros((rows * multiple, words * 64 * multiple), np.bool_)

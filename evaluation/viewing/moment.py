@@ -8,6 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.simulation.depth.point_cloud import point_cloud
+from lidarium.envs.simulation.people.crowd import Crowd, crowd_of
 from lidarium.evaluation.episodes.watching import WatchedExploration
 from lidarium.evaluation.truth.beliefs import believed_on_floor
 from lidarium.mapping.geometry.rigid import Transform, relative
@@ -79,11 +80,14 @@ class Moment:
         The robots.
     depth : (robots, rows, columns) float32 or None
         Their last depth images [m]; None without cameras. The environment's own.
+    crowd : Crowd or None
+        People and doors; None without any.
     """
 
     time_s: float
     robots: list[RobotMoment]
     depth: NDArray[np.float32] | None
+    crowd: Crowd | None = None
 
 
 def moment_of(env: WatchedExploration) -> Moment:
@@ -94,7 +98,7 @@ def moment_of(env: WatchedExploration) -> Moment:
     believed, trails = believed_on_floor(env), _trails(env)
     frames = None if env.simulation.camera is None else env.simulation.camera.frames
     robots = [_robot(env, row, believed[row], trails[:, row]) for row in range(env.settings.robots)]
-    return Moment(env.scorer.time, robots, frames)
+    return Moment(env.scorer.time, robots, frames, crowd_of(env.simulation.population))
 
 
 def _robot(env: WatchedExploration, row: int, believed: NDArray[np.float64], trail: NDArray[np.float64]) -> RobotMoment:

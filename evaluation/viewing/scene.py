@@ -9,12 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from lidarium.envs.drawing.frame_parts import EXPLORED, UNEXPLORED, Colour, Frame, team_colours
+from lidarium.envs.drawing.frame_parts import DOOR, EXPLORED, PERSON, UNEXPLORED, Colour, Frame, team_colours
 from lidarium.envs.drawing.shading import owner_colours
 from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.floors.faces import GROUND, section_of
 from lidarium.envs.floors.floor import Floor
 from lidarium.envs.settings.robots import Robot
+from lidarium.envs.simulation.depth.frames import LEAF_HEIGHT_M, PERSON_HEIGHT_M
+from lidarium.envs.simulation.people.crowd import Crowd
 from lidarium.evaluation.drawing.joined_maps import overlaid, shades_of
 from lidarium.evaluation.report.map_layers import FREE, OCCUPIED, UNKNOWN, coarse, grid_around
 from lidarium.evaluation.truth.beliefs import map_within
@@ -31,6 +33,9 @@ SIDES = 28
 
 _BOX = np.array([[0, 1, 3], [0, 3, 2], [4, 7, 5], [4, 6, 7], [0, 4, 1], [1, 4, 5]])
 _BOX_SIDES = np.concatenate([_BOX, [[2, 3, 7], [2, 7, 6], [0, 2, 4], [2, 6, 4], [1, 5, 3], [3, 5, 7]]])
+
+
+_ENDS = (slice(0, 2), slice(2, 4))
 
 
 class _Mesh(NamedTuple):
@@ -114,6 +119,15 @@ def boxes_mesh(boxes: NDArray[np.float64]) -> _Mesh:
     vertices = boxes[:, chosen, np.arange(3)].reshape(-1, 3)
     triangles = 8 * np.arange(len(boxes))[:, None, None] + _BOX_SIDES
     return _Mesh(vertices.astype(np.float32), triangles.reshape(-1, 3).astype(np.uint32))
+
+
+def _leaves_mesh(leaves: NDArray[np.float64], height: float) -> _Mesh:
+    """Return upright leaves of doors with ends x, y, x, y (L, 4) [m]."""
+    corners = [np.column_stack([leaves[:, end], np.full(len(leaves), z)]) for z in (0.0, height) for end in _ENDS]
+    vertices = np.stack(corners, axis=1).reshape(-1, 3).astype(np.float32)
+    firsts = 4 * np.arange(len(leaves))[:, None]
+    triangles = np.concatenate([firsts + np.array(half) for half in ((0, 1, 3), (0, 3, 2))])
+    return _Mesh(vertices, triangles.astype(np.uint32))
 
 
 def segments(points: NDArray[np.float64], height: float) -> NDArray[np.float32]:
@@ -354,6 +368,8 @@ class TeamScene:
             RobotNodes(self._scene, agent, colours[row], env.settings.team[row])
             for row, agent in enumerate(env.possible_agents)
         ]
+        self._people: list[Any] = []
+        self._doors: Any = None
         self._scene.configure_default_lights(cast_shadow=False)
         self._scene.set_background_image(np.full((2, 2, 3), BACKGROUND, np.uint8))
         _look_at(server, middle, width, tall)
@@ -387,6 +403,28 @@ class TeamScene:
         """Show robots, their scans and plans."""
         for nodes, robot in zip(self._robots, moment.robots, strict=True):
             nodes.draw(robot)
+        if moment.crowd is not None:
+            self._draw_crowd(moment.crowd)
+
+    def _draw_crowd(self, crowd: Crowd) -> None:
+        """Show people as upright cylinders, and doors as leaves."""
+        for number, radius in enumerate(crowd.people[len(self._people) :, 2], len(self._people)):
+            mesh = body_mesh(float(radius), PERSON_HEIGHT_M)
+            name = f"/people/person_{number}"
+            self._people.append(self._scene.add_mesh_simple(name, mesh.vertices, mesh.triangles, color=PERSON))
+        for node, (x, y, _) in zip(self._people, crowd.people, strict=True):
+            node.position = (x, y, 0.0)
+        leaves = _leaves_mesh(crowd.leaves[crowd.opened < 1.0], LEAF_HEIGHT_M)
+        if self._doors is None:
+            self._doors = self._scene.add_mesh_simple(
+                "/doors", leaves.vertices, leaves.triangles, color=DOOR, flat_shading=True, side="double"
+            )
+        elif len(leaves.vertices) == len(self._doors.vertices):
+            self._doors.vertices = leaves.vertices
+        else:
+            self._doors.remove()
+            self._doors = None
+            self._draw_crowd(crowd)
 
     def show(self, layers: frozenset[Layer]) -> None:
         """Show some layers; the picture of the ground shows those of maps itself."""

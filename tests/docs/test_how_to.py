@@ -8,6 +8,7 @@ import pytest
 from lidarium.registry import REGISTRIES, registry
 
 PAGES = sorted((Path(__file__).parents[2] / "docs" / "how_to").glob("add_*.md"))
+PEOPLE = Path(__file__).parents[2] / "docs" / "how_to" / "people_and_doors.md"
 MOST_PLACES = {"add_a_sensor": 3}
 
 
@@ -27,7 +28,7 @@ def blocks_of(page):
     return re.findall(r"^```(python|text)\n(.*?)^```", text, re.DOTALL | re.MULTILINE)
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+@pytest.mark.parametrize("page", [*PAGES, PEOPLE], ids=lambda page: page.stem)
 def test_code_prints_what_the_page_shows(page, clean_registries, capsys):
     names = {"__name__": page.stem}
     shown = 0

@@ -98,6 +98,8 @@ class Following(NamedTuple):
         Which robots are bodies to keep clear of.
     foresight : (K,) float64
         Times at which others are predicted [s].
+    safety : (rows, 11) float64
+        Gaps to people in sight, and time lost by yielding (``kernels.arrays``).
     """
 
     unit_vectors: NDArray[np.float64]
@@ -108,6 +110,7 @@ class Following(NamedTuple):
     heard: NDArray[np.float64]
     present: NDArray[np.uint8]
     foresight: NDArray[np.float64]
+    safety: NDArray[np.float64]
 
 
 def no_drives(rows: int) -> Drives:
@@ -216,6 +219,7 @@ def follow_team(
             scanned[first:last],
             following.contact[first:last],
             following.heard[first:last],
+            following.safety[first:last],
         ),
         Courses(
             drives.paths[first:last],

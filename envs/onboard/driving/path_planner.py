@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from lidarium.envs.onboard.driving.drives import Drives
 from lidarium.envs.onboard.driving.planning import Destination, Planning, drive_to
 from lidarium.envs.onboard.navigation import CLEARANCE_LIMIT
+from lidarium.envs.onboard.people_in_sight import NOBODY
 from lidarium.envs.onboard.perception import Perception
 from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.simulation.kernels.arrays import ENDED
@@ -76,10 +77,12 @@ class PathPlanner:
         resolution = self._settings.occupancy.resolution
         return passage_of(self.footprint, resolution, limit_of(CLEARANCE_LIMIT, resolution))
 
-    def planning(self, rows: NDArray[np.int64], *, with_frontiers: bool = False) -> Planning:
+    def planning(
+        self, rows: NDArray[np.int64], *, with_frontiers: bool = False, people: NDArray[np.float64] | None = None
+    ) -> Planning:
         """Return the arrays that kernels plan with.
 
-        It has the maps that the given rows plan on, with frontiers if wanted.
+        It has the maps that the given rows plan on, with frontiers if wanted, and people (K, 2) to drive around.
         """
         perception, settings, resolution = (
             self._perception,
@@ -105,12 +108,13 @@ class PathPlanner:
             perception.beliefs.origins,
             perception.offsets,
             (world.flags & ENDED != 0) | self.held,
+            NOBODY if people is None else people,
         )
 
-    def fresh_planning(self, row: int) -> Planning:
+    def fresh_planning(self, row: int, people: NDArray[np.float64] | None = None) -> Planning:
         """Return the planning arrays of one robot, with its map up to date."""
         self._perception.planning_map(row, self.shares_map)
-        return self.planning(np.array([row]))
+        return self.planning(np.array([row]), people=people)
 
     def origin(self, row: int) -> tuple[float, float]:
         """Return the lower left corner of a robot's map [m]."""
@@ -131,14 +135,15 @@ class PathPlanner:
         avoided: list[int],
         heading: float = math.nan,
         maximum_cost: float = math.inf,
+        people: NDArray[np.float64] | None = None,
     ) -> bool:
-        """Plan a path round the bodies of ``avoided`` and start on it.
+        """Plan a path round the bodies of ``avoided`` and round people (K, 2) [m], and start on it.
 
         False if no path exists.
         """
         chosen = np.zeros(self._settings.robots, np.bool_)
         chosen[np.array(avoided, np.int64) % self._settings.robots] = True
-        planning = self.fresh_planning(row)
+        planning = self.fresh_planning(row, people)
         destination = Destination(*goal, math.nan, math.nan, heading, maximum_cost)
         return bool(drive_to(planning, self._drives, row, destination, chosen, 0))
 

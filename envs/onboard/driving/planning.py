@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from lidarium.envs.onboard.driving.drives import Drives, drop_path
 from lidarium.envs.onboard.driving.path_following import ARRIVED, BLOCKED, DRIVING, IDLE, MAX_POINTS
 from lidarium.envs.onboard.navigation import COLUMNS, ROWS, closeness_of, log_odds_of
+from lidarium.envs.onboard.people_in_sight import BODY_M
 from lidarium.envs.onboard.team_maps import TeamMaps, refresh_team
 from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.kernels.on_threads import call_at, on_threads
@@ -51,6 +52,8 @@ class Planning(NamedTuple):
         Believed poses, lower left corners of the maps and origins of the map frames [m, rad].
     has_ended : (rows,) bool
         Robots that have ended and no longer move.
+    people : (people, 2) float64
+        People to drive around, in the frame of the believed pose [m]; usually none.
     """
 
     robots: int
@@ -73,6 +76,7 @@ class Planning(NamedTuple):
     origins: NDArray[np.float64]
     offsets: NDArray[np.float64]
     has_ended: NDArray[np.bool_]
+    people: NDArray[np.float64]
 
 
 class Destination(NamedTuple):
@@ -138,12 +142,13 @@ def _room_before(cells: Array, k: int, closeness: Array, planning: Planning) -> 
 
 @kernel
 def _discs(planning: Planning, row: int, avoided: Array) -> Array:
-    """Return the bodies of the avoided teammates (robots,) as discs, in cells.
+    """Return the bodies of the avoided teammates (robots,), and of people, as discs, in cells.
 
     They are (row, column, radius) and a robot's centre must not enter them.
     """
     first = row // planning.robots * planning.robots
-    discs = np.empty((avoided.sum(), 3))
+    people = planning.people
+    discs = np.empty((avoided.sum() + people.shape[0], 3))
     count = 0
     for teammate in range(planning.robots):
         if avoided[teammate]:
@@ -154,6 +159,11 @@ def _discs(planning: Planning, row: int, avoided: Array) -> Array:
             discs[count, 1] = (x - planning.origins[row, 0]) / planning.resolution - 0.5
             discs[count, 2] = (planning.radius + planning.radius + TEAMMATE_DISTANCE) / planning.resolution
             count += 1
+    for person in range(people.shape[0]):
+        discs[count, 0] = (people[person, 1] - planning.origins[row, 1]) / planning.resolution - 0.5
+        discs[count, 1] = (people[person, 0] - planning.origins[row, 0]) / planning.resolution - 0.5
+        discs[count, 2] = (planning.radius + BODY_M + TEAMMATE_DISTANCE) / planning.resolution
+        count += 1
     return discs
 
 

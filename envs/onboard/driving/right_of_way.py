@@ -12,6 +12,7 @@ from lidarium.envs.onboard.driving.path_following import ARRIVED, BLOCKED, DRIVI
 from lidarium.envs.onboard.driving.path_planner import PathPlanner
 from lidarium.envs.onboard.driving.planning import TEAMMATE_DISTANCE, prepare_robot
 from lidarium.envs.onboard.navigation import NavigationMap
+from lidarium.envs.onboard.people_in_sight import people_in_sight
 from lidarium.envs.onboard.perception import Perception
 from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.simulation.kernels.arrays import ENDED
@@ -205,14 +206,20 @@ class RightOfWay:
         ]
         last = drives.cells[row, drives.counts[row] - 1]
         goal, heading = (int(last[0]), int(last[1])), float(drives.headings[row])
+        left = self._planner.remaining(row)
+        length = float(np.hypot(*np.diff(left, axis=0).T).sum())
+        people = people_in_sight(self._perception.simulation, row, self._settings.robot.radius + NEAR)
+        if not near and len(people):
+            # Round a person who stands in the way, if that is not far; otherwise the robot waits.
+            if not drives.is_given[row]:
+                self._planner.drive_to(row, goal, [], heading, 1.5 * length + DETOUR, people)
+            return
         if not near:
             # A wall, not a robot: back out a little along the path by which it came, and plan again.
             if not drives.is_given[row]:
                 self._planner.drive_to(row, goal, [], heading)
             drives.backing[row] = BACKING_STEPS
             return
-        left = self._planner.remaining(row)
-        length = float(np.hypot(*np.diff(left, axis=0).T).sum())
         is_planned = not drives.is_given[row]
         if is_planned and self._planner.drive_to(row, goal, near, heading, 1.5 * length + DETOUR):
             return

@@ -2,7 +2,7 @@
 
 Returns of the laser are obstacles in the swath of the body. Teammates whose poses are known are met with half
 the room, because they brake as well; of two robots whose paths cross, the one with the higher number lets the
-other pass.
+other pass. Near a person in sight a robot slows down, the more the nearer, in whatever direction the person is.
 """
 
 import math
@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from lidarium.envs.simulation.kernels.arrays import PERSON_GAP, YIELDED
 from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.kernels.views import scratch_grid
 
@@ -32,6 +33,12 @@ SIDE_GAP = 0.0003
 The swath is this much wider than the body.
 """
 
+YIELD_M = 0.8
+"""Gap to a person below which a robot slows down [m]."""
+
+YIELD_PER_M, CREEP = 0.6, 0.12
+"""Speed near a person per metre of the gap, and minimum [1/s, m/s]."""
+
 FORESIGHT_TIMES = np.array([0.0, 0.4, 0.8])
 """Times at which the robot with the higher number predicts the other's position [s]."""
 
@@ -52,6 +59,8 @@ class Sensed(NamedTuple):
         Believed poses at which these were taken [m, rad].
     contact, heard : (robots, robots) uint8, (robots, robots * 3) float64
         If not all teammates' poses are known: from which robots each heard lately, and their poses then [m, rad].
+    safety : (robots, 11) float64
+        Gap to the nearest person in sight, and time lost by yielding (``kernels.arrays``).
     """
 
     poses: NDArray[np.float64]
@@ -60,6 +69,7 @@ class Sensed(NamedTuple):
     scanned: NDArray[np.float64]
     contact: NDArray[np.uint8]
     heard: NDArray[np.float64]
+    safety: NDArray[np.float64]
 
 
 class Bodies(NamedTuple):
@@ -169,6 +179,17 @@ def _gap_to_heard(robot: int, sensed: Sensed, bodies: Bodies) -> float:
         known[robot, axis] = sensed.poses[robot, axis]
     gap: float = _gap_to_teammates(robot, known, still, bodies, sensed.contact[robot])
     return gap
+
+
+@kernel(forceinline=True, nrt=False)
+def yielding_speed(sensed: Sensed, robot: int, wanted: float, speed: float) -> float:
+    """Return the speed near people of a robot that wants one and may drive at ``speed`` [m/s]; note the time lost."""
+    gap = sensed.safety[robot, PERSON_GAP]
+    if gap < YIELD_M:
+        speed = min(speed, max(YIELD_PER_M * gap, CREEP))
+        if wanted > 0.0:
+            sensed.safety[robot, YIELDED] += 1.0 - min(speed / wanted, 1.0)
+    return speed
 
 
 @kernel(forceinline=True, nrt=False)

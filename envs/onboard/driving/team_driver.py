@@ -88,6 +88,7 @@ class TeamDriver:
             perception.beliefs.heard,
             np.ones(settings.robots, np.uint8),
             FORESIGHT_TIMES,
+            perception.simulation.safety,
         )
         self._commands = np.zeros((self._rows, 2))
 

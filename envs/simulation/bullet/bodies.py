@@ -14,6 +14,9 @@ from lidarium.envs.floors.raster import Raster, rectangles_of
 from lidarium.envs.settings.robots import Robot
 from lidarium.envs.simulation.bullet.client import Client
 from lidarium.envs.simulation.bullet.robot_text import LEFT, RIGHT, urdf_of
+from lidarium.envs.simulation.depth.frames import LEAF_HEIGHT_M, PERSON_HEIGHT_M
+from lidarium.envs.simulation.kernels.contact import LEAF
+from lidarium.envs.simulation.people.crowd import Crowd
 
 OUTER_WALL = 1.0
 """Thickness of the walls around the bounds [m]."""
@@ -144,6 +147,9 @@ SUBSTEP = 1.0 / 240.0
 GRAVITY = 9.81
 """Gravity of the Earth [m/s2]."""
 
+HALF_OPEN, AWAY_M = 0.5, -10.0
+"""A leaf that is open by this share is taken away, to this height [m]."""
+
 RAYS_AT_ONCE = 16_000
 """Rays of a call, of which PyBullet takes 16,384 at most."""
 
@@ -194,6 +200,8 @@ class Bodies:
         self._ground, self._robots = -1, [-1] * len(team)
         self._wheel_radii = np.array([robot.build.wheel_radius for robot in team]).reshape(-1, 1)
         self._angles = np.zeros((len(team), 2))
+        self._people: list[int] = []
+        self._leaves: list[int] = []
 
     def begin(self, floor: Floor, starts: NDArray[np.float64]) -> None:
         """Put robots at rest at ``starts`` (robots, 3) of a floor; nothing of before is left."""
@@ -220,6 +228,33 @@ class Bodies:
             self.put(robot, starts[robot])
         # Wheels that hang in the air by a hair would slip in the first step.
         self.step(np.zeros((len(self.team), 2)))
+
+    def add_crowd(self, crowd: Crowd) -> None:
+        """Add people, and leaves of doors, as bodies that nothing moves but `move_crowd`."""
+        client, bullet = self.client, self.client.bullet
+        self._people, self._leaves = [], []
+        for radius in crowd.people[:, 2].tolist():
+            shape = client.call("createCollisionShape", bullet.GEOM_CYLINDER, radius=radius, height=PERSON_HEIGHT_M)
+            self._people.append(client.call("createMultiBody", 0.0, shape))
+        for x, y, to_x, to_y in crowd.doors.tolist():
+            half = (0.5 * math.hypot(to_x - x, to_y - y), LEAF, 0.5 * LEAF_HEIGHT_M)
+            shape = client.call("createCollisionShape", bullet.GEOM_BOX, halfExtents=half)
+            self._leaves.append(client.call("createMultiBody", 0.0, shape))
+        self.move_crowd(crowd)
+
+    def move_crowd(self, crowd: Crowd) -> None:
+        """Put people where they are, and leaves of doors into their openings until they are half open."""
+        for body, (x, y, _) in zip(self._people, crowd.people.tolist(), strict=True):
+            place, turn = (x, y, 0.5 * PERSON_HEIGHT_M), (0.0, 0.0, 0.0, 1.0)
+            self.client.call("resetBasePositionAndOrientation", body, place, turn)
+        for body, (x, y, to_x, to_y), share in zip(
+            self._leaves, crowd.doors.tolist(), crowd.opened.tolist(), strict=True
+        ):
+            half = 0.5 * math.atan2(to_y - y, to_x - x)
+            height = 0.5 * LEAF_HEIGHT_M if share < HALF_OPEN else AWAY_M
+            place = (0.5 * (x + to_x), 0.5 * (y + to_y), height)
+            turn = (0.0, 0.0, math.sin(half), math.cos(half))
+            self.client.call("resetBasePositionAndOrientation", body, place, turn)
 
     def put(self, robot: int, pose: NDArray[np.float64]) -> None:
         """Put a robot upright and at rest at x, y, theta [m, rad]."""

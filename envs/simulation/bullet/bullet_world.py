@@ -17,11 +17,12 @@ from lidarium.envs.settings.odometry import ODOMETRY, OdometrySettings
 from lidarium.envs.settings.robots import Robot
 from lidarium.envs.simulation.bullet.bodies import Bodies, Motion
 from lidarium.envs.simulation.bullet.client import has_display
-from lidarium.envs.simulation.kernels.arrays import BROKEN_PHYSICS, DEAD, ENDED
+from lidarium.envs.simulation.kernels.arrays import BROKEN_PHYSICS, BY_PERSON, BY_ROBOT, DEAD, ENDED, MET_PERSON
 from lidarium.envs.simulation.kernels.contact import CENTRE_BUMPER, SIDE_BUMPER
 from lidarium.envs.simulation.kernels.floor_cache import FloorTables
-from lidarium.envs.simulation.kernels.stepping import disturb_scan, drive, encode, sense
+from lidarium.envs.simulation.kernels.stepping import disturb_scan, drive, encode, note_approaches, sense, walk
 from lidarium.envs.simulation.kinematic_world import KinematicWorld
+from lidarium.envs.simulation.people.crowd import Crowd, crowd_of
 
 LEAN = math.radians(2.0)
 """From this on a scan is taken along the tilted plane [rad]."""
@@ -50,6 +51,9 @@ def scan_leaning(bodies: Bodies, robot: int, lidar: Lidar, ranges: NDArray[np.fl
 TILT = math.radians(30.0)
 """A robot that leans by more than this has fallen [rad]."""
 
+AT_PERSON_M, STANDING = 0.005, 0.01
+"""A robot in contact and this near to a person touches the person [m]; a slower one stands [m/s]."""
+
 FALL = 0.05
 """A robot that lies by more than this below the ground has fallen [m]."""
 
@@ -63,7 +67,7 @@ class BulletWorld(KinematicWorld):
 
     Parameters
     ----------
-    robots, lidar, time_step, episodes, odometry, faults, horizon_s, scan_steps
+    robots, lidar, time_step, episodes, odometry, faults, horizon_s, scan_steps, people, doors
         As for ``KinematicWorld``.
 
     Raises
@@ -82,8 +86,12 @@ class BulletWorld(KinematicWorld):
         faults: FaultSettings = NO_FAULTS,
         horizon_s: float | None = None,
         scan_steps: int = 1,
+        people: int = 0,
+        doors: float = 0.0,
     ) -> None:
-        super().__init__(robots, lidar, time_step, episodes, odometry, True, faults, horizon_s, scan_steps)
+        super().__init__(
+            robots, lidar, time_step, episodes, odometry, True, faults, horizon_s, scan_steps, people, doors
+        )
         self._scan_steps = scan_steps
         self.team = list(robots)
         self._attitudes = np.zeros((self.robots * episodes, 3))
@@ -112,6 +120,9 @@ class BulletWorld(KinematicWorld):
         if not self._physics[episode].client.is_open:
             self._physics[episode] = Bodies(self.team, self.time_step)
         self._physics[episode].begin(_floor_of(floor), starts)
+        crowd = crowd_of(self.population, episode)
+        if crowd is not None:
+            self._physics[episode].add_crowd(crowd)
         self._attitudes[episode * self.robots : (episode + 1) * self.robots] = 0.0
 
     def move_and_sense(
@@ -126,9 +137,11 @@ class BulletWorld(KinematicWorld):
         if moves_bodies:
             before = self.poses.copy()
             drive(self._table, self.robots, commands, chosen)
+            walk(self._table, self.robots, chosen)
             kidnapped = (self.poses != before).any(axis=1)
             for episode in np.flatnonzero(chosen).tolist():
                 self._move(episode, kidnapped)
+            note_approaches(self._table, self.robots, chosen)
             encode(self._table, self.robots, self._wheel_velocities, chosen)
         sense(self._table, self.robots, chosen)
         self._sense_leaning(chosen & ((self.steps + 1) % self._scan_steps == 0))
@@ -154,6 +167,9 @@ class BulletWorld(KinematicWorld):
         self.contacts[rows], self.bumpers[rows] = 0, 0
         if (self.failed[rows] == BROKEN_PHYSICS).any():
             return
+        crowd = crowd_of(self.population, episode)
+        if crowd is not None:
+            bodies.move_crowd(crowd)
         speeds = np.zeros((self.robots, 2))
         for robot, row in enumerate(rows):
             if kidnapped[row]:
@@ -170,6 +186,8 @@ class BulletWorld(KinematicWorld):
             self._follow(row, motions[robot])
             self._touch(row, bodies.touched(robot))
             self.collisions[row] += self.contacts[row] != 0 and not was_in_contact[robot]
+            if crowd is not None:
+                self._note_person(row, crowd)
 
     def _within_limits(self, row: int, robot: int) -> tuple[float, float]:
         """Return the speed and turn rate that the drive aims at in this step, as kernels compute them."""
@@ -207,6 +225,15 @@ class BulletWorld(KinematicWorld):
                 self.bumpers[row, 1] = 1
             elif abs(side) <= SIDE_BUMPER:
                 self.bumpers[row, 0 if side > 0.0 else 2] = 1
+
+    def _note_person(self, row: int, crowd: Crowd) -> None:
+        """Note a contact with a person: the robot's own if it drives."""
+        gaps = np.hypot(*(crowd.people[:, :2] - self.poses[row, :2]).T) - crowd.people[:, 2]
+        is_met = bool(self.contacts[row]) and bool((gaps - self.team[row % self.robots].radius < AT_PERSON_M).any())
+        safety = self.population.safety[row]
+        if is_met and not safety[MET_PERSON]:
+            safety[BY_ROBOT if abs(self.velocities[row, 0]) > STANDING else BY_PERSON] += 1.0
+        safety[MET_PERSON] = float(is_met)
 
     def _sense_leaning(self, chosen: NDArray[np.bool_]) -> None:
         """Take the scans of robots that lean anew, along the tilted planes of their lasers."""

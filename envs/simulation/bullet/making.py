@@ -17,5 +17,7 @@ def make_bullet(settings: ExplorationSettings, episodes: int = 1) -> Simulation:
         settings.faults,
         settings.horizon_s,
         settings.scan_steps,
+        settings.people,
+        settings.doors,
     )
     return simulation_of(world, settings)

@@ -1,4 +1,4 @@
-"""Bodies of robots drawn into inverse depths: upright cylinders, exact at pixel centres."""
+"""Bodies drawn into inverse depths, exact at pixel centres: upright cylinders, and leaves of doors."""
 
 import math
 
@@ -14,6 +14,7 @@ from lidarium.envs.simulation.depth.face_drawing import (
     ROWS,
 )
 from lidarium.mapping.kernels.compilation import Array, kernel
+from lidarium.mapping.kernels.views import scratch_vector
 
 
 @kernel(nrt=False)
@@ -66,6 +67,36 @@ def _meets_cylinder(
         if met_x * met_x + met_y * met_y <= radius * radius:
             return 1.0 / along
     return 0.0
+
+
+@kernel(nrt=False)
+def draw_leaf(
+    ends: tuple[float, float, float, float], height: float, axes: Array, eye: Array, view: Array, inverse: Array
+) -> None:
+    """Draw an upright rectangle on the ground between two points x, y, x, y [m] into inverse depths."""
+    from_x, from_y, to_x, to_y = ends
+    along_x, along_y = to_x - from_x, to_y - from_y
+    centre = scratch_vector(3, np.float64)
+    centre[0], centre[1], centre[2] = 0.5 * (from_x + to_x), 0.5 * (from_y + to_y), 0.0
+    half = 0.5 * math.hypot(along_x, along_y)
+    if math.hypot(centre[0] - eye[0], centre[1] - eye[1]) > half + 2.0 * view[DEPTH_MAX]:
+        return
+    first, last, left, right = _box_around(centre, half, height, axes, eye, view)
+    gap_x, gap_y, scale = from_x - eye[0], from_y - eye[1], 1.0 / view[FOCAL]
+    for row in range(first, last + 1):
+        down = (row - view[CENTRE_ROW]) * scale
+        for column in range(left, right + 1):
+            across = (column - view[CENTRE_COLUMN]) * scale
+            ray_x = axes[0, 0] * across + axes[1, 0] * down + axes[2, 0]
+            ray_y = axes[0, 1] * across + axes[1, 1] * down + axes[2, 1]
+            ray_z = axes[0, 2] * across + axes[1, 2] * down + axes[2, 2]
+            beside = ray_x * along_y - ray_y * along_x
+            if beside == 0.0:
+                continue
+            depth = (gap_x * along_y - gap_y * along_x) / beside
+            place = (gap_x * ray_y - gap_y * ray_x) / beside
+            if depth > NEAR and 0.0 <= place <= 1.0 and 0.0 <= eye[2] + depth * ray_z <= height:
+                inverse[row, column] = max(inverse[row, column], np.float32(1.0 / depth))
 
 
 @kernel(nrt=False)

@@ -49,6 +49,8 @@ class DepthSensor:
         self.camera, self.frames = camera, np.zeros((rows, camera.rows, camera.columns), np.float32)
         self.taken_at: NDArray[np.int64] = np.full(rows, -1)
         self._world, self._threads, self._period = world, threads, camera.period_steps(time_step)
+        population = getattr(world, "population", None)
+        self._crowd = () if population is None else (population.walkers, population.doors)
         self._faces: list[Faces | None] = [None] * world.episodes
         self._face_rows = np.zeros((world.episodes, 4), np.int64)
         noise = np.array([camera.noise_floor, camera.noise_share, camera.disparity_step])
@@ -88,6 +90,7 @@ class DepthSensor:
             world.seeds,
             steps,
             GAUSSIAN_TABLE,
+            *self._crowd,
         )
         threads = use_threads(self._threads) if np.count_nonzero(takes) > 1 else 1
         take_frames = take_frames_parallel if threads > 1 else take_frames_serial

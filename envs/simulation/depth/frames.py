@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from lidarium.envs.floors.faces import Faces
 from lidarium.envs.settings.cameras import DepthCamera
-from lidarium.envs.simulation.depth.body_drawing import draw_body
+from lidarium.envs.simulation.depth.body_drawing import draw_body, draw_leaf
 from lidarium.envs.simulation.depth.face_drawing import (
     CORNERS,
     DEPTH_MAX,
@@ -20,12 +20,23 @@ from lidarium.envs.simulation.depth.face_drawing import (
 )
 from lidarium.envs.simulation.disturbances.noise import GAUSSIAN_TABLE, gaussian_at, mix, stream_key
 from lidarium.envs.simulation.disturbances.odometry import HEIGHT, RADIUS
+from lidarium.envs.simulation.kernels.arrays import (
+    DOOR_NUMBERS,
+    WALKER_NUMBERS,
+    WALKER_RADIUS,
+    WALKER_X,
+    WALKER_Y,
+)
+from lidarium.envs.simulation.kernels.contact import has_leaf, leaf_of
 from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.kernels.simd.faces import PIXELS
-from lidarium.mapping.kernels.views import grid_at, scratch_grid, vector_at
+from lidarium.mapping.kernels.views import grid_at, scratch_grid, scratch_vector, vector_at
 
 DEPTH_STREAM = 0x64657074
 """Sets the draws of cameras apart from those of the laser."""
+
+PERSON_HEIGHT_M, LEAF_HEIGHT_M = 1.7, 2.0
+"""Heights of people and of leaves of doors [m]."""
 
 FORWARD, LEFT, UP, PITCH, PAN = range(5)
 """Places in the numbers of a mount."""
@@ -54,6 +65,8 @@ class Cameras(NamedTuple):
         Seeds of the noise.
     noise_table : (4096,) float32
         ``GAUSSIAN_TABLE``.
+    walkers, doors : (episodes * people, 11), (episodes * doors, 7) float64
+        People and doors (``kernels.arrays``); none by default.
     """
 
     poses: Annotated[Array, np.float64, 2]
@@ -66,6 +79,8 @@ class Cameras(NamedTuple):
     seeds: Annotated[Array, np.uint64, 1]
     steps: Annotated[Array, np.int64, 1]
     noise_table: Annotated[Array, np.float32, 1]
+    walkers: Annotated[Array, np.float64, 2] = np.zeros((0, WALKER_NUMBERS))
+    doors: Annotated[Array, np.float64, 2] = np.zeros((0, DOOR_NUMBERS))
 
 
 def view_numbers(camera: DepthCamera) -> NDArray[np.float64]:
@@ -165,6 +180,20 @@ def _faces_at(row: Array) -> FaceArrays:
     )
 
 
+@kernel(nrt=False)
+def _draw_crowd(cameras: Cameras, episode: int, axes: Array, eye: Array, inverse: Array) -> None:
+    """Draw the people and the leaves of doors of an episode into inverse depths."""
+    episodes, centre = cameras.steps.shape[0], scratch_vector(3, np.float64)
+    people, doors = cameras.walkers.shape[0] // episodes, cameras.doors.shape[0] // episodes
+    for person in range(episode * people, (episode + 1) * people):
+        walker = cameras.walkers[person]
+        centre[0], centre[1], centre[2] = walker[WALKER_X], walker[WALKER_Y], 0.0
+        draw_body(centre, walker[WALKER_RADIUS], PERSON_HEIGHT_M, axes, eye, cameras.pinhole, inverse)
+    for door in range(episode * doors, (episode + 1) * doors):
+        if has_leaf(cameras.doors[door]):
+            draw_leaf(leaf_of(cameras.doors[door]), LEAF_HEIGHT_M, axes, eye, cameras.pinhole, inverse)
+
+
 @kernel
 def _take_frame(cameras: Cameras, row: int, robots: int, depth: Array) -> None:
     """Take the image of a robot's camera into ``depth`` (rows, columns) float32."""
@@ -180,6 +209,7 @@ def _take_frame(cameras: Cameras, row: int, robots: int, depth: Array) -> None:
             centre[2] = cameras.attitudes[other, 0]
             body = cameras.bodies[other - first]
             draw_body(centre, body[RADIUS], body[HEIGHT], axes, eye, cameras.pinhole, inverse)
+    _draw_crowd(cameras, episode, axes, eye, inverse)
     _measure_depth(inverse, cameras.pinhole, depth)
     if cameras.noise[NOISE_FLOOR] > 0.0 or cameras.noise[NOISE_SHARE] > 0.0 or cameras.noise[DISPARITY_STEP] > 0.0:
         key = stream_key(cameras.seeds[episode], row - first, cameras.steps[episode])

@@ -65,6 +65,73 @@ MAP, MAP_ROWS, MAP_COLUMNS, TOUCHED, TOUCHED_ROWS = range(5)
 OWN_MASK, TEAM_MASK, COUNTED_MASK, MASK_ROWS, MASK_WORDS = range(5)
 """Columns of ``mask_rows``."""
 
+(
+    WALKER_X,
+    WALKER_Y,
+    WALKER_VX,
+    WALKER_VY,
+    WALKER_RADIUS,
+    WALKER_SPEED,
+    WALKER_PLACE,
+    WALKER_DRAWS,
+    WALKER_WAIT,
+    WALKER_STUCK,
+    WALKER_TOUCHED,
+    WALKER_NUMBERS,
+) = range(12)
+"""Columns of ``walkers``: position, velocity, radius and preferred speed [m, m/s]; then state.
+
+The state is the number of the place that the person walks to, how often it has drawn one, steps for which it still
+stands there, steps for which it has made no way, and the row of the robot that it has walked into, plus 1.
+"""
+
+(
+    WALKWAY_SOLID,
+    WALKWAY_BOUND,
+    WALKWAY_ROWS,
+    WALKWAY_COLUMNS,
+    WALKWAY_CLEARANCE,
+    WALKWAY_HEADINGS,
+    WALKWAY_PLACES,
+    WALKWAY_COUNT,
+    WALKWAY_CELL,
+    WALKWAY_NUMBERS,
+) = range(10)
+"""Columns of ``walkways``: addresses and sizes, as ``Walkways.row`` has them."""
+
+DOOR_X, DOOR_Y, DOOR_END_X, DOOR_END_Y, DOOR_KIND, DOOR_OPEN, DOOR_HOLD, DOOR_NUMBERS = range(8)
+"""Columns of ``doors``: ends of the leaf when shut [m], kind, share by which it is open, steps until it shuts."""
+
+NO_DOOR, OPENS, STANDS_OPEN, STAYS_SHUT = range(4)
+"""Kinds of doors by number."""
+
+(
+    CLOSEST,
+    CLOSEST_SPEED,
+    NEAR_STEPS,
+    NEAR_SPEED,
+    NEAR_MISSES,
+    IS_NEAR,
+    BY_ROBOT,
+    BY_PERSON,
+    YIELDED,
+    PERSON_GAP,
+    MET_PERSON,
+    SAFETY_NUMBERS,
+) = range(12)
+"""Columns of ``safety``, of each robot among people.
+
+Smallest gap to a person and the robot's speed then [m, m/s], steps with a gap below ``NEAR_M``, maximum speed in them
+[m/s], how often such an approach began, whether one goes on; contacts by cause; steps lost by yielding; gap to the
+nearest person that the laser sees [m]; whether the robot drove into a person in the last step.
+"""
+
+PERSON_BEAM, DOOR_BEAM = 1, 2
+"""Values of ``recognised``."""
+
+NEAR_M = 0.5
+"""A gap to a person below this is a near miss [m]."""
+
 
 class WorldArrays(NamedTuple):
     """Arrays over episodes, robots of a team, and rows = episodes x robots.
@@ -129,6 +196,16 @@ class WorldArrays(NamedTuple):
     contact, heard : (rows, robots) uint8, (rows, robots * 3) float64
         Of which teammates a robot knows the poses although not all are known (0 if all are), and these
         poses.
+    walkers : (episodes * people, 11) float64
+        The people of each episode.
+    walkways : (episodes, 9) int64
+        The part of each floor on which people walk, and their ways to places on it.
+    doors : (episodes * doors, 7) float64
+        The doors of each episode.
+    recognised : (rows, beams) uint8
+        Beams that met a person or a door that opens by itself, which robots recognise; empty without any.
+    safety : (rows, 11) float64
+        Approaches and contacts of robots and people.
     """
 
     bodies: Annotated[Array, np.float64, 2]
@@ -174,6 +251,11 @@ class WorldArrays(NamedTuple):
     driven: Annotated[Array, np.float64, 2]
     contact: Annotated[Array, np.uint8, 2]
     heard: Annotated[Array, np.float64, 2]
+    walkers: Annotated[Array, np.float64, 2]
+    walkways: Annotated[Array, np.int64, 2]
+    doors: Annotated[Array, np.float64, 2]
+    recognised: Annotated[Array, np.uint8, 2]
+    safety: Annotated[Array, np.float64, 2]
 
 
 @kernel(inline="always")
@@ -192,6 +274,20 @@ def beams_of(world: WorldArrays, robot: int) -> Array:
 def is_scanning(world: WorldArrays, episode: int) -> bool:
     """Whether robots scan in the step of an episode that runs and is not counted yet."""
     return bool((world.steps[episode] + 1) % int(world.sensor[0, SCAN_STEPS]) == 0)
+
+
+@kernel(inline="always")
+def walkers_of(world: WorldArrays, episode: int) -> Array:
+    """Return the people of an episode, (people, 11)."""
+    people = world.walkers.shape[0] // world.steps.shape[0]
+    return world.walkers[episode * people : (episode + 1) * people]
+
+
+@kernel(inline="always")
+def doors_of(world: WorldArrays, episode: int) -> Array:
+    """Return the doors of an episode, (doors, 7)."""
+    doors = world.doors.shape[0] // world.steps.shape[0]
+    return world.doors[episode * doors : (episode + 1) * doors]
 
 
 def table_of_owners(*owners: object) -> NDArray[np.int64]:

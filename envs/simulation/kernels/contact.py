@@ -11,7 +11,25 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from lidarium.envs.simulation.disturbances.odometry import RADIUS
-from lidarium.envs.simulation.kernels.arrays import FRAME_RESOLUTION, FRAME_X, FRAME_Y
+from lidarium.envs.simulation.kernels.arrays import (
+    DOOR_END_X,
+    DOOR_END_Y,
+    DOOR_KIND,
+    DOOR_NUMBERS,
+    DOOR_OPEN,
+    DOOR_X,
+    DOOR_Y,
+    FRAME_RESOLUTION,
+    FRAME_X,
+    FRAME_Y,
+    MET_PERSON,
+    NO_DOOR,
+    SAFETY_NUMBERS,
+    WALKER_NUMBERS,
+    WALKER_RADIUS,
+    WALKER_X,
+    WALKER_Y,
+)
 from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.kernels.views import vector_at
 
@@ -47,8 +65,15 @@ class BodyGrids(NamedTuple):
     frame: Array
 
 
+LEAF = 0.02
+"""Half the thickness of a door's leaf [m]."""
+
+SHUT_ENOUGH = 0.99
+"""A door that is open by more than this share has no leaf in its opening."""
+
+
 class TeamBodies(NamedTuple):
-    """The bodies of one episode's robots.
+    """The bodies of one episode's robots, and what else moves around them.
 
     Attributes
     ----------
@@ -66,6 +91,10 @@ class TeamBodies(NamedTuple):
         Length of each robot's path [m].
     collisions : (robots,) int64
         Number of contacts of each robot.
+    walkers, doors : (people, 11), (doors, 7) float64
+        People and doors; none by default.
+    safety : (robots, 11) float64
+        Where contacts with people are noted; only needed with people.
     """
 
     bodies: Array
@@ -76,6 +105,9 @@ class TeamBodies(NamedTuple):
     contacts: Array
     travelled: Array
     collisions: Array
+    walkers: Array = np.zeros((0, WALKER_NUMBERS))
+    doors: Array = np.zeros((0, DOOR_NUMBERS))
+    safety: Array = np.zeros((0, SAFETY_NUMBERS))
 
 
 def distance_bound(solid: NDArray[np.uint8]) -> NDArray[np.uint8]:
@@ -159,6 +191,57 @@ def _deepest_robot(team: TeamBodies, robot: int, x: float, y: float) -> tuple[fl
 
 
 @kernel(nrt=False)
+def leaf_of(door: Array) -> tuple[float, float, float, float]:
+    """Return the ends of the part of a door's leaf that stands in the opening [m]; it slides away to its first end."""
+    shut = 1.0 - door[DOOR_OPEN]
+    x, y = door[DOOR_X], door[DOOR_Y]
+    return x, y, x + shut * (door[DOOR_END_X] - x), y + shut * (door[DOOR_END_Y] - y)
+
+
+@kernel(forceinline=True, nrt=False)
+def has_leaf(door: Array) -> bool:
+    """Whether any of a door's leaf stands in its opening."""
+    return bool(door[DOOR_KIND] != NO_DOOR and door[DOOR_OPEN] < SHUT_ENOUGH)
+
+
+@kernel(nrt=False)
+def deepest_leaf(doors: Array, x: float, y: float, radius: float) -> tuple[float, float, float]:
+    """Find the door's leaf that a disc at x, y [m] enters deepest."""
+    depth, normal_x, normal_y = 0.0, 0.0, 0.0
+    for door in range(doors.shape[0]):
+        if not has_leaf(doors[door]):
+            continue
+        from_x, from_y, to_x, to_y = leaf_of(doors[door])
+        along_x, along_y = to_x - from_x, to_y - from_y
+        squared = along_x * along_x + along_y * along_y
+        share = min(max(((x - from_x) * along_x + (y - from_y) * along_y) / squared, 0.0), 1.0)
+        gap_x, gap_y = x - from_x - share * along_x, y - from_y - share * along_y
+        distance = math.sqrt(gap_x * gap_x + gap_y * gap_y)
+        if radius + LEAF - distance > depth:
+            depth = radius + LEAF - distance
+            if distance > 0.0:
+                normal_x, normal_y = gap_x / distance, gap_y / distance
+    return depth, normal_x, normal_y
+
+
+@kernel(nrt=False)
+def deepest_person(walkers: Array, own: int, x: float, y: float, radius: float) -> tuple[float, float, float]:
+    """Find the person, other than number ``own``, that a disc at x, y [m] enters deepest."""
+    depth, normal_x, normal_y = 0.0, 0.0, 0.0
+    for other in range(walkers.shape[0]):
+        gap_x, gap_y = x - walkers[other, WALKER_X], y - walkers[other, WALKER_Y]
+        reach = radius + walkers[other, WALKER_RADIUS]
+        squared = gap_x * gap_x + gap_y * gap_y
+        if other == own or squared >= (reach - depth) ** 2:
+            continue
+        distance = math.sqrt(squared)
+        depth = reach - distance
+        if distance > 0.0:
+            normal_x, normal_y = gap_x / distance, gap_y / distance
+    return depth, normal_x, normal_y
+
+
+@kernel(nrt=False)
 def is_free_of_contact(grids: BodyGrids, team: TeamBodies, robot: int, x: float, y: float, margin: float) -> bool:
     """Whether nothing is within ``margin`` [m] of the disc at x, y, by bounds alone."""
     bound, frame, poses, bodies = grids.bound, grids.frame, team.poses, team.bodies
@@ -173,14 +256,16 @@ def is_free_of_contact(grids: BodyGrids, team: TeamBodies, robot: int, x: float,
         reach = radius + bodies[other, RADIUS]
         if other != robot and (x - poses[other, 0]) ** 2 + (y - poses[other, 1]) ** 2 <= reach * reach:
             return False
-    return True
+    if team.walkers.shape[0] > 0 and deepest_person(team.walkers, -1, x, y, radius)[0] > 0.0:
+        return False
+    return not (team.doors.shape[0] > 0 and deepest_leaf(team.doors, x, y, radius)[0] > 0.0)
 
 
 @kernel(nrt=False)
 def push_out(
     grids: BodyGrids, team: TeamBodies, robot: int, x: float, y: float, heading: float
 ) -> tuple[float, float, bool, bool]:
-    """Push the disc out of walls and robots.
+    """Push the disc out of walls, robots, people and doors.
 
     Returns x, y [m], whether it touched, and whether it is free now; presses the bumpers on the sides of contact.
     """
@@ -195,10 +280,21 @@ def push_out(
         robot_depth, robot_x, robot_y = _deepest_robot(team, robot, x, y)
         if robot_depth > depth:
             depth, normal_x, normal_y = robot_depth, robot_x, robot_y
+        is_person = False
+        if team.walkers.shape[0] > 0:
+            person_depth, person_x, person_y = deepest_person(team.walkers, -1, x, y, radius)
+            if person_depth > depth:
+                depth, normal_x, normal_y, is_person = person_depth, person_x, person_y, True
+        if team.doors.shape[0] > 0:
+            leaf_depth, leaf_x, leaf_y = deepest_leaf(team.doors, x, y, radius)
+            if leaf_depth > depth:
+                depth, normal_x, normal_y, is_person = leaf_depth, leaf_x, leaf_y, False
         if depth <= 0.0:
             return x, y, touched, True
         if depth > PRESSED:
             touched = True
+            if is_person:
+                team.safety[robot, MET_PERSON] = 1.0
             side = wrapped(math.atan2(-normal_y, -normal_x) - heading)
             if abs(side) <= CENTRE_BUMPER:
                 bumpers[1] = 1

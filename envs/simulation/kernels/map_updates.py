@@ -157,6 +157,11 @@ def _update_map(
         )
     if world.flags[row] & (KNOWN_TEAMMATES | SOME_TEAMMATES):
         _filter_teammates(world, row, first, robots, local_x, local_y, ends, is_hit)
+    if world.recognised.shape[0] > 0:
+        # Doors that open by themselves are no part of the map: robots recognise them, and wait before them.
+        for beam in range(beams):
+            if world.recognised[row, beam] != 0:
+                is_hit[beam] = False
     touched = grid_at(belief[TOUCHED], belief[TOUCHED_ROWS], touched_words(belief[MAP_COLUMNS]), np.uint64)
     seen = SeenScan(bits, scratch.windows[1], box, ends, is_hit, row_offset, column_offset)
     integrate_scan(log_odds, seen, world.increments, touched)

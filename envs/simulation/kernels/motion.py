@@ -18,10 +18,14 @@ from lidarium.envs.simulation.disturbances.odometry import (
 from lidarium.envs.simulation.kernels.arrays import (
     BODY_SOLID,
     BOUND,
+    BY_ROBOT,
     FLOOR_COLUMNS,
     FLOOR_ROWS,
     FRAME_RESOLUTION,
+    MET_PERSON,
     WorldArrays,
+    doors_of,
+    walkers_of,
 )
 from lidarium.envs.simulation.kernels.contact import (
     BodyGrids,
@@ -60,6 +64,9 @@ def team_of(world: WorldArrays, first: int, last: int) -> TeamBodies:
         world.contacts[first:last],
         world.travelled[first:last],
         world.collisions[first:last],
+        walkers_of(world, first // (last - first)),
+        doors_of(world, first // (last - first)),
+        world.safety[first:last],
     )
 
 
@@ -103,6 +110,10 @@ def move_robots(grids: BodyGrids, team: TeamBodies, commands: Array, duration: f
         bumpers[robot, 0] = bumpers[robot, 1] = bumpers[robot, 2] = 0
         was_in_contact = contacts[robot] != 0
         contacts[robot] = 0
+        was_at_person = False
+        if team.walkers.shape[0] > 0:
+            was_at_person = team.safety[robot, MET_PERSON] != 0.0
+            team.safety[robot, MET_PERSON] = 0.0
         if team.moves[robot] == 0:
             velocities[robot, 0] = velocities[robot, 1] = 0.0
             continue
@@ -132,6 +143,8 @@ def move_robots(grids: BodyGrids, team: TeamBodies, commands: Array, duration: f
                 advance = (x - start_x) * math.cos(heading) + (y - start_y) * math.sin(heading)
                 speed = min(max(advance / duration, -abs(speed)), abs(speed))
                 team.collisions[robot] += 0 if was_in_contact else 1
+                if team.walkers.shape[0] > 0 and not was_at_person:
+                    team.safety[robot, BY_ROBOT] += team.safety[robot, MET_PERSON]
         team.travelled[robot] += math.hypot(x - start_x, y - start_y)
         poses[robot, 0], poses[robot, 1], poses[robot, 2] = x, y, wrapped(heading)
         velocities[robot, 0], velocities[robot, 1] = speed, turn_rate

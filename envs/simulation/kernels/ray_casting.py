@@ -21,6 +21,7 @@ from lidarium.envs.simulation.kernels.arrays import (
     FACE_TABLE,
     FLOOR_COLUMNS,
     FLOOR_ROWS,
+    PERSON_BEAM,
     SQUARES,
     TILE_COLUMNS,
 )
@@ -278,6 +279,60 @@ def cut_by_disc(beams: Beams, disc_x: float, disc_y: float, disc_radius: float, 
             inside = middle * middle - gap
             if inside >= 0.0 and middle > 0.0:
                 ranges[beam] = min(ranges[beam], middle - math.sqrt(inside))
+
+
+@kernel(nrt=False)
+def cut_by_person(beams: Beams, disc_x: float, disc_y: float, disc_radius: float, ranges: Array, marks: Array) -> bool:
+    """Shorten the beams that meet a person, set their ``marks`` (beams,), and return whether any does so first."""
+    directions, increment = beams.directions, beams.increment
+    offset_x, offset_y = disc_x - beams.x, disc_y - beams.y
+    squared = offset_x * offset_x + offset_y * offset_y
+    gap, is_seen = squared - disc_radius * disc_radius, False
+    if gap <= 0.0 or squared > (beams.reach + disc_radius) ** 2:
+        return False
+    begin, count = beams_towards(offset_x, offset_y, disc_radius, beams.heading, beams.angle_first, increment)
+    turn = 2.0 * math.pi / increment
+    for lap in range(2):
+        first = max(int(math.floor(begin - lap * turn)) - 1, 0)
+        last = min(int(math.floor(begin - lap * turn + count)) + 2, ranges.shape[0] - 1)
+        for beam in range(first, last + 1):
+            middle = offset_x * directions[0, beam] + offset_y * directions[1, beam]
+            inside = middle * middle - gap
+            if inside >= 0.0 and middle > 0.0 and middle - math.sqrt(inside) < ranges[beam]:
+                ranges[beam], marks[beam], is_seen = middle - math.sqrt(inside), PERSON_BEAM, True
+    return is_seen
+
+
+@kernel(nrt=False)
+def cut_by_segment(
+    beams: Beams, from_x: float, from_y: float, to_x: float, to_y: float, ranges: Array, marks: Array, mark: int
+) -> None:
+    """Shorten the beams that meet a segment (the leaf of a door), and set their ``marks`` (beams,).
+
+    Positions and ranges in cells.
+    """
+    directions, increment = beams.directions, beams.increment
+    middle_x, middle_y = 0.5 * (from_x + to_x) - beams.x, 0.5 * (from_y + to_y) - beams.y
+    half = 0.5 * math.hypot(to_x - from_x, to_y - from_y)
+    if middle_x * middle_x + middle_y * middle_y > (beams.reach + half) ** 2:
+        return
+    begin, count = beams_towards(middle_x, middle_y, half, beams.heading, beams.angle_first, increment)
+    offset_x, offset_y = from_x - beams.x, from_y - beams.y
+    along_x, along_y = to_x - from_x, to_y - from_y
+    turn = 2.0 * math.pi / increment
+    for lap in range(2):
+        first = max(int(math.floor(begin - lap * turn)) - 1, 0)
+        last = min(int(math.floor(begin - lap * turn + count)) + 2, ranges.shape[0] - 1)
+        for beam in range(first, last + 1):
+            direction_x, direction_y = directions[0, beam], directions[1, beam]
+            across = direction_x * along_y - direction_y * along_x
+            if across == 0.0:
+                continue
+            distance = (offset_x * along_y - offset_y * along_x) / across
+            place = (offset_x * direction_y - offset_y * direction_x) / across
+            if 0.0 <= place <= 1.0 and 0.0 < distance < ranges[beam]:
+                ranges[beam] = distance
+                marks[beam] = mark
 
 
 @kernel

@@ -1,5 +1,6 @@
 """The scan of a robot in kernels: true ranges by ray casting, noise, invalid ranges."""
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -10,6 +11,8 @@ from lidarium.envs.simulation.disturbances.odometry import HEIGHT, RADIUS
 from lidarium.envs.simulation.kernels.arrays import (
     ANGLE_FIRST,
     ANGLE_INCREMENT,
+    DOOR_BEAM,
+    DOOR_KIND,
     FRAME_RESOLUTION,
     FRAME_X,
     FRAME_Y,
@@ -17,12 +20,20 @@ from lidarium.envs.simulation.kernels.arrays import (
     MAP_RESOLUTION,
     NOISE_FLOOR,
     NOISE_SHARE,
+    OPENS,
+    PERSON_GAP,
     RANGE_MAX,
     RANGE_MIN,
+    WALKER_RADIUS,
+    WALKER_X,
+    WALKER_Y,
     WorldArrays,
     beams_of,
+    doors_of,
+    walkers_of,
 )
-from lidarium.envs.simulation.kernels.ray_casting import cast_scan, cut_by_disc
+from lidarium.envs.simulation.kernels.contact import has_leaf, leaf_of
+from lidarium.envs.simulation.kernels.ray_casting import cast_scan, cut_by_disc, cut_by_person, cut_by_segment
 from lidarium.mapping.grids.scan_geometry import Beams, beam_directions
 from lidarium.mapping.grids.scan_polygon import window_rows, window_words
 from lidarium.mapping.kernels.compilation import Array, kernel
@@ -60,6 +71,43 @@ class ScanScratch(NamedTuple):
 
 
 @kernel(nrt=False)
+def _meet_doors(world: WorldArrays, row: int, episode: int, beams: Beams, lengths: Array) -> None:
+    """Shorten the beams that meet doors, and mark those that meet one that opens by itself."""
+    doors, frame, marks = doors_of(world, episode), world.frames[episode], world.recognised[row]
+    scale = 1.0 / frame[FRAME_RESOLUTION]
+    for door in range(doors.shape[0]):
+        if has_leaf(doors[door]):
+            from_x, from_y, to_x, to_y = leaf_of(doors[door])
+            cut_by_segment(
+                beams,
+                (from_x - frame[FRAME_X]) * scale,
+                (from_y - frame[FRAME_Y]) * scale,
+                (to_x - frame[FRAME_X]) * scale,
+                (to_y - frame[FRAME_Y]) * scale,
+                lengths,
+                marks,
+                DOOR_BEAM if doors[door, DOOR_KIND] == OPENS else 0,
+            )
+
+
+@kernel(nrt=False)
+def _meet_people(world: WorldArrays, row: int, episode: int, beams: Beams, lengths: Array) -> None:
+    """Shorten the beams that meet people, and note the gap to the nearest person of whom the laser sees a part."""
+    walkers, frame = walkers_of(world, episode), world.frames[episode]
+    scale, robots = 1.0 / frame[FRAME_RESOLUTION], world.poses.shape[0] // world.steps.shape[0]
+    marks, own = world.recognised[row], world.bodies[row - episode * robots, RADIUS]
+    nearest = np.inf
+    for person in range(walkers.shape[0]):
+        x = (walkers[person, WALKER_X] - frame[FRAME_X]) * scale
+        y = (walkers[person, WALKER_Y] - frame[FRAME_Y]) * scale
+        radius = walkers[person, WALKER_RADIUS]
+        if cut_by_person(beams, x, y, radius * scale, lengths, marks):
+            apart = math.hypot(x - beams.x, y - beams.y) / scale
+            nearest = min(nearest, apart - radius - own)
+    world.safety[row, PERSON_GAP] = nearest
+
+
+@kernel(nrt=False)
 def measure(
     world: WorldArrays, row: int, first: int, robots: int, directions: Array, ranges: Array, lengths: Array
 ) -> None:
@@ -88,6 +136,12 @@ def measure(
             )
             radius = world.bodies[other, RADIUS] / resolution
             cut_by_disc(beams, other_x, other_y, radius, lengths)
+    if world.recognised.shape[0] > 0:
+        world.recognised[row, :] = 0
+    if world.walkers.shape[0] > 0:
+        _meet_people(world, row, episode, beams, lengths)
+    if world.doors.shape[0] > 0:
+        _meet_doors(world, row, episode, beams, lengths)
     scale = 1.0 / sensor[MAP_RESOLUTION]
     longest = sensor[RANGE_MAX]
     for beam in range(lengths.shape[0]):

@@ -37,6 +37,7 @@ from lidarium.envs.simulation.kernels.arrays import (
     is_scanning,
     world_at,
 )
+from lidarium.envs.simulation.kernels.doors import move_doors
 from lidarium.envs.simulation.kernels.map_updates import (
     invalidate_teammates,
     perceive_robot,
@@ -45,6 +46,7 @@ from lidarium.envs.simulation.kernels.map_updates import (
 from lidarium.envs.simulation.kernels.masks import score_robot
 from lidarium.envs.simulation.kernels.motion import body_grids, move_robots, team_of
 from lidarium.envs.simulation.kernels.scanning import disturb_robot, scan_scratch, sense_robot
+from lidarium.envs.simulation.kernels.walking import note_people, walk_people
 from lidarium.envs.simulation.rewards import add_rewards
 from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.kernels.views import grid_at
@@ -115,6 +117,15 @@ def _encode(world: WorldArrays, episode: int, robots: int, velocities: Array) ->
 
 
 @kernel(inline="always")
+def move_people(world: WorldArrays, episode: int, robots: int) -> None:
+    """Move the doors and the people of an episode, who see the robots where they are."""
+    if world.doors.shape[0] > 0:
+        move_doors(world, episode, robots)
+    if world.walkers.shape[0] > 0:
+        walk_people(world, episode, robots)
+
+
+@kernel(inline="always")
 def _move(world: WorldArrays, episode: int, robots: int, commands: Array, moves_bodies: bool) -> None:
     """Move the bodies of an episode by ``commands`` (rows, 2), and read their encoders."""
     first, last = episode * robots, (episode + 1) * robots
@@ -123,8 +134,11 @@ def _move(world: WorldArrays, episode: int, robots: int, commands: Array, moves_
         if has_odometry or world.faults.shape[1] > 0:
             _drive(world, episode, robots, commands)
             commands = world.driven
+        move_people(world, episode, robots)
         grids = body_grids(world.floor_rows[episode], world.frames[episode])
         move_robots(grids, team_of(world, first, last), commands[first:last], world.sensor[0, TIME_STEP])
+        if world.walkers.shape[0] > 0:
+            note_people(world, episode, robots)
     if moves_bodies and has_odometry:
         _encode(world, episode, robots, world.velocities)
 
@@ -239,6 +253,24 @@ def drive(table: Array, robots: int, commands: Array, runs: Array) -> None:
 
 
 @kernel
+def walk(table: Array, robots: int, runs: Array) -> None:
+    """Move the people and doors of the episodes with ``runs`` (episodes,)."""
+    world = world_at(table)
+    for episode in range(runs.shape[0]):
+        if runs[episode]:
+            move_people(world, episode, robots)
+
+
+@kernel
+def note_approaches(table: Array, robots: int, runs: Array) -> None:
+    """Note how near robots of the episodes with ``runs`` (episodes,) are to people, after both have moved."""
+    world = world_at(table)
+    for episode in range(runs.shape[0]):
+        if runs[episode] and world.walkers.shape[0] > 0:
+            note_people(world, episode, robots)
+
+
+@kernel
 def encode(table: Array, robots: int, velocities: Array, runs: Array) -> None:
     """Read the encoders of wheels that drove at ``velocities`` (rows, 2)."""
     world = world_at(table)
@@ -309,6 +341,10 @@ def render_row(table: Array, row: int, robots: int, poses: Array, ranges: Array)
     flags, pose, scan = world.flags[row], world.believed[row].copy(), world.ranges[row].copy()
     # Teammates' poses at that time are not known any more.
     world.flags[row] = flags & ~(KNOWN_TEAMMATES | SOME_TEAMMATES)
+    # Those scans have no beams on doors any more, see ``ranges_without_teammates``.
+    marks = world.recognised[row].copy() if world.recognised.shape[0] > 0 else np.zeros(0, np.uint8)
+    if world.recognised.shape[0] > 0:
+        world.recognised[row, :] = 0
     scratch = scan_scratch(world)
     for k in range(poses.shape[0]):
         world.believed[row, 0], world.believed[row, 1], world.believed[row, 2] = (
@@ -319,13 +355,15 @@ def render_row(table: Array, row: int, robots: int, poses: Array, ranges: Array)
         world.ranges[row, :] = ranges[k]
         perceive_robot(world, row, row // robots * robots, robots, scratch)
     world.flags[row] = flags
+    if world.recognised.shape[0] > 0:
+        world.recognised[row, :] = marks
     world.believed[row, 0], world.believed[row, 1], world.believed[row, 2] = pose[0], pose[1], pose[2]
     world.ranges[row, :] = scan
 
 
 @kernel
 def ranges_without_teammates(table: Array, row: int, robots: int, ranges: Array) -> None:
-    """Copy a robot's scan into ``ranges`` (beams,), without teammates.
+    """Copy a robot's scan into ``ranges`` (beams,), without teammates and doors that open by themselves.
 
     Beams that met teammates are made invalid if the robot knows these.
     """
@@ -333,6 +371,10 @@ def ranges_without_teammates(table: Array, row: int, robots: int, ranges: Array)
     ranges[:] = world.ranges[row]
     if world.flags[row] & (KNOWN_TEAMMATES | SOME_TEAMMATES):
         invalidate_teammates(world, row, row // robots * robots, robots, ranges)
+    if world.recognised.shape[0] > 0:
+        for beam in range(ranges.shape[0]):
+            if world.recognised[row, beam] != 0:
+                ranges[beam] = np.float32(np.nan)
 
 
 def _step_serial(table: Array, robots: int, commands: Array, runs: Array, moves_bodies: bool, perceives: bool) -> None:

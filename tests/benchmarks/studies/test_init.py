@@ -18,7 +18,7 @@ NAMES = (
         "machines",
         "merging",
     ),
-    *("parity", "prediction", "printed", "realism", "slam", "sparse", "splines", "srt", "supervisor"),
+    *("parity", "people", "prediction", "printed", "realism", "slam", "sparse", "splines", "srt", "supervisor"),
 )
 
 

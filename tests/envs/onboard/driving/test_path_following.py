@@ -68,6 +68,7 @@ class Drive:
                     simulation.beliefs.scanned,
                     simulation.beliefs.contact,
                     simulation.beliefs.heard,
+                    simulation.safety,
                 ),
                 Courses(
                     self.paths,

@@ -16,6 +16,7 @@ from lidarium.envs.onboard.driving.safety_stop import (
     _gap_to_teammates,
     safe_speed,
 )
+from lidarium.envs.simulation.people.population import no_people
 from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.kernels.compilation import kernel
 
@@ -37,7 +38,8 @@ def sensed_of(poses, ranges=None, contact=None):
     if ranges is not None:
         scans[0] = ranges
     contact = np.zeros((robots, robots), np.uint8) if contact is None else contact
-    return Sensed(poses, np.zeros((robots, 2)), scans, poses, contact, np.tile(poses.ravel(), (robots, 1)))
+    heard = np.tile(poses.ravel(), (robots, 1))
+    return Sensed(poses, np.zeros((robots, 2)), scans, poses, contact, heard, no_people(robots))
 
 
 @kernel

@@ -1,0 +1,1 @@
+"""People who walk on a floor, and its doors."""

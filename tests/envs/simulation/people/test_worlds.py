@@ -1,0 +1,85 @@
+"""Depth cameras see people and doors, and in PyBullet they are bodies."""
+
+import numpy as np
+import pytest
+from doored_rooms import robot_at_door
+
+from lidarium.envs.faces.parallel import ExplorationEnv
+from lidarium.envs.floors.floor import Floor
+from lidarium.envs.settings.making import make_settings
+from lidarium.envs.simulation.kernels.arrays import (
+    BY_ROBOT,
+    DOOR_END_X,
+    DOOR_END_Y,
+    DOOR_KIND,
+    DOOR_OPEN,
+    DOOR_X,
+    DOOR_Y,
+    STAYS_SHUT,
+    WALKER_RADIUS,
+    WALKER_WAIT,
+    WALKER_X,
+    WALKER_Y,
+)
+from lidarium.envs.simulation.people.crowd import crowd_of
+
+HALL = Floor("hall", (0.0, 0.0, 8.0, 6.0))
+START = {"starts": [(2.0, 3.0, 0.0)]}
+
+
+def begun(**options):
+    env = ExplorationEnv(HALL, make_settings(**{"robots": 1, "horizon_s": None, "resolution": 0.05, **options}))
+    env.reset(seed=0, options=START)
+    return env
+
+
+def test_a_depth_camera_sees_a_person_at_his_distance():
+    env = begun(people=1, camera="xtion", noise="none")
+    walker, camera = env.simulation.population.people_of(0)[0], env.settings.camera
+    depths = []
+    for x in (1.0, 3.5):  # behind the robot, and ahead of it
+        walker[WALKER_X], walker[WALKER_Y] = x, 3.0
+        env.simulation.camera.take(np.zeros(1, np.int64) - 1)
+        depths.append(float(env.simulation.camera.frames[0, 10, camera.columns // 2]))
+    expected = 1.5 - walker[WALKER_RADIUS] - camera.forward
+    assert depths[1] == pytest.approx(expected, abs=0.15)
+    assert depths[0] == 0.0 or depths[0] > 3.0
+
+
+def test_a_depth_camera_sees_a_leaf():
+    env, door = robot_at_door(STAYS_SHUT, camera="xtion")
+    depths = []
+    for share in (0.0, 1.0):
+        door[DOOR_OPEN] = share
+        env.simulation.camera.take(np.zeros(1, np.int64) - 1)
+        depths.append(float(env.simulation.camera.frames[0, 10, env.settings.camera.columns // 2]))
+    assert depths[0] == pytest.approx(3.0 - env.settings.camera.forward, abs=0.2)
+    assert depths[1] == 0.0 or depths[1] > depths[0] + 1.0
+
+
+def test_in_pybullet_a_robot_that_drives_into_a_person_touches_him():
+    pytest.importorskip("pybullet", reason="the extra bullet is not installed")
+    env = begun(people=1, backend="bullet")
+    walker = env.simulation.population.people_of(0)[0]
+    gaps = []
+    for _ in range(40):
+        # He stands in the way, whatever he would do.
+        walker[WALKER_X], walker[WALKER_Y], walker[WALKER_WAIT] = 3.0, 3.0, 1e6
+        env.world.bodies_of(0).move_crowd(crowd_of(env.simulation.population))
+        env.step({"robot_0": np.array([0.6, 0.0], np.float32)})
+        apart = np.hypot(*(walker[[WALKER_X, WALKER_Y]] - env.world.poses[0, :2]))
+        gaps.append(apart - 0.18 - walker[WALKER_RADIUS])
+    assert min(gaps) == pytest.approx(0.0, abs=0.02)
+    assert env.simulation.safety[0, BY_ROBOT] >= 1.0
+    env.close()
+
+
+def test_in_pybullet_a_shut_door_stops_a_robot():
+    pytest.importorskip("pybullet", reason="the extra bullet is not installed")
+    env, door = robot_at_door(STAYS_SHUT, backend="bullet")
+    assert door[DOOR_KIND] == STAYS_SHUT
+    for _ in range(120):
+        env.step({"robot_0": np.array([0.5, 0.0], np.float32)})
+    leaf = 0.5 * (door[[DOOR_X, DOOR_Y]] + door[[DOOR_END_X, DOOR_END_Y]])
+    assert env.world.poses[0, 0] < leaf[0] - 0.15
+    env.close()

@@ -1,0 +1,77 @@
+"""Records, frames and bags show people and doors; records without them have no arrays of theirs."""
+
+import zipfile
+
+import numpy as np
+import pytest
+
+import lidarium
+from lidarium.envs.drawing.frame_parts import DOOR, PERSON
+from lidarium.evaluation.drawing.record_frames import TrackFrames
+from lidarium.evaluation.record.bag import write_bag
+from lidarium.evaluation.record.file import read_record
+from lidarium.evaluation.record.replay import is_same, rerun
+from lidarium.evaluation.viewing.moment import moment_of
+
+SETTINGS = {"robots": 2, "horizon_s": 8.0, "resolution": 0.05}
+
+
+@pytest.fixture(scope="module")
+def among(tmp_path_factory):
+    path = tmp_path_factory.mktemp("crowd") / "episode.npz"
+    settings = lidarium.make_settings(people=4, doors=1.0, **SETTINGS)
+    return lidarium.record("nearest_frontier", "office:1", settings, 3, path), path
+
+
+def test_a_record_keeps_people_and_doors_and_runs_again_to_the_bit(among):
+    record, path = among
+    found = read_record(path)
+    crowd = found.display.crowd
+    assert crowd.people.shape == (41, 4, 3)
+    assert crowd.opened.shape == (41, len(crowd.doors))
+    for name in ("times", "people", "doors", "opened"):
+        assert getattr(crowd, name) == pytest.approx(getattr(record.display.crowd, name), abs=1e-9)
+    env = rerun(found)
+    assert is_same(found, env)
+    now = moment_of(env).crowd
+    assert now.people == pytest.approx(crowd.people[-1], abs=1e-3)
+    assert now.opened == pytest.approx(crowd.opened[-1], abs=1e-2)
+
+
+def test_frames_of_records_and_of_environments_show_people_and_doors(among):
+    record, _ = among
+    for frame in (TrackFrames(record).draw(4.0), rerun(record).render()):
+        if frame is not None:
+            for colour in (PERSON, DOOR):
+                assert (frame == np.array(colour)).all(axis=2).sum() > 20
+
+
+def test_a_record_without_people_has_no_arrays_of_people(tmp_path):
+    path = tmp_path / "episode.npz"
+    lidarium.record("nearest_frontier", "apartment", lidarium.make_settings(**SETTINGS), 3, path)
+    assert not [name for name in zipfile.ZipFile(path).namelist() if "crowd" in name or "people" in name]
+    assert read_record(path).display.crowd is None
+
+
+def test_a_record_whose_people_do_not_fit_is_refused(among, tmp_path):
+    _, path = among
+    broken = tmp_path / "broken.npz"
+    with zipfile.ZipFile(path) as source, zipfile.ZipFile(broken, "w") as target:
+        for name in source.namelist():
+            content = source.read(name)
+            if name == "people.npy":
+                content = source.read("door_ends.npy")
+            target.writestr(name, content)
+    with pytest.raises(ValueError, match="people and doors"):
+        read_record(broken)
+
+
+def test_a_bag_has_a_frame_for_each_person_and_a_topic_for_each_door(among, tmp_path):
+    mcap = pytest.importorskip("mcap.reader")
+    record, _ = among
+    path = tmp_path / "episode.mcap"
+    write_bag(path, record)
+    with path.open("rb") as file:
+        topics = {channel.topic for _, channel, _ in mcap.make_reader(file).iter_messages()}
+        assert {f"/door_{number}" for number in range(len(record.display.crowd.doors))} <= topics
+    assert b"person_3" in path.read_bytes() or "/tf" in topics
