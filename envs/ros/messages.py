@@ -100,6 +100,6 @@ _DEPTHS = {LASER_SCAN: 5, CLOCK: 1, TRANSFORMS: 100, ODOMETRY: 50}
 def quality(topic: str, name: str, *, is_read: bool) -> Qos:
     """Return the quality of service of a topic: as sensor drivers and tf2 publish, and as any publisher is read."""
     if name == DISCOVERY or topic.endswith(_LATCHED):
-        return _quality(name, 100 if is_read else 1, is_latched=True)
+        return _quality(name, 100 if is_read or name == TRANSFORMS else 1, is_latched=True)
     is_reliable = not is_read and name not in (LASER_SCAN, CLOCK)
     return _quality(name, _DEPTHS.get(name, 10), is_reliable=is_reliable)
