@@ -67,7 +67,8 @@ class MapPublisher:
             frames, fused = merged
             first, *others = frames
             for name in others:
-                graph.transform(self._frame(first), self._frame(name), stamp, tuple(frames[name]))
+                lies = frames[name]
+                graph.transform(self._frame(first), self._frame(name), stamp, (lies.x, lies.y, lies.theta))
             self._draw(MERGED_MAP, self._frame(first), stamp, fused)
 
     def _frame(self, agent: str) -> str:

@@ -4,7 +4,7 @@ import math
 import time
 from bisect import bisect_right
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -33,6 +33,9 @@ _RESTARTS_AFTER = 10
 
 _SET_BACK_S = 1.0
 """Odometry that is earlier than the last by this much is of a clock that was set back [s]."""
+
+_MOUNT_S = 1.0
+"""Time after the first scan in which the laser's place on the robot is awaited [s]."""
 
 _CENTRED_M = 0.01
 """A laser that is nearer to the robot's middle is at it [m]."""
@@ -151,8 +154,6 @@ class RobotLink:
         Frame of the odometry.
     scan_period_s : float
         Time between scans as the first one states it; 0 if it does not [s].
-    heard_s : float
-        Wall time at which the last usable scan came [s].
     remark : str
         What was taken for granted of the laser; empty if nothing.
     """
@@ -162,8 +163,8 @@ class RobotLink:
         graph.subscribe(names.scan, LASER_SCAN)
         graph.subscribe(names.odometry, ODOMETRY)
         self.geometry: ScanGeometry | None = None
-        self.odom_frame, self.heard_s, self.scan_period_s, self.remark = "", -math.inf, 0.0, ""
-        self._has_topic = False
+        self.odom_frame, self.scan_period_s, self.remark = "", 0.0, ""
+        self._has_topic, self._first_s = False, 0.0
         self._base, self._laser = names.base, ""
         self._mounting = Mounting(np.zeros(3), is_hanging=False)
         self._native, self._wanted, self._axis = Beams(0.0, 0.0), Beams(0.0, 0.0), 0.0
@@ -193,6 +194,9 @@ class RobotLink:
         if not self._wheels:
             return False
         found = self._transforms.frames.mounting(self._base, self._laser)
+        self._first_s = self._first_s or time.monotonic()
+        if found is None and time.monotonic() - self._first_s < _MOUNT_S:
+            return False
         self._mounting = found or self._mounting
         self.remark = (
             f"no transforms say where the laser ({printable(self._laser)}) is on the robot ({printable(self._base)}): "
@@ -212,7 +216,7 @@ class RobotLink:
             count = min(round(WHOLE_TURN / self._native.increment), MAX_BEAMS)
             self.geometry = ScanGeometry(beams=count, field_of_view=WHOLE_TURN, range_min=reach[0], range_max=reach[1])
         self._wanted = Beams(self.geometry.angle_first + self._axis, self.geometry.angle_increment)
-        self.scan_period_s, self.heard_s = float(scan.scan_time), time.monotonic()
+        self.scan_period_s = float(scan.scan_time)
         return True
 
     @property
@@ -247,7 +251,6 @@ class RobotLink:
             self._waiting.popleft()
             reading = self._reading(scan)
             if reading is not None:
-                self.heard_s = time.monotonic()
                 found.append(reading)
         return found
 
@@ -368,7 +371,7 @@ def connected(graph: Graph, team: Sequence[Names], timeout_s: float, *, on_map: 
 
     With ``on_map`` transforms have to say where each is in the map's frame.
 
-    Raises ValueError if one has not in time, is driven already, or has a laser that cannot be used.
+    Raises ValueError if one has not in time, or has a laser that cannot be used.
     """
     transforms = Transforms(graph)
     links = [RobotLink(graph, names, transforms) for names in team]
@@ -387,14 +390,26 @@ def connected(graph: Graph, team: Sequence[Names], timeout_s: float, *, on_map: 
                 "--domain, or other --namespaces"
             )
         graph.wait(0.02)
-    for names in team:
-        if graph.publishers(names.command):
-            raise ValueError(f"{names.command} is published by another node already; want one driver of each robot")
     geometry = links[0].geometry
     assert geometry is not None
     for link in links[1:]:
         link.use_geometry(geometry)
     return links
+
+
+def begin_driving(graph: Graph, topics: Mapping[str, str], timeout_s: float = 2.0) -> list[str]:
+    """Publish topics of commands, by their types, before the first command; return those that nobody reads.
+
+    Raises ValueError if another node publishes one.
+    """
+    for topic, name in topics.items():
+        if graph.publishers(topic):
+            raise ValueError(f"{topic} is published by another node already; want one driver of each robot")
+        graph.advertise(topic, name)
+    until = time.monotonic() + timeout_s
+    while time.monotonic() < until and not all(map(graph.subscribers, topics)):
+        time.sleep(0.02)
+    return [topic for topic in topics if not graph.subscribers(topic)]
 
 
 def recentred(ranges: NDArray[np.float32], geometry: ScanGeometry, x: float, y: float) -> NDArray[np.float32]:

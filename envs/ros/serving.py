@@ -32,8 +32,8 @@ _MASTER_S = 1.0
 _AGAIN_S = 0.2
 """Wall time after which the last scans are sent again to drivers that are waited for [s]."""
 
-ABSENT_S: Final = 5.0
-"""Wall time after which the simulation goes on without a driver that it waits for [s]."""
+ABSENT_S: Final = 120.0
+"""Wall time after which a driver that is waited for has hung [s]."""
 
 
 @dataclass(slots=True)
@@ -143,15 +143,15 @@ class TeamServer:
             Simulated seconds in a second; 0 for as many as possible.
         waits : bool
             Whether each step waits for a command for each robot that has a driver. Runs then do not depend on the
-            speed of the drivers.
+            speed of the drivers, and end when these leave.
         """
         period = self.env.settings.time_step / speed if speed > 0.0 else 0.0
         self._publish()
         due, began, cpu = time.monotonic(), time.monotonic(), time.process_time()
         while self.env.agents and not is_over():
             due = self._pace(due, period)
-            if waits:
-                self._await()
+            if waits and not self._await():
+                break
             self._hear()
             self._step()
             self._publish()
@@ -171,19 +171,20 @@ class TeamServer:
             return time.monotonic()
         return due
 
-    def _await(self) -> None:
-        """Wait for a new command for each robot, but not for drivers that were silent before."""
+    def _await(self) -> bool:
+        """Wait for a new command for each robot that has a driver; return False if all drivers have left."""
         began = again = time.monotonic()
         while True:
             self._hear()
-            if all(driven.is_new for driven in self._driven if driven.master or not self.counts.steps):
-                return
+            has_driver = [self.graph.publishers(f"/{robot}/cmd_vel") > 0 for robot in self.env.possible_agents]
+            if any(has_driver):
+                if all(driven.is_new for driven, has in zip(self._driven, has_driver, strict=True) if has):
+                    return True
+            elif self.counts.steps:
+                return False
             now = time.monotonic()
             if self.counts.steps and now - began > ABSENT_S:
-                for driven in self._driven:
-                    if not driven.is_new:
-                        driven.master, driven.velocity = 0, (0.0, 0.0)
-                return
+                return False
             if now - again > _AGAIN_S:
                 again = now
                 self._publish()

@@ -96,6 +96,7 @@ class RosWorld(KinematicWorld):
         self._uses_map = settings.localization == "truth"
         self._origins = np.zeros((self.robots, 3))
         self._has_begun = [False] * self.robots
+        self._silent_since: list[float | None] = [None] * self.robots
         self._sent: list[Target | None] = [None] * self.robots
         self.stale_steps = 0
         self.given_map: GivenMap | None = None
@@ -131,18 +132,18 @@ class RosWorld(KinematicWorld):
         elif self.given_map is not None and self.env is not None:
             self.given_map.write(self.env)
         missing = {row for row in range(self.robots) if not ended[row] and not self.failed[row]}
-        # A robot that was silent before is not waited for.
-        now = time.monotonic()
-        silent = {row for row in missing if moves_bodies and now - self.links[row].heard_s > self._stale_s}
-        until = now + self._stale_s
-        while True:
+        # A robot that was silent before is not waited for, unless all were.
+        silent = {row for row in missing if self._silent_since[row] is not None}
+        hopeful = missing - silent
+        until = time.monotonic() + (self._stale_s if hopeful else self.time_step)
+        while missing:
             for row in sorted(missing):
                 readings = self.links[row].readings()
                 if readings:
                     self._sense(row, readings[-1])
                     missing.discard(row)
             left = until - time.monotonic()
-            if not missing - silent or left <= 0.0:
+            if left <= 0.0 or (hopeful and not missing & hopeful):
                 break
             self._graph.wait(min(left, 0.01))
         for row in missing:
@@ -188,6 +189,7 @@ class RosWorld(KinematicWorld):
 
     def _sense(self, row: int, reading: Reading) -> None:
         """Take the newest reading of a robot."""
+        self._silent_since[row] = None
         self.ranges[row] = reading.ranges
         self.measured[row] = self.velocities[row] = reading.velocity
         if not self._has_begun[row]:
@@ -205,7 +207,10 @@ class RosWorld(KinematicWorld):
         self.stale_steps += 1
         self.ranges[row] = np.nan
         self._command(row, np.zeros(2))
-        if time.monotonic() - self.links[row].heard_s > self._lost_s:
+        # By the time spent waiting: a robot is not silent while its driver thinks.
+        since = self._silent_since[row] or time.monotonic() - self._stale_s
+        self._silent_since[row] = since
+        if time.monotonic() - since > self._lost_s:
             self.failed[row], self.moves[row] = DEAD, 0
 
 

@@ -113,8 +113,9 @@ def _driven(command: _RosDrive, policy: "Policy", graph: "Graph") -> "tuple[Epis
 
     import lidarium
     from lidarium.envs.ros.maps import MapPublisher
-    from lidarium.envs.ros.robots import connected, names_of
+    from lidarium.envs.ros.robots import begin_driving, connected, names_of
     from lidarium.envs.ros.world import RosWorld, ground_around, robots_as_backend
+    from lidarium.mapping.files.bags.messages import POSE_STAMPED, TWIST, TWIST_STAMPED
 
     on_map = command.localization == "tf"
     names = [names_of(each, command.base) for each in command.namespaces]
@@ -123,6 +124,13 @@ def _driven(command: _RosDrive, policy: "Policy", graph: "Graph") -> "tuple[Epis
         if link.remark:
             notify(link.remark)
     given = _given_map(command, graph)
+    if command.sends == "goals":
+        commands = {each.goal: POSE_STAMPED for each in names}
+    else:
+        commands = {each.command: TWIST_STAMPED if command.stamped else TWIST for each in names}
+    unread = begin_driving(graph, commands)
+    if unread:
+        notify(f"nobody reads {', '.join(unread)} yet: want a robot that is driven by it")
     # Robots that do not know their starts are somewhere: apart, so that they may begin.
     starts = np.array([link.start() if on_map else (2.0 * k, 0.0, 0.0) for k, link in enumerate(links)])
 
@@ -147,8 +155,8 @@ def _driven(command: _RosDrive, policy: "Policy", graph: "Graph") -> "tuple[Epis
 
     def on_decision(_: "ExplorationEnv") -> None:
         maps.publish()
-        for each in names:
-            if graph.publishers(each.command) and (remark := f"{each.command} has a second driver") not in remarks:
+        for topic in commands:
+            if graph.publishers(topic) and (remark := f"{topic} has a second driver") not in remarks:
                 remarks.append(remark)
                 notify(remark)
 

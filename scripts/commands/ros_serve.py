@@ -31,7 +31,7 @@ class _RosServe(RosOptions, TeamCommand):
     speed: float = 1.0
     """simulated seconds in a second; 0 for as many as possible"""
     waits: bool = False
-    """each step waits for a command for each robot: runs do not depend on the speed of the drivers"""
+    """each step waits for a command for each driven robot, and the run ends when all drivers have left"""
     truth: Literal["shown", "aside"] = "shown"
     """whether `/map` and `/tf` have the floor and the true poses; aside, these are `/truth/map` and `/truth/tf`"""
     horizon_s: float | None = None

@@ -9,7 +9,8 @@ pytest.importorskip("cyclonedds", reason="cyclonedds (extra ros) is not installe
 
 from ros_graphs import GEOMETRY, node, until
 
-from lidarium.envs.ros.robots import RobotLink, Transforms, connected, names_of
+from lidarium.envs.ros.robots import RobotLink, Transforms, begin_driving, connected, names_of
+from lidarium.mapping.files.bags.messages import POSE_STAMPED, TWIST
 from lidarium.mapping.grids.scan_geometry import ScanGeometry
 
 NAMES = names_of("robot_0")
@@ -146,13 +147,14 @@ def test_a_silent_robot_is_named_with_its_domain(nodes):
 
 
 def test_a_robot_with_a_driver_gets_no_second_one(nodes):
-    robot = Robot(*nodes)
     with node("other") as other:
         other.velocity(NAMES.command, None, 0.0, (0.1, 0.0))
         until(lambda: nodes[1].publishers(NAMES.command))
-        del robot
-        feeding = Robot(*nodes)
-        feeding.odometry(9.0, (0.0, 0.0, 0.0))
-        feeding.scan(9.0)
         with pytest.raises(ValueError, match="/robot_0/cmd_vel is published by another node already"):
-            connected(nodes[1], [NAMES], 5.0)
+            begin_driving(nodes[1], {NAMES.command: TWIST})
+
+
+def test_commands_that_nobody_reads_are_named(nodes):
+    nodes[0].subscribe(NAMES.command, TWIST)
+    unread = begin_driving(nodes[1], {NAMES.command: TWIST, NAMES.goal: POSE_STAMPED}, 0.5)
+    assert unread == [NAMES.goal]
