@@ -30,8 +30,21 @@ POLICY = "nearest_frontier"
 
 
 def _served(*options: str) -> "subprocess.Popen[str]":
-    command = [sys.executable, "-m", "lidarium", "ros", "serve", "--floor", FLOOR, "--domain", str(DOMAIN), "--localhost"]
-    return subprocess.Popen([*command, "--json", *options], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+    command = [
+        sys.executable,
+        "-m",
+        "lidarium",
+        "ros",
+        "serve",
+        "--floor",
+        FLOOR,
+        "--domain",
+        str(DOMAIN),
+        "--localhost",
+    ]
+    return subprocess.Popen(
+        [*command, "--json", *options], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
+    )
 
 
 def _ended(server: "subprocess.Popen[str]") -> dict[str, Any]:

@@ -49,23 +49,36 @@ def test_the_graph_of_ros_sees_topic_type_hash_and_node():
         participant = DomainParticipant(DOMAIN)
         reader = BuiltinDataReader(participant, BuiltinTopicDcpsPublication)
         found = {}
-        until(lambda: found.update({e.topic_name: e for e in reader.take(20) if e.topic_name}) or "rt/robot_0/cmd_vel" in found)
+        until(
+            lambda: (
+                found.update({e.topic_name: e for e in reader.take(20) if e.topic_name})
+                or "rt/robot_0/cmd_vel" in found
+            )
+        )
         topic = found["rt/robot_0/cmd_vel"]
         assert topic.type_name == "geometry_msgs::msg::dds_::Twist_"
         assert topic.qos[Policy.Userdata].data.startswith(b"typehash=RIHS01_9c45bf16")
         names = []
         until(
-            lambda: names.extend(
-                n.node_name for each in b.take("ros_discovery_info") for n in each.message.node_entities_info_seq
+            lambda: (
+                names.extend(
+                    n.node_name for each in b.take("ros_discovery_info") for n in each.message.node_entities_info_seq
+                )
+                or "seen" in names
             )
-            or "seen" in names
         )
 
 
 def test_messages_that_are_malformed_or_too_long_are_refused_and_counted(monkeypatch):
     monkeypatch.setattr(graphs, "MAX_MESSAGE_BYTES", 100)
     info = SimpleNamespace(publication_handle=1, source_timestamp=0)
-    bad = [b"", b"\x00\x01\x00\x00\xff\xff\xff\xff", b"\x07\x07" + bytes(48), b"\x00\x01\x00\x00" + bytes(13), bytes(101)]
+    bad = [
+        b"",
+        b"\x00\x01\x00\x00\xff\xff\xff\xff",
+        b"\x07\x07" + bytes(48),
+        b"\x00\x01\x00\x00" + bytes(13),
+        bytes(101),
+    ]
     with node() as a:
         a.subscribe("/cmd_vel", TWIST)
         samples = [SimpleNamespace(content=content, sample_info=info) for content in bad]

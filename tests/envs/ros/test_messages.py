@@ -23,7 +23,10 @@ USED = (CLOCK, GRID, LASER_SCAN, ODOMETRY, POSE_STAMPED, TRANSFORMS, TWIST, TWIS
 
 
 def test_types_have_the_names_that_rmw_gives_them():
-    assert wire_type(LASER_SCAN).__idl__.idl_transformed_typename.replace(".", "::") == "sensor_msgs::msg::dds_::LaserScan_"
+    assert (
+        wire_type(LASER_SCAN).__idl__.idl_transformed_typename.replace(".", "::")
+        == "sensor_msgs::msg::dds_::LaserScan_"
+    )
 
 
 @pytest.mark.parametrize(
@@ -60,13 +63,28 @@ def test_dds_reads_the_bytes_as_rosbags_writes_them():
 @pytest.mark.parametrize(
     ("topic", "name", "is_read", "wanted"),
     [
-        ("/scan", LASER_SCAN, False, (Policy.Reliability.BestEffort, Policy.Durability.Volatile, Policy.History.KeepLast(5))),
-        ("/clock", CLOCK, False, (Policy.Reliability.BestEffort, Policy.Durability.Volatile, Policy.History.KeepLast(1))),
+        (
+            "/scan",
+            LASER_SCAN,
+            False,
+            (Policy.Reliability.BestEffort, Policy.Durability.Volatile, Policy.History.KeepLast(5)),
+        ),
+        (
+            "/clock",
+            CLOCK,
+            False,
+            (Policy.Reliability.BestEffort, Policy.Durability.Volatile, Policy.History.KeepLast(1)),
+        ),
         ("/robot_0/map", GRID, False, (None, Policy.Durability.TransientLocal, Policy.History.KeepLast(1))),
         ("/tf_static", TRANSFORMS, True, (None, Policy.Durability.TransientLocal, Policy.History.KeepLast(100))),
         ("/tf", TRANSFORMS, False, (None, Policy.Durability.Volatile, Policy.History.KeepLast(100))),
         # Publishers of either kind meet a reader that asks for no more than the best effort.
-        ("/odom", ODOMETRY, True, (Policy.Reliability.BestEffort, Policy.Durability.Volatile, Policy.History.KeepLast(50))),
+        (
+            "/odom",
+            ODOMETRY,
+            True,
+            (Policy.Reliability.BestEffort, Policy.Durability.Volatile, Policy.History.KeepLast(50)),
+        ),
     ],
 )
 def test_quality_of_service_is_that_of_drivers_and_tf2(topic, name, is_read, wanted):
