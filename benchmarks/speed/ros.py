@@ -1,6 +1,6 @@
 """ROS 2 over loopback: what serving costs and loses, and a policy driven through it beside the direct run.
 
-Prints JSON. The served team is a process of its own, on one core if there are two.
+Prints JSON. The served team is a process of its own on one core.
 """
 
 import argparse
@@ -25,6 +25,7 @@ from lidarium.mapping.files.bags.reading import seconds_of
 from lidarium.scripts.main import main as lidarium
 
 DOMAIN = 87
+ON_LOOPBACK = ("--domain", str(DOMAIN), "--localhost")
 FLOOR = "apartment"
 POLICY = "nearest_frontier"
 
@@ -43,7 +44,11 @@ def _served(*options: str) -> "subprocess.Popen[str]":
         "--localhost",
     ]
     return subprocess.Popen(
-        [*command, "--json", *options], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
+        [*command, "--json", *options],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        text=True,
+        preexec_fn=lambda: os.sched_setaffinity(0, {0}),
     )
 
 
@@ -57,7 +62,7 @@ def _ended(server: "subprocess.Popen[str]") -> dict[str, Any]:
 
 
 def stream(robots: int, speed: float, seconds: float) -> dict[str, Any]:
-    """Listen to the scans of a served team for a time, and return what they cost, their losses and their latency."""
+    """Drive a served team in circles for a time; return what that costs the server, losses and latency of scans."""
     server = _served("--robots", str(robots), "--speed", str(speed), "--horizon-s", str(seconds * max(speed, 1.0)))
     graph = Graph("listener", DOMAIN, localhost=True)
     topics = [f"/robot_{robot}/scan" for robot in range(robots)]
@@ -71,6 +76,7 @@ def stream(robots: int, speed: float, seconds: float) -> dict[str, Any]:
             for message, _, sent_s in graph.take(topic):
                 stamps[topic].append(seconds_of(message.header.stamp))
                 latencies.append(time.time() - sent_s)
+                graph.velocity(topic.replace("scan", "cmd_vel"), None, 0.0, (0.1, 0.5))
     counts = _ended(server)
     graph.close()
     lost = 0
@@ -89,40 +95,48 @@ def stream(robots: int, speed: float, seconds: float) -> dict[str, Any]:
     }
 
 
-def driven(seed: int) -> float | None:
-    """Return the simulated time to 99 % of a policy that drives a served robot [s]."""
+def driven(seed: int) -> tuple[float | None, str]:
+    """Return the simulated time to 99 % of a policy that drives a served robot [s], and why it ended."""
     server = _served(
         *("--robots", "1", "--starts", "drawn", "--seed", str(seed), "--waits", "--speed", "0"),
         *("--stop-coverage", "0.99", "--horizon-s", "900"),
     )
-    with TemporaryDirectory() as folder, contextlib.redirect_stdout(io.StringIO()):
-        lidarium(
-            ["ros", "drive", "--domain", str(DOMAIN), "--localhost", "--policy", POLICY, "--seed", str(seed), "--json"]
-            + ["--stale-s", "20", "--lost-s", "2", "--timeout-s", "60", "--out", folder]
-        )
-    return _ended(server)["time_to_99_s"]
+    with TemporaryDirectory() as folder:
+        asked = ("--policy", POLICY, "--seed", str(seed), "--out", folder)
+        result = _run("ros", "drive", *ON_LOOPBACK, *asked, "--stale-s", "20", "--lost-s", "2", "--timeout-s", "60")
+    return _ended(server)["time_to_99_s"], str(result["ended_because"])
 
 
 def direct(seed: int) -> float | None:
-    """Return the same of the run without ROS."""
-    with TemporaryDirectory() as folder, contextlib.redirect_stdout(io.StringIO()) as out:
-        lidarium(
-            ["run", "--floor", FLOOR, "--robots", "1", "--policy", POLICY, "--seed", str(seed), "--starts", "drawn"]
-            + ["--unknown-starts", "--localization", "slam", "--map-resolution", "0.05", "--out", folder, "--json"]
-        )
-    return json.loads(out.getvalue())["t99_s"]
+    """Return the time of the same run without ROS [s]."""
+    with TemporaryDirectory() as folder:
+        asked = ("--policy", POLICY, "--seed", str(seed), "--out", folder, "--floor", FLOOR, "--starts", "drawn")
+        own_frame = ("--unknown-starts", "--localization", "slam", "--map-resolution", "0.05")
+        found: float | None = _run("run", "--robots", "1", *asked, *own_frame)["t99_s"]
+    return found
+
+
+def _run(*words: str) -> dict[str, Any]:
+    """Run a command here, and return its result."""
+    with contextlib.redirect_stdout(io.StringIO()) as out:
+        lidarium([*words, "--json"])
+    result: dict[str, Any] = json.loads(out.getvalue())
+    return result
 
 
 def compare(seeds: int) -> dict[str, Any]:
     """Return times to 99 % of some seeds, driven through ROS and directly."""
-    pairs = [{"seed": seed, "driven_s": driven(seed), "direct_s": direct(seed)} for seed in range(seeds)]
+    pairs: list[dict[str, Any]] = []
+    for seed in range(seeds):
+        time_s, ended = driven(seed)
+        pairs.append({"seed": seed, "driven_s": time_s, "direct_s": direct(seed), "driver_ended": ended})
     whole = [pair for pair in pairs if pair["driven_s"] is not None and pair["direct_s"] is not None]
-    ratios = [pair["driven_s"] / pair["direct_s"] for pair in whole]  # type: ignore[operator]
+    ratios = [pair["driven_s"] / pair["direct_s"] for pair in whole]
     return {
         "runs": pairs,
         "whole": len(whole),
-        "mean_driven_s": statistics.mean(pair["driven_s"] for pair in whole),  # type: ignore[type-var]
-        "mean_direct_s": statistics.mean(pair["direct_s"] for pair in whole),  # type: ignore[type-var]
+        "mean_driven_s": statistics.mean(pair["driven_s"] for pair in whole),
+        "mean_direct_s": statistics.mean(pair["direct_s"] for pair in whole),
         "median_ratio": round(statistics.median(ratios), 4),
     }
 

@@ -55,8 +55,8 @@ class MapPublisher:
         resolution, stamp = env.settings.occupancy.resolution, max(link.stamp_s for link in world.links)
         maps = [known_map(env.perception, row) for row in range(env.settings.robots)]
         if not own:
-            origins = [Transform(*env.perception.poses.offset(row).tolist(), 0.0) for row in range(len(maps))]
-            places = [origin @ placed(one.origin) for origin, one in zip(origins, maps, strict=True)]
+            corners = env.perception.poses.offsets.tolist()
+            places = [placed((x + one.origin[0], y + one.origin[1])) for (x, y), one in zip(corners, maps, strict=True)]
             self._draw(MERGED_MAP, world.map_frame(0), stamp, fuse([one.levels for one in maps], places, resolution))
             return
         for link, one in zip(world.links, maps, strict=True):

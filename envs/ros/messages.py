@@ -73,7 +73,8 @@ def _field(kind: Any, is_humble: bool) -> Any:  # noqa: ANN401
     if node == Nodetype.NAME:
         return _struct(about, is_humble)
     inner, length = _field(about[0], is_humble), about[1]
-    return types.array[inner, length] if node == Nodetype.ARRAY else types.sequence[inner]
+    arrays: Any = types  # whose generics type checkers do not know
+    return arrays.array[inner, length] if node == Nodetype.ARRAY else arrays.sequence[inner]
 
 
 def type_hash(name: str) -> str:
