@@ -4,8 +4,6 @@ Prints JSON. The served team is a process of its own on one core.
 """
 
 import argparse
-import contextlib
-import io
 import json
 import os
 import signal
@@ -22,8 +20,8 @@ import numpy as np
 from lidarium.envs.ros.graph import Graph
 from lidarium.mapping.files.bags.messages import LASER_SCAN
 from lidarium.mapping.files.bags.reading import seconds_of
-from lidarium.scripts.main import main as lidarium
 
+PROGRAM = (sys.executable, "-m", "lidarium")
 DOMAIN = 87
 ON_LOOPBACK = ("--domain", str(DOMAIN), "--localhost")
 FLOOR = "apartment"
@@ -117,10 +115,9 @@ def direct(seed: int) -> float | None:
 
 
 def _run(*words: str) -> dict[str, Any]:
-    """Run a command here, and return its result."""
-    with contextlib.redirect_stdout(io.StringIO()) as out:
-        lidarium([*words, "--json"])
-    result: dict[str, Any] = json.loads(out.getvalue())
+    """Run a command, and return its result."""
+    ran = subprocess.run([*PROGRAM, *words, "--json"], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, check=False)
+    result: dict[str, Any] = json.loads(ran.stdout)
     return result
 
 

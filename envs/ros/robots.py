@@ -28,6 +28,12 @@ _READINGS = 512
 _MAX_FRAMES = 256
 """Frames of transforms that are noted: a robot has tens."""
 
+_MAX_NAMES = 512
+"""Letters of the names of two frames."""
+
+_MIN_STEP = 1e-4
+"""Smallest step from beam to beam [rad]."""
+
 _RESTARTS_AFTER = 10
 """Scans in order of time, all before the last one, after which the clock has been set back."""
 
@@ -106,7 +112,7 @@ class Transforms:
         self._graph, self._topics = graph, topics
         self.frames = Frames()
         self.moving: dict[tuple[str, str], deque[tuple[float, tuple[float, float, float]]]] = {}
-        self._known: set[str] = set()
+        self._known: set[tuple[str, str]] = set()
         for topic in topics:
             graph.subscribe(topic, TRANSFORMS)
 
@@ -119,14 +125,17 @@ class Transforms:
 
     def _note(self, topic: str, each: Any) -> None:  # noqa: ANN401
         parent, child = frame_of(each.header.frame_id), frame_of(each.child_frame_id)
-        if child not in self._known and len(self._known) >= _MAX_FRAMES:
+        if len(parent) + len(child) > _MAX_NAMES:
+            self._graph.refuse(topic, "names of frames are too long")
+            return
+        if (parent, child) not in self._known and len(self._known) >= _MAX_FRAMES:
             self._graph.refuse(topic, f"more than {_MAX_FRAMES} frames")
             return
         pose = in_plane(each.transform.translation, each.transform.rotation)
         if not all(map(math.isfinite, pose)):
             self._graph.refuse(topic, "nan or infinite")
             return
-        self._known.add(child)
+        self._known.add((parent, child))
         is_static = topic.endswith("_static")
         self.frames.note(parent, child, each.transform, is_static=is_static)
         if not is_static:
@@ -305,7 +314,8 @@ class RobotLink:
     def _beams(self, scan: Any) -> tuple[NDArray[np.float32], Beams] | None:  # noqa: ANN401
         """Return a scan, counter-clockwise, and its directions against the robot; None if it has none."""
         beams = directions_of(scan, is_hanging=self._mounting.is_hanging)
-        if beams is None or len(scan.ranges) > MAX_BEAMS or not math.isfinite(scan.range_min):
+        is_whole = beams is not None and len(scan.ranges) <= MAX_BEAMS and 0.0 <= scan.range_min < _reach(scan)
+        if beams is None or not is_whole or not _MIN_STEP < abs(beams.increment) < WHOLE_TURN:
             self._graph.refuse(self.names.scan, "no beams that can be used")
             return None
         ranges, beams = from_right_to_left(np.array(scan.ranges, np.float32), beams)

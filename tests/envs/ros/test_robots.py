@@ -10,7 +10,7 @@ pytest.importorskip("cyclonedds", reason="cyclonedds (extra ros) is not installe
 from ros_graphs import GEOMETRY, node, until
 
 from lidarium.envs.ros.robots import RobotLink, Transforms, begin_driving, connected, names_of
-from lidarium.mapping.files.bags.messages import POSE_STAMPED, TWIST
+from lidarium.mapping.files.bags.messages import POSE_STAMPED, TRANSFORMS, TWIST
 from lidarium.mapping.grids.scan_geometry import ScanGeometry
 
 NAMES = names_of("robot_0")
@@ -111,6 +111,42 @@ def test_odometry_that_is_no_pose_is_refused(nodes, pose):
     robot.odometry(2.0, pose)
     until(lambda: robot.link.readings() or nodes[1].refused)
     assert nodes[1].refused == {"/robot_0/odom: not a pose in metres": 1}
+
+
+@pytest.mark.parametrize(
+    "geometry",
+    [
+        {"angle_min": math.nan},
+        {"angle_increment": 1e-12, "angle_max": -math.pi / 2},
+        {"range_min": math.nan},
+        {"range_min": 9.0},
+        {"ranges": np.zeros(0, np.float32)},
+        {"ranges": np.ones(20_000, np.float32)},
+    ],
+)
+def test_scans_without_usable_beams_are_refused(nodes, geometry):
+    robot = Robot(*nodes)
+    robot.odometry(2.0, (0.0, 0.0, 0.0))
+    write = robot.robot._write
+    robot.robot._write = lambda *arguments, **fields: write(*arguments, **{**fields, **geometry})
+    robot.scan(2.0)
+    until(lambda: robot.link.readings() or nodes[1].refused)
+    assert nodes[1].refused == {"/robot_0/scan: no beams that can be used": 1}
+
+
+def test_frames_without_end_are_refused(nodes):
+    robot, driver = nodes
+    transforms = Transforms(driver)
+    robot.advertise("/tf", TRANSFORMS)
+    until(lambda: robot.subscribers("/tf"))
+    for first in range(0, 300, 50):
+        for k in range(first, first + 50):
+            robot.transform(f"frame_{k}", "base", 1.0, np.zeros(3))
+        robot.transform("map", "x" * 600, 1.0, np.zeros(3))
+        until(lambda: driver.wait(0.1))
+        transforms.hear()
+    until(lambda: transforms.hear() or len(driver.refused) == 2)
+    assert len(transforms.moving) == 256
 
 
 def test_a_scan_with_other_beams_is_brought_into_the_directions_of_the_first(nodes):
