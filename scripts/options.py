@@ -223,5 +223,6 @@ def open_graph(options: RosOptions, node: str) -> "Graph":
     try:
         from lidarium.envs.ros.graph import Graph
     except ImportError as error:
-        raise ValueError(f"ROS 2 needs the package {error.name}: {install_command('ros')}") from error
+        package = str(error.name).partition(".")[0]
+        raise ValueError(f"ROS 2 needs the package {package}: {install_command('ros')}") from error
     return Graph(node, options.domain, localhost=options.localhost or None, is_humble=options.humble)

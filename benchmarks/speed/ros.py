@@ -29,20 +29,8 @@ POLICY = "nearest_frontier"
 
 
 def _served(*options: str) -> "subprocess.Popen[str]":
-    command = [
-        sys.executable,
-        "-m",
-        "lidarium",
-        "ros",
-        "serve",
-        "--floor",
-        FLOOR,
-        "--domain",
-        str(DOMAIN),
-        "--localhost",
-    ]
     return subprocess.Popen(
-        [*command, "--json", *options],
+        [*PROGRAM, "ros", "serve", "--floor", FLOOR, *ON_LOOPBACK, "--json", *options],
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,
         text=True,
