@@ -152,22 +152,25 @@ class RosWorld(KinematicWorld):
     def close(self) -> None:
         """Stop all robots."""
         for row in range(self.robots):
-            self._command(row, np.zeros(2))
+            self._command(row, None)
 
-    def _command(self, row: int, velocity: NDArray[np.float64]) -> None:
+    def _command(self, row: int, velocity: NDArray[np.float64] | None) -> None:
+        """Send a speed and turn rate, or the target that these lead to; None stops."""
         link = self.links[row]
         if self._sends_goals:
-            self._send_goal(row, link)
+            self._send_goal(row, link, stops=velocity is None)
         else:
+            velocity = np.zeros(2) if velocity is None else velocity
             frame = link.base_frame if self._is_stamped else None
             self._graph.velocity(link.names.command, frame, link.stamp_s, (velocity[0], velocity[1]))
 
-    def _send_goal(self, row: int, link: RobotLink) -> None:
-        """Send a new target of a robot, or its own place if it has lost it."""
+    def _send_goal(self, row: int, link: RobotLink, *, stops: bool) -> None:
+        """Send a new target of a robot, or its own place if it has none or stops."""
         driver = None if self.env is None else self.env.driver
         if self.env is None or driver is None:
             return
-        target = driver.target(row) if self.moves[row] and not self.flags[row] & ENDED else None
+        has_target = self.moves[row] and not self.flags[row] & ENDED and not stops
+        target = driver.target(row) if has_target else None
         if target == self._sent[row]:
             return
         self._sent[row] = target
@@ -206,7 +209,7 @@ class RosWorld(KinematicWorld):
         """Stop a robot without a scan: nothing is known of what is ahead."""
         self.stale_steps += 1
         self.ranges[row] = np.nan
-        self._command(row, np.zeros(2))
+        self._command(row, None)
         # By the time spent waiting: a robot is not silent while its driver thinks.
         since = self._silent_since[row] or time.monotonic() - self._stale_s
         self._silent_since[row] = since

@@ -71,13 +71,25 @@ def test_a_driven_robot_goes_where_it_goes_without_ros(tmp_path, capsys):
 
 
 def test_robots_are_driven_by_goals_in_the_frame_of_the_transforms(tmp_path, capsys):
+    options = ("--horizon-s", "12", "--localization", "tf", "--sends", "goals", "--stale-s", "5")
     with served(1, waits=False, speed=4.0) as server:
-        code, result = drive(
-            tmp_path, "--horizon-s", "12", "--localization", "tf", "--map", "--sends", "goals", "--stale-s", "5",
-        )  # fmt: skip
+        code, result = drive(tmp_path, *options)
+        last = until(lambda: server._driven[0].target)
+        corner = server.env.perception.poses.offset(0)
+        until(lambda: np.hypot(*(server.env.world.poses[0, :2] - corner - (last.x, last.y))) < 0.2)  # it stops there
     assert code == 0
-    assert result["free_m2"]["robot_0"] > 40.0  # of the map that was given
-    assert "cmd_vel" not in str(server.graph.refused)
+    assert result["travelled_m"]["robot_0"] > 0.5
+    assert not server.graph.refused
+
+
+def test_a_robot_that_is_given_the_map_has_nothing_to_explore(tmp_path, capsys):
+    with served(1) as server:
+        code, result = drive(tmp_path, "--horizon-s", "60", "--localization", "tf", "--map", "--stale-s", "60")
+    assert code == 0
+    assert result["free_m2"]["robot_0"] > 40.0
+    assert result["travelled_m"]["robot_0"] < 1.0
+    assert result["ended_because"]["robot_0"] != "horizon"
+    assert server.counts.steps < 100
 
 
 def test_a_team_goes_on_without_a_robot_that_falls_silent(tmp_path, capsys, monkeypatch):
