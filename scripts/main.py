@@ -25,8 +25,13 @@ from lidarium.scripts.common import (
 )
 from lidarium.scripts.options import gathered
 
-_IN_TWO_WORDS = {("sparse-map", "edit"): "sparse-map-edit"}
-"""Commands in two words, the first of which is a command of its own that takes files."""
+_IN_TWO_WORDS = {
+    ("sparse-map", "edit"): "sparse-map-edit",
+    ("ros", "serve"): "ros-serve",
+    ("ros", "drive"): "ros-drive",
+    ("ros", "play"): "ros-play",
+}
+"""Commands in two words; the first of some is a command of its own that takes files."""
 
 _OVERVIEW = """usage: lidarium [--version] [--import MODULE] COMMAND [OPTIONS]
 

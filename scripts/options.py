@@ -1,4 +1,4 @@
-"""Options that several commands share: settings of policies and the supervisor, films, the live view."""
+"""Options that several commands share: settings of policies and the supervisor, films, the live view, ROS 2."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
@@ -8,10 +8,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from tyro.conf import arg
 
-from lidarium.scripts.common import notify
+from lidarium.extras import install_command
+from lidarium.scripts.common import Command, notify
 
 if TYPE_CHECKING:
     from lidarium.agents.policy import Policy
+    from lidarium.envs.ros.graph import Graph
     from lidarium.evaluation.drawing.films import FilmSettings
     from lidarium.evaluation.viewing.live_view import LiveView
 
@@ -202,3 +204,25 @@ def opened_view(options: ViewOptions, policy: "Policy", name: str) -> Iterator["
             with suppress(KeyboardInterrupt):
                 notify(f"the run is over; {address_of(server)} stays until Ctrl-C")
                 view.stay()
+
+
+@dataclass(frozen=True, kw_only=True)
+class RosOptions(Command):
+    """Options of commands that speak ROS 2."""
+
+    domain: int | None = None
+    """domain, 0 to 232; ROS_DOMAIN_ID, else 0, if not given"""
+    localhost: bool = False
+    """reach only programs on this machine, without multicast; ROS_LOCALHOST_ONLY=1 does the same"""
+    humble: bool = False
+    """the other nodes run Humble, which names nodes in another form than Iron and later"""
+
+
+def open_graph(options: RosOptions, node: str) -> "Graph":
+    """Return a node of ROS 2; ValueError if the packages of the extra are not installed."""
+    try:
+        from lidarium.envs.ros.graph import Graph
+    except ImportError as error:
+        package = str(error.name).partition(".")[0]
+        raise ValueError(f"ROS 2 needs the package {package}: {install_command('ros')}") from error
+    return Graph(node, options.domain, localhost=options.localhost or None, is_humble=options.humble)

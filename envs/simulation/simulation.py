@@ -168,6 +168,15 @@ class Simulation:
         poses, beliefs = self.world.poses, self.beliefs
         return poses if self.scan_steps == 1 else composed(poses, relative(beliefs.believed, beliefs.scanned))
 
+    @property
+    def dead_reckoning(self) -> NDArray[np.float64]:
+        """Poses by the wheels since the starts, (rows, 3) [m, rad].
+
+        Wheels that do not err are not simulated unless a localizer reads them: they measure the true motion.
+        """
+        measures = len(getattr(self.world, "odometry_model", (0,))) > 0
+        return self.odometry if measures else relative(self.world.starts, self.world.poses)
+
     def place(
         self,
         episode: int,

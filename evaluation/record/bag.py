@@ -77,9 +77,7 @@ class _BagRecorder(Watcher):
 
     def _write(self, env: ExplorationEnv) -> None:
         time_s, poses, steps = _time_of(env), env.world.poses, int(env.world.steps[0])
-        # Wheels that do not err are not simulated unless a localizer reads them: they measure the true motion.
-        is_true = env.settings.odometry.is_ideal and env.settings.localization == "truth"
-        reckoned = relative(self._starts, poses) if is_true else env.simulation.odometry
+        reckoned = env.simulation.dead_reckoning
         odom_on_map = composed(poses, relative(reckoned, np.zeros_like(poses)))
         lidars = env.settings.team_lidars
         for row, robot in enumerate(env.possible_agents):

@@ -12,6 +12,10 @@ ODOMETRY: Final = "nav_msgs/msg/Odometry"
 TRANSFORMS: Final = "tf2_msgs/msg/TFMessage"
 GRID: Final = "nav_msgs/msg/OccupancyGrid"
 PATH: Final = "nav_msgs/msg/Path"
+TWIST: Final = "geometry_msgs/msg/Twist"
+TWIST_STAMPED: Final = "geometry_msgs/msg/TwistStamped"
+POSE_STAMPED: Final = "geometry_msgs/msg/PoseStamped"
+CLOCK: Final = "rosgraph_msgs/msg/Clock"
 
 BAG_SUFFIXES: Final = (".mcap", ".db3", ".bag", ".mcap.zstd", ".db3.zstd")
 """Endings of the names of files that are bags, or parts of one."""

@@ -106,10 +106,10 @@ def _messages(path: Path, topic: str | None) -> _Messages:
         if name == scans:
             found.scans.append(content)
         elif name == odometry:
-            found.odometry_stamps.append(_seconds(content.header.stamp))
+            found.odometry_stamps.append(seconds_of(content.header.stamp))
             pose = content.pose.pose
-            found.odometry.append(_in_plane(pose.position, pose.orientation))
-            found.base = _frame(content.child_frame_id)
+            found.odometry.append(in_plane(pose.position, pose.orientation))
+            found.base = frame_of(content.child_frame_id)
         else:
             _note_transforms(found, content, is_static=name == static)
     return found
@@ -146,10 +146,10 @@ def _same_beginning(a: Iterable[str], b: Iterable[str]) -> Iterator[str]:
 
 def _note_transforms(found: _Messages, content: Any, *, is_static: bool) -> None:  # noqa: ANN401
     for each in content.transforms:
-        parent, child = _frame(each.header.frame_id), _frame(each.child_frame_id)
+        parent, child = frame_of(each.header.frame_id), frame_of(each.child_frame_id)
         if parent.rstrip("/").endswith("odom") and not is_static:
-            pose = _in_plane(each.transform.translation, each.transform.rotation)
-            found.moving.setdefault((parent, child), []).append((_seconds(each.header.stamp), pose))
+            pose = in_plane(each.transform.translation, each.transform.rotation)
+            found.moving.setdefault((parent, child), []).append((seconds_of(each.header.stamp), pose))
         found.frames.note(parent, child, each.transform, is_static=is_static)
 
 
@@ -159,7 +159,7 @@ def _log(path: Path, messages: _Messages) -> LaserLog:
     laser_pose, is_hanging = _mounted(messages, remarks)
     kept, ranges, beams = list[Any](), list[NDArray[np.float32]](), list[Beams]()
     for scan in messages.scans:
-        directions = _directions(scan, is_hanging=is_hanging)
+        directions = directions_of(scan, is_hanging=is_hanging)
         if directions is not None:
             kept.append(scan)
             own, directions = from_right_to_left(np.array(scan.ranges, np.float32), directions)
@@ -177,7 +177,7 @@ def _log(path: Path, messages: _Messages) -> LaserLog:
         remarks.append(f"{others} x scans whose beams are not as those of most are resampled")
     wide, geometry, axis = symmetric_scans(table, *directions[:2], (max(least, 0.0), max(most)))
     interval = np.array([max(float(scan.time_increment), 0.0) for scan in kept])
-    stamps = np.array([_seconds(scan.header.stamp) for scan in kept]) + interval * [len(own) - 1 for own in ranges]
+    stamps = np.array([seconds_of(scan.header.stamp) for scan in kept]) + interval * [len(own) - 1 for own in ranges]
     is_turned = abs(geometry.angle_first + axis - directions.angle_min) > 0.5 * directions.increment
     is_reversed = (float(kept[0].angle_increment) < 0.0) != is_hanging
     if interval.any() and (others or is_reversed or (is_turned and geometry.is_full_circle)):
@@ -205,7 +205,7 @@ def _mounted(messages: _Messages, remarks: list[str]) -> Mounting:
     """Return where the laser is on the robot; without odometry the body is the frame to which the laser is fixed."""
     if not messages.scans:
         return Mounting(np.zeros(3), is_hanging=False)
-    laser = _frame(messages.scans[0].header.frame_id)
+    laser = frame_of(messages.scans[0].header.frame_id)
     base = messages.base or messages.frames.body(laser)
     found = messages.frames.mounting(base, laser)
     if found is None or (base == laser and not messages.base):
@@ -219,7 +219,7 @@ def _mounted(messages: _Messages, remarks: list[str]) -> Mounting:
     return found
 
 
-def _directions(scan: Any, *, is_hanging: bool) -> Beams | None:  # noqa: ANN401
+def directions_of(scan: Any, *, is_hanging: bool) -> Beams | None:  # noqa: ANN401
     """Return the directions that a scan's header states; None if it states none.
 
     Steps are those between the first and the last direction if the header has no usable step.
@@ -261,16 +261,17 @@ def _odometry(messages: _Messages) -> tuple[NDArray[np.float64], NDArray[np.floa
     return times[order], table
 
 
-def _frame(name: str) -> str:
+def frame_of(name: str) -> str:
     """Return the name of a frame; ROS 1 allows a slash before it."""
     return name.removeprefix("/")
 
 
-def _seconds(stamp: Any) -> float:  # noqa: ANN401
+def seconds_of(stamp: Any) -> float:  # noqa: ANN401
+    """Return a stamp in seconds."""
     return float(stamp.sec) + 1e-9 * float(stamp.nanosec)
 
 
-def _in_plane(place: Any, turn: Any) -> tuple[float, float, float]:  # noqa: ANN401
+def in_plane(place: Any, turn: Any) -> tuple[float, float, float]:  # noqa: ANN401
     """Return x, y, theta of a pose in space [m, rad]."""
     theta = math.atan2(2.0 * (turn.w * turn.z + turn.x * turn.y), 1.0 - 2.0 * (turn.y * turn.y + turn.z * turn.z))
     return float(place.x), float(place.y), theta
