@@ -12,7 +12,9 @@ WEIGHT = Rule(float, bounds=within(-1e6, 1e6))
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RewardSettings:
-    """Rewards and costs of a robot.
+    """Weights of the terms of a robot's reward, which is the sum of all terms times their weights.
+
+    Costs are terms that are negative themselves: a positive weight makes them cost.
 
     Attributes
     ----------
@@ -20,13 +22,14 @@ class RewardSettings:
         Per square metre of F that the team had not sensed, shared among the robots that sense it first
         [1/m2].
     time : float
-        Price of a second [1/s].
+        Of the time, a term of -1 a second [1/s].
     contact : float
-        Price of a step in contact [1].
+        Of contacts, a term of -1 for each step in contact [1].
     energy : float
-        Price of a metre driven [1/m].
+        Of the way driven, a term of -1 a metre [1/m].
     more : tuple of (str, float)
-        Registered terms (`lidarium show rewards`) with their weights; a mapping is taken as well.
+        Registered terms (`lidarium show rewards`), whose sign is their own, with their weights; a mapping is taken as
+        well.
     """
 
     area: Annotated[float, within(-1e6, 1e6)] = 1.0

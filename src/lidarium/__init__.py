@@ -247,7 +247,5 @@ for _name, _teams in _TASKS.items():
 if "IPython" in sys.modules:
     from IPython import get_ipython
 
-    from lidarium.notebooks import show_pictures
-
     if (_shell := get_ipython()) is not None:
-        show_pictures(_shell)
+        import_module("lidarium.notebooks").show_pictures(_shell)
