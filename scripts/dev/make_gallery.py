@@ -176,7 +176,8 @@ def _rewards(settings: RewardSettings) -> str:
         for name in settings.__dataclass_fields__
         if isinstance(getattr(settings, name), int | float) and getattr(settings, name)
     ]
-    return f"{markdown_table(('term', 'weight'), rows)}\n\nCosts are negative terms: [rewards](../reference/environments.md#reward)."
+    about = "Costs are negative terms: [rewards](../reference/environments.md#reward)."
+    return f"{markdown_table(('term', 'weight'), rows)}\n\n{about}"
 
 
 def _endings(settings: Any) -> str:  # noqa: ANN401
