@@ -12,6 +12,9 @@ from pathlib import Path
 from setuptools import find_packages, setup
 
 FOLDERS = ("envs", "agents", "mapping", "evaluation", "training", "benchmarks", "scripts")
+EXAMPLES = ("how_to/trainers", "tutorials", "notebooks")
+"""Folders of the documentation whose programs, configurations and notebooks wheels have below ``lidarium/examples``."""
+
 COMMAND = "lidarium_command"
 ROOT = Path(__file__).resolve().parent
 
@@ -38,8 +41,9 @@ if "editable_wheel" in sys.argv:
     setup(package_dir={"": "src"}, packages=find_packages("src"), py_modules=[COMMAND])
 else:
     patterns = [pattern for folder in FOLDERS for pattern in (folder, f"{folder}.*")]
+    examples = {f"lidarium.examples.{folder.replace('/', '.')}": f"docs/{folder}" for folder in EXAMPLES}
     setup(
-        package_dir={"": "src", **{f"lidarium.{folder}": folder for folder in FOLDERS}},
-        packages=["lidarium", *(f"lidarium.{package}" for package in find_packages(".", include=patterns))],
+        package_dir={"": "src", **{f"lidarium.{folder}": folder for folder in FOLDERS}, **examples},
+        packages=["lidarium", *(f"lidarium.{package}" for package in find_packages(".", include=patterns)), *examples],
         py_modules=[COMMAND],
     )

@@ -27,6 +27,7 @@ from lidarium.scripts.options import gathered
 
 _IN_TWO_WORDS = {
     ("sparse-map", "edit"): "sparse-map-edit",
+    ("examples", "copy"): "examples-copy",
     ("ros", "serve"): "ros-serve",
     ("ros", "drive"): "ros-drive",
     ("ros", "play"): "ros-play",
