@@ -45,7 +45,7 @@ class ByHand(Policy):
     def act(self, observations: Mapping[str, Observation]) -> dict[str, Action]:
         """Return what the person wants of the one robot, and the policy of the others."""
         others: list[Any] = [agent for agent in observations if agent != self._agent]
-        actions: dict[str, Action] = dict.fromkeys(others, np.zeros(2, np.float32))  # type: ignore[arg-type]
+        actions: dict[str, Action] = dict.fromkeys(others, np.zeros(2, np.float32))
         if self._others is not None and others:
             actions = self._others.act(observations, others)
         if self._agent in observations:

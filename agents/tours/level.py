@@ -107,7 +107,8 @@ class TourLevel(OffersLevel):
         """Begin an episode: there are no tours."""
         super().start(episode)
         guide = self._guides[episode] = TourFrontier(self._shares_map)
-        guide.reset(_Team(self, episode))
+        team: Any = _Team(self, episode)
+        guide.reset(team)
         rows = self._rows_of(episode)
         self._tables[rows] = 0.0
         self._offers[rows] = [_Offer(None, [], None)] * self.settings.robots

@@ -272,15 +272,18 @@ def tour_options(
     robots = _robots_of(due)
     (maps, width), most = robots.kept.shape, settings.most
     plans = Plans(
-        np.zeros(maps, np.int64),
-        np.zeros((maps, 4), np.int64),
-        *(np.zeros((maps, most, 2), np.int64) for _ in range(2)),
-        np.zeros((maps, most), np.int64),
-        np.zeros((maps, most)),
-        *(np.zeros((maps, width, most)) for _ in range(3)),
-        np.zeros((maps, width, most), np.bool_),
-        np.zeros((maps, most, most)),
-        np.zeros((maps, most + width - 1), np.int64),
+        counts=np.zeros(maps, np.int64),
+        frames=np.zeros((maps, 4), np.int64),
+        places=np.zeros((maps, most, 2), np.int64),
+        cells=np.zeros((maps, most, 2), np.int64),
+        numbers=np.zeros((maps, most), np.int64),
+        gains=np.zeros((maps, most)),
+        lengths=np.zeros((maps, width, most)),
+        turns=np.zeros((maps, width, most)),
+        first=np.zeros((maps, width, most)),
+        is_kept=np.zeros((maps, width, most), np.bool_),
+        between=np.zeros((maps, most, most)),
+        sequences=np.zeros((maps, most + width - 1), np.int64),
     )
     resolution, clearance = due[0].navigation.resolution, due[0].navigation.clearance
     factor = _factor_of(resolution)
@@ -349,12 +352,16 @@ def _options_of(request: TourRequest, k: int, plans: Plans, rules: PlanRules) ->
         CoarseFrame(
             low_row * factor, low_column * factor, (high_row - low_row, high_column - low_column), factor, rules.side
         ),
-        *(array[k, :n] for array in (plans.places, plans.cells, plans.numbers, plans.gains)),
-        *(np.ascontiguousarray(table[k, :robots, :n]) for table in (plans.lengths, plans.turns)),
-        np.ascontiguousarray(plans.is_kept[k, :robots, :n]),
-        np.ascontiguousarray(plans.first[k, :robots, :n]),
-        np.ascontiguousarray(plans.between[k, :n, :n]),
-        plans.sequences[k, : n + robots - 1],
+        places=plans.places[k, :n],
+        cells=plans.cells[k, :n],
+        numbers=plans.numbers[k, :n],
+        gains=plans.gains[k, :n],
+        lengths=np.ascontiguousarray(plans.lengths[k, :robots, :n]),
+        turns=np.ascontiguousarray(plans.turns[k, :robots, :n]),
+        is_kept=np.ascontiguousarray(plans.is_kept[k, :robots, :n]),
+        first=np.ascontiguousarray(plans.first[k, :robots, :n]),
+        between=np.ascontiguousarray(plans.between[k, :n, :n]),
+        sequence=plans.sequences[k, : n + robots - 1],
     )
 
 

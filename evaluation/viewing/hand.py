@@ -3,6 +3,7 @@
 import math
 import time
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -66,6 +67,10 @@ class Hand:
         return self._target or np.array([self._speed, self._turn], np.float32)
 
 
+def _press(hand: Hand, what: str, _event: object) -> None:
+    hand.press(what)
+
+
 class DrivenView(LiveView):
     """A page of a run one of whose robots a person drives.
 
@@ -104,10 +109,11 @@ class DrivenView(LiveView):
         server, hand = self._server, self._hand
         with server.gui.add_folder(f"Drive {self._env.possible_agents[self._row]}: keys, or a click on the floor"):
             for what, keys in KEYS.items():
-                server.gui.add_button(what).on_click(lambda _, what=what: hand.press(what))
+                pressed: Any = partial(_press, hand, what)
+                server.gui.add_button(what).on_click(pressed)
                 for key in keys:
                     command: Any = server.gui.add_command(f"{what}: {key}", hotkey=key)  # type: ignore[arg-type]
-                    command.on_trigger(lambda _, what=what: hand.press(what))
+                    command.on_trigger(pressed)
             server.gui.add_button("End its work").on_click(lambda _: hand.end())
 
     def _click(self, origin: Sequence[float], direction: Sequence[float]) -> None:

@@ -158,7 +158,7 @@ def _usage(entry: Entry) -> str:
 
 
 def _boxes(space: Any) -> list[tuple[str, ...]]:  # noqa: ANN401
-    rows = []
+    rows: list[tuple[str, ...]] = []
     for name, box in space.spaces.items():
         shape = " x ".join(map(str, box.shape)) or "number"
         low, high = (f"{float(each):g}" for each in (box.low.min(), box.high.max()))

@@ -72,7 +72,8 @@ def _merged(merged: Any) -> bytes:  # noqa: ANN401
     from lidarium.evaluation.drawing.merge_picture import save_merge_picture
     from lidarium.mapping.geometry.rigid import Transform
 
-    corners = {name: Transform(*merged.origins.get(name, (0.0, 0.0)), 0.0) for name in merged.levels}
+    origins = {name: merged.origins.get(name, (0.0, 0.0)) for name in merged.levels}
+    corners = {name: Transform(x, y) for name, (x, y) in origins.items()}
     return _saved(lambda path: save_merge_picture(path, merged, corners))
 
 

@@ -5,6 +5,7 @@ A plan gives all robots of a team their next goals; a decision is that of a robo
 
 import statistics
 import time
+from typing import Any
 
 import numpy as np
 
@@ -18,7 +19,7 @@ from lidarium.benchmarks.speed.harness.timing import Effort
 CORES = 2
 ROBOTS, EPISODES, FLOORS = 2, 32, "set:validation"
 WARM_STEPS = 25
-OPTIONS = {"robots": ROBOTS, "resolution": 0.05, "stop_coverage": 0.99, "horizon_s": 1800.0}
+OPTIONS: dict[str, Any] = {"robots": ROBOTS, "resolution": 0.05, "stop_coverage": 0.99, "horizon_s": 1800.0}
 MOST_MS, TO_REACH = 1.2, 800.0
 
 NOTES = (

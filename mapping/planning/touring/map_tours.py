@@ -539,7 +539,8 @@ def _turn(field: Array, columns: int, pose: Array, start: Array, frame: Array, r
     y = (at_row + 0.5) * factor * rules.resolution - pose[1]
     if math.hypot(x, y) <= rules.side:
         return 0.0
-    return abs((math.atan2(y, x) - pose[2] + math.pi) % (2.0 * math.pi) - math.pi)
+    turn: float = abs((math.atan2(y, x) - pose[2] + math.pi) % (2.0 * math.pi) - math.pi)
+    return turn
 
 
 @kernel(nrt=False)
