@@ -18,6 +18,8 @@ NEEDS = {
     "random_walk": {"observe": ("scan", "pose", "bumper")},
     "nearest_node": SMALL_GRAPH,
     "utility_node": SMALL_GRAPH,
+    "zoo:ppo-2": {"observe": ("frontier_gains", "teammates")},
+    "zoo:ppo-4": {"observe": ("frontier_gains", "teammates")},
 }
 NAMES = sorted(policy_names())
 LEVELS = ("velocity", "waypoint", "frontier")
