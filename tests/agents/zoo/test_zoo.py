@@ -6,6 +6,7 @@ import pytest
 import lidarium
 from lidarium.agents.zoo.network import FrontierNetwork, frontier_shapes
 from lidarium.agents.zoo.policy import zoo_files
+from lidarium.scripts.main import main
 
 NAMES = ("zoo:ppo-2", "zoo:ppo-4")
 
@@ -106,6 +107,8 @@ def test_weights_of_another_network_are_refused(tmp_path):
         lidarium.policy("zoo:ppo-2", weights=path)
 
 
-def test_one_robot_alone_has_no_teammates_to_observe():
-    with pytest.raises(ValueError, match="teammates"):
-        lidarium.run_episode("zoo:ppo-2", "apartment:7", robots=1, horizon_s=4.0)
+def test_one_robot_alone_has_no_teammates_to_observe(tmp_path, capsys):
+    arguments = ["run", "--policy", "zoo:ppo-2", "--robots", "1", "--out", str(tmp_path / "run")]
+    assert main(arguments) == 2
+    assert "observe has 'teammates', which needs two robots or more" in capsys.readouterr().err
+    assert not (tmp_path / "run").exists()
