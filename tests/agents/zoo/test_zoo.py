@@ -6,6 +6,7 @@ import pytest
 import lidarium
 from lidarium.agents.zoo.network import FrontierNetwork, frontier_shapes
 from lidarium.agents.zoo.policy import zoo_files
+from lidarium.evaluation.suites.starts import starts_in
 from lidarium.scripts.main import main
 
 NAMES = ("zoo:ppo-2", "zoo:ppo-4")
@@ -112,3 +113,17 @@ def test_one_robot_alone_has_no_teammates_to_observe(tmp_path, capsys):
     assert main(arguments) == 2
     assert "observe has 'teammates', which needs two robots or more" in capsys.readouterr().err
     assert not (tmp_path / "run").exists()
+
+
+def test_commands_run_a_team_at_its_level(tmp_path, capsys):
+    arguments = ["--policy", "zoo:ppo-2", "--floor", "apartment:7", "--robots", "2", "--set", "horizon_s=6"]
+    assert main(["run", *arguments, "--out", str(tmp_path / "run")]) == 0
+    rows = lidarium.evaluate("zoo:ppo-2", floors="apartment:7", robots=2, seeds=1, settings={"horizon_s": 6.0})
+    assert rows[0]["coverage_final"] > 0.0
+    capsys.readouterr()
+
+
+def test_starts_of_a_reset_are_known_whatever_is_observed():
+    plain = lidarium.make_settings(robots=2)
+    shown = lidarium.make_settings(robots=2, observe=["frontier_gains", "teammates"])
+    assert starts_in("apartment:7", shown, 3) == starts_in("apartment:7", plain, 3)
