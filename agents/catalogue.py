@@ -70,6 +70,16 @@ POLICIES.register(
     "tours of the team, of which a trained network chooses where each robot sets out",
 )
 POLICIES.register(
+    "zoo:ppo-2",
+    "lidarium.agents.zoo.policy:ppo_2",
+    "at the level of frontiers: two robots that share a network trained by PPO",
+)
+POLICIES.register(
+    "zoo:ppo-4",
+    "lidarium.agents.zoo.policy:ppo_4",
+    "at the level of frontiers: four robots that share a network trained by PPO",
+)
+POLICIES.register(
     "sparse_frontier",
     "lidarium.agents.sparse.frontier:SparseFrontier",
     "robots see all ground with depth cameras, and plan on sparse maps of boxes",

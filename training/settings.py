@@ -6,6 +6,7 @@ from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
+from lidarium.agents.zoo.network import OBSERVED
 from lidarium.envs.floors.generation.buildings import KINDS
 from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.settings.making import make_settings
@@ -141,6 +142,92 @@ class PpoSettings:
                 f"{update}: so many decisions are made between two updates"
             )
 
+    @property
+    def whole_decisions(self) -> int:
+        """Decisions up to the end of the last checkpoint."""
+        return -(-self.decisions // self.checkpoint) * self.checkpoint
+
+
+TEAM_PPO: Mapping[str, Any] = {
+    "environments": 32,
+    "steps": 64,
+    "batch": 512,
+    "epochs": 3,
+    "learning_rate": 5e-4,
+    "clip": 0.2,
+    "entropy": 0.005,
+    "discount": 0.98,
+}
+"""Defaults of ``[ppo]`` for teams, where they are not those of explorers."""
+
+ALGORITHMS, LEVELS = ("ppo",), ("frontier",)
+"""Algorithms that train teams, and levels at which these decide."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TeamSettings:
+    """How a team of the zoo is trained, by rewards alone.
+
+    Attributes
+    ----------
+    seed : int
+        Seed of all draws.
+    algorithm, level : str
+        ``ppo``: all robots share a network that attends to frontiers and teammates; ``frontier``.
+    robots : int
+        Size of the team.
+    floors : str
+        Floors to learn on, as for ``--floor``.
+    horizon_s : float
+        Episodes end after so long, or when 0.99 of the floor is seen [s].
+    realism : str
+        World of the episodes to learn in; validation is in that of ``lidarium evaluate``.
+    validation : str
+        Floors on which checkpoints are compared; the best one is kept.
+    settings : dict
+        More options of the environment, for learning and validation.
+    ppo : PpoSettings
+        How it learns; ``environments`` are robots side by side, a whole number of teams.
+    """
+
+    seed: Annotated[int, within(0, 2**31 - 1)] = 0
+    algorithm: str = "ppo"
+    level: str = "frontier"
+    robots: Annotated[int, within(2, 100)] = 2
+    floors: str = "set:train:1000"
+    horizon_s: Annotated[float, above(0.0, 1e6)] = 120.0
+    realism: str = "fast"
+    validation: str = "set:validation:16"
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    ppo: PpoSettings = field(default_factory=lambda: PpoSettings(**{**TEAM_PPO, "decisions": 65536}))
+
+    def __post_init__(self) -> None:
+        check_settings(self, "team")
+        for name, known in (("algorithm", ALGORITHMS), ("level", LEVELS)):
+            if getattr(self, name) not in known:
+                raise ValueError(f"{name} of team is {shown(getattr(self, name))}; want {' or '.join(known)}")
+        if self.ppo.environments % self.robots:
+            raise ValueError(
+                f"environments of ppo is {self.ppo.environments}; want a whole multiple of the {self.robots} robots "
+                "of the team: they are robots side by side"
+            )
+        if not self.ppo.decisions:
+            raise ValueError("decisions of ppo is 0; want how many the team makes while it learns")
+        taken = sorted({"robots", "horizon_s", "realism", "observe"} & set(self.settings))
+        if taken:
+            raise ValueError(f"settings of team has {shown(taken[0])}; the table [team] sets it, observe is fixed")
+        self.options("ideal")
+
+    def options(self, realism: str) -> dict[str, Any]:
+        """Return the options of the environment, checked."""
+        options = {"stop_coverage": 0.99, **self.settings, "robots": self.robots, "horizon_s": self.horizon_s}
+        options |= {"observe": list(OBSERVED), "realism": realism}
+        try:
+            make_settings(**options)
+        except (TypeError, AttributeError) as error:
+            raise ValueError(f"settings of the training cannot be used: {error}") from error
+        return options
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _ValidationSettings:
@@ -220,12 +307,15 @@ def read_training(path: Path) -> TrainingSettings:
     """Read the settings of a training of explorers from a TOML file."""
     settings = read_any_training(path)
     if not isinstance(settings, TrainingSettings):
-        raise ValueError(f"{path} has a table [prediction], and is no training of explorers")
+        raise ValueError(f"{path} has a table [prediction] or [team], and is no training of explorers")
     return settings
 
 
-def read_any_training(path: Path) -> TrainingSettings | PredictionSettings:
-    """Read the settings of a training from a TOML file; with a table ``[prediction]`` that of a map predictor."""
+def read_any_training(path: Path) -> TrainingSettings | PredictionSettings | TeamSettings:
+    """Read the settings of a training from a TOML file.
+
+    With a table ``[prediction]`` it is that of a map predictor, with ``[team]`` that of a team of the zoo.
+    """
     path = Path(path)
     if not path.exists():
         raise FileNotFoundError(f"no training {path}; want a TOML file, as docs/tutorials/train_a_team.md shows one")
@@ -235,6 +325,8 @@ def read_any_training(path: Path) -> TrainingSettings | PredictionSettings:
     with reading(path, "a training that can be used"):
         if "prediction" in content:
             return _prediction_of(content)
+        if "team" in content:
+            return _team_of(content)
         return training_of(content)
 
 
@@ -247,6 +339,18 @@ def _prediction_of(content: Mapping[str, Any]) -> PredictionSettings:
     if isinstance(table, Mapping) and "seed" in content:
         table = {"seed": content["seed"], **table}
     return _made(PredictionSettings, table, "prediction")
+
+
+def _team_of(content: Mapping[str, Any]) -> TeamSettings:
+    """Make settings of a file with a table ``[team]``, and ``[ppo]`` if it likes."""
+    others = sorted(set(content) - {"team", "ppo", "seed"})
+    if others:
+        raise ValueError(f"a training of teams has no {shown(others[0])}; it has seed, [team] and [ppo]")
+    table = content["team"]
+    if isinstance(table, Mapping):
+        ppo = _made(PpoSettings, {**TEAM_PPO, **content.get("ppo", {})}, "ppo")
+        table = {**{name: content[name] for name in ("seed",) if name in content}, **table, "ppo": ppo}
+    return _made(TeamSettings, table, "team")
 
 
 def training_of(content: Mapping[str, Any]) -> TrainingSettings:

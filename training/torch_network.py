@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 from torch.nn import functional
 
+from lidarium.agents.attention import HEADS, INNER, LAYERS, WIDTH
 from lidarium.agents.learned.decision import CROP_SIDE
 from lidarium.agents.learned.features import OPTION_FEATURES, SITUATION_FEATURES, TEAMMATE_FEATURES
-from lidarium.agents.learned.network import CROP_WIDTH, HEADS, INNER, LAYERS, WIDTH
+from lidarium.agents.learned.network import CROP_WIDTH
 from lidarium.mapping.planning.touring.map_crops import FREE, OCCUPIED
 from lidarium.training.decisions import Decisions
 

@@ -4,23 +4,19 @@ Finished parts are on the disk. The same call continues an interrupted one.
 """
 
 import json
-import platform
 import time
 from collections.abc import Generator
 from dataclasses import asdict, dataclass
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import torch
 
-import lidarium
 from lidarium.agents.learned.network import load_weights, save_weights
 from lidarium.mapping.files.guarded_reading import read_text, reading
 from lidarium.mapping.files.output import clear_unfinished, only_writer, remove_unfinished, write_json
-from lidarium.mapping.geometry.bounds import shown
-from lidarium.training.loggers import flattened
+from lidarium.training.folder import asked_for, begin_folder, versions
 from lidarium.training.progress import Progress
 from lidarium.training.settings import MOST_BYTES, TrainingSettings
 from lidarium.training.teaching.rounds import FIT, LESSONS, RoundFolder, run_round
@@ -54,7 +50,7 @@ class Training:
         if self.workers < 1:
             raise ValueError(f"workers is {self.workers}; want at least 1")
         validation_suite(self.settings, {})  # hours of lessons are not for floors that are not there
-        self._begin()
+        begin_folder(self.folder / TRAINING_FILE, self.settings.as_dict())
         with only_writer(self.folder / TRAINING_FILE):
             self._clear_unfinished()
             torch.set_num_threads(1)
@@ -108,26 +104,6 @@ class Training:
             raise ValueError(f"{folder} has no checkpoint; run the training again")
         return weights_of(folder, last)
 
-    def _begin(self) -> None:
-        """Check that the folder is this training's, or new."""
-        path, asked = self.folder / TRAINING_FILE, self._asked()
-        if not path.exists():
-            clear_unfinished(self.folder, ".json")
-            if self.folder.exists() and any(self.folder.iterdir()):
-                raise ValueError(f"{self.folder} has files, and no training has written them; choose another folder")
-            write_json(path, asked)
-            return
-        with reading(path, "what a training was asked for"):
-            kept = flattened(dict(json.loads(read_text(path, MOST_BYTES))))
-        asked = flattened(asked)
-        for name in sorted({*kept, *asked}):
-            before, now = kept.get(name, "nothing"), asked.get(name, "nothing")
-            if before != now:
-                raise ValueError(
-                    f"{self.folder} holds a training with {name} = {shown(before)}, this one has "
-                    f"{shown(now)}; choose another folder"
-                )
-
     def _clear_unfinished(self) -> None:
         """Remove unfinished files of killed writers."""
         rounds = [RoundFolder(self.folder, number).path for number in range(len(self.settings.rounds))]
@@ -135,10 +111,6 @@ class Training:
         for folder in (self.folder, self.folder / REWARDS, *rounds, *lessons):
             clear_unfinished(folder, ".json")
             remove_unfinished(folder, (".npz", ".safetensors"))
-
-    def _asked(self) -> dict[str, Any]:
-        content: dict[str, Any] = json.loads(json.dumps(self.settings.as_dict()))
-        return {"version": lidarium.__version__, **content}
 
     def _best(self, candidates: dict[str, Path]) -> str:
         """Return the name of the weights with the least time in validation."""
@@ -159,12 +131,8 @@ class Training:
             "best": best,
             "hours": self._hours(),
             "workers": self.workers,
-            "versions": {
-                "lidarium": lidarium.__version__,
-                "python": platform.python_version(),
-                **{name: version(name) for name in LIBRARIES},
-            },
-            "training": self._asked(),
+            "versions": versions(LIBRARIES),
+            "training": asked_for(self.settings.as_dict()),
             "validation": {name: asdict(self._validated(name)) for name in candidates},
             "fits": fits,
             "rewards": self._curve(),

@@ -159,6 +159,11 @@ def check_level(names: Iterable[str], level: str) -> None:
         raise ValueError(f"observe has {absent[0]!r}, which needs level='frontier'; level is {level!r}")
 
 
+def level_for(names: Iterable[str]) -> str:
+    """Return a level of decision at which all observations exist."""
+    return "frontier" if any(name in LEVEL_OBSERVABLES for name in names) else "velocity"
+
+
 def egocentric_scales_of(scales: Iterable[int]) -> tuple[int, ...]:
     """Return the scales of the egocentric map as a tuple, checked."""
     wanted = f"want one or more whole numbers from 1 to {MAX_EGOCENTRIC_SCALE}, in a list or tuple"

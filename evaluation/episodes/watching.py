@@ -14,6 +14,7 @@ from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.floors.floor_choice import Floors
 from lidarium.envs.onboard.radio.messages import Orders
 from lidarium.envs.settings.exploration import ExplorationSettings
+from lidarium.envs.settings.limits import level_for
 
 
 class Watcher:
@@ -48,7 +49,8 @@ class WatchedExploration(ExplorationEnv):
         image_resolution: float | None = None,
         watchers: Iterable[Watcher] = (),
     ) -> None:
-        super().__init__(floor, settings, image_resolution=image_resolution)
+        level = level_for(settings.observe)  # until a policy's level is used
+        super().__init__(floor, settings, image_resolution=image_resolution, level=level)
         self.watchers: list[Watcher] = list(watchers)
 
     def on_begin(self) -> None:

@@ -4,6 +4,7 @@ import numpy as np
 
 from lidarium.envs.floors.floor import Floor
 from lidarium.envs.settings.exploration import ExplorationSettings
+from lidarium.envs.settings.limits import level_for
 
 
 def drawn_starts(
@@ -31,6 +32,6 @@ def starts_in(
     """Return the start poses of a reset with a seed on a floor, x, y, theta of each [m, rad]."""
     from lidarium.envs.faces.parallel import ExplorationEnv
 
-    env = ExplorationEnv(floor, settings, image_resolution=image_resolution)
+    env = ExplorationEnv(floor, settings, image_resolution=image_resolution, level=level_for(settings.observe))
     env.reset(seed=seed)
     return [[float(number) for number in start] for start in env.world.starts]

@@ -8,6 +8,7 @@ import sys
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
+from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -22,8 +23,11 @@ if TYPE_CHECKING:
     from lidarium.training.prediction.settings import PredictionSettings
     from lidarium.training.prediction.training import PredictionTraining
     from lidarium.training.progress import Progress
-    from lidarium.training.settings import TrainingSettings
+    from lidarium.training.settings import TeamSettings, TrainingSettings
+    from lidarium.training.teams.training import TeamTraining
     from lidarium.training.training import Training
+
+    AnySettings = TrainingSettings | PredictionSettings | TeamSettings
 
 DEFAULT_FOLDER = Path("runs/training")
 
@@ -33,18 +37,21 @@ EXTRA = ("torch", "stable_baselines3", "sb3_contrib", "tensorboard")
 
 @dataclass(frozen=True, kw_only=True)
 class _Train(Command):
-    """Train explorers, or a network that predicts maps, by the settings of a TOML file.
+    """Train explorers, teams of the zoo, or a network that predicts maps, by the settings of a TOML file.
 
     A teacher that knows the floors rates each choice, a network is fitted to that, and goes on by rewards if
-    the file says so. If the file has a table [prediction], robots explore floors, and a network learns what their
-    partial maps hide. Finished parts are kept, and the same command continues after the last one. The best weights
-    and a card with all that made them are written to --out, runs/training by default.
+    the file says so. If the file has a table [team], a team learns by rewards alone. If it has a table [prediction],
+    robots explore floors, and a network learns what their partial maps hide. Finished parts are kept, and the same
+    command continues after the last one. The best weights and a card with all that made them are
+    written to --out, runs/training by default.
     """
 
     compiles: ClassVar[bool] = True
 
-    config: Positional[Path]
-    """TOML file of the training, with its seed; docs/tutorials/train_a_team.md shows one"""
+    config: Positional[Path | None] = None
+    """TOML file of the training, with its seed, as docs/tutorials/train_a_team.md shows one; or a name of --list"""
+    list: bool = False
+    """list the trainings that ship, and end"""
     workers: int = 0
     """processes; 0 for as many as there are cores"""
     device: str = "cpu"
@@ -57,6 +64,10 @@ def execute(command: _Train) -> Answer:
     """Do the missing parts of a training."""
     from lidarium.mapping.files.output import check_writable
 
+    if command.list:
+        return _listed()
+    if command.config is None:
+        raise ValueError("no training is named; want a TOML file, or a name of `lidarium train --list`")
     if command.workers < 0:
         raise ValueError(f"--workers is {command.workers}; want 0 for as many as there are cores, or more")
     if command.seed:
@@ -65,10 +76,10 @@ def execute(command: _Train) -> Answer:
             f"seed = {command.seed} at the top of {command.config}"
         )
     from lidarium.training.prediction.settings import PredictionSettings
-    from lidarium.training.settings import read_any_training
+    from lidarium.training.settings import TeamSettings, read_any_training
 
-    settings = read_any_training(command.config)
-    is_prediction = isinstance(settings, PredictionSettings)
+    settings = read_any_training(_file_of(command.config))
+    is_prediction, is_team = isinstance(settings, PredictionSettings), isinstance(settings, TeamSettings)
     _check_extra(EXTRA[:1] if is_prediction else EXTRA)
     if command.device != "cpu" and not is_prediction:
         raise ValueError(f"--device is {command.device}, and explorers are trained on the cpu; leave it out")
@@ -91,10 +102,36 @@ def execute(command: _Train) -> Answer:
         show.close()
         for logger in loggers:
             logger.close(is_whole)
-    return _predictor_answer(folder, is_interrupted) if is_prediction else _answer(folder, is_interrupted)
+    answer = _predictor_answer if is_prediction else _team_answer if is_team else _answer
+    return answer(folder, is_interrupted)
 
 
-def _loggers(names: Sequence[str], folder: Path, settings: "TrainingSettings | PredictionSettings") -> "list[Logger]":
+def _shipped() -> "dict[str, Path]":
+    """Return the files of the trainings that ship, by name."""
+    folder = Path(str(resources.files("lidarium.training.teams") / "data"))
+    return {path.stem: path for path in sorted(folder.glob("*.toml"))}
+
+
+def _file_of(config: Path) -> Path:
+    """Return the file of a training: a file that is there, or a training that ships."""
+    return config if config.exists() else _shipped().get(str(config), config)
+
+
+def _listed() -> Answer:
+    """Return the trainings that ship."""
+    from lidarium.training.settings import TeamSettings, read_any_training
+
+    found = {name: read_any_training(path) for name, path in _shipped().items()}
+    teams = {name: each for name, each in found.items() if isinstance(each, TeamSettings)}
+    header = ("training", "algorithm", "level", "robots", "decisions", "floors")
+    rows = [
+        (name, each.algorithm, each.level, each.robots, f"{each.ppo.whole_decisions:,}", each.floors)
+        for name, each in teams.items()
+    ]
+    return Answer({"trainings": {name: asdict(each) for name, each in teams.items()}}, table(rows, header))
+
+
+def _loggers(names: Sequence[str], folder: Path, settings: "AnySettings") -> "list[Logger]":
     """Return the loggers of a training, each once."""
     from lidarium.training.loggers import flattened, make_logger
 
@@ -102,11 +139,15 @@ def _loggers(names: Sequence[str], folder: Path, settings: "TrainingSettings | P
 
 
 def _training_of(
-    settings: "TrainingSettings | PredictionSettings", folder: Path, workers: int, device: str
-) -> "Training | PredictionTraining":
-    """Return what a file asks for: the training of explorers, or of a network that predicts maps."""
-    from lidarium.training.settings import TrainingSettings
+    settings: "AnySettings", folder: Path, workers: int, device: str
+) -> "Training | PredictionTraining | TeamTraining":
+    """Return what a file asks for: the training of explorers, of a team, or of a network that predicts maps."""
+    from lidarium.training.settings import TeamSettings, TrainingSettings
 
+    if isinstance(settings, TeamSettings):
+        from lidarium.training.teams.training import TeamTraining
+
+        return TeamTraining(settings, folder)
     if isinstance(settings, TrainingSettings):
         from lidarium.training.training import Training
 
@@ -176,6 +217,28 @@ def _span(seconds: float) -> str:
     if seconds < 90.0:
         return f"{seconds:.0f} s"
     return f"{seconds / 60.0:.0f} min" if seconds < 5400.0 else f"{seconds / 3600.0:.1f} h"
+
+
+def _team_answer(folder: Path, is_interrupted: bool) -> Answer:
+    from lidarium.mapping.files.guarded_reading import read_text
+    from lidarium.training.folder import MOST_BYTES
+    from lidarium.training.teams.training import CARD_FILE, WEIGHTS_FILE
+
+    if is_interrupted or not (folder / CARD_FILE).exists():
+        text = f"interrupted; what is finished is in {folder}, and the same command goes on there"
+        return Answer({"folder": str(folder), "interrupted": True}, text, INTERRUPTED)
+    card = json.loads(read_text(folder / CARD_FILE, MOST_BYTES))
+    best, untrained = card["best"], card["untrained"]["coverage"]
+    lines = [
+        f"best after {best['decisions']:,} of {card['decisions']:,} decisions, in {folder / WEIGHTS_FILE}",
+        f"coverage on the validation floors, mean over an episode: {100 * best['coverage']:.1f} %, "
+        f"{100 * untrained:.1f} % before it learned",
+    ]
+    if best["coverage"] <= untrained:
+        lines.append("it is no better than before it learned; want more decisions or floors")
+    weights = shlex.quote(f"weights={folder / WEIGHTS_FILE}")
+    lines.append(f"use them: lidarium run --policy zoo:ppo-2 --policy-set {weights}")
+    return Answer({"folder": str(folder), "interrupted": False, **card}, "\n".join(lines))
 
 
 def _predictor_answer(folder: Path, is_interrupted: bool) -> Answer:

@@ -18,6 +18,8 @@ NEEDS = {
     "random_walk": {"observe": ("scan", "pose", "bumper")},
     "nearest_node": SMALL_GRAPH,
     "utility_node": SMALL_GRAPH,
+    "zoo:ppo-2": {"observe": ("frontier_gains", "teammates")},
+    "zoo:ppo-4": {"observe": ("frontier_gains", "teammates")},
 }
 NAMES = sorted(policy_names())
 LEVELS = ("velocity", "waypoint", "frontier")
@@ -73,7 +75,8 @@ def test_every_policy_runs_in_a_plain_loop_as_run_episode_runs_it(name):
     env = lidarium.parallel_env(TWO_ROOMS, level=policy.level, **options_for(name))
     env.use_level(policy.level, policy.shares_map, policy.decision_period_s)
     poses = run(env, policy)
-    other = lidarium.parallel_env(TWO_ROOMS, **options_for(name))
+    at = {"level": "frontier"} if policy.level == "frontier" else {}  # gains are observed there only
+    other = lidarium.parallel_env(TWO_ROOMS, **at, **options_for(name))
     lidarium.run_episode(lidarium.policy(name), other, seed=3)
     assert len(poses) > 5
     assert np.array_equal(poses[-1], other.world.poses)

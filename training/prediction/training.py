@@ -4,26 +4,22 @@ Finished parts are on the disk. The same call continues an interrupted one.
 """
 
 import json
-import platform
 import time
 from collections.abc import Generator
 from contextlib import closing
 from dataclasses import asdict, dataclass
 from functools import partial
-from importlib.metadata import version
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import torch
 
-import lidarium
 from lidarium.evaluation.processes import shared_out
 from lidarium.mapping.files.guarded_reading import read_text, reading
 from lidarium.mapping.files.output import clear_unfinished, only_writer, remove_unfinished, write_json
-from lidarium.mapping.geometry.bounds import shown
 from lidarium.mapping.prediction.network import FILES
 from lidarium.training.failures import raise_named
+from lidarium.training.folder import asked_for, begin_folder, versions
 from lidarium.training.prediction.fitting import Fitting, Windows, judged
 from lidarium.training.prediction.maps import FloorMaps, explore, read_maps, write_maps
 from lidarium.training.prediction.settings import PredictionSettings
@@ -52,7 +48,7 @@ class PredictionTraining:
         if self.workers < 1:
             raise ValueError(f"workers is {self.workers}; want at least 1")
         _check_device(self.device)
-        self._begin()
+        begin_folder(self.folder / TRAINING_FILE, asdict(self.settings))
         with only_writer(self.folder / TRAINING_FILE):
             clear_unfinished(self.folder, ".json")
             remove_unfinished(self.folder, (".safetensors",))
@@ -61,27 +57,6 @@ class PredictionTraining:
             yield from self._explore()
             yield from self._fit()
         yield Progress("weights", 1, 1)
-
-    def _begin(self) -> None:
-        """Check that the folder is this training's, or new."""
-        path, asked = self.folder / TRAINING_FILE, self._asked()
-        if not path.exists():
-            if self.folder.exists() and any(self.folder.iterdir()):
-                raise ValueError(f"{self.folder} has files, and no training has written them; choose another folder")
-            write_json(path, asked)
-            return
-        with reading(path, "what a training was asked for"):
-            kept = dict(json.loads(read_text(path, MOST_BYTES)))
-        for name in sorted({*kept, *asked}):
-            if kept.get(name) != asked.get(name):
-                raise ValueError(
-                    f"{self.folder} holds a training with {name} = {shown(kept.get(name))}, this one has "
-                    f"{shown(asked.get(name))}; choose another folder"
-                )
-
-    def _asked(self) -> dict[str, Any]:
-        content: dict[str, Any] = json.loads(json.dumps(asdict(self.settings)))
-        return {"version": lidarium.__version__, **content}
 
     def _file(self, number: int) -> Path:
         return self.folder / MAPS / f"{number:06d}.npz"
@@ -132,11 +107,7 @@ class PredictionTraining:
         digest = FILES.save(self.folder / WEIGHTS_FILE, fitting.weights())
         card = {
             "sha256": digest,
-            "versions": {
-                "lidarium": lidarium.__version__,
-                "python": platform.python_version(),
-                **{name: version(name) for name in LIBRARIES},
-            },
+            "versions": versions(LIBRARIES),
             "device": self.device,
             "minutes": last / 60.0,
             "steps": fitting.step,
@@ -144,7 +115,7 @@ class PredictionTraining:
             "maps": sum(len(floor.levels) for floor in fitted),
             "held_out_floors": len(others),
             "held_out": quality.as_dict(),
-            "training": self._asked(),
+            "training": asked_for(asdict(self.settings)),
         }
         write_json(self.folder / CARD_FILE, card)
 

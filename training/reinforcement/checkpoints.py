@@ -3,6 +3,7 @@
 import json
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 import torch
@@ -11,10 +12,9 @@ from safetensors import SafetensorError
 from safetensors.numpy import load, save
 from torch import nn
 
-from lidarium.agents.learned.network import load_weights, save_weights
 from lidarium.mapping.files.guarded_reading import read_bytes, read_text, reading, shortened
 from lidarium.mapping.files.output import write_json, write_whole
-from lidarium.training.torch_network import ExplorerNetwork
+from lidarium.mapping.files.weight_files import WeightFiles
 
 MOMENTS = ("exp_avg", "exp_avg_sq")
 """Adam's state of each parameter, besides its step count."""
@@ -35,11 +35,27 @@ class Checkpoint:
     decisions : int
         How many were made.
     curve : list of (int, float or None)
-        Mean reward of the episodes that ended, by the number of decisions; None if none ended.
+        How good it was, by the number of decisions: for explorers the mean reward of the episodes that ended, None
+        if none ended; for teams what they reach on the validation floors.
     """
 
     decisions: int
     curve: list[tuple[int, float | None]]
+
+
+class Trained(Protocol):
+    """A network that is trained."""
+
+    def weights(self) -> dict[str, NDArray[np.float32]]:
+        """Return the weights as arrays, by name, without the critic's."""
+
+    def set_weights(self, weights: dict[str, NDArray[np.float32]]) -> None:
+        """Take weights over."""
+
+
+def files_of(network: Trained) -> WeightFiles:
+    """Return the files of a network's weights."""
+    return WeightFiles({name: array.shape for name, array in network.weights().items()}, "", "", "")
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,14 +74,14 @@ class Learner:
     optimizer: torch.optim.Optimizer
 
 
-def write_checkpoint(folder: Path, checkpoint: Checkpoint, network: ExplorerNetwork, learner: Learner) -> None:
+def write_checkpoint(folder: Path, checkpoint: Checkpoint, network: Trained, learner: Learner) -> None:
     """Write a checkpoint, and remove all but the last two.
 
     The file that makes it one is written last and removed first: whenever the process is killed, the part that is
     found is whole.
     """
     name = _name(checkpoint.decisions)
-    save_weights(folder / f"{name}.safetensors", network.weights())
+    files_of(network).save(folder / f"{name}.safetensors", network.weights())
     write_whole(folder / f"{name}.learner.safetensors", save(_state_of(learner)))
     write_json(folder / f"{name}.json", {"decisions": checkpoint.decisions, "curve": checkpoint.curve})
     kept = {path.stem for path in sorted(folder.glob("decisions-*.json"))[-KEPT:]}
@@ -85,12 +101,12 @@ def latest_checkpoint(folder: Path) -> Checkpoint | None:
         return Checkpoint(int(content["decisions"]), curve)
 
 
-def restore(folder: Path, checkpoint: Checkpoint, network: ExplorerNetwork, learner: Learner) -> None:
+def restore(folder: Path, checkpoint: Checkpoint, network: Trained, learner: Learner) -> None:
     """Bring network and learner to where they were at a checkpoint."""
     name = _name(checkpoint.decisions)
     path = weights_of(folder, checkpoint)
     try:
-        weights = load_weights(path)
+        weights = files_of(network).load(path)
         path = folder / f"{name}.learner.safetensors"
         _set_state(learner, load(read_bytes(path)))
     except (OSError, SafetensorError, ValueError, KeyError, RuntimeError) as error:

@@ -11,24 +11,29 @@ the ranking of explore_lite, three times the path less the size.
 
 from collections.abc import Mapping
 
+import numpy as np
 import torch
 from gymnasium import spaces
+from numpy.typing import NDArray
 from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 from torch import Tensor, nn
 
-from lidarium.agents.learned.network import LAYERS, WIDTH
+from lidarium.agents.attention import LAYERS, WIDTH
+from lidarium.agents.zoo.network import (
+    FRONTIERS,
+    GAINS,
+    MASK,
+    METRES,
+    PATH_FACTOR,
+    SQUARE_METRES,
+    TEAMMATE_UNITS,
+    TEAMMATES,
+)
 from lidarium.training.reinforcement.masked_ppo import RankingPolicy
 from lidarium.training.torch_network import AttentionLayer
 
-FRONTIERS, MASK, GAINS, TEAMMATES = "frontiers", "action_mask", "frontier_gains", "teammates"
 SITUATION = ("time_left", "coverage", "velocity", "bumper")
 """Observables that are seen of the situation."""
-
-METRES, SQUARE_METRES, SECONDS = 10.0, 10.0, 60.0
-"""Scales of lengths, areas and ages."""
-
-PATH_FACTOR = 3.0
-"""A metre of path counts as so many of size, as in explore_lite."""
 
 LEAST_GROUP = 32
 """Decisions are ranked in groups of like numbers of frontiers, of at least so many decisions."""
@@ -67,6 +72,16 @@ class FrontierRanking(BaseFeaturesExtractor):
         order = counts.argsort()
         found = [self._ranked(observations, offered, rows) for rows in order.chunk(groups)]
         return torch.cat(found)[order.argsort()]
+
+    def weights(self) -> dict[str, NDArray[np.float32]]:
+        """Return the weights as arrays, by name, but for the critic's."""
+        state = {name: each for name, each in self.state_dict().items() if not name.startswith("critic.")}
+        return {name: array.detach().cpu().numpy().copy() for name, array in state.items()}
+
+    def set_weights(self, weights: Mapping[str, NDArray[np.float32]]) -> None:
+        """Take weights over; the critic stays."""
+        given = {name: torch.from_numpy(array.copy()) for name, array in weights.items()}
+        self.load_state_dict({**self.state_dict(), **given})
 
     def _ranked(self, observations: Mapping[str, Tensor], offered: Tensor, rows: Tensor) -> Tensor:
         """Rank the frontiers of some decisions; no more of them are taken than the widest one has."""
@@ -111,6 +126,17 @@ class FrontierPolicy(RankingPolicy):
 
     ranking = FrontierRanking
 
+    @property
+    def network(self) -> FrontierRanking:
+        """The network, with the critic."""
+        assert isinstance(self.features_extractor, FrontierRanking)
+        return self.features_extractor
+
+    @property
+    def critic(self) -> nn.Module:
+        """The critic."""
+        return self.network.critic
+
 
 def _check_observed(space: spaces.Space[dict[str, object]]) -> None:
     """Check that the network supports the observations."""
@@ -133,5 +159,4 @@ def _frontier_numbers(frontiers: Tensor) -> Tensor:
 
 def _teammate_numbers(teammates: Tensor) -> Tensor:
     """Return rows of teammates near 1."""
-    units = teammates.new_tensor([METRES, METRES, torch.pi, METRES, METRES, 1.0, SECONDS, 1.0])
-    return teammates / units
+    return teammates / torch.from_numpy(TEAMMATE_UNITS)

@@ -27,7 +27,8 @@ from lidarium.training.reinforcement.checkpoints import (
     write_checkpoint,
 )
 from lidarium.training.reinforcement.choice_env import ChoiceEnv
-from lidarium.training.reinforcement.masked_ppo import ExplorerPolicy
+from lidarium.training.reinforcement.frontier_policy import FrontierPolicy
+from lidarium.training.reinforcement.masked_ppo import ExplorerPolicy, RankingPolicy
 from lidarium.training.settings import PpoSettings, TrainingSettings
 
 PLACES_PER_CHECKPOINT = 1000
@@ -38,31 +39,22 @@ def learn(
     training: TrainingSettings, folder: Path, begin: Path | None, workers: int, log: Path
 ) -> Generator[Progress, None, None]:
     """Go on with a network by rewards, from its last checkpoint on."""
-    settings, checkpoint = training.ppo, latest_checkpoint(folder) or Checkpoint(0, [])
-    total = -(-settings.decisions // settings.checkpoint) * settings.checkpoint
-    if checkpoint.decisions >= total:
+    settings, last = training.ppo, latest_checkpoint(folder)
+    done, total = 0 if last is None else last.decisions, settings.whole_decisions
+    if done >= total:
         return
-    yield Progress("rewards", checkpoint.decisions, total)
+    yield Progress("rewards", done, total)
     environment = environments_of(training, workers)
     is_whole = False
     try:
-        model = model_of(settings, environment, training.seed)
-        model.set_logger(configure(str(log), ["tensorboard"]))
-        policy = model.policy
-        assert isinstance(policy, ExplorerPolicy)
-        learner = Learner(policy.critic, policy.optimizer)
-        if checkpoint.decisions:
-            restore(folder, checkpoint, policy.network, learner)
-            model.num_timesteps = checkpoint.decisions  # where TensorBoard's curves go on
-        elif begin is not None:
-            policy.network.set_weights(load_weights(begin))
-        while checkpoint.decisions < total:
-            number = checkpoint.decisions // settings.checkpoint
-            reward = _learn_on(model, environment, training, number)
-            decisions = checkpoint.decisions + settings.checkpoint
-            checkpoint = Checkpoint(decisions, [*checkpoint.curve, (decisions, reward)])
-            write_checkpoint(folder, checkpoint, policy.network, learner)
-            yield Progress("rewards", decisions, total, {} if reward is None else {"reward": reward})
+        model = model_of(ExplorerPolicy, settings, environment, training.seed)
+        if last is None and begin is not None:
+            model.policy.network.set_weights(load_weights(begin))
+        begin_at = partial(_begin_at, environment)
+        first = Checkpoint(0, [])
+        for checkpoint in learn_on(model, settings, training.seed, folder, log, begin_at, _mean_reward, first):
+            reward = checkpoint.curve[-1][1]
+            yield Progress("rewards", checkpoint.decisions, total, {} if reward is None else {"reward": reward})
         is_whole = True
     except (EOFError, ConnectionError) as error:
         raise ValueError(
@@ -71,6 +63,42 @@ def learn(
         ) from error
     finally:
         _close(environment, is_whole)
+
+
+def learn_on(
+    model: MaskablePPO,
+    settings: PpoSettings,
+    seed: int,
+    folder: Path,
+    log: Path,
+    begin_at: Callable[[int], None],
+    measure: Callable[[MaskablePPO, Checkpoint], float | None],
+    first: Checkpoint,
+) -> Generator[Checkpoint, None, None]:
+    """Learn from the last checkpoint in a folder on, or from the first one, and yield each checkpoint.
+
+    New episodes begin and all draws are seeded again behind each, so that a training that goes on from one does the
+    same as one that was never interrupted: ``begin_at`` gets the number of the checkpoint. ``measure`` returns the
+    next entry of the curve, when the network has learned on from a checkpoint.
+    """
+    model.set_logger(configure(str(log), ["tensorboard"]))
+    policy, checkpoint = model.policy, latest_checkpoint(folder) or first
+    assert isinstance(policy, ExplorerPolicy | FrontierPolicy)
+    learner = Learner(policy.critic, policy.optimizer)
+    if checkpoint.decisions:
+        restore(folder, checkpoint, policy.network, learner)
+        model.num_timesteps = checkpoint.decisions  # where TensorBoard's curves go on
+    while checkpoint.decisions < settings.whole_decisions:
+        number = checkpoint.decisions // settings.checkpoint
+        model.set_random_seed(seed + 1 + number)
+        begin_at(number)
+        model._last_obs = None  # learn() resets the environments
+        model.ep_info_buffer = None
+        model.learn(settings.checkpoint, reset_num_timesteps=False)
+        decisions = checkpoint.decisions + settings.checkpoint
+        checkpoint = Checkpoint(decisions, [*checkpoint.curve, (decisions, measure(model, checkpoint))])
+        write_checkpoint(folder, checkpoint, policy.network, learner)
+        yield checkpoint
 
 
 def _close(environment: VecEnv, is_whole: bool) -> None:
@@ -107,12 +135,12 @@ def _place(training: TrainingSettings, number: int) -> Place:
     return place_of(training, training.rounds[-1], begin + number)
 
 
-def model_of(settings: PpoSettings, environment: VecEnv, seed: int) -> MaskablePPO:
-    """Return a learner whose network is that of classic tours."""
+def model_of(policy: type[RankingPolicy], settings: PpoSettings, environment: VecEnv, seed: int) -> MaskablePPO:
+    """Return a learner whose network has not learned yet."""
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="You have specified a mini-batch size")
         return MaskablePPO(
-            ExplorerPolicy,
+            policy,
             environment,
             learning_rate=settings.learning_rate,
             n_steps=settings.steps,
@@ -127,16 +155,13 @@ def model_of(settings: PpoSettings, environment: VecEnv, seed: int) -> MaskableP
         )
 
 
-def _learn_on(model: MaskablePPO, environment: VecEnv, training: TrainingSettings, number: int) -> float | None:
-    """Learn up to the next checkpoint.
-
-    New episodes begin and all draws are seeded again, so that a training that goes on from a checkpoint does the
-    same as one that was never interrupted.
-    """
+def _begin_at(environment: VecEnv, number: int) -> None:
+    """Let new episodes begin behind a checkpoint."""
     environment.env_method("begin_at", number * PLACES_PER_CHECKPOINT)
-    model.set_random_seed(training.seed + 1 + number)
-    model._last_obs = None  # learn() resets the environments
-    model.ep_info_buffer = None
-    model.learn(training.ppo.checkpoint, reset_num_timesteps=False)
+
+
+def _mean_reward(model: MaskablePPO, before: Checkpoint) -> float | None:
+    """Return the mean reward of the episodes that ended since the last checkpoint, None if none ended."""
+    del before
     episodes: list[dict[str, float]] = list(model.ep_info_buffer or [])
     return float(np.mean([each["r"] for each in episodes])) if episodes else None

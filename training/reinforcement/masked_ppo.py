@@ -9,7 +9,7 @@ from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 from stable_baselines3.common.type_aliases import Schedule
 from torch import Tensor, nn
 
-from lidarium.agents.learned.network import WIDTH
+from lidarium.agents.attention import WIDTH
 from lidarium.training.decisions import MOST_OPTIONS
 from lidarium.training.torch_network import ExplorerNetwork, Seen
 

@@ -8,6 +8,7 @@ from safetensors.numpy import load_file, save_file
 from torch import nn
 
 from lidarium.agents.learned.network import WIDTH
+from lidarium.mapping.files.weight_files import WeightFiles
 from lidarium.training.decisions import stacked
 from lidarium.training.reinforcement.checkpoints import (
     Checkpoint,
@@ -88,8 +89,8 @@ def test_of_a_kill_between_two_files_the_checkpoint_before_is_left(tmp_path, mon
 
     from lidarium.training.reinforcement import checkpoints
 
-    for name in ("save_weights", "write_whole", "write_json"):
-        monkeypatch.setattr(checkpoints, name, counting(getattr(checkpoints, name)))
+    for where, name in ((WeightFiles, "save"), (checkpoints, "write_whole"), (checkpoints, "write_json")):
+        monkeypatch.setattr(where, name, counting(getattr(where, name)))
     network, found = learner(0, 3)
     with pytest.raises(KeyboardInterrupt):
         write_checkpoint(tmp_path, Checkpoint(16, []), network, found)

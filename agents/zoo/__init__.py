@@ -1,0 +1,1 @@
+"""Zoo: teams that were trained by rewards, run by numpy."""

@@ -1,0 +1,49 @@
+"""Teams of the zoo as policies: the networks that the package has, or those of a training of your own."""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from lidarium.agents.policy import Action, Policy, Team
+from lidarium.agents.zoo.network import GAINS, TEAMMATES, FrontierNetwork, frontier_shapes
+from lidarium.envs.faces.parallel import Observation
+from lidarium.mapping.files.weight_files import WeightFiles
+
+
+def zoo_files(name: str) -> WeightFiles:
+    """Return the files of a team of the zoo, such as ``ppo-2``."""
+    return WeightFiles(frontier_shapes(), "lidarium.agents.zoo", f"{name}.safetensors", f"{name}.json")
+
+
+class ZooTeam(Policy):
+    """Robots that share one trained network, and each choose a frontier by it.
+
+    Parameters
+    ----------
+    name : str
+        The team, such as ``ppo-2``; any number of robots, two at least, may use its network.
+    weights : str or Path, optional
+        File of weights of `lidarium train`. Those of the package by default.
+    """
+
+    level = "frontier"
+    observes = (GAINS, TEAMMATES)
+
+    def __init__(self, name: str, weights: str | Path = "") -> None:
+        self._network = FrontierNetwork(zoo_files(name).load(weights))
+
+    def reset(self, team: Team, seed: int = 0) -> None:
+        """Begin an episode: nothing is kept of the last one."""
+
+    def act(self, observations: Mapping[str, Observation]) -> dict[str, Action]:
+        """Choose a frontier for each robot; one without a frontier stays."""
+        return {agent: self._network.choose(observation) for agent, observation in observations.items()}
+
+
+def ppo_2(weights: str | Path = "") -> ZooTeam:
+    """Return the team of two that was trained by PPO."""
+    return ZooTeam("ppo-2", weights)
+
+
+def ppo_4(weights: str | Path = "") -> ZooTeam:
+    """Return the team of four that was trained by PPO."""
+    return ZooTeam("ppo-4", weights)

@@ -1,0 +1,136 @@
+"""Trainings of teams by rewards, into a folder."""
+
+import json
+
+import numpy as np
+import pytest
+
+torch = pytest.importorskip("torch", reason='PyTorch is not installed: extra "rl"')
+pytest.importorskip("sb3_contrib", reason='sb3-contrib is not installed: extra "rl"')
+
+from lidarium.agents.zoo.network import FrontierNetwork  # noqa: E402
+from lidarium.agents.zoo.policy import zoo_files  # noqa: E402
+from lidarium.envs.faces.makers import sb3_vec_env  # noqa: E402
+from lidarium.scripts.main import main  # noqa: E402
+from lidarium.training.reinforcement.frontier_policy import FrontierRanking  # noqa: E402
+from lidarium.training.settings import TeamSettings, read_any_training  # noqa: E402
+from lidarium.training.teams.training import CARD_FILE, CHECKPOINTS, CURVE_FILE, WEIGHTS_FILE, TeamTraining  # noqa: E402
+
+TINY = """
+seed = 3
+[team]
+robots = 2
+floors = "apartment"
+horizon_s = 20.0
+validation = "validation:2"
+[ppo]
+decisions = 32
+checkpoint = 16
+environments = 4
+steps = 4
+batch = 8
+epochs = 1
+learning_rate = 0.01
+"""
+
+
+def settings_of(text, tmp_path):
+    path = tmp_path / "team.toml"
+    path.write_text(text)
+    return read_any_training(path)
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """A training of two updates that was never interrupted."""
+    folder = tmp_path_factory.mktemp("whole")
+    steps = list(TeamTraining(settings_of(TINY, folder), folder / "run").run())
+    return folder / "run", steps
+
+
+def test_two_updates_have_a_curve_a_card_and_the_best_weights(whole):
+    folder, steps = whole
+    assert [(step.part, step.done) for step in steps] == [
+        ("rewards", 0),
+        ("rewards", 16),
+        ("rewards", 32),
+        ("best weights", 1),
+    ]
+    card = json.loads((folder / CARD_FILE).read_text())
+    curve = card["curve"]
+    assert [number for number, _ in curve] == [0, 16, 32]
+    assert all(0.0 < coverage < 1.0 for _, coverage in curve)
+    assert card["best"]["coverage"] == max(coverage for _, coverage in curve[1:])
+    assert (folder / CURVE_FILE).read_text().splitlines()[0] == "step,coverage"
+    best = folder / CHECKPOINTS / f"decisions-{card['best']['decisions']:09d}.safetensors"
+    assert best.read_bytes() == (folder / WEIGHTS_FILE).read_bytes()
+
+
+def test_a_training_that_goes_on_after_a_kill_is_equal(whole, tmp_path):
+    settings = settings_of(TINY, tmp_path)
+    steps = TeamTraining(settings, tmp_path / "run").run()
+    assert next(steps).done == 0
+    assert next(steps).done == 16
+    steps.close()
+    list(TeamTraining(settings, tmp_path / "run").run())
+    for name in (CARD_FILE, CURVE_FILE, WEIGHTS_FILE, f"{CHECKPOINTS}/decisions-000000032.learner.safetensors"):
+        assert (tmp_path / "run" / name).read_bytes() == (whole[0] / name).read_bytes(), name
+
+
+def test_a_finished_training_is_not_run_again(whole):
+    before = (whole[0] / WEIGHTS_FILE).read_bytes()
+    folder = whole[0]
+    settings = settings_of(TINY, folder.parent)
+    assert [step.part for step in TeamTraining(settings, folder).run()] == ["rewards", "best weights"]
+    assert (folder / WEIGHTS_FILE).read_bytes() == before
+
+
+def test_numpy_decides_as_torch(whole):
+    weights = zoo_files("").load(whole[0] / WEIGHTS_FILE)
+    options = TeamSettings().options("fast")
+    env = sb3_vec_env(4, "apartment:7", level="frontier", **options)
+    seen, generator = env.reset(), np.random.default_rng(0)
+    ranking = FrontierRanking(env.observation_space)
+    drawn = {
+        name: array + generator.normal(0.0, 0.1, array.shape).astype(np.float32) for name, array in weights.items()
+    }
+    ranking.set_weights(drawn)
+    network = FrontierNetwork(drawn)
+    for _ in range(5):
+        tensors = {name: torch.from_numpy(array.astype(np.float32)) for name, array in seen.items()}
+        wanted = ranking(tensors).detach().numpy()[:, :-1]
+        for row, mask in enumerate(seen["action_mask"] > 0):
+            found = network.preferences({name: array[row] for name, array in seen.items()})
+            np.testing.assert_allclose(found[mask], wanted[row][mask], rtol=1e-4, atol=1e-4)
+        seen = env.step(np.array([generator.choice(np.flatnonzero(mask)) for mask in seen["action_mask"]]))[0]
+    env.close()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("robots = 2", "robots = 1", "robots of team is 1"),
+        ("robots = 2", "robots = 3", "whole multiple of the 3 robots"),
+        ("robots = 2", 'robots = 2\nalgorithm = "dqn"', "algorithm of team is 'dqn'; want ppo"),
+        ("robots = 2", 'robots = 2\nlevel = "tour"', "level of team is 'tour'; want frontier"),
+        ("robots = 2", "robots = 2\nsettings = { observe = ['scan'] }", "settings of team has 'observe'"),
+        ("decisions = 32", "decisions = 0", "decisions of ppo is 0"),
+        ("seed = 3", "seed = 3\nfit = {}", "a training of teams has no 'fit'"),
+        ('"validation:2"', '"castle:3"', "castle"),
+    ],
+)
+def test_bad_settings_are_refused_before_anything_is_written(old, new, words, tmp_path, capsys):
+    path = tmp_path / "team.toml"
+    path.write_text(TINY.replace(old, new))
+    assert main(["train", str(path), "--out", str(tmp_path / "run")]) == 2
+    assert words in capsys.readouterr().err
+    assert not (tmp_path / "run").exists()
+
+
+def test_trainings_that_ship_are_listed_and_can_be_read(capsys):
+    assert main(["train", "--list"]) == 0
+    text = capsys.readouterr().out
+    assert "ppo-2" in text
+    assert "ppo-4" in text
+    assert main(["train"]) == 2
+    assert "lidarium train --list" in capsys.readouterr().err

@@ -1,0 +1,1 @@
+"""Training of the teams of the zoo, by rewards alone."""

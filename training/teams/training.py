@@ -1,0 +1,138 @@
+"""A whole training of a team of the zoo, in a folder: rewards, and the best network on the validation floors.
+
+Checkpoints are on the disk. The same call continues an interrupted training.
+"""
+
+import math
+from collections.abc import Generator
+from contextlib import closing
+from dataclasses import asdict, dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from sb3_contrib import MaskablePPO
+from stable_baselines3.common.vec_env import VecEnv, VecMonitor
+
+from lidarium.agents.zoo.policy import zoo_files
+from lidarium.envs.faces.makers import sb3_vec_env, vector_env
+from lidarium.envs.floors.catalogue.names import set_floors
+from lidarium.mapping.files.output import clear_unfinished, only_writer, remove_unfinished, write_json, write_text
+from lidarium.training.folder import asked_for, begin_folder, versions
+from lidarium.training.progress import Progress
+from lidarium.training.reinforcement.checkpoints import Checkpoint, latest_checkpoint
+from lidarium.training.reinforcement.frontier_policy import FrontierPolicy
+from lidarium.training.reinforcement.learning import learn_on, model_of
+from lidarium.training.settings import TeamSettings
+
+TRAINING_FILE, WEIGHTS_FILE, CARD_FILE, CURVE_FILE = "training.json", "weights.safetensors", "card.json", "curve.csv"
+CHECKPOINTS, TENSORBOARD = "checkpoints", "tensorboard"
+LIBRARIES = ("numpy", "numba", "torch", "stable-baselines3", "sb3-contrib")
+
+LEARNING_WORLD_SEED = 7
+"""Seeds of the episodes behind a checkpoint are drawn with it."""
+
+
+@dataclass(frozen=True, slots=True)
+class TeamTraining:
+    """A training that runs into a folder."""
+
+    settings: TeamSettings
+    folder: Path
+
+    def run(self) -> Generator[Progress, None, None]:
+        """Learn from the last checkpoint on, and yield each step when it is on the disk."""
+        set_floors(self.settings.validation)  # hours of learning are not for floors that are not there
+        begin_folder(self.folder / TRAINING_FILE, asdict(self.settings))
+        with only_writer(self.folder / TRAINING_FILE):
+            checkpoints = self.folder / CHECKPOINTS
+            for folder in (self.folder, checkpoints):
+                clear_unfinished(folder, ".json")
+                remove_unfinished(folder, (".safetensors", ".csv"))
+            torch.set_num_threads(1)
+            last, total = latest_checkpoint(checkpoints), self.settings.ppo.whole_decisions
+            done = 0 if last is None else last.decisions
+            yield Progress("rewards", done, total)
+            if last is None or done < total:
+                yield from self._learn(last, total)
+            self._write(latest_checkpoint(checkpoints))
+        yield Progress("best weights", 1, 1)
+
+    def _learn(self, last: Checkpoint | None, total: int) -> Generator[Progress, None, None]:
+        settings, ppo = self.settings, self.settings.ppo
+        episodes = ppo.environments // settings.robots
+        options = settings.options(settings.realism)
+        with closing(
+            VecMonitor(sb3_vec_env(episodes, settings.floors, level=settings.level, threads=1, **options))
+        ) as environment:
+            model = model_of(FrontierPolicy, ppo, environment, settings.seed)
+            first = Checkpoint(0, []) if last is not None else Checkpoint(0, [(0, self._validated(model))])
+            for checkpoint in learn_on(
+                model,
+                ppo,
+                settings.seed,
+                self.folder / CHECKPOINTS,
+                self.folder / TENSORBOARD,
+                partial(_seed_episodes, environment, settings.seed),
+                self._measured,
+                first,
+            ):
+                self._write(checkpoint)
+                yield Progress("rewards", checkpoint.decisions, total, {"coverage": checkpoint.curve[-1][1] or 0.0})
+
+    def _measured(self, model: MaskablePPO, before: Checkpoint) -> float:
+        """Return what the network reaches; keep its weights if that is more than ever before."""
+        reached = self._validated(model)
+        if reached > max((found for number, found in before.curve if number and found is not None), default=-1.0):
+            assert isinstance(model.policy, FrontierPolicy)
+            zoo_files("").save(self.folder / WEIGHTS_FILE, model.policy.network.weights())
+        model.logger.record("validation/coverage", reached)
+        model.logger.dump(model.num_timesteps)
+        return reached
+
+    def _validated(self, model: MaskablePPO) -> float:
+        """Return the coverage that a network reaches, mean over the time of an episode and over the floors.
+
+        The network takes what it prefers, from the same starts each time.
+        """
+        settings, floors = self.settings, set_floors(self.settings.validation)
+        options = settings.options("ideal")
+        environment = vector_env(len(floors), floors[0], level=settings.level, threads=1, copy=False, **options)
+        with closing(environment):
+            seen, infos = environment.reset(seed=[0] * len(floors), options={"floor": list(floors)})
+            reached, is_over = infos["truth"]["coverage"].copy(), np.zeros(environment.num_envs, np.bool_)
+            decisions, total = math.ceil(settings.horizon_s / environment.settings.decision_period_s), 0.0
+            for _ in range(decisions):
+                actions, _ = model.predict(seen, action_masks=seen["action_mask"], deterministic=True)
+                seen, _, terminated, truncated, infos = environment.step(actions)
+                reached[~is_over] = infos["truth"]["coverage"][~is_over]
+                is_over |= terminated | truncated
+                total += float(reached.mean())
+        return total / decisions
+
+    def _write(self, checkpoint: Checkpoint | None) -> None:
+        """Write the curve and the card of the best network so far."""
+        assert checkpoint is not None  # the curve has one point at least
+        curve = [(number, found) for number, found in checkpoint.curve if found is not None]
+        write_text(self.folder / CURVE_FILE, "step,coverage\n" + "".join(f"{k},{found}\n" for k, found in curve))
+        best = max(curve[1:] or curve, key=lambda entry: entry[1])
+        files = zoo_files("")
+        digest = files.save(self.folder / WEIGHTS_FILE, files.load(self.folder / WEIGHTS_FILE))
+        card: dict[str, Any] = {
+            "sha256": digest,
+            "decisions": checkpoint.decisions,
+            "best": {"decisions": best[0], "coverage": best[1]},
+            "untrained": {"coverage": curve[0][1]},
+            "curve": curve,
+            "versions": versions(LIBRARIES),
+            "training": asked_for(asdict(self.settings)),
+        }
+        write_json(self.folder / CARD_FILE, card)
+
+
+def _seed_episodes(environment: VecEnv, seed: int, number: int) -> None:
+    """Let the episodes behind a checkpoint draw floors and starts of their own."""
+    draws = np.random.SeedSequence([LEARNING_WORLD_SEED, seed, number])
+    environment.seed(int(draws.generate_state(1)[0]) >> 1)
