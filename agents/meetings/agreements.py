@@ -43,9 +43,9 @@ class MeetingSettings:
     """
 
     rule: str = "meeting"
-    interval: Annotated[float, within(0.0, 1e3)] = 2.0
-    minimum_s: Seconds = 40.0
-    maximum_s: Seconds = 120.0
+    interval: Annotated[float, within(0.0, 1e3)] = 4.0
+    minimum_s: Seconds = 200.0
+    maximum_s: Seconds = 600.0
     patience_s: Seconds = 20.0
     trust_s: Seconds = 60.0
 

@@ -57,7 +57,8 @@ class Tethered(Meetings, TourFrontier):
             return wanted
         navigation = self.navigation(agents[0])
         cells = [self._goal_cell(agent) for agent in agents]
-        raster = Raster((navigation.log_odds > 0).astype(np.uint8), (0.0, 0.0), navigation.resolution)
+        # What is unknown may be a wall.
+        raster = Raster((navigation.log_odds >= 0).astype(np.uint8), (0.0, 0.0), navigation.resolution)
         places = (np.vstack([np.array(cells), options.cells])[:, ::-1] + 0.5) * navigation.resolution
         joined = links(careful(self.team.settings.radio), places, raster)
         at = list(range(len(agents)))

@@ -44,7 +44,8 @@ def test_an_ideal_radio_and_a_robot_alone_give_tour_frontier_to_the_bit():
 def test_two_robots_in_a_corridor_part_and_meet_in_its_middle(make):
     policy = make(rule="meeting")
     episode, history = finished(policy, corridor(2), robots=2, radio=NEAR)
-    assert history.curves.c_own[-1].min() >= 0.99
+    own = history.curves.c_own[-1]
+    assert own.min() == own.max() >= 0.985
     # Both ends are open, and as far from there.
     assert policy.agreed[0].place[0] == pytest.approx(12.0, abs=1.5)
     assert all(book.given_up == set() for book in policy.notebooks.values())
@@ -53,7 +54,7 @@ def test_two_robots_in_a_corridor_part_and_meet_in_its_middle(make):
 
 def test_all_that_live_know_the_floor_if_a_teammate_dies():
     faults = FaultSettings(schedule=(Fault(kind="dead_robot", robot=1, at_s=12.0),))
-    policy = MeetingTours(rule="meeting")
+    policy = MeetingTours(minimum_s=40.0, maximum_s=40.0)
     episode, history = finished(policy, corridor(3), robots=3, radio=NEAR, faults=faults)
     assert history.curves.c_own[-1][[0, 2]].min() >= 0.99
     assert episode.env.scorer.time < 600.0
