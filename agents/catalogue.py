@@ -60,6 +60,26 @@ POLICIES.register(
     "the team shares out all frontiers as tours past places from which much is seen",
 )
 POLICIES.register(
+    "oblivious",
+    "lidarium.agents.tours.policy:TourFrontier",
+    "tour_frontier, whose robots exchange maps when they are in reach by chance; a baseline of meeting_tours",
+)
+POLICIES.register(
+    "tethered",
+    "lidarium.agents.meetings.tethered:Tethered",
+    "as tour_frontier, with robots that never leave each other's radio; a baseline of meeting_tours",
+)
+POLICIES.register(
+    "meeting_tours",
+    "lidarium.agents.meetings.policy:MeetingTours",
+    "as tour_frontier, with robots that meet again when their radio does not reach",
+)
+POLICIES.register(
+    "meeting_frontier",
+    "lidarium.agents.meetings.policy:MeetingFrontier",
+    "each robot drives to the nearest frontier of its map, and meets the others again",
+)
+POLICIES.register(
     "predicted_tours",
     "lidarium.agents.predicted.policy:PredictedTours",
     "tours of the team on a map whose unknown part a network predicts",

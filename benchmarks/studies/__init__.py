@@ -20,6 +20,7 @@ for _name, _module, _summary in (
         "learned explorers beside classic ones and bounds, on floors that no training has seen",
     ),
     ("machines", "machines", "10^5 episodes, two nodes of a Ray cluster beside one, and nodes that are killed"),
+    ("meetings", "meetings", "teams whose radio breaks: meetings, beside pursuit, robots that never part, and chance"),
     ("merging", "merging.study", "map merging on a bank of maps that robots made, beside the thesis and ROS map_merge"),
     ("parity", "parity", "random driving in the world of PyBullet beside the kinematic one, on 20 floors"),
     ("people", "people", "reference policies, SLAM and batches among people and doors, beside the same without"),

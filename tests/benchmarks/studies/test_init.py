@@ -16,6 +16,7 @@ NAMES = (
         "leaderboard",
         "learned",
         "machines",
+        "meetings",
         "merging",
     ),
     *("parity", "people", "prediction", "printed", "realism", "slam", "sparse", "splines", "srt", "supervisor"),

@@ -1,0 +1,1 @@
+"""Explorers that agree on meetings, so that all robots know the floor although their radio breaks."""
