@@ -49,6 +49,7 @@ def learn(
     try:
         model = model_of(ExplorerPolicy, settings, environment, training.seed)
         if last is None and begin is not None:
+            assert isinstance(model.policy, ExplorerPolicy)
             model.policy.network.set_weights(load_weights(begin))
         begin_at = partial(_begin_at, environment)
         first = Checkpoint(0, [])

@@ -59,6 +59,7 @@ def measure(effort: Effort) -> list[Line]:
 def _decisions(rounds: int, workers: int) -> list[tuple[float, float]]:
     """Return of each rollout with its update the seconds a decision, and those within environments."""
     from lidarium.training.reinforcement.learning import environments_of, model_of
+    from lidarium.training.reinforcement.masked_ppo import ExplorerPolicy
     from lidarium.training.settings import read_training
 
     with tempfile.TemporaryDirectory() as folder:
@@ -68,7 +69,7 @@ def _decisions(rounds: int, workers: int) -> list[tuple[float, float]]:
     environments = environments_of(training, workers)
     inside = timed(environments)
     try:
-        model = model_of(training.ppo, environments, training.seed)
+        model = model_of(ExplorerPolicy, training.ppo, environments, training.seed)
         count = ENVIRONMENTS * STEPS
         model.learn(count)  # kernels and floors come into memory
         found = []
