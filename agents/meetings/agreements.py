@@ -44,10 +44,10 @@ class MeetingSettings:
 
     rule: str = "meeting"
     interval: Annotated[float, within(0.0, 1e3)] = 4.0
-    minimum_s: Seconds = 200.0
-    maximum_s: Seconds = 600.0
+    minimum_s: Seconds = 400.0
+    maximum_s: Seconds = 800.0
     patience_s: Seconds = 20.0
-    trust_s: Seconds = 60.0
+    trust_s: Seconds = 20.0
 
     def __post_init__(self) -> None:
         check_settings(self, "meetings")
