@@ -43,7 +43,8 @@ PAGE = """# Meetings
 
 Teams of 4 whose radio breaks (`signal` unless said otherwise), maps of 0.1 m, `realism="ideal"`, until every robot
 that lives knows {share:.0f} % of the floor, or {horizon:.0f} s, which then count. Ratios are geometric means over
-pairs on the same floor, with 95 % intervals. Floors are a part of 60: {offices} offices and {buildings} smaller buildings.
+pairs on the same floor, with 95 % intervals. Starts are those of the floor. Floors are a part of 60: {offices} offices
+and {buildings} smaller buildings.
 
 | figure | to reach | measured | floors | reached |
 |---|---:|---:|---:|---|
