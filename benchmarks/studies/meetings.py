@@ -43,8 +43,8 @@ PAGE = """# Meetings
 
 Teams of 4 whose radio breaks (`signal` unless said otherwise), maps of 0.1 m, `realism="ideal"`, until every robot
 that lives knows {share:.0f} % of the floor, or {horizon:.0f} s, which then count. Ratios are geometric means over
-pairs on the same floor, with 95 % intervals. Floors are a part of 60: {offices} offices and {buildings} smaller
-buildings.
+pairs on the same floor, with 95 % intervals. Starts are those of the floor. Floors are a part of 60: {offices} offices
+and {buildings} smaller buildings.
 
 | figure | to reach | measured | floors | reached |
 |---|---:|---:|---:|---|
@@ -146,7 +146,7 @@ def _station_share(env: ExplorationEnv, history: History) -> float:
     held = [copy for copy in env.perception.exchanges[0].copies[-1] if copy.size]
     if not held:
         return 0.0
-    summed = np.sum(held, axis=0, dtype=np.int16)
+    summed: NDArray[np.int16] = np.sum(np.stack(held), axis=0, dtype=np.int16)
     counted = history.truth.counted
     row, column = cells_beyond(env, 0)
     return float((summed[row : row + counted.shape[0], column : column + counted.shape[1]] < 0)[counted].mean())
