@@ -124,7 +124,7 @@ def page(entry: Entry, found: Benchmark) -> str:
         _usage(entry),
         "## Observation",
         markdown_table(("name", "shape", "dtype", "from", "to"), _boxes(env.observation_space("robot_0"))),
-        "What the arrays hold: [observations](../reference/environments.md#observation). `observe` chooses others.",
+        "What the arrays hold: [observations](../reference/observations.md). `observe` chooses others.",
         "## Action",
         f"`{_space(env.action_space('robot_0'))}`: [actions](../reference/environments.md#action) of the level "
         f"`{env.unwrapped.level}`. `level` chooses another.",
