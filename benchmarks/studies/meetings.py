@@ -18,7 +18,7 @@ from lidarium.envs.settings.making import make_settings
 from lidarium.evaluation.episodes.history import History
 from lidarium.evaluation.episodes.runner import run_episode
 from lidarium.evaluation.episodes.watching import WatchedExploration
-from lidarium.evaluation.statistics.estimates import paired_ratio
+from lidarium.evaluation.statistics.estimates import FEWEST_FOR_INTERVAL, paired_ratio
 from lidarium.evaluation.truth.beliefs import cells_beyond
 
 OURS, POLICIES = "meeting_tours", ("oblivious", "tethered", "meeting_tours")
@@ -213,17 +213,24 @@ def _goals(lines: Sequence[Line]) -> str:
         if times:
             value = float(np.exp(np.mean(np.log(times) - np.log(known))))
             name = f"time of `{OURS}` over `{other}`, radio `{radio}`"
-            rows.append(f"| {name} | at most {goal} | {_ratio(ours, others)} | {len(times)} | {_said(value <= goal)} |")
+            rows.append(
+                f"| {name} | at most {goal} | {_ratio(ours, others)} | {len(times)} | {_said(value <= goal, len(times))} |"
+            )
     for lost, name in (("", "runs in which all know"), ("lost", "the same with a robot lost")):
         ours = _chosen(lines, OURS, lost=lost)
         if ours:
             know = sum(line["all_know_s"] is not None for line in ours)
-            rows.append(f"| {name} | all | {know} of {len(ours)} | {len(ours)} | {_said(know == len(ours))} |")
+            rows.append(
+                f"| {name} | all | {know} of {len(ours)} | {len(ours)} | {_said(know == len(ours), len(ours))} |"
+            )
     return "\n".join(rows)
 
 
-def _said(is_reached: bool) -> str:
-    return "yes" if is_reached else "**no**"
+def _said(is_reached: bool, floors: int) -> str:
+    """Return whether a figure was reached; few floors do not tell that it was."""
+    if not is_reached:
+        return "**no**"
+    return "yes" if floors >= FEWEST_FOR_INTERVAL else "too few floors"
 
 
 def _kind_row(lines: Sequence[Line], other: str) -> str:

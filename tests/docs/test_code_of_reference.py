@@ -10,7 +10,9 @@ import lidarium
 REFERENCE = Path(__file__).parents[2] / "docs" / "reference"
 
 
-@pytest.mark.parametrize("name", ["conventions", "depth_camera", "environments", "floors", "learned", "station"])
+@pytest.mark.parametrize(
+    "name", ["conventions", "depth_camera", "environments", "floors", "observations", "policies", "learned", "station"]
+)
 def test_code_of_a_page_runs(name, capsys):
     text = (REFERENCE / f"{name}.md").read_text(encoding="utf-8")
     blocks = re.findall(r"^```(python|text)\n(.*?)^```", text, re.DOTALL | re.MULTILINE)

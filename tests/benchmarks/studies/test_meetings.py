@@ -12,5 +12,5 @@ def test_a_part_of_the_study_fills_its_page(tmp_path, monkeypatch):
     assert done == ["rules"] * 4 + ["runs"] * 10
     page = meetings.page(tmp_path)
     assert_published("meetings", page, tmp_path)
-    assert "over `tour_frontier`, radio `all` | at most 1.03 | 1.000 | 1 | yes |" in page
+    assert "over `tour_frontier`, radio `all` | at most 1.03 | 1.000 | 1 | too few floors |" in page
     assert "| `meeting_tours` | 4, one lost | `signal` | 1 | 1 |" in page
