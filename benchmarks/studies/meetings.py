@@ -18,7 +18,7 @@ from lidarium.envs.settings.making import make_settings
 from lidarium.evaluation.episodes.history import History
 from lidarium.evaluation.episodes.runner import run_episode
 from lidarium.evaluation.episodes.watching import WatchedExploration
-from lidarium.evaluation.statistics.estimates import FEWEST_FOR_INTERVAL, paired_ratio
+from lidarium.evaluation.statistics import FEWEST_FOR_INTERVAL, paired_ratio
 from lidarium.evaluation.truth.beliefs import cells_beyond
 
 OURS, POLICIES = "meeting_tours", ("oblivious", "tethered", "meeting_tours")
