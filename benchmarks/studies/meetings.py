@@ -213,9 +213,8 @@ def _goals(lines: Sequence[Line]) -> str:
         if times:
             value = float(np.exp(np.mean(np.log(times) - np.log(known))))
             name = f"time of `{OURS}` over `{other}`, radio `{radio}`"
-            rows.append(
-                f"| {name} | at most {goal} | {_ratio(ours, others)} | {len(times)} | {_said(value <= goal, len(times))} |"
-            )
+            said = _said(value <= goal, len(times))
+            rows.append(f"| {name} | at most {goal} | {_ratio(ours, others)} | {len(times)} | {said} |")
     for lost, name in (("", "runs in which all know"), ("lost", "the same with a robot lost")):
         ours = _chosen(lines, OURS, lost=lost)
         if ours:
