@@ -117,11 +117,13 @@ def test_every_policy_drives_one_robot_beside_a_learner_at_every_level_alone_and
         observations, _ = env.reset(seed=5 + episode)
         driver.policy.reset(env, seed=5 + episode)
         robot = env.possible_agents.index(agent)
-        start = env.world.poses[robot].copy()
+        start, moved = env.world.poses[robot].copy(), 0.0
         for in_batch in poses:
             observations, *_ = env.step(driver.act(env.agents, observations))
             assert np.array_equal(env.world.poses, in_batch[2 * episode : 2 * episode + 2])
-        assert np.abs(env.world.poses[robot] - start).max() > 0.1
+            # A robot that has turned may turn back.
+            moved = max(moved, float(np.abs(env.world.poses[robot] - start).max()))
+        assert moved > 0.1
         assert env.world.collisions[robot] == 0
 
 
