@@ -43,7 +43,7 @@ class ByHand(Policy):
             self._others.reset(team, seed)
 
     def act(self, observations: Mapping[str, Observation]) -> dict[str, Action]:
-        """Return what the person wants of the one robot, and the policy of the others."""
+        """Return the person's action for their robot, and the policy's actions for the others."""
         others: list[Any] = [agent for agent in observations if agent != self._agent]
         actions: dict[str, Action] = dict.fromkeys(others, np.zeros(2, np.float32))
         if self._others is not None and others:

@@ -80,7 +80,7 @@ class FrontierExplorer(Policy):
         return [agent for agent in agents if self._work[agent].choice is None]
 
     def take(self, chosen: Mapping[str, Choice | None]) -> None:
-        """Let agents begin what was chosen for them; one that goes on has no new beginning."""
+        """Start the new choice of each agent; an agent that keeps its choice goes on undisturbed."""
         for agent, choice in chosen.items():
             if choice != self._work[agent].choice:
                 self._begin(agent, choice)

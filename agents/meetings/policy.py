@@ -110,7 +110,7 @@ class Meetings(FrontierExplorer):
     # What robots tell each other
 
     def _talk(self, agents: Sequence[str]) -> None:
-        """Let robots read the notebooks of those of which a message has just come, and agree anew."""
+        """Let robots read the notebooks of teammates whose message has just arrived, and agree again."""
         now = self.team.time_s
         for agent in agents:
             self.notebooks[agent].news[agent] = self._own_news(agent)
@@ -252,7 +252,7 @@ class Meetings(FrontierExplorer):
         return Target(float(x), float(y))
 
     def _has_ended(self, agent: str) -> bool:
-        """Whether a robot has nothing to explore, and nobody to meet."""
+        """Whether a robot has nothing left to explore and nobody to meet."""
         book = self.notebooks[agent]
         return self.current(agent) is None and not book.expects(agent, self.team.time_s - self._near_s, NEW_SHARE)
 
