@@ -100,10 +100,8 @@ class FitSettings:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class PpoSettings:
-    """How a network goes on by proximal policy optimization with masks.
-
-    See sb3-contrib's MaskablePPO.
+class _Budget:
+    """How long a network learns by rewards.
 
     Attributes
     ----------
@@ -112,7 +110,27 @@ class PpoSettings:
     checkpoint : int
         Decisions from one checkpoint to the next; new episodes begin after each.
     environments : int
-        Episodes side by side, each in a process of its own.
+        Episodes side by side, each in a process of its own; for teams robots side by side.
+    """
+
+    decisions: Annotated[int, within(0, 100_000_000)] = 0
+    checkpoint: Annotated[int, within(1, 10_000_000)] = 8192
+    environments: Annotated[int, within(1, 256)] = 4
+
+    @property
+    def whole_decisions(self) -> int:
+        """Decisions up to the end of the last checkpoint."""
+        return -(-self.decisions // self.checkpoint) * self.checkpoint
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PpoSettings(_Budget):
+    """How a network goes on by proximal policy optimization with masks.
+
+    See sb3-contrib's MaskablePPO.
+
+    Attributes
+    ----------
     steps : int
         Decisions of each environment between two updates.
     batch, epochs : int
@@ -121,9 +139,6 @@ class PpoSettings:
         Rate of Adam, greatest change of a ratio, weight of the entropy, gamma and lambda.
     """
 
-    decisions: Annotated[int, within(0, 100_000_000)] = 0
-    checkpoint: Annotated[int, within(1, 10_000_000)] = 8192
-    environments: Annotated[int, within(1, 256)] = 4
     steps: Annotated[int, within(2, 100_000)] = 512
     batch: Annotated[int, within(2, 100_000)] = 256
     epochs: Annotated[int, within(1, 100)] = 4
@@ -142,10 +157,46 @@ class PpoSettings:
                 f"{update}: so many decisions are made between two updates"
             )
 
-    @property
-    def whole_decisions(self) -> int:
-        """Decisions up to the end of the last checkpoint."""
-        return -(-self.decisions // self.checkpoint) * self.checkpoint
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ValueSettings(_Budget):
+    """How a team learns the value of each robot's choices, by QMIX or VDN.
+
+    See TorchRL's QMixerLoss. A step of gradients follows each decision of the teams.
+
+    Attributes
+    ----------
+    batch : int
+        Decisions of teams in a step of gradients.
+    kept : int
+        Decisions of teams that are kept to learn from, the latest; none from before the last checkpoint.
+    learning_rate, discount : float
+        Rate of Adam, and gamma.
+    tracking : float
+        Share of the way that target networks go towards the learned ones in each step.
+    first_chance, last_chance : float
+        Share of choices that are drawn evenly: at the beginning, and from the middle of the training on.
+    mixing : int
+        Width of the network of QMIX that mixes values.
+    """
+
+    environments: Annotated[int, within(1, 256)] = 32
+    batch: Annotated[int, within(2, 100_000)] = 64
+    kept: Annotated[int, within(2, 10_000_000)] = 20_000
+    learning_rate: Annotated[float, above(0.0, 1.0)] = 3e-4
+    discount: Annotated[float, above(0.0, 1.0)] = 0.98
+    tracking: Annotated[float, above(0.0, 1.0)] = 0.01
+    first_chance: Annotated[float, share()] = 0.3
+    last_chance: Annotated[float, share()] = 0.05
+    mixing: Annotated[int, within(1, 1024)] = 32
+
+    def __post_init__(self) -> None:
+        check_settings(self, "value")
+        if self.checkpoint % self.environments:
+            raise ValueError(
+                f"checkpoint of value is {self.checkpoint}; want a whole multiple of environments, "
+                f"{self.environments}: all robots decide together"
+            )
 
 
 TEAM_PPO: Mapping[str, Any] = {
@@ -160,8 +211,14 @@ TEAM_PPO: Mapping[str, Any] = {
 }
 """Defaults of ``[ppo]`` for teams, where they are not those of explorers."""
 
-ALGORITHMS, LEVELS = ("ppo",), ("frontier",)
-"""Algorithms that train teams, and levels at which these decide."""
+POLICY_GRADIENT, VALUES = ("ppo", "mappo"), ("qmix", "vdn")
+"""Algorithms that train teams: those that learn a policy, and those that learn the value of choices."""
+
+ALGORITHMS, LEVELS = (*POLICY_GRADIENT, *VALUES), ("frontier",)
+"""All algorithms that train teams, and levels at which these decide."""
+
+STATE_CELLS = 8
+"""Side of the pictures in the true state of a team, which critics and QMIX see."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -172,8 +229,13 @@ class TeamSettings:
     ----------
     seed : int
         Seed of all draws.
-    algorithm, level : str
-        ``ppo``: all robots share a network that attends to frontiers and teammates; ``frontier``.
+    algorithm : str
+        All robots share a network that attends to frontiers and teammates. ``ppo``: MaskablePPO, whose critic sees
+        what the robot sees (independent PPO, IPPO); ``mappo``: the same, its critic sees the true state of the team as
+        well; ``qmix``, ``vdn``: the network gives the value of each choice, and that of the team is a mixture that
+        depends on the true state, or their sum.
+    level : str
+        ``frontier``.
     robots : int
         Size of the team.
     floors : str
@@ -186,8 +248,9 @@ class TeamSettings:
         Floors on which checkpoints are compared; the best one is kept.
     settings : dict
         More options of the environment, for learning and validation.
-    ppo : PpoSettings
-        How it learns; ``environments`` are robots side by side, a whole number of teams.
+    ppo, value : PpoSettings, ValueSettings
+        How it learns by ``ppo`` and ``mappo``, and by ``qmix`` and ``vdn``; ``environments`` are robots side by side, a
+        whole number of teams.
     """
 
     seed: Annotated[int, within(0, 2**31 - 1)] = 0
@@ -200,27 +263,43 @@ class TeamSettings:
     validation: str = "set:validation:16"
     settings: Mapping[str, Any] = field(default_factory=dict)
     ppo: PpoSettings = field(default_factory=lambda: PpoSettings(**{**TEAM_PPO, "decisions": 65536}))
+    value: ValueSettings = field(default_factory=lambda: ValueSettings(decisions=65536))
 
     def __post_init__(self) -> None:
         check_settings(self, "team")
         for name, known in (("algorithm", ALGORITHMS), ("level", LEVELS)):
             if getattr(self, name) not in known:
                 raise ValueError(f"{name} of team is {shown(getattr(self, name))}; want {' or '.join(known)}")
-        if self.ppo.environments % self.robots:
+        name, learning = self.table, self.learning
+        if learning.environments % self.robots:
             raise ValueError(
-                f"environments of ppo is {self.ppo.environments}; want a whole multiple of the {self.robots} robots "
+                f"environments of {name} is {learning.environments}; want a whole multiple of the {self.robots} robots "
                 "of the team: they are robots side by side"
             )
-        if not self.ppo.decisions:
-            raise ValueError("decisions of ppo is 0; want how many the team makes while it learns")
+        if not learning.decisions:
+            raise ValueError(f"decisions of {name} is 0; want how many the team makes while it learns")
         taken = sorted({"robots", "horizon_s", "realism", "observe"} & set(self.settings))
         if taken:
             raise ValueError(f"settings of team has {shown(taken[0])}; the table [team] sets it, observe is fixed")
         self.options("ideal")
 
+    @property
+    def table(self) -> str:
+        """Name of the table that says how it learns."""
+        return "value" if self.algorithm in VALUES else "ppo"
+
+    @property
+    def learning(self) -> PpoSettings | ValueSettings:
+        """How it learns."""
+        return self.value if self.algorithm in VALUES else self.ppo
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return it as types that JSON has, without the table of other algorithms."""
+        return {name: each for name, each in asdict(self).items() if name not in {"ppo", "value"} - {self.table}}
+
     def options(self, realism: str) -> dict[str, Any]:
         """Return the options of the environment, checked."""
-        options = {"stop_coverage": 0.99, **self.settings, "robots": self.robots, "horizon_s": self.horizon_s}
+        options = {"stop_coverage": 0.99, "state_cells": STATE_CELLS, **self.settings, "robots": self.robots, "horizon_s": self.horizon_s}
         options |= {"observe": list(OBSERVED), "realism": realism}
         try:
             make_settings(**options)
@@ -342,15 +421,23 @@ def _prediction_of(content: Mapping[str, Any]) -> PredictionSettings:
 
 
 def _team_of(content: Mapping[str, Any]) -> TeamSettings:
-    """Make settings of a file with a table ``[team]``, and ``[ppo]`` if it likes."""
-    others = sorted(set(content) - {"team", "ppo", "seed"})
-    if others:
-        raise ValueError(f"a training of teams has no {shown(others[0])}; it has seed, [team] and [ppo]")
+    """Make settings of a file with a table ``[team]``, and ``[ppo]`` or ``[value]`` by its algorithm."""
     table = content["team"]
-    if isinstance(table, Mapping):
-        ppo = _made(PpoSettings, {**TEAM_PPO, **content.get("ppo", {})}, "ppo")
-        table = {**{name: content[name] for name in ("seed",) if name in content}, **table, "ppo": ppo}
-    return _made(TeamSettings, table, "team")
+    if not isinstance(table, Mapping):
+        return _made(TeamSettings, table, "team")
+    algorithm = table.get("algorithm", "ppo")
+    is_value = algorithm in VALUES
+    name = "value" if is_value else "ppo"
+    others = sorted(set(content) - {"team", name, "seed"})
+    if others:
+        raise ValueError(f"a training of teams by {algorithm} has no {shown(others[0])}; it has seed, [team], [{name}]")
+    given = content.get(name, {})
+    if is_value:
+        learning: PpoSettings | ValueSettings = _made(ValueSettings, given, name)
+    else:
+        learning = _made(PpoSettings, {**TEAM_PPO, **given} if isinstance(given, Mapping) else given, name)
+    seed = {"seed": content["seed"]} if "seed" in content else {}
+    return _made(TeamSettings, {**seed, **table, name: learning}, "team")
 
 
 def training_of(content: Mapping[str, Any]) -> TrainingSettings:

@@ -405,13 +405,14 @@ class RandomizedRows:
         masks = [part.masks for part in self.parts]
         return None if masks[0] is None else self._together([each for each in masks if each is not None])
 
-    def states(self) -> NDArray[np.float32]:
-        """Return the true state of each team, (episodes, numbers); see `team_state`."""
+    def states(self, episodes: NDArray[np.int64] | None = None) -> NDArray[np.float32]:
+        """Return the true state of each team or of some episodes' teams, (episodes, numbers); see `team_state`."""
         space = state_space(self.settings)
+        parts = self.parts if episodes is None else [self.parts[episode] for episode in episodes]
         return np.stack(
             [
                 _padded_state(team_state(part.engine.simulation, part.engine.settings), part.robots, space)
-                for part in self.parts
+                for part in parts
             ]
         )
 

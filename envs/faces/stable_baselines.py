@@ -36,7 +36,8 @@ class ExplorationVecEnv(VecEnv):
     row then repeats its last observation with reward 0 and ``infos[row]["active"]`` False. When the last robot of an
     episode ends, the repeating rows are done as well, truncated, and the episode begins again in the same step. In
     every row that is done, ``infos[row]["terminal_observation"]`` is the last observation of the robot, and
-    ``infos[row]["TimeLimit.truncated"]`` tells the horizon from an ending of the robot itself.
+    ``infos[row]["TimeLimit.truncated"]`` tells the horizon from an ending of the robot itself. In all rows of an
+    episode that is over, ``infos[row]["terminal_state"]`` is the last `state` of the team.
 
     Parameters
     ----------
@@ -153,6 +154,9 @@ class ExplorationVecEnv(VecEnv):
                 info["terminal_observation"] = batch.observation(row)
         over = np.flatnonzero(batch.is_over)
         if len(over):
+            for episode, last in zip(over.tolist(), batch.states(over), strict=True):
+                for row in range(episode * batch.robots, (episode + 1) * batch.robots):
+                    infos[row]["terminal_state"] = last
             batch.begin(over, is_same_step=True)
             rows = (over[:, None] * batch.robots + np.arange(batch.robots)).ravel()
             for began, info in zip(rows.tolist(), self._infos_of(rows), strict=True):

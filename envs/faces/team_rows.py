@@ -366,10 +366,10 @@ class TeamRows:
         masks = self.engine.observations.get(MASK)
         return None if masks is None else masks != 0
 
-    def states(self) -> NDArray[np.float32]:
-        """Return the true state of each team, (episodes, numbers); see `team_state`."""
-        engine = self.engine
-        return np.stack([team_state(engine.simulation, engine.settings, episode) for episode in range(self.episodes)])
+    def states(self, episodes: NDArray[np.int64] | None = None) -> NDArray[np.float32]:
+        """Return the true state of each team or of some episodes' teams, (episodes, numbers); see `team_state`."""
+        engine, chosen = self.engine, range(self.episodes) if episodes is None else episodes.tolist()
+        return np.stack([team_state(engine.simulation, engine.settings, episode) for episode in chosen])
 
     def scenes(self) -> list[Any]:
         """Return the scene of each episode, for pictures."""

@@ -125,10 +125,10 @@ def _listed() -> Answer:
     teams = {name: each for name, each in found.items() if isinstance(each, TeamSettings)}
     header = ("training", "algorithm", "level", "robots", "decisions", "floors")
     rows = [
-        (name, each.algorithm, each.level, each.robots, f"{each.ppo.whole_decisions:,}", each.floors)
+        (name, each.algorithm, each.level, each.robots, f"{each.learning.whole_decisions:,}", each.floors)
         for name, each in teams.items()
     ]
-    return Answer({"trainings": {name: asdict(each) for name, each in teams.items()}}, table(rows, header))
+    return Answer({"trainings": {name: each.as_dict() for name, each in teams.items()}}, table(rows, header))
 
 
 def _loggers(names: Sequence[str], folder: Path, settings: "AnySettings") -> "list[Logger]":

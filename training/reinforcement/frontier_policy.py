@@ -9,7 +9,9 @@ A. Vaswani et al., "Attention is all you need", 2017. J. Horner, "Map-merging fo
 the ranking of explore_lite, three times the path less the size.
 """
 
+import math
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 import torch
@@ -35,6 +37,9 @@ from lidarium.training.torch_network import AttentionLayer
 SITUATION = ("time_left", "coverage", "velocity", "bumper")
 """Observables that are seen of the situation."""
 
+STATE = "state"
+"""True state of the team, which the critic alone sees; see `CentralState`."""
+
 LEAST_GROUP = 32
 """Decisions are ranked in groups of like numbers of frontiers, of at least so many decisions."""
 
@@ -58,7 +63,8 @@ class FrontierRanking(BaseFeaturesExtractor):
         self.last = nn.LayerNorm(WIDTH)
         self.correction = nn.Linear(WIDTH, 1)
         self.stay = nn.Linear(WIDTH, 1)
-        self.critic = nn.Sequential(nn.Linear(WIDTH, WIDTH), nn.ReLU(), nn.Linear(WIDTH, 1))
+        known = WIDTH + (shapes[STATE][0] if STATE in shapes else 0)
+        self.critic = nn.Sequential(nn.Linear(known, WIDTH), nn.ReLU(), nn.Linear(WIDTH, 1))
         self.steepness = nn.Parameter(torch.ones(1))
         for zero in (self.correction, self.stay, self.critic[2]):
             nn.init.zeros_(zero.weight)  # type: ignore[arg-type]
@@ -66,12 +72,26 @@ class FrontierRanking(BaseFeaturesExtractor):
 
     def forward(self, observations: Mapping[str, Tensor]) -> Tensor:
         """Return the preferences (N, actions), then the estimate, (N, actions + 1)."""
+        return self._in_groups(observations, True)
+
+    def preferences(self, observations: Mapping[str, Tensor]) -> Tensor:
+        """Return the preferences (N, actions); no critic, so that no true state is needed."""
+        return self._in_groups(observations, False)
+
+    def _in_groups(self, observations: Mapping[str, Tensor], is_rated: bool) -> Tensor:
         offered = observations[MASK][:, :-1] > 0
         counts = offered.sum(dim=1)
         groups = max(min(len(counts) // LEAST_GROUP, MOST_GROUPS), 1)
         order = counts.argsort()
-        found = [self._ranked(observations, offered, rows) for rows in order.chunk(groups)]
+        found = [self._ranked(observations, offered, rows, is_rated) for rows in order.chunk(groups)]
         return torch.cat(found)[order.argsort()]
+
+    def preferred(self, observations: Mapping[str, NDArray[Any]]) -> NDArray[np.int64]:
+        """Return the action that each row of observations prefers, of those that the mask allows."""
+        tensors = {name: torch.from_numpy(array.astype(np.float32)) for name, array in observations.items()}
+        with torch.no_grad():
+            preferences = self.preferences(tensors)
+        return preferences.masked_fill(tensors[MASK] <= 0, -math.inf).argmax(dim=1).numpy()
 
     def weights(self) -> dict[str, NDArray[np.float32]]:
         """Return the weights as arrays, by name, but for the critic's."""
@@ -83,7 +103,7 @@ class FrontierRanking(BaseFeaturesExtractor):
         given = {name: torch.from_numpy(array.copy()) for name, array in weights.items()}
         self.load_state_dict({**self.state_dict(), **given})
 
-    def _ranked(self, observations: Mapping[str, Tensor], offered: Tensor, rows: Tensor) -> Tensor:
+    def _ranked(self, observations: Mapping[str, Tensor], offered: Tensor, rows: Tensor, is_rated: bool) -> Tensor:
         """Rank the frontiers of some decisions; no more of them are taken than the widest one has."""
         actions = offered.shape[1]
         offered = offered[rows]
@@ -107,7 +127,11 @@ class FrontierRanking(BaseFeaturesExtractor):
         ranked = self.steepness * classic + self.correction(mixed[:, -width:])[..., 0]
         ranked = nn.functional.pad(ranked.masked_fill(~offered, 0.0), (0, actions - width))
         stay = self.stay(mixed[:, 0]) + ranked.min(dim=1, keepdim=True).values  # behind all, at the start
-        return torch.cat([ranked, stay, self.critic(mixed[:, 0])], dim=1)
+        found = [ranked, stay]
+        if is_rated:
+            known = [mixed[:, 0], *([observations[STATE][rows]] if STATE in observations else [])]
+            found.append(self.critic(torch.cat(known, dim=1)))
+        return torch.cat(found, dim=1)
 
     def _situation(self, observations: Mapping[str, Tensor], rows: Tensor) -> Tensor:
         parts = [observations[name][rows].to(torch.float32) for name in self.situation_names]
@@ -148,7 +172,7 @@ def _check_observed(space: spaces.Space[dict[str, object]]) -> None:
             'level="frontier" and observe=["frontiers", "time_left"], its observations as a dict'
         )
     for name in names:
-        if name not in (*seen, MASK):
+        if name not in (*seen, MASK, STATE):
             raise ValueError(f"FrontierPolicy does not see {name!r}; observe some of {', '.join(seen)}")
 
 

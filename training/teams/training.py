@@ -6,7 +6,7 @@ Checkpoints are on the disk. The same call continues an interrupted training.
 import math
 from collections.abc import Generator
 from contextlib import closing
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -22,10 +22,11 @@ from lidarium.envs.floors.catalogue.names import set_floors
 from lidarium.mapping.files.output import clear_unfinished, only_writer, remove_unfinished, write_json, write_text
 from lidarium.training.folder import asked_for, begin_folder, versions
 from lidarium.training.progress import Progress
+from lidarium.training.reinforcement.central_state import CentralState
 from lidarium.training.reinforcement.checkpoints import Checkpoint, latest_checkpoint
-from lidarium.training.reinforcement.frontier_policy import FrontierPolicy
+from lidarium.training.reinforcement.frontier_policy import FrontierPolicy, FrontierRanking
 from lidarium.training.reinforcement.learning import learn_on, model_of
-from lidarium.training.settings import TeamSettings
+from lidarium.training.settings import VALUES, PpoSettings, TeamSettings, ValueSettings
 
 TRAINING_FILE, WEIGHTS_FILE, CARD_FILE, CURVE_FILE = "training.json", "weights.safetensors", "card.json", "curve.csv"
 CHECKPOINTS, TENSORBOARD = "checkpoints", "tensorboard"
@@ -45,54 +46,93 @@ class TeamTraining:
     def run(self) -> Generator[Progress, None, None]:
         """Learn from the last checkpoint on, and yield each step when it is on the disk."""
         set_floors(self.settings.validation)  # hours of learning are not for floors that are not there
-        begin_folder(self.folder / TRAINING_FILE, asdict(self.settings))
+        begin_folder(self.folder / TRAINING_FILE, self.settings.as_dict())
         with only_writer(self.folder / TRAINING_FILE):
             checkpoints = self.folder / CHECKPOINTS
             for folder in (self.folder, checkpoints):
                 clear_unfinished(folder, ".json")
                 remove_unfinished(folder, (".safetensors", ".csv"))
             torch.set_num_threads(1)
-            last, total = latest_checkpoint(checkpoints), self.settings.ppo.whole_decisions
+            last, total = latest_checkpoint(checkpoints), self.settings.learning.whole_decisions
             done = 0 if last is None else last.decisions
             yield Progress("rewards", done, total)
             if last is None or done < total:
-                yield from self._learn(last, total)
+                learn = self._learn_values if self.settings.algorithm in VALUES else self._learn_policy
+                with closing(learn(last is None)) as found:
+                    for checkpoint in found:
+                        self._write(checkpoint)
+                        coverage = checkpoint.curve[-1][1] or 0.0
+                        yield Progress("rewards", checkpoint.decisions, total, {"coverage": coverage})
             self._write(latest_checkpoint(checkpoints))
         yield Progress("best weights", 1, 1)
 
-    def _learn(self, last: Checkpoint | None, total: int) -> Generator[Progress, None, None]:
+    def _learn_policy(self, is_new: bool) -> Generator[Checkpoint, None, None]:
+        """Learn by PPO or MAPPO."""
         settings, ppo = self.settings, self.settings.ppo
-        episodes = ppo.environments // settings.robots
-        options = settings.options(settings.realism)
-        with closing(
-            VecMonitor(sb3_vec_env(episodes, settings.floors, level=settings.level, threads=1, **options))
-        ) as environment:
+        rows: VecEnv = sb3_vec_env(*self._floors(ppo), level=settings.level, threads=1, **self._world)
+        if settings.algorithm == "mappo":
+            rows = CentralState(rows)
+        with closing(VecMonitor(rows)) as environment:
             model = model_of(FrontierPolicy, ppo, environment, settings.seed)
-            first = Checkpoint(0, []) if last is not None else Checkpoint(0, [(0, self._validated(model))])
-            for checkpoint in learn_on(
+            assert isinstance(model.policy, FrontierPolicy)
+            network = model.policy.network
+
+            def measure(model: MaskablePPO, before: Checkpoint) -> float:
+                reached = self._measured(network, before)
+                model.logger.record("validation/coverage", reached)
+                model.logger.dump(model.num_timesteps)
+                return reached
+
+            yield from learn_on(
                 model,
                 ppo,
                 settings.seed,
                 self.folder / CHECKPOINTS,
                 self.folder / TENSORBOARD,
-                partial(_seed_episodes, environment, settings.seed),
-                self._measured,
-                first,
-            ):
-                self._write(checkpoint)
-                yield Progress("rewards", checkpoint.decisions, total, {"coverage": checkpoint.curve[-1][1] or 0.0})
+                lambda number: environment.seed(_episodes_seed(settings.seed, number)),
+                measure,
+                self._first(network, is_new),
+            )
 
-    def _measured(self, model: MaskablePPO, before: Checkpoint) -> float:
+    def _learn_values(self, is_new: bool) -> Generator[Checkpoint, None, None]:
+        """Learn by QMIX or VDN."""
+        from lidarium.training.teams.value_decomposition import learn_values
+
+        settings, value = self.settings, self.settings.value
+        with closing(vector_env(*self._floors(value), level=settings.level, threads=1, **self._world)) as environment:
+            torch.manual_seed(settings.seed)
+            network = FrontierRanking(environment.single_observation_space)
+            yield from learn_values(
+                settings,
+                environment,
+                network,
+                self.folder / CHECKPOINTS,
+                self.folder / TENSORBOARD,
+                partial(_episodes_seed, settings.seed),
+                partial(self._measured, network),
+                self._first(network, is_new),
+            )
+
+    @property
+    def _world(self) -> dict[str, Any]:
+        return self.settings.options(self.settings.realism)
+
+    def _floors(self, learning: PpoSettings | ValueSettings) -> tuple[int, str]:
+        """Return how many episodes run side by side, and their floors."""
+        return learning.environments // self.settings.robots, self.settings.floors
+
+    def _first(self, network: FrontierRanking, is_new: bool) -> Checkpoint:
+        """Return the curve before a network learns."""
+        return Checkpoint(0, [(0, self._validated(network))] if is_new else [])
+
+    def _measured(self, network: FrontierRanking, before: Checkpoint) -> float:
         """Return what the network reaches; keep its weights if that is more than ever before."""
-        reached = self._validated(model)
+        reached = self._validated(network)
         if reached > max((found for number, found in before.curve if number and found is not None), default=-1.0):
-            assert isinstance(model.policy, FrontierPolicy)
-            zoo_files("").save(self.folder / WEIGHTS_FILE, model.policy.network.weights())
-        model.logger.record("validation/coverage", reached)
-        model.logger.dump(model.num_timesteps)
+            zoo_files("").save(self.folder / WEIGHTS_FILE, network.weights())
         return reached
 
-    def _validated(self, model: MaskablePPO) -> float:
+    def _validated(self, network: FrontierRanking) -> float:
         """Return the coverage that a network reaches, mean over the time of an episode and over the floors.
 
         The network takes what it prefers, from the same starts each time.
@@ -105,8 +145,7 @@ class TeamTraining:
             reached, is_over = infos["truth"]["coverage"].copy(), np.zeros(environment.num_envs, np.bool_)
             decisions, total = math.ceil(settings.horizon_s / environment.settings.decision_period_s), 0.0
             for _ in range(decisions):
-                actions, _ = model.predict(seen, action_masks=seen["action_mask"], deterministic=True)
-                seen, _, terminated, truncated, infos = environment.step(actions)
+                seen, _, terminated, truncated, infos = environment.step(network.preferred(seen))
                 reached[~is_over] = infos["truth"]["coverage"][~is_over]
                 is_over |= terminated | truncated
                 total += float(reached.mean())
@@ -127,12 +166,12 @@ class TeamTraining:
             "untrained": {"coverage": curve[0][1]},
             "curve": curve,
             "versions": versions(LIBRARIES),
-            "training": asked_for(asdict(self.settings)),
+            "training": asked_for(self.settings.as_dict()),
         }
         write_json(self.folder / CARD_FILE, card)
 
 
-def _seed_episodes(environment: VecEnv, seed: int, number: int) -> None:
-    """Let the episodes behind a checkpoint draw floors and starts of their own."""
+def _episodes_seed(seed: int, number: int) -> int:
+    """Return the seed of the episodes behind a checkpoint: they draw floors and starts of their own."""
     draws = np.random.SeedSequence([LEARNING_WORLD_SEED, seed, number])
-    environment.seed(int(draws.generate_state(1)[0]) >> 1)
+    return int(draws.generate_state(1)[0]) >> 1

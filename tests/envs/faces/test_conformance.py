@@ -340,6 +340,8 @@ def test_rows_for_learners_are_those_robots_and_begin_again_in_the_step_that_end
             assert ("terminal_observation" in info) == dones[row]
             if dones[row]:
                 assert_same(info.pop("terminal_observation"), last)
+            assert ("terminal_state" in info) == moment.is_over
+            info.pop("terminal_state", None)
             assert is_active(moment, agent) in (None, info["active"])
             if agent in moment.infos:
                 assert_same(without_forms(info), without_forms(moment.infos[agent]))

@@ -34,6 +34,30 @@ learning_rate = 0.01
 """
 
 
+VALUES = """
+seed = 3
+[team]
+algorithm = "qmix"
+robots = 2
+floors = "apartment"
+horizon_s = 20.0
+validation = "validation:2"
+[value]
+decisions = 64
+checkpoint = 32
+environments = 4
+batch = 4
+learning_rate = 0.01
+"""
+
+ALGORITHMS = {
+    "ppo": TINY,
+    "mappo": TINY.replace("robots = 2", 'robots = 2\nalgorithm = "mappo"'),
+    "qmix": VALUES,
+    "vdn": VALUES.replace("qmix", "vdn"),
+}
+
+
 def settings_of(text, tmp_path):
     path = tmp_path / "team.toml"
     path.write_text(text)
