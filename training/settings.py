@@ -299,7 +299,13 @@ class TeamSettings:
 
     def options(self, realism: str) -> dict[str, Any]:
         """Return the options of the environment, checked."""
-        options = {"stop_coverage": 0.99, "state_cells": STATE_CELLS, **self.settings, "robots": self.robots, "horizon_s": self.horizon_s}
+        options = {
+            "stop_coverage": 0.99,
+            "state_cells": STATE_CELLS,
+            **self.settings,
+            "robots": self.robots,
+            "horizon_s": self.horizon_s,
+        }
         options |= {"observe": list(OBSERVED), "realism": realism}
         try:
             make_settings(**options)

@@ -116,3 +116,31 @@ def test_what_it_cannot_see_is_refused():
     space = {"frontiers": spaces.Box(-1.0, 1.0, (8, 4)), "action_mask": spaces.Box(0, 1, (9,)), "map": box}
     with pytest.raises(ValueError, match="does not see 'map'; observe some of frontiers, frontier_gains"):
         FrontierRanking(spaces.Dict(space))
+
+
+def test_a_central_critic_sees_the_true_state_and_preferences_do_not():
+    pytest.importorskip("stable_baselines3", reason='stable-baselines3 is not installed: extra "rl"')
+    from lidarium.training.reinforcement.central_state import CentralState
+
+    plain = lidarium.sb3_vec_env(2, "apartment:7", **{**TEAM, "horizon_s": 4.0, "state_cells": 4}, starts="fixed")
+    env = CentralState(plain)
+    seen = env.reset()
+    assert seen["state"].shape == (6, *plain.state().shape[1:])
+    torch.manual_seed(0)
+    ranking = FrontierRanking(env.observation_space)
+    for layer in (ranking.correction, ranking.stay, ranking.critic[2]):
+        torch.nn.init.normal_(layer.weight)
+    tensors = {name: torch.from_numpy(array.astype(np.float32)) for name, array in seen.items()}
+    other = {**tensors, "state": tensors["state"] + 1.0}
+    without = {name: array for name, array in tensors.items() if name != "state"}
+    assert torch.equal(ranking(tensors)[:, :-1], ranking(other)[:, :-1])
+    assert not torch.equal(ranking(tensors)[:, -1], ranking(other)[:, -1])
+    assert torch.equal(ranking.preferences(without), ranking(tensors)[:, :-1])
+    left = 3 * 7 + 2  # 7 numbers of each robot, then side, coverage and the share of the horizon that is left
+    for wanted in (0.5, 1.0):  # the second decision ends the episodes, and they have begun again
+        seen, _, dones, infos = env.step(np.full(6, seen["action_mask"].shape[1] - 1))
+        np.testing.assert_array_equal(seen["state"], plain.state().repeat(3, axis=0))
+        assert (seen["state"][:, left] == wanted).all()
+    assert dones.all()
+    assert [info["terminal_observation"]["state"][left] for info in infos] == [0.0] * 6
+    env.close()

@@ -64,25 +64,29 @@ def settings_of(text, tmp_path):
     return read_any_training(path)
 
 
-@pytest.fixture(scope="module")
-def whole(tmp_path_factory):
+@pytest.fixture(scope="module", params=ALGORITHMS)
+def whole(request, tmp_path_factory):
     """A training of two updates that was never interrupted."""
-    folder = tmp_path_factory.mktemp("whole")
-    steps = list(TeamTraining(settings_of(TINY, folder), folder / "run").run())
-    return folder / "run", steps
+    if "[value]" in ALGORITHMS[request.param]:
+        pytest.importorskip("torchrl", reason='TorchRL is not installed: extra "torchrl"')
+    folder = tmp_path_factory.mktemp(request.param)
+    settings = settings_of(ALGORITHMS[request.param], folder)
+    return settings, folder / "run", list(TeamTraining(settings, folder / "run").run())
 
 
 def test_two_updates_have_a_curve_a_card_and_the_best_weights(whole):
-    folder, steps = whole
+    settings, folder, steps = whole
+    half = settings.learning.checkpoint
     assert [(step.part, step.done) for step in steps] == [
         ("rewards", 0),
-        ("rewards", 16),
-        ("rewards", 32),
+        ("rewards", half),
+        ("rewards", 2 * half),
         ("best weights", 1),
     ]
     card = json.loads((folder / CARD_FILE).read_text())
     curve = card["curve"]
-    assert [number for number, _ in curve] == [0, 16, 32]
+    assert card["training"]["algorithm"] == settings.algorithm
+    assert [number for number, _ in curve] == [0, half, 2 * half]
     assert all(0.0 < coverage < 1.0 for _, coverage in curve)
     assert card["best"]["coverage"] == max(coverage for _, coverage in curve[1:])
     assert (folder / CURVE_FILE).read_text().splitlines()[0] == "step,coverage"
@@ -90,27 +94,38 @@ def test_two_updates_have_a_curve_a_card_and_the_best_weights(whole):
     assert best.read_bytes() == (folder / WEIGHTS_FILE).read_bytes()
 
 
+def test_both_checkpoints_have_learned(whole):
+    settings, folder, _ = whole
+    files = zoo_files("")
+    weights = [
+        files.load(folder / CHECKPOINTS / f"decisions-{k * settings.learning.checkpoint:09d}.safetensors")
+        for k in (1, 2)
+    ]
+    for name in ("correction.weight", "frontier.weight", "steepness"):
+        assert not np.array_equal(weights[0][name], weights[1][name]), name
+
+
 def test_a_training_that_goes_on_after_a_kill_is_equal(whole, tmp_path):
-    settings = settings_of(TINY, tmp_path)
+    settings, folder, _ = whole
+    half = settings.learning.checkpoint
     steps = TeamTraining(settings, tmp_path / "run").run()
     assert next(steps).done == 0
-    assert next(steps).done == 16
+    assert next(steps).done == half
     steps.close()
     list(TeamTraining(settings, tmp_path / "run").run())
-    for name in (CARD_FILE, CURVE_FILE, WEIGHTS_FILE, f"{CHECKPOINTS}/decisions-000000032.learner.safetensors"):
-        assert (tmp_path / "run" / name).read_bytes() == (whole[0] / name).read_bytes(), name
+    for name in (CARD_FILE, CURVE_FILE, WEIGHTS_FILE, f"{CHECKPOINTS}/decisions-{2 * half:09d}.learner.safetensors"):
+        assert (tmp_path / "run" / name).read_bytes() == (folder / name).read_bytes(), name
 
 
 def test_a_finished_training_is_not_run_again(whole):
-    before = (whole[0] / WEIGHTS_FILE).read_bytes()
-    folder = whole[0]
-    settings = settings_of(TINY, folder.parent)
+    settings, folder, _ = whole
+    before = (folder / WEIGHTS_FILE).read_bytes()
     assert [step.part for step in TeamTraining(settings, folder).run()] == ["rewards", "best weights"]
     assert (folder / WEIGHTS_FILE).read_bytes() == before
 
 
 def test_numpy_decides_as_torch(whole):
-    weights = zoo_files("").load(whole[0] / WEIGHTS_FILE)
+    weights = zoo_files("").load(whole[1] / WEIGHTS_FILE)
     options = TeamSettings().options("fast")
     env = sb3_vec_env(4, "apartment:7", level="frontier", **options)
     seen, generator = env.reset(), np.random.default_rng(0)
@@ -135,11 +150,13 @@ def test_numpy_decides_as_torch(whole):
     [
         ("robots = 2", "robots = 1", "robots of team is 1"),
         ("robots = 2", "robots = 3", "whole multiple of the 3 robots"),
-        ("robots = 2", 'robots = 2\nalgorithm = "dqn"', "algorithm of team is 'dqn'; want ppo"),
+        ("robots = 2", 'robots = 2\nalgorithm = "dqn"', "algorithm of team is 'dqn'; want ppo or mappo or qmix or vdn"),
         ("robots = 2", 'robots = 2\nlevel = "tour"', "level of team is 'tour'; want frontier"),
         ("robots = 2", "robots = 2\nsettings = { observe = ['scan'] }", "settings of team has 'observe'"),
         ("decisions = 32", "decisions = 0", "decisions of ppo is 0"),
-        ("seed = 3", "seed = 3\nfit = {}", "a training of teams has no 'fit'"),
+        ("seed = 3", "seed = 3\nfit = {}", "a training of teams by ppo has no 'fit'"),
+        ("robots = 2", 'robots = 2\nalgorithm = "qmix"', "a training of teams by qmix has no 'ppo'"),
+        ("[ppo]", "[value]", "a training of teams by ppo has no 'value'"),
         ('"validation:2"', '"castle:3"', "castle"),
     ],
 )
