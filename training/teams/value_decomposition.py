@@ -43,6 +43,9 @@ VALUES, CHOICE, CHOSEN, TOGETHER = (ROBOTS, "values"), (ROBOTS, "choice"), (ROBO
 REWARD_UNIT = 10.0
 """Rewards of teams are learned in these units [m2]."""
 
+STEEPNESS = 0.1
+"""What a metre of path costs at the beginning, in these units: some 4 s of an exploration."""
+
 STEEPEST = 10.0
 """Gradients are shortened to this length."""
 
@@ -67,6 +70,7 @@ def learn_values(
     mixer = _mixer(settings, environment)
     learned = [each for name, each in network.named_parameters() if not name.startswith("critic.")]
     learner = Learner(mixer, torch.optim.Adam([*learned, *mixer.parameters()], value.learning_rate))
+    nn.init.constant_(network.steepness, STEEPNESS)
     if checkpoint.decisions:
         restore(folder, checkpoint, network, learner)
     torchrl_logger.setLevel(logging.WARNING)  # it tells of every memory that it makes
