@@ -100,6 +100,16 @@ POLICIES.register(
     "at the level of frontiers: four robots that share a network trained by PPO",
 )
 POLICIES.register(
+    "zoo:mappo-2",
+    "lidarium.agents.zoo.policy:mappo_2",
+    "at the level of frontiers: two robots that share a network trained by MAPPO",
+)
+POLICIES.register(
+    "zoo:qmix-2",
+    "lidarium.agents.zoo.policy:qmix_2",
+    "at the level of frontiers: two robots that share a network of values, trained by QMIX",
+)
+POLICIES.register(
     "sparse_frontier",
     "lidarium.agents.sparse.frontier:SparseFrontier",
     "robots see all ground with depth cameras, and plan on sparse maps of boxes",

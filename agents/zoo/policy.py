@@ -47,3 +47,13 @@ def ppo_2(weights: str | Path = "") -> ZooTeam:
 def ppo_4(weights: str | Path = "") -> ZooTeam:
     """Return the team of four that was trained by PPO."""
     return ZooTeam("ppo-4", weights)
+
+
+def mappo_2(weights: str | Path = "") -> ZooTeam:
+    """Return the team of two that was trained by MAPPO."""
+    return ZooTeam("mappo-2", weights)
+
+
+def qmix_2(weights: str | Path = "") -> ZooTeam:
+    """Return the team of two that was trained by QMIX."""
+    return ZooTeam("qmix-2", weights)

@@ -36,5 +36,6 @@ for _name, _module, _summary in (
         "supervisor.study",
         "teams with unknown starts under the supervisor, beside bounds of merging",
     ),
+    ("zoo", "zoo", "teams that learned by rewards, five trainings of each, beside classic teams on unseen floors"),
 ):
     STUDIES.register(_name, f"{_PACKAGE}.{_module}:STUDY", _summary)

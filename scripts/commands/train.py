@@ -81,6 +81,8 @@ def execute(command: _Train) -> Answer:
     settings = read_any_training(_file_of(command.config))
     is_prediction, is_team = isinstance(settings, PredictionSettings), isinstance(settings, TeamSettings)
     _check_extra(EXTRA[:1] if is_prediction else EXTRA)
+    if isinstance(settings, TeamSettings) and settings.table == "value":
+        _check_extra(("torchrl",), "torchrl")
     if command.device != "cpu" and not is_prediction:
         raise ValueError(f"--device is {command.device}, and explorers are trained on the cpu; leave it out")
     folder = command.out or DEFAULT_FOLDER
@@ -157,11 +159,11 @@ def _training_of(
     return PredictionTraining(settings, folder, workers, device)
 
 
-def _check_extra(packages: Sequence[str]) -> None:
-    """Check that the extra is installed, as far as it is needed."""
+def _check_extra(packages: Sequence[str], extra: str = "rl") -> None:
+    """Check that an extra is installed, as far as it is needed."""
     missing = [name for name in packages if importlib.util.find_spec(name) is None]
     if missing:
-        raise ValueError(f"training needs {', '.join(missing)}: {install_command('rl')}")
+        raise ValueError(f"training needs {', '.join(missing)}: {install_command(extra)}")
 
 
 class _Shown:

@@ -19,9 +19,11 @@ NEEDS = {
     "nearest_node": SMALL_GRAPH,
     "utility_node": SMALL_GRAPH,
     "zoo:ppo-2": {"observe": ("frontier_gains", "teammates")},
-    "zoo:ppo-4": {"observe": ("frontier_gains", "teammates")},
 }
-NAMES = sorted(policy_names())
+ALIKE = {"zoo:ppo-4", "zoo:mappo-2", "zoo:qmix-2"}
+"""Policies that differ from ``zoo:ppo-2`` by their weights alone."""
+
+NAMES = sorted(set(policy_names()) - ALIKE)
 LEVELS = ("velocity", "waypoint", "frontier")
 CARRIED = [
     (name, level)

@@ -9,7 +9,7 @@ from lidarium.agents.zoo.policy import zoo_files
 from lidarium.evaluation.suites.starts import starts_in
 from lidarium.scripts.main import main
 
-NAMES = ("zoo:ppo-2", "zoo:ppo-4")
+NAMES = ("zoo:ppo-2", "zoo:ppo-4", "zoo:mappo-2", "zoo:qmix-2")
 
 
 @pytest.fixture(scope="module")

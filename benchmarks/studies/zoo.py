@@ -1,0 +1,368 @@
+"""The study ``zoo``: teams that learned by rewards, five trainings of each, beside classic teams on unseen floors."""
+
+import math
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lidarium.agents.catalogue import make_policy
+from lidarium.agents.policy import settings_for
+from lidarium.agents.zoo.network import frontier_shapes
+from lidarium.agents.zoo.policy import zoo_files
+from lidarium.benchmarks.studies.shared.study import Progress, Study, Task, do_missing, kept_lines
+from lidarium.envs.floors.catalogue.names import set_floors
+from lidarium.envs.settings.making import make_settings
+from lidarium.evaluation.episodes.history import History
+from lidarium.evaluation.episodes.runner import run_episode
+from lidarium.evaluation.episodes.watching import WatchedExploration
+from lidarium.evaluation.statistics import FEWEST_FOR_INTERVAL, Interval, paired_ratio
+
+TEAMS = ("ppo-2", "ppo-4", "mappo-2", "qmix-2")
+"""Trainings that ship; the number is the size of the team in training."""
+
+SEEDS = tuple(range(5))
+
+CLASSICS = ("nearest_frontier", "utility_frontier", "explore_lite", "tour_frontier", "learned", "predicted_tours")
+NEAREST, TOURS, UNTRAINED, SHIPPED = "nearest_frontier", "tour_frontier", "untrained", "shipped"
+
+FLOORS = set_floors("set:test:50")
+SIZES, LARGE = (2, 4), 8
+"""Sizes of teams; networks of these teams drive large ones too."""
+
+LARGE_FLOORS = 16
+"""Large teams run on the first so many floors."""
+
+HORIZON_S, SHARE, EARLY_S = 1200.0, 0.99, 60.0
+
+LESSONS_FILE, RUNS_FILE, LESSONS = "lessons.jsonl", "runs.jsonl", "lessons"
+CURVES_PICTURE = "zoo_curves.png"
+
+PAGE = """# The zoo
+
+{conclusion}
+
+## What is compared
+
+[Teams of the zoo](../reference/learned.md#teams-of-the-zoo) choose among frontiers, in the ideal world. Each is
+trained from {seeds} seeds; the best network of each training by the validation floors runs here. "Untrained" is the
+network before a training, which ranks frontiers as explore_lite does. All run on the same {floors} floors of the set
+`test` from the same drawn starts, until 99 % is seen or {horizon:.0f} s are over, which then count. Classic policies
+decide at their own level. Ratios are geometric means of times, floor by floor, with 95 % intervals over floors and
+seeds: runs of a floor are not independent.
+
+## Figures
+
+| figure | to reach | measured | reached |
+|---|---:|---:|---|
+{goals}
+
+{tables}
+
+## Teams of eight
+
+Networks of smaller teams, with 8 robots.
+
+{large}
+
+## By training
+
+{by_seed}
+
+## Curves
+
+![Coverage on the validation floors]({picture})
+
+Coverage on the validation floors, mean over the time of an episode of 120 s; bands hold the mean curve with 95 %.
+
+{curves}
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class Lesson(Task):
+    """A training of a team from a seed."""
+
+    team: str
+    seed: int
+    folder: Path
+
+
+@dataclass(frozen=True, slots=True)
+class Run(Task):
+    """An episode of a policy; of teams of the zoo with the weights of a training."""
+
+    policy: str
+    training: str
+    floor: str
+    robots: int
+    weights: Path | None
+
+
+def learn(lesson: Lesson) -> dict[str, Any]:
+    """Train a team; return its curve, and the processor time that it took."""
+    from lidarium.training.settings import TeamSettings, read_any_training
+    from lidarium.training.teams.training import TeamTraining
+
+    settings = read_any_training(Path(str(resources.files("lidarium.training.teams") / "data" / f"{lesson.team}.toml")))
+    assert isinstance(settings, TeamSettings)
+    began = time.process_time()
+    *_, last = TeamTraining(replace(settings, seed=lesson.seed), lesson.folder).run()
+    assert last.done
+    curve = [line.split(",") for line in (lesson.folder / "curve.csv").read_text(encoding="utf-8").splitlines()[1:]]
+    return {
+        "team": lesson.team,
+        "seed": lesson.seed,
+        "curve": [[int(step), float(coverage)] for step, coverage in curve],
+        "processor_s": time.process_time() - began,
+    }
+
+
+def measure(run: Run) -> dict[str, Any]:
+    """Run an episode; return its figures."""
+    options: dict[str, Any] = {} if run.weights is None else {"weights": run.weights}
+    name = "zoo:ppo-2" if run.policy == UNTRAINED else run.policy
+    policy = make_policy(name, **options)
+    settings = settings_for(policy, make_settings(robots=run.robots, stop_coverage=SHARE, horizon_s=HORIZON_S))
+    history = History()
+    run_episode(policy, WatchedExploration(run.floor, settings, watchers=[history]), 0)
+    curves = history.curves
+    seen = np.flatnonzero(curves.c_free >= SHARE)
+    return {
+        **{name: getattr(run, name) for name in ("policy", "training", "floor", "robots")},
+        "early": float(np.interp(EARLY_S, curves.times, curves.c_free)),
+        "time_s": float(curves.times[seen[0]]) if len(seen) else None,
+    }
+
+
+def work(folder: Path, _data: Path | None, every: int, workers: int) -> Progress:
+    """Train all teams, and run them beside classic ones on every N-th floor; a part runs the teams that ship."""
+    floors = FLOORS[::every]
+    networks: dict[tuple[str, str], Path | None] = {(team, SHIPPED): None for team in TEAMS}
+    if every == 1:
+        lessons = [Lesson(team, seed, folder / LESSONS / f"{team}-{seed}") for seed in SEEDS for team in TEAMS]
+        yield from do_missing(folder / LESSONS_FILE, "lessons", lessons, learn, workers)
+        networks = {(each.team, str(each.seed)): each.folder / "weights.safetensors" for each in lessons}
+    untrained = folder / f"{UNTRAINED}.safetensors"
+    zeros = {name: np.zeros(shape, np.float32) for name, shape in frontier_shapes().items()}
+    zoo_files("").save(untrained, {**zeros, "steepness": np.ones(1, np.float32)})
+    teams: list[tuple[str, str, Path | None]] = [(name, "", None) for name in CLASSICS]
+    teams += [(UNTRAINED, "", untrained)]
+    teams += [(f"zoo:{team}", training, weights) for (team, training), weights in networks.items()]
+    runs = [
+        Run(name, training, floor, robots, weights)
+        for floor in floors
+        for robots in SIZES
+        for name, training, weights in teams
+        if not name.startswith("zoo:") or _size(name) == robots
+    ]
+    ship = [team for team in teams if team[0] in (NEAREST, TOURS, UNTRAINED) or team[1] in ("0", SHIPPED)]
+    runs += [
+        Run(name, training, floor, LARGE, weights)
+        for floor in floors[:LARGE_FLOORS]
+        for name, training, weights in ship
+    ]
+    yield from do_missing(folder / RUNS_FILE, "runs", runs, measure, workers)
+
+
+Line = Mapping[str, Any]
+
+
+def _size(name: str) -> int:
+    """Return the size of the team in the training of a team of the zoo."""
+    return int(name.rpartition("-")[2])
+
+
+def _seconds(line: Line) -> float:
+    return HORIZON_S if line["time_s"] is None else float(line["time_s"])
+
+
+def _ratio(ours: Sequence[Line], others: Sequence[Line]) -> Interval | None:
+    """Return the geometric mean of the ratios of times on the floors that both have."""
+    known = {line["floor"]: _seconds(line) for line in others}
+    both = [line for line in ours if line["floor"] in known]
+    if len({line["floor"] for line in both}) < 2:
+        return None
+    floors = [line["floor"] for line in both]
+    clusters = [sorted(set(floors)).index(floor) for floor in floors]
+    return paired_ratio([_seconds(line) for line in both], [known[floor] for floor in floors], clusters=clusters)
+
+
+def _mean(lines: Sequence[Line], of: Callable[[Line], float]) -> float:
+    return float(np.mean([of(line) for line in lines]))
+
+
+def _by_policy(lines: Sequence[Line], robots: int) -> dict[str, list[Line]]:
+    """Return the runs of teams of a size, by policy."""
+    found: dict[str, list[Line]] = {}
+    for line in lines:
+        if line["robots"] == robots:
+            found.setdefault(line["policy"], []).append(line)
+    return found
+
+
+def _named(policy: str) -> str:
+    return "untrained network" if policy == UNTRAINED else f"`{policy}`"
+
+
+def _written(ratio: Interval | None) -> str:
+    return "-" if ratio is None else f"{ratio:.2f}"
+
+
+def _table(found: Mapping[str, Sequence[Line]]) -> str:
+    """Return the table of teams of a size, fastest first."""
+    rows = []
+    for policy in sorted(found, key=lambda name: _mean(found[name], lambda line: math.log(_seconds(line)))):
+        lines = found[policy]
+        over = [_written(_ratio(lines, found.get(other, []))) if other != policy else "-" for other in (NEAREST, TOURS)]
+        reached = sum(line["time_s"] is not None for line in lines)
+        rows.append(
+            f"| {_named(policy)} | {len(lines)} | {100 * _mean(lines, lambda line: line['early']):.1f} % "
+            f"| {np.median([_seconds(line) for line in lines]):.1f} s | {over[0]} | {over[1]} | {reached} |"
+        )
+    header = (
+        f"| policy | runs | seen after {EARLY_S:.0f} s, mean | time to 99 %, median | time over `{NEAREST}` "
+        f"| time over `{TOURS}` | reached 99 % |\n|---|---:|---:|---:|---:|---:|---:|"
+    )
+    return "\n".join([header, *rows])
+
+
+def _best(found: Mapping[str, Sequence[Line]]) -> str | None:
+    """Return the team of the zoo that takes least time, over all its trainings."""
+    teams = [name for name in found if name.startswith("zoo:")]
+    return min(teams, key=lambda name: _mean(found[name], lambda line: math.log(_seconds(line))), default=None)
+
+
+def _goals(lines: Sequence[Line]) -> str:
+    """Return a row for each figure that was to be reached."""
+    rows = []
+    for robots in (*SIZES, LARGE):
+        found = _by_policy(lines, robots)
+        best = _best(found)
+        if best is None:
+            continue
+        for other in (NEAREST, "utility_frontier", "explore_lite", TOURS):
+            ratio = _ratio(found[best], found.get(other, []))
+            if ratio is None or (robots == LARGE and other != NEAREST):
+                continue
+            sure = len({line["floor"] for line in found[best]}) >= FEWEST_FOR_INTERVAL
+            if other == TOURS:
+                goal, said = "published", "-"
+            elif robots == LARGE:
+                goal, said = "at most 1", _said(ratio.low <= 1.0, sure)
+            elif other == NEAREST:
+                goal, said = "at most 0.90, interval below 1", _said(ratio.estimate <= 0.9 and ratio.high < 1.0, sure)
+            else:
+                goal, said = "interval below 1", _said(ratio.high < 1.0, sure)
+            rows.append(f"| {robots} robots, `{best}` over `{other}` | {goal} | {_written(ratio)} | {said} |")
+        if robots != LARGE:
+            reached = [_mean(found[name], lambda line: line["time_s"] is not None) for name in (best, NEAREST)]
+            rows.append(
+                f"| {robots} robots, `{best}`: runs that reach 99 % | as many as `{NEAREST}` "
+                f"| {100 * reached[0]:.1f} % ({100 * reached[1]:.1f} %) | {_said(reached[0] >= reached[1], True)} |"
+            )
+    return "\n".join(rows)
+
+
+def _said(is_reached: bool, is_sure: bool) -> str:
+    """Return whether a figure was reached; few floors do not tell that it was."""
+    if not is_reached:
+        return "**no**"
+    return "yes" if is_sure else "too few floors"
+
+
+def _conclusion(lines: Sequence[Line]) -> str:
+    """Return what the best teams reach, a line for each size."""
+    said = []
+    for robots in SIZES:
+        found = _by_policy(lines, robots)
+        best = _best(found)
+        if best is None:
+            continue
+        nearest, tours, before = (_ratio(found[best], found.get(other, [])) for other in (NEAREST, TOURS, UNTRAINED))
+        said.append(
+            f"{robots} robots: `{best}` takes {_written(nearest)} of the time of `{NEAREST}`, {_written(before)} of "
+            f"that before it learned, and {_written(tours)} of that of `{TOURS}`."
+        )
+    return "\n".join(said)
+
+
+def _seed_rows(lines: Sequence[Line], lessons: Sequence[Line]) -> str:
+    """Return the time over that of the nearest frontier by training."""
+    rows = []
+    for lesson in lessons:
+        curve = lesson["curve"]
+        robots = _size(lesson["team"])
+        found = _by_policy(lines, robots)
+        own = [line for line in found.get(f"zoo:{lesson['team']}", []) if line["training"] == str(lesson["seed"])]
+        best = max(curve[1:], key=lambda entry: entry[1])
+        rows.append(
+            f"| `{lesson['team']}` | {lesson['seed']} | {curve[-1][0]:,} | {100 * curve[0][1]:.1f} % "
+            f"| {100 * best[1]:.1f} % | {_written(_ratio(own, found.get(NEAREST, [])))} "
+            f"| {lesson['processor_s'] / 60:.1f} min |"
+        )
+    header = (
+        "| team | seed | decisions | validation before | best | time over `nearest_frontier` | processor time |\n"
+        "|---|---:|---:|---:|---:|---:|---:|"
+    )
+    return "\n".join([header, *rows])
+
+
+def _lessons(folder: Path) -> list[dict[str, Any]]:
+    """Return the trainings, in the order of the teams; a part of the study has none."""
+    found = kept_lines(folder / LESSONS_FILE) if (folder / LESSONS_FILE).exists() else []
+    return sorted(found, key=lambda line: (TEAMS.index(line["team"]), line["seed"]))
+
+
+def _curve_rows(lessons: Sequence[Line]) -> str:
+    """Return the mean curve of each team at a few points."""
+    rows = ["| decisions | " + " | ".join(f"`{team}`" for team in TEAMS) + " |", "|---:|" + "---:|" * len(TEAMS)]
+    curves = {team: [dict(map(tuple, line["curve"])) for line in lessons if line["team"] == team] for team in TEAMS}
+    for step in sorted({step for found in curves.values() for each in found for step in each}):
+        cells = [
+            f"{100 * np.mean([each[step] for each in curves[team]]):.1f} %"
+            if curves[team] and all(step in each for each in curves[team])
+            else "-"
+            for team in TEAMS
+        ]
+        rows.append(f"| {step:,} | " + " | ".join(cells) + " |")
+    return "\n".join(rows)
+
+
+def page(folder: Path) -> str:
+    """Return the results as markdown."""
+    lines, lessons = kept_lines(folder / RUNS_FILE), _lessons(folder)
+    return PAGE.format(
+        conclusion=_conclusion(lines),
+        seeds=len({line["seed"] for line in lessons}) or "no",
+        floors=len({line["floor"] for line in lines}),
+        horizon=HORIZON_S,
+        goals=_goals(lines),
+        tables="\n\n".join(f"## Teams of {robots}\n\n{_table(_by_policy(lines, robots))}" for robots in SIZES),
+        large=_table(_by_policy(lines, LARGE)),
+        by_seed=_seed_rows(lines, lessons),
+        picture=CURVES_PICTURE,
+        curves=_curve_rows(lessons),
+    )
+
+
+def pictures(folder: Path, out: Path) -> None:
+    """Draw the curves of all teams over the seeds."""
+    from lidarium.evaluation.analysis.learning_curves import joined
+    from lidarium.evaluation.drawing.curves_picture import save_learning_curves
+
+    curves = [
+        joined(team, [folder / LESSONS / f"{team}-{seed}" / "curve.csv" for seed in SEEDS], "step", "coverage")
+        for team in TEAMS
+        if any(line["team"] == team for line in _lessons(folder))
+    ]
+    if curves:
+        save_learning_curves(out / CURVES_PICTURE, curves, "decisions", "coverage")
+
+
+STUDY = Study(page, work=work, pictures=pictures, quick=25)
+"""The study of teams that learned by rewards."""

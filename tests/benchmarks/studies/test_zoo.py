@@ -1,0 +1,92 @@
+import json
+
+import pytest
+from published_pages import assert_published, keep
+
+from lidarium.agents.zoo.policy import zoo_files
+from lidarium.benchmarks.studies import zoo
+
+
+def line(policy, floor, time_s, robots=2, training=""):
+    return {
+        "policy": policy,
+        "training": training,
+        "floor": floor,
+        "robots": robots,
+        "early": 0.5 if time_s is None else min(60.0 / time_s, 1.0),
+        "time_s": time_s,
+    }
+
+
+def test_a_part_runs_the_teams_that_ship(tmp_path, monkeypatch):
+    monkeypatch.setattr(zoo, "FLOORS", ("apartment:7",))
+    monkeypatch.setattr(zoo, "CLASSICS", ("nearest_frontier",))
+    monkeypatch.setattr(zoo, "TEAMS", ("ppo-2",))
+    monkeypatch.setattr(zoo, "LARGE", 3)
+    monkeypatch.setattr(zoo, "HORIZON_S", 20.0)
+    done = [what for what, _, _ in zoo.work(tmp_path, None, 2, 1)]
+    assert done == ["runs"] * 8
+    lines = zoo.kept_lines(tmp_path / zoo.RUNS_FILE)
+    assert [(each["policy"], each["robots"]) for each in lines] == [
+        ("nearest_frontier", 2),
+        ("untrained", 2),
+        ("zoo:ppo-2", 2),
+        ("nearest_frontier", 4),
+        ("untrained", 4),
+        ("nearest_frontier", 3),
+        ("untrained", 3),
+        ("zoo:ppo-2", 3),
+    ]
+    assert zoo_files("").load(tmp_path / "untrained.safetensors")["steepness"] == 1.0
+    assert "| `nearest_frontier` | 1 |" in zoo.page(tmp_path)
+
+
+def test_trainings_that_are_there_are_not_run_again(tmp_path):
+    pytest.importorskip("torch", reason='PyTorch is not installed: extra "rl"')
+    lesson = zoo.Lesson("ppo-2", 3, tmp_path / "ppo-2-3")
+    kept = [{"team": "ppo-2", "seed": 3, "curve": [[0, 0.5], [10, 0.6]], "processor_s": 60.0}]
+    (tmp_path / zoo.LESSONS_FILE).write_text(
+        json.dumps({"key": lesson.key, **kept[0], "version": zoo_version()}) + "\n"
+    )
+    assert list(zoo.do_missing(tmp_path / zoo.LESSONS_FILE, "lessons", [lesson], zoo.learn, 1)) == []
+    assert zoo.kept_lines(tmp_path / zoo.LESSONS_FILE)[0]["curve"] == kept[0]["curve"]
+
+
+def zoo_version():
+    import lidarium
+
+    return lidarium.__version__
+
+
+def test_the_page_tells_what_is_reached_over_floors_and_seeds(tmp_path):
+    floors = [f"building:{k}" for k in range(8)]
+    lines = [line("nearest_frontier", floor, 100.0 + k) for k, floor in enumerate(floors)]
+    lines += [line("tour_frontier", floor, 70.0 + k) for k, floor in enumerate(floors)]
+    lines += [line("untrained", floor, None) for floor in floors]
+    lines += [
+        line("zoo:ppo-2", floor, (100.0 + k) * (0.78 + 0.01 * seed + 0.01 * (k % 3)), training=str(seed))
+        for k, floor in enumerate(floors)
+        for seed in range(2)
+    ]
+    lines += [line(policy, floor, 50.0, robots=8) for floor in floors for policy in ("nearest_frontier", "zoo:ppo-2")]
+    lines += [line(policy, floor, 60.0, robots=4) for floor in floors for policy in ("nearest_frontier", "zoo:ppo-4")]
+    lessons = [
+        {"team": "ppo-2", "seed": seed, "curve": [[0, 0.5], [10, 0.6 + seed / 10]], "processor_s": 90.0}
+        for seed in (0, 1)
+    ]
+    keep(tmp_path / zoo.RUNS_FILE, lines)
+    keep(tmp_path / zoo.LESSONS_FILE, lessons)
+    page = zoo.page(tmp_path)
+    assert_published("zoo", page, tmp_path)
+    ratio = zoo.paired_ratio([0.79, 0.80, 0.81], [1.0, 1.0, 1.0]).estimate
+    assert (
+        f"| 2 robots, `zoo:ppo-2` over `nearest_frontier` | at most 0.90, interval below 1 | {ratio:.2f}"[:-1] in page
+    )
+    assert (
+        "| 2 robots, `zoo:ppo-2`: runs that reach 99 % | as many as `nearest_frontier` | 100.0 % (100.0 %) | yes |"
+        in page
+    )
+    assert "| untrained network | 8 | 50.0 % | 1200.0 s |" in page
+    assert "| `ppo-2` | 1 | 10 | 50.0 % | 70.0 % |" in page
+    assert "| 10 | 65.0 % | - | - | - |" in page
+    assert "| 4 robots, `zoo:ppo-4` over `nearest_frontier` | at most 0.90, interval below 1 | 1.00" in page
