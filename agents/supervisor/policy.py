@@ -5,7 +5,7 @@ import time
 from collections.abc import Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from gymnasium.vector import VectorEnv, VectorWrapper
@@ -29,6 +29,10 @@ from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.mapping.merging.fusion import FusedMap
 from lidarium.mapping.planning.frontiers.frontier_map import FRONTIER
 from lidarium.mapping.planning.grid_planning import cells_of
+
+_BatchWrapper = VectorWrapper
+if TYPE_CHECKING:  # Gymnasium 1.1 has no parameters there
+    _BatchWrapper = VectorWrapper[Any, Any, Any]
 
 PATIENCE_S = 20.0
 """Time without motion after which a sent robot explores by itself again [s]."""
@@ -563,7 +567,7 @@ class SupervisedTeam(TeamWrapper):
                 observations[agent][MASK] = _only_stay(observations[agent][MASK])
 
 
-class SupervisedBatch(VectorWrapper[Any, Any, Any]):
+class SupervisedBatch(_BatchWrapper):
     """A supervisor around each episode of a batch; see `SupervisedTeam`.
 
     ``infos["directed"]`` (rows,) bool is True for robots under an order of the station.
