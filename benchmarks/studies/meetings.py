@@ -57,6 +57,12 @@ and {buildings} smaller buildings.
 |---|---:|---:|
 {kinds}
 
+## What can be won
+
+If all robots of `oblivious` had known at once what the team knew together, they would have needed {together} of the
+time. With the ideal radio `tour_frontier` needs {ideal} of the time of `oblivious`. Meetings can win no more than
+that, less the ways to them.
+
 ## By radio and team
 
 *All know*: mean time until every robot knows 99 %; *reached*: runs in which they do. *Team*: until they know it
@@ -232,6 +238,14 @@ def _said(is_reached: bool, floors: int) -> str:
     return "yes" if floors >= FEWEST_FOR_INTERVAL else "too few floors"
 
 
+def _together(lines: Sequence[Line]) -> str:
+    """Return the time until the team knows the floor together, over that until all know."""
+    known = [line for line in lines if line["team_s"] is not None and line["team_s"] > 0.0]
+    if len(known) < 2:
+        return f"{known[0]['team_s'] / _seconds(known[0]):.3f}" if known else "-"
+    return f"{paired_ratio([line['team_s'] for line in known], [_seconds(line) for line in known]):.3f}"
+
+
 def _kind_row(lines: Sequence[Line], other: str) -> str:
     ratios = [_ratio(_chosen(lines, OURS, kind=kind), _chosen(lines, other, kind=kind)) for kind in ("office", "build")]
     return f"| `{OURS}` over `{other}` | {ratios[0]} | {ratios[1]} |"
@@ -267,6 +281,8 @@ def page(folder: Path) -> str:
         offices=sum(floor.startswith("office") for floor in floors),
         buildings=sum(floor.startswith("building") for floor in floors),
         goals=_goals(lines),
+        together=_together(_chosen(lines, "oblivious")),
+        ideal=_ratio(_chosen(lines, "tour_frontier", "all"), _chosen(lines, "oblivious")) or "-",
         kinds="\n".join(_kind_row(lines, other) for other in POLICIES if other != OURS),
         teams="\n".join(_team_row(teams[key]) for key in sorted(teams)),
         rules="\n".join(
