@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
-from lidarium.agents.zoo.network import OBSERVED
+from lidarium.agents.zoo.network import OBSERVED, TOURS
 from lidarium.envs.floors.generation.buildings import KINDS
 from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.settings.making import make_settings
@@ -214,7 +214,7 @@ TEAM_PPO: Mapping[str, Any] = {
 POLICY_GRADIENT, VALUES = ("ppo", "mappo"), ("qmix", "vdn")
 """Algorithms that train teams: those that learn a policy, and those that learn the value of choices."""
 
-ALGORITHMS, LEVELS = (*POLICY_GRADIENT, *VALUES), ("frontier",)
+ALGORITHMS, LEVELS = (*POLICY_GRADIENT, *VALUES), tuple(OBSERVED)
 """All algorithms that train teams, and levels at which these decide."""
 
 STATE_CELLS = 8
@@ -235,7 +235,8 @@ class TeamSettings:
         well; ``qmix``, ``vdn``: the network gives the value of each choice, and that of the team is a mixture that
         depends on the true state, or their sum.
     level : str
-        ``frontier``.
+        ``frontier``, where the network begins with the ranking of explore_lite, or ``tour``, where it begins with what
+        `tour_frontier` does.
     robots : int
         Size of the team.
     floors : str
@@ -306,7 +307,8 @@ class TeamSettings:
             "robots": self.robots,
             "horizon_s": self.horizon_s,
         }
-        options |= {"observe": list(OBSERVED), "realism": realism}
+        observe = [name for name in OBSERVED[self.level] if name != TOURS]  # the level itself shows its tours
+        options |= {"observe": observe, "realism": realism}
         try:
             make_settings(**options)
         except (TypeError, AttributeError) as error:

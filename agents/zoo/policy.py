@@ -4,18 +4,18 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from lidarium.agents.policy import Action, Policy, Team
-from lidarium.agents.zoo.network import GAINS, TEAMMATES, FrontierNetwork, frontier_shapes
+from lidarium.agents.zoo.network import NETWORKS, OBSERVED, network_shapes
 from lidarium.envs.faces.parallel import Observation
 from lidarium.mapping.files.weight_files import WeightFiles
 
 
-def zoo_files(name: str) -> WeightFiles:
-    """Return the files of a team of the zoo, such as ``ppo-2``."""
-    return WeightFiles(frontier_shapes(), "lidarium.agents.zoo", f"{name}.safetensors", f"{name}.json")
+def zoo_files(name: str, level: str = "frontier") -> WeightFiles:
+    """Return the files of a team of the zoo at a level, such as ``ppo-2``."""
+    return WeightFiles(network_shapes(level), "lidarium.agents.zoo", f"{name}.safetensors", f"{name}.json")
 
 
 class ZooTeam(Policy):
-    """Robots that share one trained network, and each choose a frontier by it.
+    """Robots that share one trained network, and each choose a frontier or a stop of tours by it.
 
     Parameters
     ----------
@@ -23,19 +23,20 @@ class ZooTeam(Policy):
         The team, such as ``ppo-2``; any number of robots, two at least, may use its network.
     weights : str or Path, optional
         File of weights of `lidarium train`. Those of the package by default.
+    level : str, default "frontier"
+        Level at which the network decides, or ``tour``.
     """
 
-    level = "frontier"
-    observes = (GAINS, TEAMMATES)
-
-    def __init__(self, name: str, weights: str | Path = "") -> None:
-        self._network = FrontierNetwork(zoo_files(name).load(weights))
+    def __init__(self, name: str, weights: str | Path = "", level: str = "frontier") -> None:
+        self.level = level
+        self.observes = OBSERVED[level][1:]  # the level itself shows what is on offer
+        self._network = NETWORKS[level](zoo_files(name, level).load(weights))
 
     def reset(self, team: Team, seed: int = 0) -> None:
         """Begin an episode: nothing is kept of the last one."""
 
     def act(self, observations: Mapping[str, Observation]) -> dict[str, Action]:
-        """Choose a frontier for each robot; one without a frontier stays."""
+        """Choose for each robot; one with nothing on offer stays."""
         return {agent: self._network.choose(observation) for agent, observation in observations.items()}
 
 
@@ -57,3 +58,8 @@ def mappo_2(weights: str | Path = "") -> ZooTeam:
 def qmix_2(weights: str | Path = "") -> ZooTeam:
     """Return the team of two that was trained by QMIX."""
     return ZooTeam("qmix-2", weights)
+
+
+def tours_2(weights: str | Path = "") -> ZooTeam:
+    """Return the team of two that was trained by PPO at the level of tours."""
+    return ZooTeam("tours-2", weights, "tour")

@@ -12,7 +12,7 @@ import numpy as np
 
 from lidarium.agents.catalogue import make_policy
 from lidarium.agents.policy import settings_for
-from lidarium.agents.zoo.network import frontier_shapes
+from lidarium.agents.zoo.network import network_shapes
 from lidarium.agents.zoo.policy import zoo_files
 from lidarium.benchmarks.studies.shared.study import Progress, Study, Task, do_missing, kept_lines
 from lidarium.envs.floors.catalogue.names import set_floors
@@ -148,7 +148,7 @@ def work(folder: Path, _data: Path | None, every: int, workers: int) -> Progress
         yield from do_missing(folder / LESSONS_FILE, "lessons", lessons, learn, workers)
         networks = {(each.team, str(each.seed)): each.folder / "weights.safetensors" for each in lessons}
     untrained = folder / f"{UNTRAINED}.safetensors"
-    zeros = {name: np.zeros(shape, np.float32) for name, shape in frontier_shapes().items()}
+    zeros = {name: np.zeros(shape, np.float32) for name, shape in network_shapes("frontier").items()}
     zoo_files("").save(untrained, {**zeros, "steepness": np.ones(1, np.float32)})
     teams: list[tuple[str, str, Path | None]] = [(name, "", None) for name in CLASSICS]
     teams += [(UNTRAINED, "", untrained)]

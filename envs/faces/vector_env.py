@@ -87,9 +87,10 @@ class ExplorationVectorEnv(VectorEnv[Any, NDArray[Any], NDArray[Any]]):
         self.batch = make_rows(episodes, floor, options, level, image_resolution, copy, curriculum)
         self.settings = self.batch.settings
         self.render_mode = render_mode
+        first = self.batch.parts[0] if isinstance(self.batch, RandomizedRows) else self.batch
         self.metadata = {
             **type(self).metadata,
-            "render_fps": 1.0 / self._period_s(level),
+            "render_fps": 1.0 / first.engine.level.period_s,
             "autoreset_mode": _mode(autoreset_mode),
         }
         self.num_envs = self.batch.rows
@@ -101,9 +102,6 @@ class ExplorationVectorEnv(VectorEnv[Any, NDArray[Any], NDArray[Any]]):
 
     def __repr__(self) -> str:
         return batch_text(self)
-
-    def _period_s(self, level: str) -> float:
-        return self.settings.time_step if level == "velocity" else self.settings.decision_period_s
 
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None

@@ -1,7 +1,7 @@
-"""A policy for sb3-contrib's PPO with masks that attends to the frontiers on offer.
+"""Policies for sb3-contrib's PPO with masks that attend to what is on offer: frontiers, or stops of tours.
 
-Its network takes any number of frontiers and teammates in any order. It begins with the ranking of
-explore_lite, to which it adds a correction that is zero until it is trained.
+Their networks take any number of options and teammates in any order. They begin with a ranking, that of explore_lite
+or that of `tour_frontier`, to which they add a correction that is zero until it is trained.
 
 References
 ----------
@@ -10,8 +10,9 @@ the ranking of explore_lite, three times the path less the size.
 """
 
 import math
+from abc import abstractmethod
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import torch
@@ -26,10 +27,15 @@ from lidarium.agents.zoo.network import (
     GAINS,
     MASK,
     METRES,
+    OPTION_NUMBERS,
+    OTHER_STOPS,
     PATH_FACTOR,
     SQUARE_METRES,
+    STAY,
     TEAMMATE_UNITS,
     TEAMMATES,
+    TOUR_UNITS,
+    TOURS,
 )
 from lidarium.training.reinforcement.masked_ppo import RankingPolicy
 from lidarium.training.torch_network import AttentionLayer
@@ -46,17 +52,28 @@ LEAST_GROUP = 32
 MOST_GROUPS = 4
 
 
-class FrontierRanking(BaseFeaturesExtractor):
-    """Ranks the frontiers on offer, and estimates the future gain."""
+class OptionRanking(BaseFeaturesExtractor):
+    """Ranks what is on offer, and estimates the future gain.
+
+    Attributes
+    ----------
+    level, table : str
+        Level of decision, and the observable that has a row for each option.
+    seen : tuple of str
+        Observables that it sees, besides the situation.
+    """
+
+    level: ClassVar[str]
+    table: ClassVar[str]
+    seen: ClassVar[tuple[str, ...]]
 
     def __init__(self, observation_space: spaces.Space[dict[str, object]]) -> None:
-        _check_observed(observation_space)
+        self._check_observed(observation_space)
         assert isinstance(observation_space, spaces.Dict)
         shapes = {name: space.shape or () for name, space in observation_space.spaces.items()}
         super().__init__(observation_space, shapes[MASK][0] + 1)
-        numbers = shapes[FRONTIERS][1] + 2 + (GAINS in shapes)
         self.situation_names = [name for name in SITUATION if name in shapes]
-        self.frontier = nn.Linear(numbers, WIDTH)
+        self.add_module(self.level, nn.Linear(self._numbers(shapes), WIDTH))
         self.teammate = nn.Linear(shapes[TEAMMATES][1], WIDTH) if TEAMMATES in shapes else None
         self.situation = nn.Linear(1 + sum(shapes[name][0] for name in self.situation_names), WIDTH)
         self.layers = nn.ModuleList(AttentionLayer() for _ in range(LAYERS))
@@ -103,30 +120,49 @@ class FrontierRanking(BaseFeaturesExtractor):
         given = {name: torch.from_numpy(array.copy()) for name, array in weights.items()}
         self.load_state_dict({**self.state_dict(), **given})
 
+    def _check_observed(self, space: spaces.Space[dict[str, object]]) -> None:
+        """Check that the network supports the observations."""
+        names = list(space.spaces) if isinstance(space, spaces.Dict) else []
+        name = type(self).__name__.replace("Ranking", "Policy")
+        if self.table not in names or MASK not in names:
+            raise ValueError(
+                f"{name} attends to {self.table}, and there are none to observe; make the environment with "
+                f'level="{self.level}" and observe=["{self.seen[-1]}", "time_left"], its observations as a dict'
+            )
+        known = (*self.seen, *SITUATION)
+        for each in names:
+            if each not in (*known, MASK, STATE):
+                raise ValueError(f"{name} does not see {each!r}; observe some of {', '.join(known)}")
+
+    @abstractmethod
+    def _numbers(self, shapes: Mapping[str, tuple[int, ...]]) -> int:
+        """Return how many numbers of an option it sees."""
+
+    @abstractmethod
+    def _options(self, observations: Mapping[str, Tensor], rows: Tensor, width: int) -> tuple[Tensor, Tensor]:
+        """Return the numbers of the first options of some decisions, and how these are ranked before a training."""
+
     def _ranked(self, observations: Mapping[str, Tensor], offered: Tensor, rows: Tensor, is_rated: bool) -> Tensor:
-        """Rank the frontiers of some decisions; no more of them are taken than the widest one has."""
+        """Rank the options of some decisions; no more of them are taken than the widest one has."""
         actions = offered.shape[1]
         offered = offered[rows]
         width = max(int(offered.sum(dim=1).max()), 1)  # offers come first
         offered = offered[:, :width]
-        frontiers = observations[FRONTIERS][rows, :width]
         tokens, is_there = [self._situation(observations, rows)[:, None]], [torch.ones_like(offered[:, :1])]
         if self.teammate is not None:
             teammates = observations[TEAMMATES][rows]
             tokens.append(self.teammate(_teammate_numbers(teammates)))
             is_there.append(teammates[..., -1] > 0)
-        numbers = [_frontier_numbers(frontiers)]
-        if GAINS in observations:
-            numbers.append(observations[GAINS][rows, :width, None] / SQUARE_METRES)
-        tokens.append(self.frontier(torch.cat(numbers, dim=2)))
+        numbers, classic = self._options(observations, rows, width)
+        tokens.append(self.get_submodule(self.level)(numbers))
         mixed, seen = torch.cat(tokens, dim=1), torch.cat([*is_there, offered], dim=1)
         for layer in self.layers:
             mixed = layer(mixed, seen)
         mixed = self.last(mixed)
-        classic = frontiers[..., 3] / PATH_FACTOR - frontiers[..., 2]
         ranked = self.steepness * classic + self.correction(mixed[:, -width:])[..., 0]
         ranked = nn.functional.pad(ranked.masked_fill(~offered, 0.0), (0, actions - width))
-        stay = self.stay(mixed[:, 0]) + ranked.min(dim=1, keepdim=True).values  # behind all, at the start
+        last = ranked.min(dim=1, keepdim=True).values
+        stay = self.stay(mixed[:, 0]) + last + STAY[self.level]  # behind all, before a training
         found = [ranked, stay]
         if is_rated:
             known = [mixed[:, 0], *([observations[STATE][rows]] if STATE in observations else [])]
@@ -140,6 +176,39 @@ class FrontierRanking(BaseFeaturesExtractor):
         return tokens
 
 
+class FrontierRanking(OptionRanking):
+    """Ranks frontiers."""
+
+    level, table, seen = "frontier", FRONTIERS, (FRONTIERS, GAINS, TEAMMATES)
+
+    def _numbers(self, shapes: Mapping[str, tuple[int, ...]]) -> int:
+        return OPTION_NUMBERS[self.level] - (GAINS not in shapes)
+
+    def _options(self, observations: Mapping[str, Tensor], rows: Tensor, width: int) -> tuple[Tensor, Tensor]:
+        frontiers = observations[FRONTIERS][rows, :width]
+        numbers = [frontiers / METRES, torch.log1p(frontiers[..., 2:])]  # near 1, path and size as logarithms too
+        if GAINS in observations:
+            numbers.append(observations[GAINS][rows, :width, None] / SQUARE_METRES)
+        return torch.cat(numbers, dim=2), frontiers[..., 3] / PATH_FACTOR - frontiers[..., 2]
+
+
+class TourRanking(OptionRanking):
+    """Ranks stops of tours, the first one of which is what `tour_frontier` does."""
+
+    level, table, seen = "tour", TOURS, (TOURS, TEAMMATES)
+
+    def _numbers(self, shapes: Mapping[str, tuple[int, ...]]) -> int:
+        return OPTION_NUMBERS[self.level]
+
+    def _options(self, observations: Mapping[str, Tensor], rows: Tensor, width: int) -> tuple[Tensor, Tensor]:
+        stops = observations[TOURS][rows, :width]
+        is_first = torch.zeros_like(stops[..., :1])
+        is_first[:, 0] = 1.0
+        numbers = [stops / torch.from_numpy(TOUR_UNITS), torch.log1p(stops[..., 2:5]), is_first]
+        classic = torch.where(is_first[..., 0] > 0, 0.0, OTHER_STOPS - stops[..., 2] / METRES)
+        return torch.cat(numbers, dim=2), classic
+
+
 class FrontierPolicy(RankingPolicy):
     """Attends to frontiers and teammates; for ``MaskablePPO`` at the level of frontiers.
 
@@ -148,12 +217,12 @@ class FrontierPolicy(RankingPolicy):
     ``velocity`` and ``bumper``.
     """
 
-    ranking = FrontierRanking
+    ranking: type[OptionRanking] = FrontierRanking
 
     @property
-    def network(self) -> FrontierRanking:
+    def network(self) -> OptionRanking:
         """The network, with the critic."""
-        assert isinstance(self.features_extractor, FrontierRanking)
+        assert isinstance(self.features_extractor, OptionRanking)
         return self.features_extractor
 
     @property
@@ -162,23 +231,13 @@ class FrontierPolicy(RankingPolicy):
         return self.network.critic
 
 
-def _check_observed(space: spaces.Space[dict[str, object]]) -> None:
-    """Check that the network supports the observations."""
-    seen = (FRONTIERS, GAINS, TEAMMATES, *SITUATION)
-    names = list(space.spaces) if isinstance(space, spaces.Dict) else []
-    if FRONTIERS not in names or MASK not in names:
-        raise ValueError(
-            "FrontierPolicy attends to frontiers, and there are none to observe; make the environment with "
-            'level="frontier" and observe=["frontiers", "time_left"], its observations as a dict'
-        )
-    for name in names:
-        if name not in (*seen, MASK, STATE):
-            raise ValueError(f"FrontierPolicy does not see {name!r}; observe some of {', '.join(seen)}")
+class TourPolicy(FrontierPolicy):
+    """Attends to stops of tours and teammates; for ``MaskablePPO`` at the level of tours.
 
+    ``MaskablePPO(TourPolicy, lidarium.sb3_vec_env(16, "set:train", level="tour", robots=2, observe=["teammates"]))``.
+    """
 
-def _frontier_numbers(frontiers: Tensor) -> Tensor:
-    """Return place, path and size of frontiers near 1, and path and size as logarithms."""
-    return torch.cat([frontiers / METRES, torch.log1p(frontiers[..., 2:])], dim=2)
+    ranking = TourRanking
 
 
 def _teammate_numbers(teammates: Tensor) -> Tensor:

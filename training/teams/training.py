@@ -24,13 +24,16 @@ from lidarium.training.folder import asked_for, begin_folder, versions
 from lidarium.training.progress import Progress
 from lidarium.training.reinforcement.central_state import CentralState
 from lidarium.training.reinforcement.checkpoints import Checkpoint, latest_checkpoint
-from lidarium.training.reinforcement.frontier_policy import FrontierPolicy, FrontierRanking
+from lidarium.training.reinforcement.frontier_policy import FrontierPolicy, OptionRanking, TourPolicy
 from lidarium.training.reinforcement.learning import learn_on, model_of
 from lidarium.training.settings import VALUES, PpoSettings, TeamSettings, ValueSettings
 
 TRAINING_FILE, WEIGHTS_FILE, CARD_FILE, CURVE_FILE = "training.json", "weights.safetensors", "card.json", "curve.csv"
 CHECKPOINTS, TENSORBOARD = "checkpoints", "tensorboard"
 LIBRARIES = ("numpy", "numba", "torch", "stable-baselines3", "sb3-contrib")
+
+POLICIES: dict[str, type[FrontierPolicy]] = {each.ranking.level: each for each in (FrontierPolicy, TourPolicy)}
+"""Policies that learn, by their level."""
 
 LEARNING_WORLD_SEED = 7
 """Seeds of the episodes behind a checkpoint are drawn with it."""
@@ -73,7 +76,7 @@ class TeamTraining:
         if settings.algorithm == "mappo":
             rows = CentralState(rows)
         with closing(VecMonitor(rows)) as environment:
-            model = model_of(FrontierPolicy, ppo, environment, settings.seed)
+            model = model_of(POLICIES[settings.level], ppo, environment, settings.seed)
             assert isinstance(model.policy, FrontierPolicy)
             network = model.policy.network
 
@@ -101,7 +104,7 @@ class TeamTraining:
         settings, value = self.settings, self.settings.value
         with closing(vector_env(*self._floors(value), level=settings.level, threads=1, **self._world)) as environment:
             torch.manual_seed(settings.seed)
-            network = FrontierRanking(environment.single_observation_space)
+            network = POLICIES[settings.level].ranking(environment.single_observation_space)
             yield from learn_values(
                 settings,
                 environment,
@@ -121,18 +124,18 @@ class TeamTraining:
         """Return how many episodes run side by side, and their floors."""
         return learning.environments // self.settings.robots, self.settings.floors
 
-    def _first(self, network: FrontierRanking, is_new: bool) -> Checkpoint:
+    def _first(self, network: OptionRanking, is_new: bool) -> Checkpoint:
         """Return the curve before a network learns."""
         return Checkpoint(0, [(0, self._validated(network))] if is_new else [])
 
-    def _measured(self, network: FrontierRanking, before: Checkpoint) -> float:
+    def _measured(self, network: OptionRanking, before: Checkpoint) -> float:
         """Return what the network reaches; keep its weights if that is more than ever before."""
         reached = self._validated(network)
         if reached > max((found for number, found in before.curve if number and found is not None), default=-1.0):
-            zoo_files("").save(self.folder / WEIGHTS_FILE, network.weights())
+            zoo_files("", self.settings.level).save(self.folder / WEIGHTS_FILE, network.weights())
         return reached
 
-    def _validated(self, network: FrontierRanking) -> float:
+    def _validated(self, network: OptionRanking) -> float:
         """Return the coverage that a network reaches, mean over the time of an episode and over the floors.
 
         The network takes what it prefers, from the same starts each time.
@@ -143,7 +146,7 @@ class TeamTraining:
         with closing(environment):
             seen, infos = environment.reset(seed=[0] * len(floors), options={"floor": list(floors)})
             reached, is_over = infos["truth"]["coverage"].copy(), np.zeros(environment.num_envs, np.bool_)
-            decisions, total = math.ceil(settings.horizon_s / environment.settings.decision_period_s), 0.0
+            decisions, total = math.ceil(settings.horizon_s / environment.engine.level.period_s), 0.0
             for _ in range(decisions):
                 seen, _, terminated, truncated, infos = environment.step(network.preferred(seen))
                 reached[~is_over] = infos["truth"]["coverage"][~is_over]
@@ -157,7 +160,7 @@ class TeamTraining:
         curve = [(number, found) for number, found in checkpoint.curve if found is not None]
         write_text(self.folder / CURVE_FILE, "step,coverage\n" + "".join(f"{k},{found}\n" for k, found in curve))
         best = max(curve[1:] or curve, key=lambda entry: entry[1])
-        files = zoo_files("")
+        files = zoo_files("", self.settings.level)
         digest = files.save(self.folder / WEIGHTS_FILE, files.load(self.folder / WEIGHTS_FILE))
         card: dict[str, Any] = {
             "sha256": digest,

@@ -23,7 +23,7 @@ from torchrl.data import LazyTensorStorage, TensorDictReplayBuffer
 from torchrl.modules import QMixer, QValueModule, VDNMixer
 from torchrl.objectives import QMixerLoss, SoftUpdate, ValueEstimators
 
-from lidarium.agents.zoo.network import MASK, OBSERVED
+from lidarium.agents.zoo.network import MASK
 from lidarium.envs.faces.team_rows import ACTIVE
 from lidarium.envs.faces.vector_env import ExplorationVectorEnv
 from lidarium.training.reinforcement.checkpoints import (
@@ -33,11 +33,10 @@ from lidarium.training.reinforcement.checkpoints import (
     restore,
     write_checkpoint,
 )
-from lidarium.training.reinforcement.frontier_policy import STATE, FrontierRanking
+from lidarium.training.reinforcement.frontier_policy import STATE, OptionRanking
 from lidarium.training.settings import TeamSettings, ValueSettings
 
 ROBOTS = "agents"
-SEEN = (*OBSERVED, MASK)
 VALUES, CHOICE, CHOSEN, TOGETHER = (ROBOTS, "values"), (ROBOTS, "choice"), (ROBOTS, "chosen"), "together"
 
 REWARD_UNIT = 10.0
@@ -53,7 +52,7 @@ STEEPEST = 10.0
 def learn_values(
     settings: TeamSettings,
     environment: ExplorationVectorEnv,
-    network: FrontierRanking,
+    network: OptionRanking,
     folder: Path,
     log: Path,
     begin_at: Callable[[int], int],
@@ -95,7 +94,7 @@ def learn_values(
 def _learn_on(
     value: ValueSettings,
     environment: ExplorationVectorEnv,
-    network: FrontierRanking,
+    network: OptionRanking,
     learner: Learner,
     seed: int,
     generator: np.random.Generator,
@@ -145,10 +144,10 @@ def _mixer(settings: TeamSettings, environment: ExplorationVectorEnv) -> nn.Modu
     return QMixer(environment.state_space.shape, settings.value.mixing, settings.robots, "cpu")
 
 
-def _loss(network: FrontierRanking, mixer: nn.Module, discount: float) -> QMixerLoss:
+def _loss(network: OptionRanking, mixer: nn.Module, discount: float) -> QMixerLoss:
     """Return the loss of a team's value, with target networks that are as the learned ones are now."""
     values = TensorDictSequential(
-        TensorDictModule(_Values(network), [(ROBOTS, name) for name in SEEN], [VALUES]),
+        TensorDictModule(_Values(network), [(ROBOTS, name) for name in _seen(network)], [VALUES]),
         QValueModule("categorical", VALUES, (ROBOTS, "allowed"), [CHOICE, VALUES, CHOSEN], strict_shape=False),
     )
     mixed = TensorDictModule(mixer, [CHOSEN, STATE] if mixer.needs_state else [CHOSEN], [TOGETHER])
@@ -158,26 +157,31 @@ def _loss(network: FrontierRanking, mixer: nn.Module, discount: float) -> QMixer
     return loss
 
 
+def _seen(network: OptionRanking) -> tuple[str, ...]:
+    """Return what a network sees of an observation."""
+    return *network.seen, MASK
+
+
 class _Values(nn.Module):
     """The network's preferences as values, for robots of teams: (teams, robots, actions)."""
 
-    def __init__(self, network: FrontierRanking) -> None:
+    def __init__(self, network: OptionRanking) -> None:
         super().__init__()
         self.network = network
 
     def forward(self, *seen: Tensor) -> Tensor:
         teams = seen[0].shape[:2]
-        rows = {name: each.flatten(0, 1) for name, each in zip(SEEN, seen, strict=True)}
+        rows = {name: each.flatten(0, 1) for name, each in zip(_seen(self.network), seen, strict=True)}
         return self.network.preferences(rows).unflatten(0, teams)
 
 
 def _choices(
-    network: FrontierRanking, seen: dict[str, Any], chance: float, generator: np.random.Generator
+    network: OptionRanking, seen: dict[str, Any], chance: float, generator: np.random.Generator
 ) -> NDArray[np.int64]:
     """Return the choice of each robot, (teams, robots): the most valuable, or now and then any that is allowed."""
     robots = seen[ROBOTS]
     with torch.no_grad():
-        values = _Values(network)(*(robots[name] for name in SEEN)).numpy()
+        values = _Values(network)(*(robots[name] for name in _seen(network))).numpy()
     allowed = robots["allowed"].numpy()
     best = np.where(allowed, values, -np.inf).argmax(axis=2)
     drawn = np.where(allowed, generator.random(allowed.shape), -1.0).argmax(axis=2)
@@ -192,7 +196,7 @@ def _teams(
     mask = observations[MASK].copy()
     if active is not None:
         mask[~active, :-1] = 0
-    arrays = {**{name: observations[name] for name in OBSERVED}, MASK: mask, "allowed": mask > 0}
+    arrays = {**{name: each for name, each in observations.items() if name != MASK}, MASK: mask, "allowed": mask > 0}
     tensors = {
         name: torch.from_numpy(array.reshape(teams, robots, *array.shape[1:]).copy()) for name, array in arrays.items()
     }

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import lidarium
-from lidarium.agents.zoo.network import FrontierNetwork, frontier_shapes
+from lidarium.agents.zoo.network import FrontierNetwork, network_shapes
 from lidarium.agents.zoo.policy import zoo_files
 from lidarium.evaluation.suites.starts import starts_in
 from lidarium.scripts.main import main
@@ -16,7 +16,7 @@ NAMES = ("zoo:ppo-2", "zoo:ppo-4", "zoo:mappo-2", "zoo:qmix-2")
 def network():
     """A network whose weights are drawn."""
     generator = np.random.default_rng(0)
-    drawn = {name: generator.normal(0.0, 0.3, shape) for name, shape in frontier_shapes().items()}
+    drawn = {name: generator.normal(0.0, 0.3, shape) for name, shape in network_shapes("frontier").items()}
     return FrontierNetwork({name: array.astype(np.float32) for name, array in drawn.items()})
 
 
@@ -69,7 +69,7 @@ def test_masked_actions_are_never_taken(network, count):
 def test_what_ships_is_small_and_begins_from_its_card(name):
     weights = zoo_files(name.partition(":")[2]).load()
     assert sum(array.nbytes for array in weights.values()) < 400_000
-    assert {key: array.shape for key, array in weights.items()} == frontier_shapes()
+    assert {key: array.shape for key, array in weights.items()} == network_shapes("frontier")
 
 
 def test_a_team_in_a_batch_does_as_alone():
