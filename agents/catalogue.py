@@ -110,6 +110,11 @@ POLICIES.register(
     "at the level of frontiers: two robots that share a network of values, trained by QMIX",
 )
 POLICIES.register(
+    "zoo:tours-2",
+    "lidarium.agents.zoo.policy:tours_2",
+    "at the level of tours: two robots that share a network trained by PPO, which begins as tour_frontier",
+)
+POLICIES.register(
     "sparse_frontier",
     "lidarium.agents.sparse.frontier:SparseFrontier",
     "robots see all ground with depth cameras, and plan on sparse maps of boxes",

@@ -22,7 +22,7 @@ from lidarium.evaluation.episodes.runner import run_episode
 from lidarium.evaluation.episodes.watching import WatchedExploration
 from lidarium.evaluation.statistics import FEWEST_FOR_INTERVAL, Interval, paired_ratio
 
-TEAMS = ("ppo-2", "ppo-4", "mappo-2", "qmix-2")
+TEAMS = ("tours-2", "ppo-2", "mappo-2", "qmix-2", "ppo-4")
 """Trainings that ship; the number is the size of the team in training."""
 
 SEEDS = tuple(range(5))

@@ -239,7 +239,8 @@ def _team_answer(folder: Path, is_interrupted: bool) -> Answer:
     if best["coverage"] <= untrained:
         lines.append("it is no better than before it learned; want more decisions or floors")
     weights = shlex.quote(f"weights={folder / WEIGHTS_FILE}")
-    lines.append(f"use them: lidarium run --policy zoo:ppo-2 --policy-set {weights}")
+    name = "zoo:tours-2" if card["training"]["level"] == "tour" else "zoo:ppo-2"
+    lines.append(f"use them: lidarium run --policy {name} --policy-set {weights}")
     return Answer({"folder": str(folder), "interrupted": False, **card}, "\n".join(lines))
 
 

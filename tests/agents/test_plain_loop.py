@@ -19,6 +19,7 @@ NEEDS = {
     "nearest_node": SMALL_GRAPH,
     "utility_node": SMALL_GRAPH,
     "zoo:ppo-2": {"observe": ("frontier_gains", "teammates")},
+    "zoo:tours-2": {"observe": ("teammates",)},
 }
 ALIKE = {"zoo:ppo-4", "zoo:mappo-2", "zoo:qmix-2"}
 """Policies that differ from ``zoo:ppo-2`` by their weights alone."""

@@ -9,7 +9,13 @@ from lidarium.agents.zoo.policy import zoo_files
 from lidarium.evaluation.suites.starts import starts_in
 from lidarium.scripts.main import main
 
-NAMES = ("zoo:ppo-2", "zoo:ppo-4", "zoo:mappo-2", "zoo:qmix-2")
+NAMES = {
+    "zoo:tours-2": "tour",
+    "zoo:ppo-2": "frontier",
+    "zoo:ppo-4": "frontier",
+    "zoo:mappo-2": "frontier",
+    "zoo:qmix-2": "frontier",
+}
 
 
 @pytest.fixture(scope="module")
@@ -65,11 +71,12 @@ def test_masked_actions_are_never_taken(network, count):
     assert network.choose(observation(0)) == 8
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_what_ships_is_small_and_begins_from_its_card(name):
-    weights = zoo_files(name.partition(":")[2]).load()
+@pytest.mark.parametrize(("name", "level"), NAMES.items())
+def test_what_ships_is_small_and_begins_from_its_card(name, level):
+    assert lidarium.policy(name).level == level
+    weights = zoo_files(name.partition(":")[2], level).load()
     assert sum(array.nbytes for array in weights.values()) < 400_000
-    assert {key: array.shape for key, array in weights.items()} == network_shapes("frontier")
+    assert {key: array.shape for key, array in weights.items()} == network_shapes(level)
 
 
 def test_a_team_in_a_batch_does_as_alone():
