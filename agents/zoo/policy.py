@@ -11,7 +11,9 @@ from lidarium.mapping.files.weight_files import WeightFiles
 
 def zoo_files(name: str, level: str = "frontier") -> WeightFiles:
     """Return the files of a team of the zoo at a level, such as ``ppo-2``."""
-    return WeightFiles(network_shapes(level), "lidarium.agents.zoo", f"{name}.safetensors", f"{name}.json")
+    return WeightFiles(
+        network_shapes(level), "lidarium.agents.zoo", f"{name}.safetensors", f"{name}.json", is_half=True
+    )
 
 
 class ZooTeam(Policy):

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,12 +35,15 @@ class WeightFiles:
         The package whose folder ``data`` has the weights that are shipped.
     shipped, card : str
         Names of their file and of its card, which has its SHA-256.
+    is_half : bool
+        Whether files hold half precision, which takes half the space.
     """
 
     shapes: Mapping[str, tuple[int, ...]]
     package: str
     shipped: str
     card: str
+    is_half: bool = False
 
     def load(self, path: str | Path = "") -> dict[str, NDArray[np.float32]]:
         """Return the weights of a file; if ``path`` is empty, the package's."""
@@ -52,16 +56,20 @@ class WeightFiles:
     def read(self, content: bytes, name: str) -> dict[str, NDArray[np.float32]]:
         """Return the weights of a file's content; ``name`` is its name in messages."""
         try:
-            weights: dict[str, NDArray[np.float32]] = load(content)
+            weights: dict[str, NDArray[Any]] = load(content)
         except (SafetensorError, ValueError, KeyError, TypeError) as error:
             raise ValueError(f"{name} is no file of weights, or is truncated: {error}") from error
+        if self.is_half:
+            halves = {key: array for key, array in weights.items() if array.dtype == np.float16}
+            weights |= {key: array.astype(np.float32) for key, array in halves.items()}
         self.check(weights, name)
         return weights
 
     def save(self, path: Path, weights: Weights) -> str:
         """Write weights to a file, whole or not at all, and return its SHA-256."""
         self.check(weights, "what was trained")
-        content = save({name: np.ascontiguousarray(array) for name, array in weights.items()})
+        kind = np.float16 if self.is_half else np.float32
+        content = save({name: np.ascontiguousarray(array, kind) for name, array in weights.items()})
         path.parent.mkdir(parents=True, exist_ok=True)
         write_whole(path, content)
         return hashlib.sha256(content).hexdigest()

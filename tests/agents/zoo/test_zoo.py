@@ -76,6 +76,7 @@ def test_what_ships_is_small_and_begins_from_its_card(name, level):
     assert lidarium.policy(name).level == level
     weights = zoo_files(name.partition(":")[2], level).load()
     assert sum(array.nbytes for array in weights.values()) < 400_000
+    assert all((array == array.astype(np.float16)).all() for array in weights.values())  # files hold half precision
     assert {key: array.shape for key, array in weights.items()} == network_shapes(level)
 
 
