@@ -30,9 +30,10 @@ from lidarium.mapping.merging.fusion import FusedMap
 from lidarium.mapping.planning.frontiers.frontier_map import FRONTIER
 from lidarium.mapping.planning.grid_planning import cells_of
 
-_BatchWrapper = VectorWrapper
-if TYPE_CHECKING:  # Gymnasium 1.1 has no parameters there
+if TYPE_CHECKING:
     _BatchWrapper = VectorWrapper[Any, Any, Any]
+else:  # Gymnasium 1.1 has no parameters there
+    _BatchWrapper = VectorWrapper
 
 PATIENCE_S = 20.0
 """Time without motion after which a sent robot explores by itself again [s]."""

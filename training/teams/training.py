@@ -86,13 +86,16 @@ class TeamTraining:
                 model.logger.dump(model.num_timesteps)
                 return reached
 
+            def begin_at(number: int) -> None:
+                environment.seed(_episodes_seed(settings.seed, number))
+
             yield from learn_on(
                 model,
                 ppo,
                 settings.seed,
                 self.folder / CHECKPOINTS,
                 self.folder / TENSORBOARD,
-                lambda number: environment.seed(_episodes_seed(settings.seed, number)),
+                begin_at,
                 measure,
                 self._first(network, is_new),
             )

@@ -118,7 +118,8 @@ def _learn_on(
         after = _teams(environment, observations, infos[ACTIVE])
         teams, over = choices.shape, environment.batch.is_over
         is_cut = truncated.reshape(teams).any(axis=1)
-        happened = TensorDict({**before, CHOICE: torch.from_numpy(choices), "next": TensorDict(after)}, [len(began)])
+        both: dict[Any, Any] = {**before, CHOICE: torch.from_numpy(choices), "next": TensorDict(after)}
+        happened = TensorDict(both, [len(began)])
         happened["next", "reward"] = torch.from_numpy(
             (rewards.reshape(teams).sum(axis=1, keepdims=True) / REWARD_UNIT).astype(np.float32)
         )
@@ -139,9 +140,12 @@ def _learn_on(
 
 
 def _mixer(settings: TeamSettings, environment: ExplorationVectorEnv) -> nn.Module:
-    if settings.algorithm == "vdn":
-        return VDNMixer(settings.robots, "cpu")
-    return QMixer(environment.state_space.shape, settings.value.mixing, settings.robots, "cpu")
+    mixer: nn.Module = (
+        VDNMixer(settings.robots, "cpu")
+        if settings.algorithm == "vdn"
+        else QMixer(environment.state_space.shape, settings.value.mixing, settings.robots, "cpu")
+    )
+    return mixer
 
 
 def _loss(network: OptionRanking, mixer: nn.Module, discount: float) -> QMixerLoss:
@@ -172,7 +176,8 @@ class _Values(nn.Module):
     def forward(self, *seen: Tensor) -> Tensor:
         teams = seen[0].shape[:2]
         rows = {name: each.flatten(0, 1) for name, each in zip(_seen(self.network), seen, strict=True)}
-        return self.network.preferences(rows).unflatten(0, teams)
+        values = self.network.preferences(rows)
+        return values.reshape(*teams, values.shape[1])
 
 
 def _choices(
@@ -185,7 +190,7 @@ def _choices(
     allowed = robots["allowed"].numpy()
     best = np.where(allowed, values, -np.inf).argmax(axis=2)
     drawn = np.where(allowed, generator.random(allowed.shape), -1.0).argmax(axis=2)
-    return np.where(generator.random(best.shape) < chance, drawn, best)
+    return np.asarray(np.where(generator.random(best.shape) < chance, drawn, best), np.int64)
 
 
 def _teams(
