@@ -88,5 +88,5 @@ def test_the_page_tells_what_is_reached_over_floors_and_seeds(tmp_path):
     )
     assert "| untrained network | 8 | 50.0 % | 1200.0 s |" in page
     assert "| `ppo-2` | 1 | 10 | 50.0 % | 70.0 % |" in page
-    assert "| 10 | 65.0 % | - | - | - |" in page
+    assert "| 10 | - | 65.0 % | - | - | - |" in page
     assert "| 4 robots, `zoo:ppo-4` over `nearest_frontier` | at most 0.90, interval below 1 | 1.00" in page
