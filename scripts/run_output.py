@@ -54,7 +54,7 @@ def write_run(
         _save_view(folder / "view.png", episode)
         files += ["view.png", *_write_sparse_maps(folder, episode)]
     files += [*_write_spline_maps(folder, episode), *_write_trees(folder, episode)]
-    report = episode.policy.report()
+    report = episode.report
     if report.supervision is not None:
         write_text(folder / "decisions.jsonl", decision_lines(report))
         files.append("decisions.jsonl")

@@ -90,6 +90,9 @@ class _TreeGrowth:
         view = joined_views(node.view, view_of(senses.scan, self._lidar, float(senses.pose[2])))
         node.view = view
         node.safe, node.seen, node.openings = self.rules.regions(node.pose, view)
+        if self._settings.memory == "regions" and self._settings.backtrack == "open":
+            # The first scan may be blind towards a node of an earlier run, which nothing else leads to.
+            self.tree.bridge(node, sees_back_and_forth, self.known)
 
     def move_to(self, number: int) -> Node:
         """Return the node to which the robot has come; the two are neighbours from now on."""

@@ -120,10 +120,7 @@ class Tree:
         self.nodes: list[Node] = []
 
     def add(self, node: Node, joins: Callable[[Node, Node], bool] | None, known: Iterable[int]) -> None:
-        """Add a node below its parent, with bridges to the nodes that it ``joins``.
-
-        Bridges go to ``known`` nodes only; there are none if ``joins`` is None.
-        """
+        """Add a node below its parent, with its bridges."""
         if node.number != len(self.nodes):
             raise ValueError(f"number of the node is {node.number}; want the next one, {len(self.nodes)}")
         if node.parent is not None and not 0 <= node.parent < node.number:
@@ -131,6 +128,10 @@ class Tree:
         self.nodes.append(node)
         if node.parent is not None:
             self.connect(node.number, node.parent)
+        self.bridge(node, joins, known)
+
+    def bridge(self, node: Node, joins: Callable[[Node, Node], bool] | None, known: Iterable[int]) -> None:
+        """Add bridges from a node to those of the ``known`` nodes that it ``joins``; none if that is None."""
         if joins is not None:
             for other in sorted(known):
                 if other not in (node.number, node.parent) and joins(node, self.nodes[other]):

@@ -26,6 +26,7 @@ from lidarium.envs.onboard.driving.path_planner import footprint_of
 from lidarium.envs.onboard.radio.messages import DriveState, OperatingState, Order, OrderKind
 from lidarium.envs.onboard.station.reports import Report
 from lidarium.envs.settings.exploration import ExplorationSettings
+from lidarium.mapping.geometry.bounds import shown
 from lidarium.mapping.merging.fusion import FusedMap
 from lidarium.mapping.planning.frontiers.frontier_map import FRONTIER
 from lidarium.mapping.planning.grid_planning import cells_of
@@ -248,6 +249,10 @@ class Supervised(Policy):
                 f"settings of the supervisor are given twice, also as {', '.join(options)}; want one or the other"
             )
         self.policy, self.settings = policy, settings or SupervisorSettings(**options)
+        if not isinstance(self.settings, SupervisorSettings):
+            raise ValueError(
+                f"settings of the supervisor are {shown(settings)}; want SupervisorSettings, or settings by name"
+            )
         self.level, self.observes = policy.level, policy.observes
         self.decision_period_s = policy.decision_period_s
         self.has_begun = False
@@ -561,9 +566,10 @@ class SupervisedTeam(TeamWrapper):
         return outcome
 
     def _direct(self, observations: dict[str, Any], infos: dict[str, dict[str, Any]]) -> None:
-        self._free = self.supervisor.direct(self._base.agents)
+        live = self._base.agents
+        self._free = self.supervisor.direct(live)
         for agent, info in infos.items():
-            info[DIRECTED] = agent not in self._free
+            info[DIRECTED] = agent in live and agent not in self._free
             if self._masks and info[DIRECTED]:
                 observations[agent][MASK] = _only_stay(observations[agent][MASK])
 
@@ -626,14 +632,14 @@ class SupervisedBatch(_BatchWrapper):
 
     def _direct(self, observations: Any, infos: dict[str, Any]) -> tuple[Any, dict[str, Any]]:  # noqa: ANN401
         robots = self._rows.robots
-        directed: NDArray[np.bool_] = np.ones(self.num_envs, np.bool_)
+        directed: NDArray[np.bool_] = np.zeros(self.num_envs, np.bool_)
         for episode, supervisor in enumerate(self.supervisors):
             team = self._rows.team(episode)
             if team.time_s == 0.0:
                 supervisor.reset(team)
             self._free[episode] = supervisor.direct(team.agents)
-            for agent in self._free[episode]:
-                directed[episode * robots + self._agents.index(agent)] = False
+            for agent in set(team.agents).difference(self._free[episode]):
+                directed[episode * robots + self._agents.index(agent)] = True
         if self._masks:
             masks = observations[MASK].copy()
             masks[directed] = _only_stay(masks[directed])

@@ -13,7 +13,7 @@ from lidarium.envs.engine.engine import Engine
 from lidarium.envs.observing.spaces import FARTHEST
 from lidarium.envs.onboard.perception import Perception
 from lidarium.envs.onboard.station.team_mapping import Frames, TeamMapping, crop_around
-from lidarium.mapping.geometry.bounds import above, check_settings
+from lidarium.mapping.geometry.bounds import above, check_settings, shown
 from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.merging.settings import MergeSettings
 
@@ -301,12 +301,16 @@ class MergedRows:
     Raises
     ------
     ValueError
-        If a team is one robot.
+        If a team is one robot, or ``merging`` is something else.
     """
 
     def __init__(
         self, engine: Engine, merging: MergingSettings, can_talk: NDArray[np.bool_] | CanTalk | None = None
     ) -> None:
+        if not isinstance(merging, MergingSettings):
+            raise ValueError(
+                f"merging is {shown(merging)}; want True or MergingSettings, such as MergingSettings(period_s=2)"
+            )
         self._engine = engine
         self._robots = engine.robots
         self.teams = [TeamExchange(engine.perception, merging, can_talk, episode) for episode in range(engine.episodes)]

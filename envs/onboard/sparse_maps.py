@@ -100,6 +100,7 @@ class SparseMapper:
             )
         self._mount, self._intrinsics, self._range = camera_pose(camera), camera.intrinsics, camera.depth_max
         mapping = MapperSettings(
+            mode=sparse.mode,
             robot_height_m=settings.robot.height,
             range_m=camera.depth_max,
             most_boxes=sparse.most_boxes,

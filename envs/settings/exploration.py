@@ -32,6 +32,7 @@ from lidarium.mapping.geometry.bounds import (
 )
 from lidarium.mapping.grids.occupancy import OccupancySettings
 from lidarium.mapping.localization.registry import LOCALIZERS
+from lidarium.mapping.sparse.settings import MODES
 from lidarium.registry import REGISTRIES, registry, unknown
 
 
@@ -53,6 +54,8 @@ class SparseMapSettings:
         Side of the cells of seen ground [m].
     margin_m : float
         Paths on the map keep the body so far from boxes [m].
+    mode : str
+        What codes are: boxes (``default``), or points without extent (``thesis``).
     """
 
     codes: Annotated[int, within(2, 65_536)] = 256
@@ -61,9 +64,12 @@ class SparseMapSettings:
     least_turn: Annotated[float, within(0.0, 2.0 * math.pi)] = math.radians(25.0)
     cell_m: Annotated[float, above(0.0, 10.0)] = 0.1
     margin_m: Annotated[float, within(0.0, 10.0)] = 0.05
+    mode: str = MODES[0]
 
     def __post_init__(self) -> None:
         check_settings(self, "the sparse map")
+        if self.mode not in MODES:
+            raise ValueError(f"mode of the sparse map is {self.mode!r}; want one of {', '.join(MODES)}")
 
 
 MAX_ROBOTS = 64

@@ -7,6 +7,7 @@ manner (large neighbourhood search; Shaw 1998).
 
 import math
 from dataclasses import dataclass
+from importlib.util import find_spec
 
 import numpy as np
 from numpy.typing import NDArray
@@ -172,12 +173,17 @@ def _seen_count(graph: ViewGraph, stops: Stops) -> int:
     return int(count(np.bitwise_or.reduce([graph.seen(walk) for walk in walks], axis=0)))
 
 
+def check_solver() -> None:
+    """Check that OR-Tools is installed, before anything is run."""
+    if find_spec("ortools") is None:
+        raise ValueError(f"bounds need OR-Tools: {install_command('bounds')}")
+
+
 def ordered(graph: ViewGraph, stops: Stops) -> Stops:
     """Return the same stops as the best open tours that OR-Tools finds."""
-    try:
-        from ortools.constraint_solver import pywrapcp, routing_enums_pb2
-    except ImportError as error:
-        raise ValueError(f"bounds need OR-Tools: {install_command('bounds')}") from error
+    check_solver()
+    from ortools.constraint_solver import pywrapcp, routing_enums_pb2
+
     places = sorted({stop for tour in stops for stop in tour})
     if len(places) < 2:
         return stops

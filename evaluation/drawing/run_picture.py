@@ -62,7 +62,7 @@ def save_run_picture(path: Path, episode: Episode, policy: str) -> None:
         np.stack([poses for _, poses in scorer.track] + [env.world.poses]),
         env.settings.robot.radius,
     )
-    entries = draw_supervision(floor_axes, env, episode.policy)
+    entries = draw_supervision(floor_axes, env, episode.report)
     _draw_legend(figure, *_draw_frontiers(floor_axes, episode), entries)
     draw_curve(curve_axes, scorer.curve, scorer.times, scorer.time)
     _list_robots(team_axes, episode)

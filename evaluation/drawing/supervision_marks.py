@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
 from lidarium.agents.policy import Policy
-from lidarium.agents.report import GivenOrder
+from lidarium.agents.report import GivenOrder, PolicyReport
 from lidarium.envs.drawing.frame_parts import SHIFT, Frame, View, team_colours
 from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.onboard.radio.messages import OrderKind
@@ -24,12 +24,12 @@ SHOWN_S = 4.0
 _JOIN_COLOUR = "#0f766e"
 
 
-def draw_supervision(axes: Axes, env: ExplorationEnv, policy: Policy) -> list[Line2D]:
+def draw_supervision(axes: Axes, env: ExplorationEnv, report: PolicyReport) -> list[Line2D]:
     """Draw the positions at which rules joined, redirected and stopped robots; return the legend.
 
     They are drawn on a map of the floor.
     """
-    station = policy.report().supervision
+    station = report.supervision
     if station is None:
         return []
     colours = dict(zip(env.possible_agents, hex_colours(env.settings.robots), strict=True))

@@ -102,10 +102,10 @@ class EpisodeData:
         """Number of contacts that began, all robots together."""
         return int(self.env.world.collisions.sum())
 
-    @cached_property
+    @property
     def report(self) -> PolicyReport:
         """The policy's report."""
-        return self.run.policy.report()
+        return self.run.report
 
     @property
     def run(self) -> Episode:
@@ -164,7 +164,7 @@ def result_of(episode: Episode, policy: str | None = None, history: History | No
     Times are simulated [s], lengths are in metres, positions of ``given_up`` in the floor's frame. Figures over
     time are None without a history. ``ended_because`` is None for robots that an interrupted run left at work. A
     ValueError if the episode was interrupted before it began. A metric that fails is None, and
-    ``failed_metrics`` says why.
+    ``failed_metrics`` says why; it names ``report`` if that of the policy failed.
     """
     env, settings = episode.env, episode.env.settings
     if env.floor is None:
@@ -192,7 +192,7 @@ def result_of(episode: Episode, policy: str | None = None, history: History | No
 def _figures_or_errors(data: EpisodeData) -> tuple[dict[str, Any], dict[str, str]]:
     """Return all metrics of an episode, and why some of them, which are None, failed: an episode is never lost."""
     figures: dict[str, Any] = {}
-    failed: dict[str, str] = {}
+    failed = {"report": data.run.report_error} if data.run.report_error else {}
     for name in METRICS:
         try:
             figures |= figures_of(data, [name])

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from lidarium.agents.policy import Policy, check_observed
-from lidarium.agents.report import GivenUp
+from lidarium.agents.report import GivenUp, PolicyReport
 from lidarium.envs.faces.merged_maps import MergedMaps, true_frames
 from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.faces.sparse_planning import SparsePlanning
@@ -45,6 +45,10 @@ class Episode:
     merges : list of MergeEvent
         Which robots were joined, if maps are merged: by the environment, or by a policy with a
         station.
+    report : PolicyReport
+        What the policy reports at the end; empty if that failed.
+    report_error : str
+        Why it failed; empty if it did not.
     """
 
     env: ExplorationEnv
@@ -55,6 +59,8 @@ class Episode:
     given_up: list[GivenUp] = field(default_factory=list)
     is_interrupted: bool = False
     merges: list[MergeEvent] = field(default_factory=list)
+    report: PolicyReport = field(default_factory=PolicyReport)
+    report_error: str = ""
 
 
 def run_episode(
@@ -139,7 +145,11 @@ def run_episode(
         episode.is_interrupted |= interrupt is not None and interrupt.is_asked and bool(env.agents)
     episode.wall_seconds = time.perf_counter() - began
     episode.given_up = list(policy.given_up)
-    _note_merges(episode, world.events if isinstance(world, MergedMaps) else _merges_of(policy, env))
+    try:
+        episode.report = policy.report()
+    except Exception as error:  # of a policy of a user's own, anything; the episode is not lost
+        episode.report_error = f"{type(error).__name__}: {error}"
+    _note_merges(episode, world.events if isinstance(world, MergedMaps) else _merges_of(episode.report, env))
     return episode
 
 
@@ -163,9 +173,9 @@ def _show_decision(
         on_decision(env)
 
 
-def _merges_of(policy: Policy, env: ExplorationEnv) -> list[MergeEvent]:
+def _merges_of(report: PolicyReport, env: ExplorationEnv) -> list[MergeEvent]:
     """Return the joins that a policy's decisions were based on, compared with the truth."""
-    station = policy.report().supervision
+    station = report.supervision
     used = [] if station is None else [join for join in station.joins if join.is_used]
     if not used:
         return []

@@ -48,8 +48,8 @@ def settings_sha256(settings: ExplorationSettings, has_observe: bool = False) ->
 
     It is of their JSON with sorted keys, without ``threads``, without settings that older records do not have if it is
     not used (`LATER` settings at their defaults, more rewards, the build of robots without forces, sparse maps of
-    robots without cameras), and with the default of ``observe``: policies may see different things in one world.
-    Hashes before 0.3 have ``has_observe``.
+    robots without cameras or their default mode), and with the default of ``observe``: policies may see different
+    things in one world. Hashes before 0.3 have ``has_observe``.
     """
     values, plain = asdict(settings), ExplorationSettings()
     del values["threads"]
@@ -57,6 +57,8 @@ def settings_sha256(settings: ExplorationSettings, has_observe: bool = False) ->
         values["observe"] = plain.observe
     if values["camera"] is None:
         del values["sparse_map"]
+    elif settings.sparse_map.mode == plain.sparse_map.mode:
+        del values["sparse_map"]["mode"]
     for name in LATER:
         if name in values and getattr(settings, name) == getattr(plain, name):
             del values[name]

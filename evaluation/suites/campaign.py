@@ -64,6 +64,10 @@ class Campaign:
         """Run the missing parts, and yield each episode's line when it is on the disk."""
         if self.workers < 1:
             raise ValueError(f"workers is {self.workers}; want at least 1")
+        if self.suite.bounds:
+            from lidarium.evaluation.bounds.tours import check_solver
+
+            check_solver()
         trials = list(self.suite.trials() if self.trials is None else self.trials)
         self.total, self.failures = len(trials), []
         with EpisodesFile(self.folder / EPISODES_FILE) as file:
@@ -197,8 +201,8 @@ def _rows_of(campaign: Campaign, shows_progress: bool) -> Rows:
 def _inputs_of(suite: Suite) -> dict[str, str]:
     """Return hashes of the files that a suite's results depend on, by what they are.
 
-    They are floors in files, the modules of own policies, files that settings of policies name, such as weights, and
-    modules that are imported for what they register.
+    They are floors in files, the modules of own policies, files that settings of policies and of the world name, such
+    as weights, and modules that are imported for what they register.
     """
     found = {
         f"floor {floor!r}": load_floor(floor, suite.image_resolution).sha256
@@ -208,15 +212,26 @@ def _inputs_of(suite: Suite) -> dict[str, str]:
     for name in suite.policies:
         options = dict(suite.policy_settings.get(name, {}))
         source = source_of(options.pop("policy", name))
-        files = [] if source is None else [source]
-        files += [Path(value) for value in options.values() if isinstance(value, str) and _is_file(value)]
+        files = [*([] if source is None else [source]), *_files_of(options)]
         if files:
             found[f"policy {name!r}"] = _hash_of(files)
+    for name, options in suite.as_dict()["variants"].items():
+        if files := _files_of(options):
+            found[f"settings {name!r}"] = _hash_of(files)
     for module in filter(None, os.environ.get(IMPORTS_VARIABLE, "").split(",")):
         file = getattr(sys.modules.get(module.strip()), "__file__", None)
         if file is not None:
             found[f"module {module.strip()!r}"] = _hash_of([Path(file)])
     return found
+
+
+def _files_of(options: object) -> list[Path]:
+    """Return the files that options name, at any depth and also as ``NAME=FILE``."""
+    if isinstance(options, str):
+        return [Path(text) for text in (options, options.partition("=")[2]) if _is_file(text)]
+    if isinstance(options, Mapping):
+        options = list(options.values())
+    return [file for each in options for file in _files_of(each)] if isinstance(options, list | tuple) else []
 
 
 def _is_file(text: str) -> bool:

@@ -90,11 +90,15 @@ def run_trial(suite: Suite, trial: Trial, records: Path | None = None) -> dict[s
     where = [[round(float(number), 6) for number in start] for start in env.world.starts]
     record = None if records is None else f"{RECORDS_FOLDER}/{trial.file_name}.npz"
     about = {KEY: trial.key, "variant": trial.variant, "starts": where, "record": record}
-    known = beside_bound(trial, settings, {**about, **result}, image_resolution) if suite.bounds else {}
+    if suite.bounds:
+        try:
+            result |= beside_bound(trial, settings, {**about, **result}, image_resolution)
+        except Exception as error:  # the episode is not lost
+            result |= {"bound_s": None, "t99_over_bound": None}
+            result.setdefault("failed_metrics", {})["bound_s"] = f"{type(error).__name__}: {error}"
     return {
         **about,
         **result,
-        **known,
         "decisions": len(episode.decision_seconds),
         "wall_s": round(time.perf_counter() - began, 4),
     }

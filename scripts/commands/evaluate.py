@@ -37,7 +37,7 @@ class _Evaluate(TeamCommand):
     preset: str | None = None
     """evaluate as another project does.
 
-    Projects are explore-bench, ariadne, chen, ir2, marvel, maexp, mapex or houseexpo. Settings, teams and
+    Projects are explore-bench, ariadne, dare, chen, ir2, marvel, maexp, mapex or houseexpo. Settings, teams and
     stop rule are its own, and its floors, too, unless --floors names others.
     """
     data: Path | None = None

@@ -155,6 +155,8 @@ def answer(command: Run, policy: "Policy", options: dict[str, Any], views: "Sequ
     # Starts that were chosen say which area is meant.
     exit_code = verdict_of_reach(reach) if isinstance(options_of_reset.get("starts", ""), str) else DONE
     files = write_run(folder, episode, result, recorder, command.chosen_policy, command.films)
+    for name, said in result.get("failed_metrics", {}).items():
+        notify(f"{name} failed: {said}")
     return Answer(
         result,
         run_summary(command.chosen_policy, episode, result, folder, files),

@@ -110,7 +110,6 @@ class _Slam(Command):
 def execute(command: _Slam) -> Answer:
     """Run SLAM over a log and write the results."""
     from lidarium.mapping.files.output import check_writable
-    from lidarium.mapping.files.trajectories import read_tum
     from lidarium.mapping.localization.slam.localizer import Slam
 
     if command.start_map is not None and command.localizer == "slam":
@@ -120,7 +119,7 @@ def execute(command: _Slam) -> Answer:
     out = command.out or DEFAULT_FOLDER
     check_writable(out)
     log = _log(command)
-    reference = None if command.reference is None else read_tum(command.reference)
+    reference = None if command.reference is None else _reference(command, log)
     relations = None if command.relations is None else _relations(command, log)
 
     def watch(scans: Iterable[int]) -> Iterator[int]:
@@ -141,7 +140,7 @@ def execute(command: _Slam) -> Answer:
         notify(f"{command.log}: {doubt}")
     result = _result(command, log, followed, doubt)
     if reference is not None:
-        result |= _against_reference(command, log, followed.poses, reference)
+        result |= _against_reference(log, followed.poses, *reference)
     if relations is not None:
         result["relations"] = _against_relations(command, log, followed.poses, relations)
     files = _write(out, log, followed, result)
@@ -280,19 +279,12 @@ def _counts_of(slam: "Slam | SplineTracker") -> dict[str, Any]:
     }
 
 
-def _against_reference(
-    command: _Slam,
-    log: "LaserLog",
-    poses: "NDArray[np.float64]",
-    reference: "tuple[NDArray[np.float64], NDArray[np.float64]]",
-) -> dict[str, Any]:
-    """Return ATE, and RPE over about a second."""
-    import numpy as np
+def _reference(command: _Slam, log: "LaserLog") -> "tuple[NDArray[np.bool_], NDArray[np.float64]]":
+    """Read the true poses: which scans have one, and these poses."""
+    from lidarium.mapping.files.trajectories import interpolated, read_tum
 
-    from lidarium.evaluation.metrics.poses import absolute_error, relative_error
-    from lidarium.mapping.files.trajectories import interpolated
-
-    stamps, true = reference
+    assert command.reference is not None
+    stamps, true = read_tum(command.reference)
     times = log.stamps + command.clock_shift
     is_known = (times >= stamps[0]) & (times <= stamps[-1])
     if is_known.sum() < 2:
@@ -301,8 +293,19 @@ def _against_reference(
             f"{times[0]:.3f} to {times[-1]:.3f} s; "
             "want times in common (--clock-shift)"
         )
-    believed, known = poses[is_known], interpolated(stamps, true, times[is_known])
-    period = float(np.median(np.diff(times[is_known])))
+    return is_known, interpolated(stamps, true, times[is_known])
+
+
+def _against_reference(
+    log: "LaserLog", poses: "NDArray[np.float64]", is_known: "NDArray[np.bool_]", known: "NDArray[np.float64]"
+) -> dict[str, Any]:
+    """Return ATE, and RPE over about a second."""
+    import numpy as np
+
+    from lidarium.evaluation.metrics.poses import absolute_error, relative_error
+
+    believed = poses[is_known]
+    period = float(np.median(np.diff(log.stamps[is_known])))
     relative = relative_error(believed, known, max(round(1.0 / period), 1) if period > 0.0 else 1)
     return {
         "ate_m": round(absolute_error(believed, known), 6),

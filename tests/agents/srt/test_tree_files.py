@@ -11,11 +11,11 @@ from lidarium.agents.srt.tree_files import read_tree
 from lidarium.evaluation.episodes.runner import run_episode
 
 
-def explored(horizon_s, seed=1, floor="apartment", robots=1, **chosen):
+def explored(horizon_s, seed=1, floor="apartment", robots=1, options=None, **chosen):
     env = lidarium.parallel_env(
         floor, robots=robots, horizon_s=horizon_s, stop_coverage=None, map_cells=32, starts="fixed"
     )
-    return run_episode(SensorBasedRandomTree(memory="regions", **chosen), env, seed)
+    return run_episode(SensorBasedRandomTree(memory="regions", **chosen), env, seed, options=options)
 
 
 @pytest.fixture(scope="module")
@@ -68,6 +68,19 @@ def test_a_tree_grows_on_in_a_later_run(path):
     # A robot without the tree sees what is known by now once more.
     blank = explored(30.0, seed=5).policy.tree
     assert new_area(tree.nodes[:before], tree.nodes[before:]) > new_area(tree.nodes[:before], blank.nodes) + 0.5
+
+
+def test_a_robot_whose_first_scan_is_blind_towards_the_tree_joins_it_when_it_has_turned(tmp_path):
+    first = explored(15.0, floor="srt_l_room")
+    first.policy.write_trees(tmp_path)
+    before = len(first.policy.tree.nodes)
+    start = first.env.world.starts[0]
+    behind = start + 0.01 * np.array([math.cos(start[2]), math.sin(start[2]), 0.0])
+    later = explored(60.0, floor="srt_l_room", tree=str(tmp_path / "tree.npz"), options={"starts": behind[None]})
+    root = later.policy.tree.nodes[before]
+    assert root.parent is None
+    assert 0 in root.neighbours
+    assert later.env.scorer.ended_because == {"robot_0": "reached"}
 
 
 def new_area(old, nodes):

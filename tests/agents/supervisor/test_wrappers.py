@@ -98,6 +98,21 @@ def test_a_batch_is_supervised_as_its_episodes_are_alone(level):
                 assert {agent: infos["directed"][rows[agent]] for agent in expected} == expected
 
 
+def test_robots_that_have_ended_are_not_directed():
+    options = {"level": "frontier", "horizon_s": 3.0, **UNKNOWN, "starts": "fixed"}
+    env = lidarium.Supervised(lidarium.parallel_env("apartment", **options))
+    observations, infos = env.reset(seed=0)
+    while env.agents:
+        observations, _, _, _, infos = env.step(greedy(env, observations, env.agents))
+    assert [info["directed"] for info in infos.values()] == [False, False]
+    batch = lidarium.Supervised(lidarium.vector_env(1, "apartment", reports=True, **options))
+    observations, _ = batch.reset(seed=0)
+    truncated = np.zeros(2, np.bool_)
+    while not truncated.all():
+        observations, _, _, truncated, infos = batch.step(observations["action_mask"].argmax(axis=1))
+    assert not infos["directed"].any()
+
+
 def test_episodes_of_a_batch_that_begin_again_are_supervised_anew():
     batch = lidarium.Supervised(
         lidarium.vector_env(2, "apartment", level="frontier", reports=True, horizon_s=3.0, **UNKNOWN, starts="fixed")
@@ -119,5 +134,7 @@ def test_what_cannot_be_supervised_is_refused():
         lidarium.Supervised(lidarium.vector_env(1, "apartment", **UNKNOWN)).reset(seed=0)
     with pytest.raises(ValueError, match=r"want a batch of lidarium.vector_env"):
         lidarium.Supervised(SyncVectorEnv([lambda: __import__("gymnasium").make("CartPole-v1")]))
+    with pytest.raises(ValueError, match=r"settings of the supervisor are \{'period_s': 5\}; want SupervisorSettings"):
+        lidarium.Supervised(lidarium.parallel_env("apartment", **UNKNOWN), {"period_s": 5})
     with pytest.raises(ValueError, match="Supervised is put around int"):
         lidarium.Supervised(3)

@@ -23,3 +23,12 @@ def test_rows_of_stable_baselines_see_merged_maps():
 def test_a_robot_alone_has_nobody_to_merge_with():
     with pytest.raises(ValueError, match="robots is 1; merging maps wants two or more"):
         lidarium.vector_env(2, "scene_room", merging=MergingSettings(), **{**OPTIONS, "robots": 1})
+
+
+@pytest.mark.parametrize("given", [{"period_s": 2.0}, "thesis"])
+def test_settings_of_another_kind_are_refused_in_batches_and_episodes(given):
+    with pytest.raises(ValueError, match=r"merging is .*; want True or MergingSettings"):
+        lidarium.vector_env(2, "scene_room", merging=given, **OPTIONS)
+    env = lidarium.parallel_env("scene_room", **OPTIONS)
+    with pytest.raises(ValueError, match=r"merging is .*; want True or MergingSettings"):
+        lidarium.run_episode(lidarium.policy("nearest_frontier"), env, seed=0, merging=given)

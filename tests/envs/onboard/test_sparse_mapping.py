@@ -101,6 +101,16 @@ def test_the_map_for_a_file_knows_the_floor_that_was_seen():
     assert min(told.values()) > 20
 
 
+def test_codes_of_the_thesis_are_points_and_plans_lead_round_them():
+    env = turned_round(made(sparse_map={"mode": "thesis"}))
+    belief = env.belief("robot_0")
+    boxes = belief.sparse_map.navigation.index.boxes
+    assert len(boxes) > 20
+    assert np.array_equal(boxes[:, :3], boxes[:, 3:])
+    route = belief.sparse_map.route(belief.pose[:2], in_frame(env, 4.6, 1.0))
+    assert len(route.points) > 2
+
+
 def test_a_robot_without_a_camera_has_no_sparse_map():
     env = lidarium.parallel_env(HALL, robots=1, starts="fixed")
     env.reset(seed=0)

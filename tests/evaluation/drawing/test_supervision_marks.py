@@ -46,7 +46,7 @@ def env():
 
 def test_without_a_station_nothing_is_marked(env):
     axes = Figure().subplots()
-    assert draw_supervision(axes, env, Led(None)) == []
+    assert draw_supervision(axes, env, Led(None).report()) == []
     assert not axes.has_data()
 
 
@@ -54,7 +54,7 @@ def test_marks_stand_in_the_frame_of_the_floor(env):
     axes = Figure().subplots()
     orders = [order(OrderKind.STOP), order(OrderKind.GO_TO, (2.0, 0.0))]
     station = Supervision(joins=[join(True), join(False)], orders=orders)
-    labels = [entry.get_label() for entry in draw_supervision(axes, env, Led(station))]
+    labels = [entry.get_label() for entry in draw_supervision(axes, env, Led(station).report())]
     assert labels == ["redirected", "stopped by the supervisor", "maps joined"]
     stopped, joined = (line.get_xydata()[0] for line in axes.lines)
     x, y, theta = NEAR[1]

@@ -27,3 +27,11 @@ def test_a_later_setting_changes_the_hash_where_it_is_used():
     plain = make_settings(robots=2)
     changed = replace(plain, least_frontier=plain.least_frontier + 0.1)
     assert settings_sha256(plain) != settings_sha256(changed)
+
+
+def test_the_mode_of_sparse_maps_changes_the_hash_only_where_it_is_used():
+    given = {"camera": "xtion", "observe": ("scan", "depth")}
+    plain, other = make_settings(**given), make_settings(**given, sparse_map={"mode": "thesis"})
+    assert settings_sha256(plain) == settings_sha256(make_settings(**given, sparse_map={"mode": "default"}))
+    assert settings_sha256(plain) != settings_sha256(other)
+    assert settings_sha256(make_settings()) == settings_sha256(make_settings(sparse_map={"mode": "thesis"}))

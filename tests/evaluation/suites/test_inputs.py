@@ -102,6 +102,46 @@ def test_a_metric_that_fails_loses_no_episode(here, capsys):
         assert row["coverage_final"] > 0.0
 
 
+def test_a_report_that_fails_loses_no_episode(here, capsys):
+    (here / "fails_at_the_end.py").write_text(f"{POLICY}\n    def report(self):\n        raise KeyError('no record')\n")
+    assert evaluate("--policies", "fails_at_the_end:Mine") == 4
+    run = ["run", "--policy", "fails_at_the_end:Mine", "--robots", "1", "--horizon-s", "2", "--out", "run"]
+    assert main(run) == 4
+    assert "report failed: KeyError: 'no record'" in capsys.readouterr().err
+    for path in (here / "out" / "episodes.jsonl", here / "run" / "result.json"):
+        row = json.loads(path.read_text())
+        assert row["failed_metrics"] == {"report": "KeyError: 'no record'"}
+        assert row["coverage_final"] > 0.0
+    assert (here / "run" / "run.png").exists()
+
+
+def test_a_bound_that_fails_loses_no_episode_and_a_missing_solver_is_told_before(here, monkeypatch, capsys):
+    def fails(*_):
+        raise ValueError("no tour")
+
+    monkeypatch.setattr("lidarium.evaluation.bounds.bound.known_floor_bound", fails)
+    assert evaluate("--policies", "random_walk", "--bounds") == 4
+    row = json.loads((here / "out" / "episodes.jsonl").read_text())
+    assert (row["bound_s"], row["failed_metrics"]) == (None, {"bound_s": "ValueError: no tour"})
+    assert row["coverage_final"] > 0.0
+    monkeypatch.setattr("lidarium.evaluation.bounds.tours.find_spec", lambda _: None)
+    capsys.readouterr()
+    assert evaluate("--policies", "random_walk", "--bounds", seeds=2) == 2
+    assert "bounds need OR-Tools: pip install" in capsys.readouterr().err
+
+
+def test_a_map_that_settings_name_is_an_input(here, capsys):
+    known = here / "known.npz"
+    splines = ["--localization", "splines", "--policy", "random_walk", "--robots", "1"]
+    for seconds in ("1", "3"):
+        assert main(["run", *splines, "--horizon-s", seconds, "--out", "run"]) == 0
+        known.write_bytes((here / "run" / "robot_0_splines.npz").read_bytes())
+        capsys.readouterr()
+        asked = ["--localization", "splines", "--set", "localizer.tracking.start_map=known.npz"]
+        assert evaluate("--policies", "random_walk", *asked) == (0 if seconds == "1" else 2)
+    assert "episodes of settings 'default' as it was before its file changed" in capsys.readouterr().err
+
+
 def test_settings_of_a_localizer_come_to_a_result(here):
     options = ["--localization", "slam", "--set", "localizer.matching.wide_share=0.1"]
     assert main(["run", "--policy", "random_walk", "--robots", "1", "--horizon-s", "2", "--out", "run", *options]) == 0

@@ -207,7 +207,8 @@ def test_logs_without_anything_to_map_are_refused(content, word, tmp_path, capsy
         (["--clock-shift", "1e6", "--relations", "RELATIONS"], "with --clock-shift, which is 1000000.0"),
     ],
 )
-def test_bad_options_are_named(log, arguments, word, tmp_path, capsys):
+def test_bad_options_are_named_before_the_log_is_followed(log, arguments, word, tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr("lidarium.mapping.localization.slam.following.follow", None)
     files = {"TRUE": log.parent / "true.tum", "RELATIONS": log.parent / "true.relations"}
     arguments = [str(files.get(argument, argument)) for argument in arguments]
     assert main(["slam", str(log), *arguments, "--out", str(tmp_path / "out")]) == 2
