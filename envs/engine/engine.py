@@ -4,7 +4,6 @@ It has their beginnings, steps, endings, rewards, observations and infos. A sing
 episode; every face (PettingZoo, Gymnasium, stable-baselines3) hands actions to it and reads its arrays.
 """
 
-import math
 import os
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
@@ -596,8 +595,8 @@ def _check_memory(episodes: int, settings: ExplorationSettings, has_goal: bool) 
     """Check that this machine has the memory for what a batch of episodes observes."""
     if not hasattr(os, "sysconf"):
         return
-    boxes = [box for box in observation_space(settings, has_goal).values() if box.shape is not None]
-    observed = settings.robots * sum(math.prod(box.shape) * np.dtype(box.dtype).itemsize for box in boxes)
+    boxes = observation_space(settings, has_goal).values()
+    observed = settings.robots * sum(box.low.nbytes for box in boxes if isinstance(box, spaces.Box))
     memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     if _COPIES * episodes * observed > memory:
         raise ValueError(

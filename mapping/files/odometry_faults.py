@@ -87,7 +87,7 @@ def mended(
     """
     _check_metres(odometry, stamps)
     remarks = []
-    gaps = _runs(~np.isfinite(odometry).all(axis=1))
+    gaps = _runs(np.asarray(np.isnan(odometry).any(axis=1)))
     if gaps:
         first, last = max(gaps, key=lambda each: each[1] - each[0])
         remarks.append(
