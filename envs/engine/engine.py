@@ -4,6 +4,7 @@ It has their beginnings, steps, endings, rewards, observations and infos. A sing
 episode; every face (PettingZoo, Gymnasium, stable-baselines3) hands actions to it and reads its arrays.
 """
 
+import os
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -58,6 +59,9 @@ AfterStep = Callable[[NDArray[np.float64]], None]
 """Called after each time step with the commands (rows, 2) [m/s, rad/s]."""
 
 NO_EPISODES = np.zeros(0, np.int64)
+
+_COPIES = 7
+"""How many times as much as a batch observes is held: in buffers, copies, and bounds of its spaces."""
 
 
 class Engine:
@@ -135,6 +139,7 @@ class Engine:
         self.rows = self.episodes * self.robots
         choice = FloorChoice(floor, image_resolution)
         self.has_goal = choice.has_goal
+        _check_memory(self.episodes, settings, self.has_goal)
         self._beginnings = Beginnings(choice, settings, self.episodes, curriculum)
         self.simulation = make_simulation(settings, self.episodes)
         self.world = self.simulation.world
@@ -584,3 +589,18 @@ class Engine:
     def __getstate__(self) -> dict[str, Any]:
         # A copy's arrays lie elsewhere.
         return {**self.__dict__, "_tables": None}
+
+
+def _check_memory(episodes: int, settings: ExplorationSettings, has_goal: bool) -> None:
+    """Check that this machine has the memory for what a batch of episodes observes."""
+    if not hasattr(os, "sysconf"):
+        return
+    boxes = observation_space(settings, has_goal).values()
+    observed = settings.robots * sum(box.low.nbytes for box in boxes if isinstance(box, spaces.Box))
+    memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    if _COPIES * episodes * observed > memory:
+        raise ValueError(
+            f"the number of episodes is {episodes:,}, which observe {episodes * observed / 2**30:,.1f} GiB and hold "
+            f"about {_COPIES} times as much; this machine has {memory / 2**30:,.1f} GiB: want at most "
+            f"{memory // (_COPIES * observed):,}, or fewer map_cells or egocentric_cells"
+        )

@@ -91,10 +91,14 @@ def _decoded(content: bytes) -> NDArray[Any] | None:
     if content[:2] in (b"P1", b"P2", b"P3"):
         # OpenCV does not read a number that the file ends with.
         content += b"\n"
+    # OpenCV also prints what is wrong, beside the error that is raised here.
+    level = cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
     try:
         return cv2.imdecode(np.frombuffer(content, dtype=np.uint8), cv2.IMREAD_UNCHANGED)
     except cv2.error:
         return None
+    finally:
+        cv2.utils.logging.setLogLevel(level)
 
 
 def _check_size(header: "ImageFile", content: bytes) -> None:

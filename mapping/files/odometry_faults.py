@@ -87,6 +87,13 @@ def mended(
     """
     _check_metres(odometry, stamps)
     remarks = []
+    gaps = _runs(np.asarray(np.isnan(odometry).any(axis=1)))
+    if gaps:
+        first, last = max(gaps, key=lambda each: each[1] - each[0])
+        remarks.append(
+            f"odometry is missing in {len(gaps)} stretches while the robot moves, the longest from {stamps[first]:.3f} "
+            f"to {stamps[last - 1]:.3f} s: {sum(b - a for a, b in gaps)} scans are matched without it"
+        )
     odometry, remark = _in_robot_axes(odometry)
     remarks += remark
     odometry, jumps = _without_jumps(odometry, stamps)
@@ -132,7 +139,8 @@ def _in_robot_axes(odometry: NDArray[np.float64]) -> tuple[NDArray[np.float64], 
     A robot mostly moves in one direction of its body. If it does not, and moves along its heading by other units or
     axes, these are the log's.
     """
-    if not np.isfinite(odometry).all() or abs(_direction(odometry)) > _INCONSISTENT:
+    known = np.isfinite(odometry).all(axis=1)
+    if abs(_direction(odometry)) > _INCONSISTENT:
         return odometry, []
     degrees, same, swapped = math.pi / 180.0, [0, 1, 2], [1, 0, 2]
     for axes, scale, what in (
@@ -143,7 +151,7 @@ def _in_robot_axes(odometry: NDArray[np.float64]) -> tuple[NDArray[np.float64], 
         (same, -degrees, "headings of odometry are clockwise, in degrees"),
     ):
         changed = odometry[:, axes] * [1.0, 1.0, scale]
-        if abs(_direction(changed).real) > _CONSISTENT and np.ptp(changed[:, 2]) > _TURNED:
+        if abs(_direction(changed).real) > _CONSISTENT and np.ptp(changed[known, 2]) > _TURNED:
             return changed, [f"{what}, and taken so"]
     return odometry, []
 
@@ -193,11 +201,16 @@ def _frozen(odometry: NDArray[np.float64], ranges: NDArray[np.float32]) -> list[
     what is usual in the log.
     """
     still = np.abs(np.diff(odometry, axis=0)).max(axis=1) < _STILL_M
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], still, [False]]).astype(np.int8)))
-    moved = [(int(a), int(b)) for a, b in edges.reshape(-1, 2) if _has_changed(ranges[a : b + 1])]
+    moved = [(a, b) for a, b in _runs(still) if _has_changed(ranges[a : b + 1])]
     lengths = [b - a for a, b in moved]
     usual = float(np.percentile(lengths, 90.0)) if len(lengths) >= 10 else 0.0
     return [(a, b) for a, b in moved if b - a >= max(_FROZEN_SCANS, 2.0 * usual)]
+
+
+def _runs(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """Return where flags are set in a row: the first of each run, and the first behind it."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8)))
+    return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
 
 
 def _has_changed(ranges: NDArray[np.float32]) -> bool:
@@ -268,9 +281,10 @@ def _turn(before: NDArray[np.float32], after: NDArray[np.float32], geometry: Sca
 def _direction(odometry: NDArray[np.float64]) -> complex:
     """Return the mean direction of motions against headings, of length 1 if they always have the same.
 
-    It is 1 for a robot that drives ahead.
+    It is 1 for a robot that drives ahead. Unknown odometry does not count.
     """
     motions = relative(odometry[:-1], odometry[1:])
+    motions = motions[np.isfinite(motions).all(axis=1)]
     lengths = np.hypot(motions[:, 0], motions[:, 1])
     if not lengths.any():
         return 1.0 + 0.0j

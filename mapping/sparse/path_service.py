@@ -26,6 +26,9 @@ MAX_LINE_BYTES = 1_000_000
 MAX_OBSTACLES = 1000
 """Most obstacles at a time: all boxes are sorted again when one comes or goes."""
 
+_OF_BROWSERS = (b"GET ", b"HEAD ", b"POST ", b"OPTIONS ")
+"""Beginnings of requests that any page in a browser of this machine can send, with lines of its own behind."""
+
 _SHOWN = 80
 """Characters of a value that an error shows."""
 
@@ -60,6 +63,9 @@ class PathService:
     def answered(self, read_line: Callable[[int], bytes]) -> Iterator[bytes]:
         """Yield an answer to each line of a stream until it ends; ``read_line`` takes a number of bytes at most."""
         while line := read_line(MAX_LINE_BYTES + 1):
+            if line.startswith(_OF_BROWSERS):
+                yield self.refused(f"the line {_shown(line)} is of a browser; want one object a line")
+                return
             if len(line) > MAX_LINE_BYTES:
                 yield self.refused(f"the line has more than {MAX_LINE_BYTES:,} bytes; want one request a line")
                 while line and not line.endswith(b"\n"):

@@ -28,7 +28,7 @@ MOST_S, MOST_MB = 1.0, 512.0
 """What reading a file may take: time of the processor, and memory beyond what its process held."""
 
 WAITS = 6
-"""A case that computes nothing is waited for so many times as long."""
+"""A case that waits for something else than its turn to compute is given so many times as long."""
 
 STARTS_S = 180.0
 """A worker's first case may have to wait for kernels."""
@@ -101,9 +101,9 @@ def _run_worker(kind: str, samples: Path, seed: int, first: int, last: int, tall
             try:
                 line = lines.get(timeout=patience)
             except queue.Empty:
-                waited += 1
-                # On a busy machine a case may have waited for its turn alone.
-                if waited < WAITS and _cpu_s(worker.pid) - began_s < HANGS_S:
+                computed_s, is_running = _cpu_s(worker.pid)
+                waited += not is_running
+                if waited < WAITS and computed_s - began_s < HANGS_S:
                     continue
                 tally.add(first if current is None else current, {"kind": "hang"})
                 return (first if current is None else current) + 1
@@ -113,7 +113,7 @@ def _run_worker(kind: str, samples: Path, seed: int, first: int, last: int, tall
             if word == "begin":
                 # The first case imports and loads what the others find.
                 current, patience = int(number), STARTS_S if int(number) == first else HANGS_S
-                began_s, waited = _cpu_s(worker.pid), 0
+                (began_s, _), waited = _cpu_s(worker.pid), 0
             elif word == "end":
                 tally.add(int(number), json.loads(rest[0]))
                 current = None
@@ -130,10 +130,10 @@ def _run_worker(kind: str, samples: Path, seed: int, first: int, last: int, tall
             worker.stdout.close()
 
 
-def _cpu_s(process: int) -> float:
-    """Return how long a process has computed [s]."""
+def _cpu_s(process: int) -> tuple[float, bool]:
+    """Return how long a process has computed [s], and whether it computes or waits for its turn to."""
     fields = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
-    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK"), fields[0] == "R"
 
 
 def _pass_on(worker: "subprocess.Popen[str]", lines: "queue.SimpleQueue[str | None]") -> None:

@@ -64,6 +64,7 @@ def file_case(samples: list[Path], folder: Path, seed: int, number: int) -> Call
     sample = samples[number % len(samples)]
     content = mutated(sample.read_bytes(), sample.name, chance)
     path = folder / sample.name
+    path.unlink(missing_ok=True)  # it may be a link to the sample
     path.write_bytes(content)
     for other in samples:  # pictures that headers name
         if other.stem == "map" and other.name != sample.name:

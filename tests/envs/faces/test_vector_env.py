@@ -356,6 +356,10 @@ def test_a_closed_environment_and_one_without_reset_say_what_to_do():
     ("arguments", "words"),
     [
         ({"episodes": 0}, "number of episodes is 0; want a whole number of at least 1"),
+        (
+            {"episodes": 10**9},
+            r"episodes is 1,000,000,000, which observe .* GiB: want at most [\d,]+, or fewer map_cells",
+        ),
         ({"episodes": -1}, "number of episodes is -1"),
         ({"episodes": 2.0}, "number of episodes is 2.0"),
         ({"episodes": True}, "number of episodes is True"),

@@ -62,3 +62,15 @@ def test_coloured_pictures_may_have_fewer_pixels(tmp_path):
     assert read_image(tmp_path / "P5").shape == (4900, 4900)
     with pytest.raises(ValueError, match=r"it has 4,900 x 4,900 pixels .* want at most 12,000,000"):
         read_image(tmp_path / "P6")
+
+
+@pytest.mark.parametrize("suffix", [".png", ".pgm", ".ppm", ".bmp", ".jpg", ".tif"])
+@pytest.mark.parametrize("share", [0.3, 0.6, 0.9])
+def test_of_a_truncated_image_libraries_print_nothing(tmp_path, capfd, suffix, share):
+    pixels = np.random.default_rng(0).integers(0, 255, (60, 60, 3), np.uint8)
+    content = bytes(cv2.imencode(suffix, pixels if suffix != ".pgm" else pixels[..., 0])[1])
+    path = tmp_path / f"cut{suffix}"
+    path.write_bytes(content[: int(share * len(content))])
+    with pytest.raises(ValueError, match="not an image"):
+        read_image(path)
+    assert capfd.readouterr() == ("", "")

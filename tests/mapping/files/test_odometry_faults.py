@@ -75,11 +75,16 @@ def test_odometry_that_is_read_at_every_fourth_scan_is_no_fault(log):
     assert not made_usable(seldom, "log").remarks
 
 
-def test_some_unknown_odometry_leaves_the_rest(log):
+def test_odometry_that_is_missing_is_told_and_leaves_the_rest(log):
     odometry = log.odometry.copy()
-    odometry[5:8] = np.nan
+    odometry[5:8], odometry[20] = np.nan, np.nan
     found = made_usable(replace(log, odometry=odometry), "log")
     np.testing.assert_array_equal(found.odometry, odometry)
+    (remark,) = found.remarks
+    first, last = log.stamps[[5, 7]]
+    assert (
+        f"missing in 2 stretches while the robot moves, the longest from {first:.3f} to {last:.3f} s: 4 scans" in remark
+    )
 
 
 @pytest.mark.parametrize(
@@ -95,6 +100,11 @@ def test_other_axes_and_units_of_odometry_are_found_and_told(name, change, words
     np.testing.assert_allclose(found.odometry, log.odometry, atol=1e-9)
     (remark,) = found.remarks
     assert words in remark
+    # Also if a part is missing.
+    part = np.where(np.arange(len(log.stamps))[:, None] < 8, np.nan, log.odometry)
+    found = made_usable(replace(log, odometry=change(part)), "log")
+    np.testing.assert_allclose(found.odometry, part, atol=1e-9)
+    assert words in found.remarks[-1]
 
 
 def test_mirrored_scans_are_turned_over_and_told(log):

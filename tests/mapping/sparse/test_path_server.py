@@ -4,7 +4,7 @@ import io
 import json
 import socket
 import threading
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import numpy as np
@@ -170,6 +170,19 @@ def test_a_long_line_is_refused_and_the_next_one_answered():
     assert first == {"id": None, "error": "the line has more than 1,000,000 bytes; want one request a line"}
     assert second["id"] == "next"
     assert second["errors"] == 1
+
+
+@pytest.mark.parametrize("path", [b"/", b"/" + b"x" * MAX_LINE_BYTES])
+def test_a_page_in_a_browser_changes_nothing(path):
+    box = b'{"id": 1, "method": "add_obstacle", "low": [0, 0, 0], "high": [1, 1, 1]}\n'
+    with served() as server, PathClient(server.port) as client:
+        with socket.create_connection((HOST, server.port)) as other, other.makefile("rb") as answers:
+            with suppress(OSError):
+                other.sendall(b"POST " + path + b" HTTP/1.1\r\nHost: a\r\n\r\n" + box)
+            with suppress(ConnectionResetError):  # as it left lines unread
+                assert "is of a browser" in json.loads(answers.readline())["error"]
+                assert answers.read() == b""
+        assert client.status()["obstacles"] == {}
 
 
 def test_a_client_that_leaves_in_the_middle_harms_nobody():
