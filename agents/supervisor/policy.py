@@ -531,13 +531,13 @@ class SupervisedTeam(TeamWrapper):
         masks_orders: bool = False,
         **options: Any,  # noqa: ANN401
     ) -> None:
-        self._base = exploration_below(getattr(env, "unwrapped", env), "Supervised")
+        base = exploration_below(getattr(env, "unwrapped", env), "Supervised")
         super().__init__(env)
         self.metadata = {**env.metadata, "name": str(env.metadata["name"]).replace("_v1", "_supervised_v1")}
-        self.supervisor: Supervised = Supervised(_Outside(self._base.level), settings, **options)
+        self.supervisor: Supervised = Supervised(_Outside(base.level), settings, **options)
         self._masks = masks_orders
         if masks_orders:
-            _check_masks(self._base.engine.observation_space.spaces)
+            _check_masks(base.engine.observation_space.spaces)
         self._free: list[str] = []
 
     def reset(
@@ -545,7 +545,7 @@ class SupervisedTeam(TeamWrapper):
     ) -> tuple[dict[str, Observation], dict[str, dict[str, Any]]]:
         """Start an episode; see ``ExplorationEnv.reset``."""
         observations, infos = super().reset(seed, options)
-        self.supervisor.reset(self._base)
+        self.supervisor.reset(self.unwrapped)
         self._direct(observations, infos)
         return observations, infos
 
@@ -553,14 +553,14 @@ class SupervisedTeam(TeamWrapper):
         """Take a step or a decision by the actions of robots without orders, and the orders of the others."""
         if not self.agents:
             return super().step(actions)
-        live = self._base.agents
+        live = self.unwrapped.agents
         own = {agent: actions[agent] for agent in self._free if agent in actions}
         outcome = super().step(self.supervisor.complete(live, own))
         self._direct(outcome[0], outcome[4])
         return outcome
 
     def _direct(self, observations: dict[str, Any], infos: dict[str, dict[str, Any]]) -> None:
-        self._free = self.supervisor.direct(self._base.agents)
+        self._free = self.supervisor.direct(self.unwrapped.agents)
         for agent, info in infos.items():
             info[DIRECTED] = agent not in self._free
             if self._masks and info[DIRECTED]:

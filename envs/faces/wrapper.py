@@ -19,6 +19,10 @@ class TeamWrapper(ParallelEnv[str, Any, Any]):
     ----------
     env : ParallelEnv
         The environment of a team, at any level of decision.
+
+    Notes
+    -----
+    If settings are drawn, each reset replaces ``unwrapped`` and its engine: subclasses must not keep parts of them.
     """
 
     def __init__(self, env: Any) -> None:  # noqa: ANN401
@@ -48,7 +52,7 @@ class TeamWrapper(ParallelEnv[str, Any, Any]):
     ) -> tuple[dict[str, Observation], dict[str, dict[str, Any]]]:
         """Start an episode; see ``ExplorationEnv.reset``."""
         outcome: tuple[dict[str, Observation], dict[str, dict[str, Any]]] = self.env.reset(seed, options)
-        self.agents = self.env.agents
+        self.agents, self.settings = self.env.agents, self.env.settings
         return outcome
 
     def step(self, actions: Any) -> Outcome:  # noqa: ANN401

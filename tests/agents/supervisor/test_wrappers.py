@@ -112,6 +112,24 @@ def test_episodes_of_a_batch_that_begin_again_are_supervised_anew():
     assert all(supervisor.report().supervision is not None for supervisor in batch.supervisors)
 
 
+def test_teams_whose_settings_are_newly_drawn_are_supervised_alone_and_in_batches():
+    options = {"horizon_s": 3.0, "starts": "fixed", **UNKNOWN, "randomize": {"robots": [3, 2]}}
+    alone = lidarium.Supervised(lidarium.parallel_env("apartment", **options), period_s=1.0)
+    batch = lidarium.Supervised(lidarium.vector_env(1, "apartment", reports=True, **options), period_s=1.0)
+    for seed in range(2):
+        alone.reset(seed=seed)
+        _, infos = batch.reset(seed=seed)
+        assert alone.supervisor.report().supervision is not None
+        actions = np.tile(np.array([0.4, 0.2], np.float32), (3, 1))
+        while alone.agents:
+            _, _, _, _, own = alone.step({agent: actions[robot] for robot, agent in enumerate(alone.agents)})
+            _, _, _, _, infos = batch.step(actions)
+            directed = {agent: bool(infos["directed"][alone.possible_agents.index(agent)]) for agent in own}
+            if alone.agents:
+                assert directed == {agent: info["directed"] for agent, info in own.items()}
+        assert np.array_equal(batch.unwrapped.batch.parts[0].engine.world.poses, alone.unwrapped.world.poses)
+
+
 def test_what_cannot_be_supervised_is_refused():
     with pytest.raises(ValueError, match="masks_orders is set, but there are no masks; want level='frontier'"):
         lidarium.Supervised(lidarium.parallel_env("apartment", **UNKNOWN), masks_orders=True)

@@ -23,3 +23,13 @@ def test_rows_of_stable_baselines_see_merged_maps():
 def test_a_robot_alone_has_nobody_to_merge_with():
     with pytest.raises(ValueError, match="robots is 1; merging maps wants two or more"):
         lidarium.vector_env(2, "scene_room", merging=MergingSettings(), **{**OPTIONS, "robots": 1})
+
+
+def test_robots_of_a_batch_that_cannot_talk_know_nothing_of_each_other():
+    merging = MergingSettings(known_starts=True)
+    for can_talk in (np.eye(2, dtype=bool), lambda time_s, poses: np.eye(2, dtype=bool)):
+        env = lidarium.vector_env(2, "scene_room", merging=merging, can_talk=can_talk, **OPTIONS)
+        observations, _ = env.reset(seed=0)
+        assert not observations["teammates"].any()
+    with pytest.raises(ValueError, match="can_talk is given, but merging is not"):
+        lidarium.vector_env(2, "scene_room", can_talk=np.eye(2, dtype=bool), **OPTIONS)
