@@ -23,10 +23,10 @@ METRES, SQUARE_METRES, SECONDS = 10.0, 10.0, 60.0
 """Scales of lengths, areas and ages."""
 
 PATH_FACTOR = 3.0
-"""A metre of path counts as so many of size, as in explore_lite."""
+"""Cost of a metre of path in metres of frontier, as in explore_lite."""
 
 TEAMMATE_UNITS = np.array([METRES, METRES, math.pi, METRES, METRES, 1.0, SECONDS, 1.0], np.float32)
-"""Scales of what is known of a teammate: place, heading, target, whether it has one, age, whether it is known."""
+"""Scales of the numbers of a teammate: position, heading, target, whether it has one, age, whether it is known."""
 
 
 def frontier_shapes() -> Shapes:
@@ -47,7 +47,7 @@ class FrontierNetwork(AttentionNetwork):
     """Ranks the frontiers on offer to a robot; teammates and frontiers are sets: their order changes nothing."""
 
     def choose(self, observation: Mapping[str, NDArray[Any]]) -> int:
-        """Return the action that is preferred of those that the mask allows."""
+        """Return the allowed action with the highest preference."""
         allowed = observation[MASK] > 0
         return int(np.argmax(np.where(allowed, self.preferences(observation), -np.inf)))
 

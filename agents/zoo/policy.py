@@ -20,7 +20,7 @@ class ZooTeam(Policy):
     Parameters
     ----------
     name : str
-        The team, such as ``ppo-2``; any number of robots, two at least, may use its network.
+        The team, such as ``ppo-2``; any team of at least two robots can use its network.
     weights : str or Path, optional
         File of weights of `lidarium train`. Those of the package by default.
     """
@@ -32,7 +32,7 @@ class ZooTeam(Policy):
         self._network = FrontierNetwork(zoo_files(name).load(weights))
 
     def reset(self, team: Team, seed: int = 0) -> None:
-        """Begin an episode: nothing is kept of the last one."""
+        """Begin an episode."""
 
     def act(self, observations: Mapping[str, Observation]) -> dict[str, Action]:
         """Choose a frontier for each robot; one without a frontier stays."""

@@ -4,7 +4,6 @@ from typing import Any
 
 import numpy as np
 from gymnasium import spaces
-from gymnasium.vector import VectorEnv
 from numpy.typing import NDArray
 from pettingzoo import ParallelEnv
 
@@ -99,7 +98,7 @@ def exploration_below(env: Any, wrapper: str) -> ExplorationEnv:  # noqa: ANN401
         If it is not one of a single team.
     """
     if not isinstance(env, ExplorationEnv):
-        kind = "a batch of many episodes" if isinstance(env, VectorEnv) else "no team's environment"
+        kind = "a batch of many episodes" if hasattr(env, "num_envs") else "no team's environment"
         raise ValueError(
             f"{wrapper} is put around {type(env).__name__}, {kind}; want an environment of lidarium.parallel_env"
         )
