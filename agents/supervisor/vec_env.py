@@ -33,11 +33,12 @@ class SupervisedVecEnv(VecEnvWrapper):
 
     def __init__(
         self,
-        venv: ExplorationVecEnv,
+        venv: Any,  # noqa: ANN401
         make: Make,
         masks_orders: bool = False,
     ) -> None:
         super().__init__(venv)
+        self._batch: ExplorationVecEnv = venv
         self._stations = Supervisors(venv, make)
         self.supervisors = self._stations.each
         self._masks = masks_orders
@@ -54,7 +55,7 @@ class SupervisedVecEnv(VecEnvWrapper):
 
     def step_async(self, actions: Any) -> None:  # noqa: ANN401
         """Take the actions of robots without orders, and the orders of the others."""
-        self.venv.step_async(self._stations.actions(actions))
+        self._batch.step_async(self._stations.actions(actions))
 
     def step_wait(self) -> VecEnvStepReturn:
         """Run all episodes; those that are over begin again."""
@@ -71,7 +72,7 @@ class SupervisedVecEnv(VecEnvWrapper):
     @property
     def action_masks(self) -> NDArray[np.bool_]:
         """Which actions each row may choose now, (rows, actions)."""
-        masks: NDArray[np.bool_] = self.venv.action_masks
+        masks = self._batch.action_masks
         return with_orders(masks, self._directed) if self._masks else masks
 
     def env_method(self, method_name: str, *method_args: Any, indices: Any = None, **method_kwargs: Any) -> list[Any]:  # noqa: ANN401

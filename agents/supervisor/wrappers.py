@@ -14,11 +14,12 @@ from lidarium.envs.faces.parallel import Observation, Outcome
 from lidarium.envs.faces.vector_env import BatchFace, ExplorationVectorEnv, Step
 from lidarium.envs.faces.wrapper import TeamWrapper, exploration_below
 
-_BatchWrapper = VectorWrapper
 if TYPE_CHECKING:
     from lidarium.agents.supervisor.policy import Supervised
 
-    _BatchWrapper = VectorWrapper[Any, Any, Any]  # Gymnasium 1.1 has no parameters there
+    _BatchWrapper = VectorWrapper[Any, Any, Any]
+else:
+    _BatchWrapper = VectorWrapper  # Gymnasium 1.1 has no parameters there
 
 Make = Callable[[str], "Supervised"]
 """Makes a supervisor of robots at a level, whose policy decides elsewhere."""
