@@ -178,7 +178,7 @@ class ExplorationVectorEnv(BatchFace, VectorEnv[Any, NDArray[Any], NDArray[Any]]
         actions : (rows, ...) array or list of dict
             An action for each row; those of rows that repeat or begin again are ignored. At the level of waypoints an
             array of objects may hold ``Target``, ``Route`` and None. Or the actions of each episode by agent, as for
-            ``ExplorationEnv.step``: what policies return.
+            ``ExplorationEnv.step``, as policies return them.
         """
         self._check_open()
         batch = self.batch

@@ -63,7 +63,7 @@ _VERTICES = re.compile(rb"^[ \t]*v(?:ertex)?[ \t]+(\S+)[ \t]+(\S+)[ \t]+(\S+)", 
 
 @dataclass(slots=True)
 class _Found:
-    """What a world holds.
+    """The content of a world.
 
     Attributes
     ----------
@@ -325,7 +325,7 @@ def _pose(path: Path, element: Element) -> Pose:
 
 
 def _add_shape(found: _Found, path: Path, name: str, geometry: Element, pose: Pose) -> None:
-    """Add a shape to what was found: a solid, or a mesh that is boxed or cannot be read."""
+    """Add a shape to the content: a solid, or a mesh that is boxed or cannot be read."""
     if any(geometry.find(tag) is not None for tag in ("plane", "empty")):
         return
     mesh = geometry.find("mesh")
