@@ -290,7 +290,7 @@ def check_observed(policy: Policy, name: str, observe: Sequence[str]) -> None:
 
 
 def _missing(policy: Policy, observe: Sequence[str]) -> tuple[str, ...]:
-    """Return what a policy reads and robots do not observe; the level of frontiers always shows what it offers."""
+    """Return the observables that a policy reads and robots lack; the level of frontiers always shows its own."""
     shown = ("frontiers", "action_mask") if policy.level == "frontier" else ()
     return tuple(each for each in policy.observes if each not in (*observe, *shown))
 

@@ -1,7 +1,7 @@
-"""What robots tell each other by radio: news of everybody, and the meeting that they have agreed on.
+"""Data that robots exchange by radio: news of all robots, and the meeting that they have agreed on.
 
-Each robot has a notebook of its own. It reads the notebook of a teammate only when a message of that teammate has
-just come, so that news and agreements spread from robot to robot, and late if messages are lost.
+Each robot has its own notebook. It reads the notebook of a teammate only if a message of that teammate has just
+arrived: news and agreements spread from robot to robot, later if messages are lost.
 """
 
 import math
@@ -12,7 +12,7 @@ from typing import Annotated
 from lidarium.mapping.geometry.bounds import check_settings, within
 
 NEWS_BYTES, AGREEMENT_BYTES = 48, 32
-"""A line of news: robot, time, pose and goal, cells known, state. An agreement: number, place, time, members."""
+"""Size of the news of a robot (name, time, pose, goal, known cells, state) and of an agreement in messages."""
 
 Place = tuple[float, float]
 """x, y on the floor [m]."""
@@ -20,26 +20,28 @@ Place = tuple[float, float]
 Seconds = Annotated[float, within(0.0, 1e6)]
 
 RULES = ("meeting", "pursuit", "none")
-"""What a robot does that has nothing left to explore: it goes to the agreed place, after a teammate, or rests."""
+"""Behaviours of a robot whose map is explored: it drives to the agreed position, follows a teammate, or waits."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MeetingSettings:
-    """How robots agree on meetings.
+    """Parameters of meetings.
 
     Attributes
     ----------
-    rule : str
-        ``meeting`` (robots go to the agreed place at the agreed time, or when they have nothing left), ``pursuit``
-        (those that have nothing left go where they expect a teammate, as in M-TARE) or ``none``.
-    interval : float
-        Time to the next meeting over the time that the tours past the open frontiers take [1].
-    minimum_s, maximum_s : float
-        Bounds of that time [s].
-    patience_s : float
-        How long robots wait for one that does not come, beside half of the time of its way [s].
-    trust_s : float
-        For how long robots leave to a teammate out of reach what lies nearest to it [s].
+    rule : str, optional
+        ``meeting``, the default: robots drive to the agreed position in time for the meeting, or earlier if their map
+        is explored. ``pursuit``: robots whose map is explored drive to the expected position of a teammate, as in
+        M-TARE. ``none``: they wait.
+    interval : float, optional
+        Time to the next meeting, relative to the duration of the tours past the open frontiers. 4 by default.
+    minimum_s, maximum_s : float, optional
+        Minimum and maximum time to the next meeting [s]. 400 and 800 s by default.
+    patience_s : float, optional
+        Time that robots wait for a missing one, in addition to half of its expected driving time [s]. 20 s by default.
+    trust_s : float, optional
+        Age of the last news of a teammate out of touch up to which the frontiers nearest to it are left to it [s].
+        20 s by default.
     """
 
     rule: str = "meeting"
@@ -59,18 +61,18 @@ class MeetingSettings:
 
 @dataclass(frozen=True, slots=True)
 class News:
-    """What is known of a robot.
+    """The state of a robot at some time.
 
     Attributes
     ----------
     time_s : float
-        When it was true [s].
+        Time of the state [s].
     place, goal : (x, y)
-        Where the robot was, and where it was driving to [m].
+        Position and goal of the robot on the floor [m].
     known : int
-        Number of cells that it knew to be free.
+        Number of free cells in its map.
     is_done : bool
-        Whether its map had nothing left to explore.
+        Whether its map has no frontiers left.
     """
 
     time_s: float
@@ -87,13 +89,13 @@ class Agreement:
     Attributes
     ----------
     number : int
-        Later agreements have higher numbers.
+        Number of the agreement; the highest one is valid.
     place : (x, y)
-        Where [m].
+        Position on the floor [m].
     time_s : float
-        When, at the latest [s].
+        Latest time of arrival [s].
     members : tuple of str
-        Who comes.
+        Robots that take part.
     """
 
     number: int
@@ -104,20 +106,20 @@ class Agreement:
 
 @dataclass(slots=True)
 class Notebook:
-    """What a robot knows of the others.
+    """The knowledge of a robot about the others.
 
     Attributes
     ----------
     news : dict
-        The latest news of each robot, its own among them.
+        The latest news of each robot, including its own.
     agreement : Agreement or None
-        The meeting that it goes to.
+        The next meeting.
     given_up : set
-        Whom it does not wait for any more.
+        Robots that it no longer expects.
     shared : dict
-        Number of free cells that it knew when it last shared its map with each teammate.
+        Number of free cells in its map when it last shared the map with each teammate.
     since : dict
-        Since when it has been in touch with each teammate, without a break [s].
+        Time since which it has been in touch with each teammate without interruption [s].
     """
 
     news: dict[str, News] = field(default_factory=dict)
@@ -127,7 +129,7 @@ class Notebook:
     since: dict[str, float] = field(default_factory=dict)
 
     def read(self, news: Mapping[str, News], agreement: Agreement | None) -> None:
-        """Take over what a teammate tells that is newer."""
+        """Take over newer news and a newer agreement from the notebook of a teammate."""
         for name, told in news.items():
             if name not in self.news or told.time_s > self.news[name].time_s:
                 self.news[name] = told
@@ -136,11 +138,11 @@ class Notebook:
             self.agreement = agreement
 
     def in_touch(self, me: str, after_s: float) -> list[str]:
-        """Return the teammates of which there is news after a time, directly or from robot to robot."""
+        """Return the teammates with news after a time, received directly or through other robots."""
         return [name for name, told in self.news.items() if name != me and told.time_s >= after_s]
 
     def note_shared(self, me: str, after_s: float, needed_s: float) -> None:
-        """Note with whom the map has been shared: who has been in touch for as long as that takes."""
+        """Mark the map as shared with teammates that have been in touch for ``needed_s``."""
         mine, near = self.news[me], self.in_touch(me, after_s)
         self.since = {name: self.since.get(name, mine.time_s) for name in near}
         for name, since in self.since.items():
@@ -148,9 +150,9 @@ class Notebook:
                 self.shared[name] = mine.known
 
     def expects(self, me: str, after_s: float, share: float) -> list[str]:
-        """Return the teammates that are worth meeting: they lack what this robot knows, or may know what it lacks.
+        """Return the missing teammates that still explore, or lack more than a share of the area that this robot knows.
 
-        A teammate must know by now what it was told when both were last in touch.
+        Maps that were shared when both were last in touch count as known to the teammate.
         """
         known, near = self.news[me].known, set(self.in_touch(me, after_s))
         return [
@@ -164,13 +166,13 @@ class Notebook:
 
 
 def next_meeting_s(settings: MeetingSettings, tour_m: float, robots: int, speed: float) -> float:
-    """Return the time to the next meeting: that of the robots' part of the tour past what is open [s]."""
+    """Return the time to the next meeting [s], in proportion to each robot's part of the tour past open frontiers."""
     taken = settings.interval * tour_m / (robots * speed)
     return min(max(taken, settings.minimum_s), settings.maximum_s)
 
 
 def tour_length(start: Place, places: list[Place]) -> float:
-    """Return the length of a tour as the crow flies, always to the nearest place left [m]."""
+    """Return the straight-line length of the nearest-neighbour tour through some positions [m]."""
     here, left, length = start, list(places), 0.0
     while left:
         nearest = min(left, key=lambda place: (math.dist(here, place), place))

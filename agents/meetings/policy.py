@@ -1,9 +1,9 @@
-"""Meetings: robots whose radio breaks explore apart, and meet where and when they have agreed.
+"""Meetings: robots with unreliable radio explore separately, and meet at an agreed position and time.
 
-While all that are expected are in touch, the first of them sets the next meeting again and again: the place to which
-the longest way of any is shortest, and a time that grows with the tours past what is open. Out of touch each robot
-explores by its own map, leaves in time for its way to the place, and goes there early if nothing is left for it. Who
-has not come when patience ends is given up, until there is news of it.
+If all expected robots are in touch, the first of them renews the agreement periodically: the position with the shortest
+longest path from all robots, and a time in proportion to the tours past open frontiers. Robots out of touch explore by
+their own maps, leave in time for the meeting, and go there early if their map is explored. Robots that have not arrived
+after the time of patience are given up, until news of them arrives.
 
 References
 ----------
@@ -42,26 +42,26 @@ from lidarium.envs.onboard.radio.messages import Target
 from lidarium.mapping.planning.grid_planning import Cell, cells_of, centres_of, plan, search
 
 RENEWED_S = 5.0
-"""Robots in touch agree anew this often [s]; the way to the place is looked at as often."""
+"""Period at which robots in touch renew their agreement, and plan the path to the meeting again [s]."""
 
 MARGIN_S = 3.0
-"""Robots leave this much before their way to the place says [s]."""
+"""Reserve with which robots leave for a meeting, in addition to the driving time [s]."""
 
 AT_PLACE = 0.7
-"""Who is this near to a place is there [m]."""
+"""Maximum distance to a position at which a robot has arrived [m]."""
 
 NEW_SHARE = 0.005
-"""A robot that knows this much more than a teammate has something to tell it [1]."""
+"""Minimum share of a robot's known area that a teammate must lack to be worth a meeting."""
 
-MOST_PLACES = 12
-"""The largest open frontiers decide on time and place of a meeting."""
+MAX_FRONTIERS = 12
+"""Maximum number of open frontiers that decide on time and position of a meeting, the largest first."""
 
 
 class Meetings(FrontierExplorer):
-    """Adds meetings to explorers; with an ideal radio, and for a robot alone, it changes nothing."""
+    """Adds meetings to explorers. It has no effect if the radio is ideal or the team is one robot."""
 
     def meet_by(self, settings: Mapping[str, Any]) -> dict[str, Any]:
-        """Take the settings of meetings; return the others."""
+        """Take the settings of meetings, and return the other ones."""
         names = {each.name for each in fields(MeetingSettings)}
         self.meetings = MeetingSettings(**{name: value for name, value in settings.items() if name in names})
         return {name: value for name, value in settings.items() if name not in names}
@@ -87,7 +87,7 @@ class Meetings(FrontierExplorer):
         self._share_s = 1.0 + 2.0 * (settings.radio.period_s + settings.radio.latency_s) / (1.0 - settings.radio.loss)
 
     def act(self, observations: Mapping[str, Observation]) -> dict[str, Action]:
-        """Send every robot to its frontier, to the meeting, or to rest."""
+        """Send each robot to its frontier or to the meeting, or let it wait."""
         if not self.is_apart:
             return super().act(observations)
         agents = list(observations)
@@ -107,10 +107,10 @@ class Meetings(FrontierExplorer):
             return {agent: Stop(self.reason(agent)) for agent in agents}
         return actions
 
-    # What robots tell each other
+    # Communication
 
     def _talk(self, agents: Sequence[str]) -> None:
-        """Let robots read the notebooks of teammates whose message has just arrived, and agree again."""
+        """Let robots read the notebooks of teammates with new messages, and renew agreements."""
         now = self.team.time_s
         for agent in agents:
             self.notebooks[agent].news[agent] = self._own_news(agent)
@@ -138,18 +138,18 @@ class Meetings(FrontierExplorer):
         return News(self.team.time_s, place, goal, known, choice is None and not len(self._open(agent)))
 
     def _open(self, agent: str) -> NDArray[np.int64]:
-        """Return a cell of each frontier that is left to a robot, the largest first."""
+        """Return a cell of each frontier in a robot's map, the largest first."""
         navigation = self.navigation(agent)
         least = max(math.ceil(0.3 / navigation.resolution - 1e-9), 1)
         clusters = navigation.frontiers.clusters(minimum_cells=least)
         return clusters.representatives[np.argsort(-clusters.sizes, kind="stable")]
 
     def near(self, agent: str) -> list[str]:
-        """Return the teammates that a robot is in touch with, directly or through others."""
+        """Return the teammates in touch with a robot, directly or through others."""
         return self.notebooks[agent].in_touch(agent, self.team.time_s - self._near_s)
 
     def _agree(self, agent: str) -> None:
-        """Set the next meeting, if this robot is the first of all that are expected, and all are in touch."""
+        """Set the next meeting if all expected robots are in touch, and this one is the first of them."""
         book, now = self.notebooks[agent], self.team.time_s
         members = sorted([agent, *self.near(agent)])
         expected = {name for name in book.news if name not in book.given_up}
@@ -159,7 +159,7 @@ class Meetings(FrontierExplorer):
         if last is not None and last.members == tuple(members) and now - self._looked_s[agent] < RENEWED_S:
             return
         self._looked_s[agent] = now
-        cells = self._open(agent)[:MOST_PLACES]
+        cells = self._open(agent)[:MAX_FRONTIERS]
         place = self._best_place(agent, members, cells)
         belief = self.team.belief(agent)
         open_at = [
@@ -173,7 +173,7 @@ class Meetings(FrontierExplorer):
         self.agreed.append(book.agreement)
 
     def _best_place(self, agent: str, members: Sequence[str], cells: NDArray[np.int64]) -> Place:
-        """Return the place to which the longest way is shortest, from where robots go and from what is open."""
+        """Return the position with the shortest longest path from the robots' goals and the open frontiers."""
         navigation, belief = self.navigation(agent), self.team.belief(agent)
         news = self.notebooks[agent].news
         starts = [self._cell_of(agent, news[name].goal) for name in members] + [
@@ -187,7 +187,7 @@ class Meetings(FrontierExplorer):
                 longest = costs if longest is None else np.maximum(longest, costs)
         if longest is None or not np.isfinite(longest).any():
             return news[agent].place
-        # Of places that are as good, one with room for all.
+        # Of nearly equal positions choose one with room for all.
         closeness = navigation.clearance.closeness
         best = longest <= longest.min() + 1.0
         rows, columns = np.nonzero(best)
@@ -196,7 +196,7 @@ class Meetings(FrontierExplorer):
         return self._on_floor(agent, centres_of(cell, belief.map_origin, navigation.resolution))
 
     def _give_up_missing(self, agent: str) -> None:
-        """Give up on those that have not come when patience has ended."""
+        """Give up members that have not arrived after the time of patience."""
         book, now, near = self.notebooks[agent], self.team.time_s, self.near(agent)
         agreement = book.agreement
         if agreement is None:
@@ -207,10 +207,10 @@ class Meetings(FrontierExplorer):
                 if now > agreement.time_s + self.meetings.patience_s + 0.5 * way_s:
                     book.given_up.add(name)
 
-    # Where robots go
+    # Goals
 
     def _has_to_leave(self, agent: str) -> bool:
-        """Whether a robot has to set out to the meeting now, or is on its way."""
+        """Whether a robot has to leave for the meeting now, or is on its way."""
         book, now = self.notebooks[agent], self.team.time_s
         agreement = book.agreement
         if agreement is None or not book.expects(agent, now - self._near_s, -1.0):
@@ -230,7 +230,7 @@ class Meetings(FrontierExplorer):
         return True
 
     def _errand(self, agent: str) -> Target | None:
-        """Return where a robot goes that has nothing to explore, None to stay."""
+        """Return the target of a robot without frontiers, None to stay."""
         book, now = self.notebooks[agent], self.team.time_s
         missing = book.expects(agent, now - self._near_s, NEW_SHARE)
         agreement = book.agreement
@@ -252,12 +252,12 @@ class Meetings(FrontierExplorer):
         return Target(float(x), float(y))
 
     def _has_ended(self, agent: str) -> bool:
-        """Whether a robot has nothing left to explore and nobody to meet."""
+        """Whether a robot has no frontiers left and no teammates to meet."""
         book = self.notebooks[agent]
         return self.current(agent) is None and not book.expects(agent, self.team.time_s - self._near_s, NEW_SHARE)
 
     def _way(self, agent: str, place: Place) -> float:
-        """Return the length of a robot's way to a place by its own map [m]."""
+        """Return the length of a robot's path to a position, planned on its own map [m]."""
         navigation = self.navigation(agent)
         found = plan(
             navigation.space,
@@ -284,10 +284,10 @@ class Meetings(FrontierExplorer):
 
 
 class MeetingTours(Meetings, TourFrontier):
-    """Explorers that share out all frontiers as tours, and meet.
+    """Explorers that divide all frontiers into tours, and meet.
 
-    A robot plans for itself and for the teammates out of touch, at the last place of which there is news: what is
-    nearer to those is left to them for a while.
+    A robot plans for itself and for teammates out of touch at their last known positions; frontiers nearer to these are
+    left to them for ``trust_s``.
     """
 
     def __init__(self, shares_map: bool = True, **settings: Any) -> None:  # noqa: ANN401
@@ -307,7 +307,7 @@ class MeetingTours(Meetings, TourFrontier):
 
 
 class MeetingFrontier(Meetings, NearestFrontier):
-    """Explorers that each drive to the nearest frontier of their map, and meet."""
+    """Explorers that drive to the nearest frontier of their own map, and meet."""
 
     decision_period_s = 0.5
 

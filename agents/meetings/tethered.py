@@ -1,8 +1,8 @@
-"""Tethered explorers: a team that never leaves its radio, the opposite of meetings.
+"""Tethered explorers: a team that always stays within radio range, the opposite of meetings.
 
-The first robot of those that are in touch plans for all. A robot sets out to a place only if the radio's own rule, on
-the map as it is known, then joins all robots, each at its goal; if no place is like that, all go to one together. Who
-loses touch goes back to the last place of the others, which wait for it, until their patience ends.
+The first robot in touch plans for all. A robot drives to a goal only if, by the model of the radio on the known map,
+all robots are connected when they are at their goals; if no such goal exists, all drive to one together. A robot that
+loses touch returns to the last known position of the others, which wait for it for the time of patience.
 """
 
 import math
@@ -24,22 +24,22 @@ from lidarium.envs.simulation.disturbances.radio import links
 from lidarium.mapping.planning.grid_planning import cells_of
 
 MARGIN_DB, MARGIN = 3.0, 0.9
-"""Links are counted on that are better than they have to be by the first, or that reach as far as the second of it."""
+"""Reserve of a reliable link: signal above the threshold [dB], and maximum share of the range."""
 
 
 def careful(radio: RadioSettings) -> RadioSettings:
-    """Return the rule of a radio by which links are counted on."""
+    """Return the settings of a radio with that reserve, by which reliable links are found."""
     return replace(radio, threshold=radio.threshold + MARGIN_DB, reach=MARGIN * radio.reach)
 
 
 class Tethered(Meetings, TourFrontier):
-    """Explorers by tours that keep in touch with each other, directly or through others."""
+    """Explorers by tours that stay in touch, directly or through others."""
 
     def __init__(self, shares_map: bool = True, **settings: Any) -> None:  # noqa: ANN401
         super().__init__(shares_map, **self.meet_by(settings))
 
     def groups(self, agents: list[str], open_agents: list[str]) -> list[list[str]]:
-        """Return the robots that are in touch and of which one is open."""
+        """Return the groups of robots in touch that contain an open one."""
         if not self.is_apart:
             return super().groups(agents, open_agents)
         left, groups = list(agents), []
@@ -51,13 +51,13 @@ class Tethered(Meetings, TourFrontier):
         return [members for members in groups if any(agent in open_agents for agent in members)]
 
     def pick(self, agents: list[str], options: TourOptions) -> list[int | None]:
-        """Return which option each robot in touch drives to, so that all stay in touch."""
+        """Return the option of each robot in touch, chosen so that all stay connected."""
         wanted = super().pick(agents, options)
         if not self.is_apart or len(agents) == 1:
             return wanted
         navigation = self.navigation(agents[0])
         cells = [self._goal_cell(agent) for agent in agents]
-        # What is unknown may be a wall.
+        # Unknown cells may be walls.
         raster = Raster((navigation.log_odds >= 0).astype(np.uint8), (0.0, 0.0), navigation.resolution)
         places = (np.vstack([np.array(cells), options.cells])[:, ::-1] + 0.5) * navigation.resolution
         joined = links(careful(self.team.settings.radio), places, raster)
@@ -80,7 +80,7 @@ class Tethered(Meetings, TourFrontier):
         ]
 
     def nearest(self, agent: str) -> Choice | None:
-        """Return the nearest frontier of the first robot in touch: all go there together."""
+        """Return the nearest frontier of the first robot in touch, to which all drive together."""
         if not self.is_apart:
             return super().nearest(agent)
         first = min([agent, *self.near(agent)])
@@ -95,7 +95,7 @@ class Tethered(Meetings, TourFrontier):
         return int(row), int(column)
 
     def _agree(self, agent: str) -> None:
-        """Agree on nothing: nobody parts."""
+        """Do nothing: robots that stay together need no meetings."""
 
     def _give_up_missing(self, agent: str) -> None:
         book, now = self.notebooks[agent], self.team.time_s
@@ -110,7 +110,7 @@ class Tethered(Meetings, TourFrontier):
         book, lost = self.notebooks[agent], self._lost(agent)
         if not lost:
             return None
-        # Of two parts of a team, that without the first robot goes back to the other one.
+        # If the team is split, the part without the first robot returns to the other part.
         here = min([agent, *self.near(agent)])
         if here < min(lost):
             return None
@@ -118,12 +118,12 @@ class Tethered(Meetings, TourFrontier):
         return self._towards(agent, book.news[nearest].place)
 
     def _lost(self, agent: str) -> list[str]:
-        """Return the teammates that are expected and out of touch."""
+        """Return the expected teammates out of touch."""
         book, near = self.notebooks[agent], self.near(agent)
         return [name for name in book.news if name not in (agent, *near, *book.given_up)]
 
 
 def _is_joined(joined: NDArray[np.bool_], at: list[int]) -> bool:
-    """Return whether robots at some of the places are one cluster; two at one place are joined."""
+    """Return whether robots at these positions are connected; two at the same position are."""
     table = joined[np.ix_(at, at)] | np.equal.outer(at, at)
     return int(connected_components(table, directed=False)[0]) == 1

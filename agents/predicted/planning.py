@@ -65,7 +65,7 @@ def rest_of(
     sensor_range: float,
     enough: float,
 ) -> Rest | None:
-    """Return what is left to see, None if that is too little for a stop.
+    """Return the unseen area that is left, None if it is too small for a stop.
 
     Parameters
     ----------

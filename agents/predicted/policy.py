@@ -35,7 +35,7 @@ LEAST_SAVED = 0.5
 
 
 class PredictedTours(TourFrontier):
-    """Explorers on tours past what is probably left.
+    """Explorers on tours past the area that is probably left.
 
     Parameters
     ----------

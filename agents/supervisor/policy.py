@@ -5,10 +5,10 @@ import time
 from collections.abc import Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
-from gymnasium.vector import VectorEnv, VectorWrapper
+from gymnasium.vector import VectorEnv
 from numpy.typing import NDArray
 
 from lidarium.agents.policy import Action, Policy, Stop, Team
@@ -17,10 +17,9 @@ from lidarium.agents.supervisor.log import Decision, StationEvent
 from lidarium.agents.supervisor.settings import SupervisorSettings
 from lidarium.agents.supervisor.station import MergeStation
 from lidarium.agents.supervisor.supervisor import Command, Supervisor
-from lidarium.envs.faces.conventions import MASK
-from lidarium.envs.faces.parallel import Observation, Outcome
-from lidarium.envs.faces.vector_env import ExplorationVectorEnv, Step
-from lidarium.envs.faces.wrapper import TeamWrapper, exploration_below
+from lidarium.agents.supervisor.wrappers import Make, SupervisedBatch, SupervisedTeam
+from lidarium.envs.faces.parallel import Observation
+from lidarium.envs.faces.vector_env import BatchFace, ExplorationVectorEnv
 from lidarium.envs.onboard.belief import Belief
 from lidarium.envs.onboard.driving.path_planner import footprint_of
 from lidarium.envs.onboard.radio.messages import DriveState, OperatingState, Order, OrderKind
@@ -30,11 +29,6 @@ from lidarium.mapping.geometry.bounds import shown
 from lidarium.mapping.merging.fusion import FusedMap
 from lidarium.mapping.planning.frontiers.frontier_map import FRONTIER
 from lidarium.mapping.planning.grid_planning import cells_of
-
-if TYPE_CHECKING:
-    _BatchWrapper = VectorWrapper[Any, Any, Any]
-else:  # Gymnasium 1.1 has no parameters there
-    _BatchWrapper = VectorWrapper
 
 PATIENCE_S = 20.0
 """Time without motion after which a sent robot explores by itself again [s]."""
@@ -48,9 +42,6 @@ LOST_S = 2.0
 
 DONE_RULE = 5
 """The rule that no frontier is left."""
-
-DIRECTED = "directed"
-"""Info: whether the station drives a robot now, so that an action for it is not carried out."""
 
 
 @dataclass(slots=True)
@@ -217,11 +208,11 @@ class Supervised(Policy):
 
     Robots explore by that policy, the station merges their maps, and the tree redirects and stops them. Joined robots
     are sent the maps of the others, so the policy explores on the merged map if it uses the shared one. Around an
-    environment or a batch it is a wrapper: see `SupervisedTeam` and `SupervisedBatch`.
+    environment or a batch it is a wrapper: see `SupervisedTeam`, `SupervisedBatch` and `SupervisedVecEnv`.
 
     Parameters
     ----------
-    policy : Policy, ParallelEnv or VectorEnv
+    policy : Policy, ParallelEnv, VectorEnv or VecEnv
         Who decides for robots that have no order.
     settings : SupervisorSettings, optional
         Settings of the supervisor. Those of `SupervisorSettings` by default.
@@ -241,7 +232,10 @@ class Supervised(Policy):
 
     def __new__(cls, policy: Any, settings: SupervisorSettings | None = None, **options: Any) -> Any:  # noqa: ANN401
         """Return the policy, or the wrapper of an environment."""
-        return super().__new__(cls) if isinstance(policy, Policy) else _supervise(policy, settings, **options)
+        if isinstance(policy, Policy):
+            return super().__new__(cls)
+        masks_orders = options.pop("masks_orders", False)
+        return _wrapped(policy, lambda level: cls(_Outside(level), settings, **options), masks_orders)
 
     def __init__(self, policy: Policy, settings: SupervisorSettings | None = None, **options: Any) -> None:  # noqa: ANN401
         if settings is not None and options:
@@ -482,9 +476,6 @@ def _next(now: float, period_s: float) -> float:
     return (math.floor(now / period_s + 1e-9) + 1.0) * period_s
 
 
-# -- Environments ------------------------------------------------------------------------------------------
-
-
 class _Outside(Policy):
     """Takes the place of the policy whose decisions come from outside."""
 
@@ -500,175 +491,14 @@ class _Outside(Policy):
         return {}
 
 
-class SupervisedTeam(TeamWrapper):
-    """A supervisor around the environment of a team: a learner or policy decides for robots that have no order.
-
-    Robots under an order of the station ignore the actions given for them. In addition to the infos of
-    the environment below, ``infos[agent]["directed"]`` is True for these robots; ``infos[agent]["order"]`` is the
-    last order as always. With ``masks_orders`` the action mask of such a robot leaves the action to stay alone. Starts
-    may be unknown.
-
-    Parameters
-    ----------
-    env : ParallelEnv
-        The environment of a team, at any level of decision.
-    settings : SupervisorSettings, optional
-        Settings of the supervisor. Those of `SupervisorSettings` by default.
-    masks_orders : bool, optional
-        Whether action masks show orders. False by default.
-    **options
-        Any of the settings by name, instead.
-
-    Attributes
-    ----------
-    supervisor : Supervised
-        Decisions, events and joins of the episode.
-
-    Raises
-    ------
-    ValueError
-        If the environment does not hold a single team, or ``masks_orders`` is set without action masks.
-    """
-
-    def __init__(
-        self,
-        env: Any,  # noqa: ANN401
-        settings: SupervisorSettings | None = None,
-        masks_orders: bool = False,
-        **options: Any,  # noqa: ANN401
-    ) -> None:
-        self._base = exploration_below(getattr(env, "unwrapped", env), "Supervised")
-        super().__init__(env)
-        self.metadata = {**env.metadata, "name": str(env.metadata["name"]).replace("_v1", "_supervised_v1")}
-        self.supervisor: Supervised = Supervised(_Outside(self._base.level), settings, **options)
-        self._masks = masks_orders
-        if masks_orders:
-            _check_masks(self._base.engine.observation_space.spaces)
-        self._free: list[str] = []
-
-    def reset(
-        self, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[dict[str, Observation], dict[str, dict[str, Any]]]:
-        """Start an episode; see ``ExplorationEnv.reset``."""
-        observations, infos = super().reset(seed, options)
-        self.supervisor.reset(self._base)
-        self._direct(observations, infos)
-        return observations, infos
-
-    def step(self, actions: Any) -> Outcome:  # noqa: ANN401
-        """Take a step or a decision by the actions of robots without orders, and the orders of the others."""
-        if not self.agents:
-            return super().step(actions)
-        live = self._base.agents
-        own = {agent: actions[agent] for agent in self._free if agent in actions}
-        outcome = super().step(self.supervisor.complete(live, own))
-        self._direct(outcome[0], outcome[4])
-        return outcome
-
-    def _direct(self, observations: dict[str, Any], infos: dict[str, dict[str, Any]]) -> None:
-        live = self._base.agents
-        self._free = self.supervisor.direct(live)
-        for agent, info in infos.items():
-            info[DIRECTED] = agent in live and agent not in self._free
-            if self._masks and info[DIRECTED]:
-                observations[agent][MASK] = _only_stay(observations[agent][MASK])
-
-
-class SupervisedBatch(_BatchWrapper):
-    """A supervisor around each episode of a batch; see `SupervisedTeam`.
-
-    ``infos["directed"]`` (rows,) bool is True for robots under an order of the station.
-
-    Parameters
-    ----------
-    env : ExplorationVectorEnv
-        The episodes, made by ``lidarium.vector_env`` with ``reports=True``.
-    settings, masks_orders, **options
-        As for `SupervisedTeam`.
-
-    Attributes
-    ----------
-    supervisors : list of Supervised
-        Those of the episodes.
-    """
-
-    def __init__(
-        self,
-        env: ExplorationVectorEnv,
-        settings: SupervisorSettings | None = None,
-        masks_orders: bool = False,
-        **options: Any,  # noqa: ANN401
-    ) -> None:
-        super().__init__(env)
-        self._rows = env.batch
-        level = self._rows.team(0).level
-        self.supervisors: list[Supervised] = [
-            Supervised(_Outside(level), settings, **options) for _ in range(self._rows.episodes)
-        ]
-        self._masks = masks_orders
-        if masks_orders:
-            _check_masks(env.single_observation_space)
-        self._free: list[list[str]] = [[] for _ in self.supervisors]
-        self._agents = env.settings.agents
-
-    def reset(self, *, seed: Any = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:  # noqa: ANN401
-        """Begin episodes; see ``ExplorationVectorEnv.reset``."""
-        observations, infos = self.env.reset(seed=seed, options=options)
-        return self._direct(observations, infos)
-
-    def step(self, actions: Any) -> Step:  # noqa: ANN401
-        """Run all episodes by the actions of robots without orders, and the orders of the others."""
-        robots = self._rows.robots
-        teams = [
-            supervisor.complete(
-                self._rows.team(episode).agents,
-                {agent: _of_row(actions, episode * robots + self._agents.index(agent)) for agent in free},
-            )
-            for episode, (supervisor, free) in enumerate(zip(self.supervisors, self._free, strict=True))
-        ]
-        observations, rewards, terminated, truncated, infos = self.env.step(teams)
-        observations, infos = self._direct(observations, infos)
-        return observations, rewards, terminated, truncated, infos
-
-    def _direct(self, observations: Any, infos: dict[str, Any]) -> tuple[Any, dict[str, Any]]:  # noqa: ANN401
-        robots = self._rows.robots
-        directed: NDArray[np.bool_] = np.zeros(self.num_envs, np.bool_)
-        for episode, supervisor in enumerate(self.supervisors):
-            team = self._rows.team(episode)
-            if team.time_s == 0.0:
-                supervisor.reset(team)
-            self._free[episode] = supervisor.direct(team.agents)
-            for agent in set(team.agents).difference(self._free[episode]):
-                directed[episode * robots + self._agents.index(agent)] = True
-        if self._masks:
-            masks = observations[MASK].copy()
-            masks[directed] = _only_stay(masks[directed])
-            observations = {**observations, MASK: masks}
-        return observations, {**infos, DIRECTED: directed, f"_{DIRECTED}": np.ones(self.num_envs, np.bool_)}
-
-
-def _supervise(env: Any, settings: SupervisorSettings | None = None, **options: Any) -> Any:  # noqa: ANN401
+def _wrapped(env: Any, make: Make, masks_orders: bool) -> Any:  # noqa: ANN401
     """Return the wrapper of an environment of one team, or of a batch of them."""
+    if isinstance(env, ExplorationVectorEnv):
+        return SupervisedBatch(env, make, masks_orders)
     if isinstance(env, VectorEnv):
-        if not isinstance(env, ExplorationVectorEnv):
-            raise ValueError(f"Supervised is put around {type(env).__name__}; want a batch of lidarium.vector_env")
-        return SupervisedBatch(env, settings, **options)
-    return SupervisedTeam(env, settings, **options)
+        raise ValueError(f"Supervised is put around {type(env).__name__}; want a batch of lidarium.vector_env")
+    if isinstance(env, BatchFace):
+        from lidarium.agents.supervisor.vec_env import SupervisedVecEnv  # needs stable-baselines3
 
-
-def _check_masks(spaces: Any) -> None:  # noqa: ANN401
-    if MASK not in spaces:
-        raise ValueError("masks_orders is set, but there are no masks; want level='frontier'")
-
-
-def _only_stay(mask: NDArray[Any]) -> NDArray[Any]:
-    """Return a mask, or some, that leaves the last action alone: to stay."""
-    left = np.zeros_like(mask)
-    left[..., -1] = 1
-    return left
-
-
-def _of_row(actions: Any, row: int) -> Any:  # noqa: ANN401
-    if isinstance(actions, Mapping):
-        return {name: _of_row(each, row) for name, each in actions.items()}
-    return actions[row]
+        return SupervisedVecEnv(env, make, masks_orders)
+    return SupervisedTeam(env, make, masks_orders)

@@ -32,7 +32,7 @@ place in its tour from 1 on, whether that is the robot's own tour, and whether t
 
 
 class _Offer(NamedTuple):
-    """What a robot is offered.
+    """The stops offered to a robot.
 
     Attributes
     ----------

@@ -230,7 +230,7 @@ class TourRequest:
     robots : sequence of Tourist
         Who visits them.
     memory : TourMemory
-        What is kept of the map, see `memory_of`.
+        The memory of the map, see `memory_of`.
     """
 
     navigation: NavigationMap

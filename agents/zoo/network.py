@@ -25,7 +25,7 @@ METRES, SQUARE_METRES, SECONDS, PLACES = 10.0, 10.0, 60.0, 5.0
 """Scales of lengths, areas, ages, and places in tours."""
 
 PATH_FACTOR = 3.0
-"""A metre of path counts as so many of size, as in explore_lite."""
+"""Cost of a metre of path in metres of frontier, as in explore_lite."""
 
 OTHER_STOPS = -3.0
 """Preference of stops but the first, before a training, less the way in units of ``METRES``."""
@@ -34,7 +34,7 @@ STAY = {"frontier": 0.0, "tour": -5.0}
 """Preference of staying over the last on offer, before a training, by level."""
 
 TEAMMATE_UNITS = np.array([METRES, METRES, math.pi, METRES, METRES, 1.0, SECONDS, 1.0], np.float32)
-"""Scales of what is known of a teammate: place, heading, target, whether it has one, age, whether it is known."""
+"""Scales of the numbers of a teammate: position, heading, target, whether it has one, age, whether it is known."""
 
 TOUR_UNITS = np.array([METRES, METRES, METRES, SQUARE_METRES, METRES, PLACES, 1.0, 1.0], np.float32)
 """Scales of what is known of a stop, see ``STOP_NUMBERS`` of `TourLevel`."""
@@ -63,7 +63,7 @@ class OptionNetwork(AttentionNetwork):
     level: ClassVar[str]
 
     def choose(self, observation: Mapping[str, NDArray[Any]]) -> int:
-        """Return the action that is preferred of those that the mask allows."""
+        """Return the allowed action with the highest preference."""
         allowed = observation[MASK] > 0
         return int(np.argmax(np.where(allowed, self.preferences(observation), -np.inf)))
 

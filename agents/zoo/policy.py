@@ -22,7 +22,7 @@ class ZooTeam(Policy):
     Parameters
     ----------
     name : str
-        The team, such as ``ppo-2``; any number of robots, two at least, may use its network.
+        The team, such as ``ppo-2``; any team of at least two robots can use its network.
     weights : str or Path, optional
         File of weights of `lidarium train`. Those of the package by default.
     level : str, default "frontier"
@@ -35,7 +35,7 @@ class ZooTeam(Policy):
         self._network = NETWORKS[level](zoo_files(name, level).load(weights))
 
     def reset(self, team: Team, seed: int = 0) -> None:
-        """Begin an episode: nothing is kept of the last one."""
+        """Begin an episode."""
 
     def act(self, observations: Mapping[str, Observation]) -> dict[str, Action]:
         """Choose for each robot; one with nothing on offer stays."""

@@ -107,7 +107,8 @@ def vector_env(
         As for `parallel_env`; of a set such as ``set:train``, each beginning draws one.
     **options
         The options of `parallel_env`; ``copy=False`` for observations in two sets of arrays that take turns,
-        ``merging`` for merged maps, ``plans_sparsely=True`` for routes on sparse maps, ``reports=True`` for stations.
+        ``merging`` (and ``can_talk``) for merged maps, ``plans_sparsely=True`` for routes on sparse maps,
+        ``shares_map=False`` for paths on each robot's own map, ``reports=True`` for stations.
         With ``randomize`` each episode is an engine of its own.
 
     Raises

@@ -6,13 +6,16 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from lidarium.envs.engine.engine import Engine
 from lidarium.envs.faces.parallel import ExplorationEnv, Observation, Outcome
+from lidarium.envs.faces.randomized import padded
 from lidarium.envs.faces.team_exchange import (
     CanTalk,
     MergedRows,
     MergeEvent,
     MergingSettings,
     frames_of,
+    team_boxes,
 )
 from lidarium.envs.faces.wrapper import TeamWrapper, exploration_below
 from lidarium.envs.onboard.station.team_mapping import Frames, TeamMapping
@@ -59,13 +62,16 @@ class MergedMaps(TeamWrapper):
         super().__init__(env)
         self.merging = settings or MergingSettings()
         self.metadata = {**env.metadata, "name": str(env.metadata["name"]).replace("_v1", "_merged_v1")}
-        self._engine = base.engine
-        self._merged = MergedRows(base.engine, self.merging, can_talk)
+        self._can_talk = can_talk
+        self._use(base.engine)
         self._index = {agent: row for row, agent in enumerate(self.possible_agents)}
+        boxes = team_boxes(len(self.possible_agents), self.settings.map_cells)
         self._observation_spaces: dict[str, spaces.Space[Any]] = {
-            agent: spaces.Dict({**env.observation_space(agent).spaces, **self._merged.boxes})
-            for agent in self.possible_agents
+            agent: spaces.Dict({**env.observation_space(agent).spaces, **boxes}) for agent in self.possible_agents
         }
+
+    def _use(self, engine: Engine) -> None:
+        self._engine, self._merged = engine, MergedRows(engine, self.merging, self._can_talk)
 
     def observation_space(self, agent: str) -> spaces.Space[Any]:
         """Return the space of an agent's observations, the same object at each call."""
@@ -76,6 +82,8 @@ class MergedMaps(TeamWrapper):
     ) -> tuple[dict[str, Observation], dict[str, dict[str, Any]]]:
         """Start an episode; see ``ExplorationEnv.reset``."""
         observations, infos = super().reset(seed, options)
+        if self.unwrapped.engine is not self._engine:  # of settings newly drawn
+            self._use(self.unwrapped.engine)
         self._exchange(observations, infos)
         return observations, infos
 
@@ -97,7 +105,7 @@ class MergedMaps(TeamWrapper):
 
     def _exchange(self, observations: dict[str, Observation], infos: dict[str, dict[str, Any]]) -> None:
         """Let the robots exchange maps if it is time, and add the results to observations and infos."""
-        seen = np.zeros(len(self._index), np.bool_)
+        seen = np.zeros(self._engine.rows, np.bool_)
         seen[[self._index[agent] for agent in infos]] = True
         self._merged.exchange(seen, np.asarray(self._engine.world.steps <= 0))
         arrays, names, events = self._merged.arrays, *self._merged.joined()
@@ -105,7 +113,8 @@ class MergedMaps(TeamWrapper):
             row = self._index[agent]
             info["merges"] = names[row]
             info["truth"]["merges"] = events[row]
-            observations[agent].update({name: array[row] for name, array in arrays.items()})
+            seen_by = {**observations[agent], **{name: array[row] for name, array in arrays.items()}}
+            observations[agent] = padded(seen_by, self._observation_spaces[agent])
 
 
 def true_frames(env: ExplorationEnv) -> Frames:

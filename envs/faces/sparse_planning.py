@@ -5,6 +5,7 @@ It works with any policy: waypoints, chosen frontiers and orders of a station na
 
 from typing import Any
 
+from lidarium.envs.engine.engine import Engine
 from lidarium.envs.faces.parallel import Observation, Outcome
 from lidarium.envs.faces.sparse_routes import SparseRouter
 from lidarium.envs.faces.wrapper import TeamWrapper, exploration_below
@@ -37,13 +38,19 @@ class SparsePlanning(TeamWrapper):
         base = exploration_below(getattr(env, "unwrapped", env), "SparsePlanning")
         super().__init__(env)
         self.metadata = {**env.metadata, "name": str(env.metadata["name"]).replace("_v1", "_sparse_v1")}
-        self._router = SparseRouter(base.engine, shares_map)
+        self._shares_map = shares_map
+        self._use(base.engine)
+
+    def _use(self, engine: Engine) -> None:
+        self._engine, self._router = engine, SparseRouter(engine, self._shares_map)
 
     def reset(
         self, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, Observation], dict[str, dict[str, Any]]]:
         """Start an episode; see ``ExplorationEnv.reset``."""
         observations, infos = super().reset(seed, options)
+        if self.unwrapped.engine is not self._engine:  # of settings newly drawn
+            self._use(self.unwrapped.engine)
         self._router.start()
         return observations, self._with_reasons(infos)
 

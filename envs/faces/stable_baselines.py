@@ -9,12 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.envs.engine.engine import NO_EPISODES, Engine
-from lidarium.envs.faces.randomized import RandomizedRows
+from lidarium.envs.engine.engine import NO_EPISODES
 from lidarium.envs.faces.requests import options_of, seeds_of
 from lidarium.envs.faces.team_rows import ACTIVE
 from lidarium.envs.faces.teams import make_rows
-from lidarium.envs.faces.vector_env import batch_text, check_render_mode
+from lidarium.envs.faces.vector_env import BatchFace, check_render_mode
 from lidarium.envs.floors.floor_choice import Floors
 from lidarium.envs.settings.reset_options import Curriculum, ResetOptions, read_options
 from lidarium.extras import install_command
@@ -27,7 +26,7 @@ except ImportError as error:
 Infos = list[dict[str, Any]]
 
 
-class ExplorationVecEnv(VecEnv):
+class ExplorationVecEnv(BatchFace, VecEnv):
     """Teams of lidar robots that explore floors (stable-baselines3).
 
     Many episodes run in one kernel call.
@@ -73,9 +72,6 @@ class ExplorationVecEnv(VecEnv):
         self._chosen: dict[int, ResetOptions] = {}
         self._is_closed = False
         super().__init__(self.batch.rows, self.batch.space, self.batch.action_space)
-
-    def __repr__(self) -> str:
-        return batch_text(self)
 
     def reset(self) -> Any:  # noqa: ANN401
         """Begin all episodes.
@@ -126,8 +122,8 @@ class ExplorationVecEnv(VecEnv):
     def _reset_options(self) -> None:
         self._chosen = {}
 
-    def step_async(self, actions: NDArray[Any]) -> None:
-        """Take the actions of all rows; ``step_wait`` runs them."""
+    def step_async(self, actions: Any) -> None:  # noqa: ANN401
+        """Take the actions of all rows, or of each team by agent as in ``vector_env``; ``step_wait`` runs them."""
         self._check_open()
         if not self.batch.is_ready:
             raise RuntimeError("the environment was not reset; call reset() before step()")
@@ -142,7 +138,7 @@ class ExplorationVecEnv(VecEnv):
             raise RuntimeError("no actions were given; call step_async() before step_wait()")
         actions, self._actions = self._actions, None
         batch = self.batch
-        batch.step(actions, NO_EPISODES)
+        self._run(actions, NO_EPISODES)
         rewards, active = batch.rewards.astype(np.float32), batch.active
         truncated = batch.truncated
         dones = batch.terminated | truncated
@@ -193,17 +189,6 @@ class ExplorationVecEnv(VecEnv):
                 "action_masks are there at the level of frontiers only; make the environment with level='frontier'"
             )
         return masks
-
-    def state(self) -> NDArray[np.float32]:
-        """Return the true state of each team, (episodes, numbers), for central critics; see `team_state`."""
-        return self.batch.states()
-
-    @property
-    def engine(self) -> Engine:
-        """The engine of all episodes; if settings are drawn, each has its own, see ``batch.parts``."""
-        if isinstance(self.batch, RandomizedRows):
-            raise AttributeError("episodes with drawn settings have an engine each; see batch.parts")
-        return self.batch.engine
 
     def get_attr(self, attr_name: str, indices: int | Iterable[int] | None = None) -> list[Any]:
         """Return an attribute of this environment once for each row."""

@@ -21,7 +21,7 @@ from lidarium.envs.faces.conventions import (
 from lidarium.envs.faces.messages import MESSAGES, MessageBoard, split_action, talking_space
 from lidarium.envs.faces.sparse_routes import SparseRouter
 from lidarium.envs.faces.team import EpisodeTeam
-from lidarium.envs.faces.team_exchange import MergedRows, MergingSettings
+from lidarium.envs.faces.team_exchange import CanTalk, MergedRows, MergingSettings
 from lidarium.envs.onboard.radio.messages import Order, Route, Stop, Target
 from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.settings.reset_options import ResetOptions
@@ -46,8 +46,12 @@ class TeamRows:
         The forms. Those of a plain environment by default.
     merging : MergingSettings, optional
         Settings of map merging. No merging by default.
+    can_talk : (robots, robots) bool or callable, optional
+        Which robots reach each other for merging, see `MergedMaps`. By default those that the radio connects.
     plans_sparsely : bool, optional
         Whether robots drive along routes on their sparse maps; see `SparsePlanning`. False by default.
+    shares_map : bool, optional
+        Whether these routes are planned on the map of the whole team. True by default.
 
     Attributes
     ----------
@@ -71,15 +75,17 @@ class TeamRows:
         engine: Engine,
         conventions: Conventions = PLAIN,
         merging: MergingSettings | None = None,
+        can_talk: NDArray[np.bool_] | CanTalk | None = None,
         plans_sparsely: bool = False,
+        shares_map: bool = True,
     ) -> None:
         self.engine = engine
         self.conventions = conventions
         self.rows, self.episodes, self.robots = engine.rows, engine.episodes, engine.robots
         self._robot_of = {agent: robot for robot, agent in enumerate(engine.settings.agents)}
         self._keeps = conventions.ended_agents == "zeros"
-        self._merged = None if merging is None else MergedRows(engine, merging)
-        self._router = SparseRouter(engine) if plans_sparsely else None
+        self._merged = None if merging is None else MergedRows(engine, merging, can_talk)
+        self._router = SparseRouter(engine, shares_map) if plans_sparsely else None
         self._board: MessageBoard | None = None
         self._seen = np.ones(self.rows, np.bool_)
         self._kept = np.zeros(self.rows, np.bool_)

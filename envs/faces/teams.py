@@ -56,27 +56,43 @@ def make_rows(
     Kernels use all threads of the machine by default.
     """
     conventions, others = split_options(options)
-    merging, plans_sparsely = others.pop("merging", None), others.pop("plans_sparsely", False)
+    merging, can_talk = others.pop("merging", None), others.pop("can_talk", None)
     if isinstance(merging, bool):
         merging = MergingSettings() if merging else None
+    if merging is None and can_talk is not None:
+        raise ValueError("can_talk is given, but merging is not; want merging=True or MergingSettings as well")
+    plans_sparsely, shares_map = others.pop("plans_sparsely", False), others.pop("shares_map", True)
     randomize = others.pop("randomize", None)
     reports, settings = others.pop("reports", False), others.pop("settings", None)
     if settings is None and randomize is None:
         others.setdefault("threads", available_threads())
     chosen = makers_settings(settings, others)
 
+    forms = (conventions, merging, can_talk, plans_sparsely, shares_map)
+    of_engine = (floor, level, image_resolution, reports, forms)
     if randomize is not None:
-        forms = (conventions, merging, plans_sparsely)
-        make = partial(_make_episode, (floor, level, image_resolution, curriculum, reports, forms))
-        return RandomizedRows(episodes, make, chosen, randomize)
-    engine = Engine(episodes, floor, chosen, level, image_resolution, copy, curriculum, reports)
-    return TeamRows(engine, conventions, merging, plans_sparsely)
+        return RandomizedRows(episodes, partial(_make_episode, of_engine, curriculum), chosen, randomize)
+    return _make_rows(of_engine, curriculum, chosen, episodes, copy)
 
 
-def _make_episode(options: tuple[Any, ...], settings: ExplorationSettings, episode: int) -> TeamRows:
-    floor, level, image_resolution, curriculum, reports, forms = options
-    taught = _taught(curriculum, episode)
-    engine = Engine(1, floor, settings, level, image_resolution, True, taught, reports)
+def _make_episode(
+    options: tuple[Any, ...], curriculum: Curriculum | None, settings: ExplorationSettings, episode: int
+) -> TeamRows:
+    return _make_rows(options, _taught(curriculum, episode), settings)
+
+
+def _make_rows(
+    options: tuple[Any, ...],
+    curriculum: Curriculum | None,
+    settings: ExplorationSettings,
+    episodes: int = 1,
+    copy: bool = True,
+) -> TeamRows:
+    floor, level, image_resolution, reports, forms = options
+    engine = Engine(episodes, floor, settings, level, image_resolution, copy, curriculum, reports)
+    *_, shares_map = forms
+    if not shares_map:
+        engine.use_level(level, shares_map)
     return TeamRows(engine, *forms)
 
 

@@ -14,15 +14,57 @@ from lidarium.envs.engine.team_state import state_space
 from lidarium.envs.faces.randomized import RandomizedRows
 from lidarium.envs.faces.requests import episodes_of, options_of, seeds_of
 from lidarium.envs.faces.team import EpisodeTeam
-from lidarium.envs.faces.team_rows import ACTIVE
+from lidarium.envs.faces.team_rows import ACTIVE, TeamRows
 from lidarium.envs.faces.teams import make_rows
 from lidarium.envs.floors.floor_choice import Floors
+from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.settings.reset_options import Curriculum
 
 Step = tuple[Any, NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]
 
 
-class ExplorationVectorEnv(VectorEnv[Any, NDArray[Any], NDArray[Any]]):
+class BatchFace:
+    """Members of a batch that do not depend on the library whose interface it has."""
+
+    batch: TeamRows | RandomizedRows
+    settings: ExplorationSettings
+
+    def __repr__(self) -> str:
+        batch = self.batch
+        return f"<{type(self).__name__}: {batch.rows} rows = {batch.episodes} episodes x {batch.robots} robots>"
+
+    @property
+    def engine(self) -> Engine:
+        """The engine of all episodes; if settings are drawn, each has its own, see ``batch.parts``."""
+        if isinstance(self.batch, RandomizedRows):
+            raise AttributeError("episodes with drawn settings have an engine each; see batch.parts")
+        return self.batch.engine
+
+    def team(self, episode: int) -> EpisodeTeam:
+        """Return the handle of an episode's team, which policies ask; see ``Policy.reset``."""
+        return self.batch.team(episode)
+
+    @property
+    def columns(self) -> tuple[tuple[str, int, int], ...]:
+        """Columns of each key of an observation in the flat form; see `flat_columns`."""
+        return self.batch.columns
+
+    @property
+    def state_space(self) -> Box:
+        """The space of the true state of each team."""
+        return state_space(self.settings)
+
+    def state(self) -> NDArray[np.float32]:
+        """Return the true state of each team, (episodes, numbers), for central critics; see `team_state`."""
+        return self.batch.states()
+
+    def _run(self, actions: Any, beginning: NDArray[np.int64]) -> None:  # noqa: ANN401
+        """Run by actions of rows, or of each team by agent, and begin episodes."""
+        is_by_agent = isinstance(actions, list) and all(isinstance(each, Mapping) for each in actions)
+        (self.batch.step_teams if is_by_agent else self.batch.step)(actions, beginning)
+
+
+class ExplorationVectorEnv(BatchFace, VectorEnv[Any, NDArray[Any], NDArray[Any]]):
     """Teams of lidar robots that explore floors (Gymnasium); many episodes run in one kernel call.
 
     Row = episode * robots + robot. A robot that ends before its team returns terminated once; its row then repeats
@@ -53,8 +95,9 @@ class ExplorationVectorEnv(VectorEnv[Any, NDArray[Any], NDArray[Any]]):
         ``infos["final_obs"]`` and ``infos["final_info"]`` then have the last results of their rows.
     **options
         As for ``lidarium.parallel_env``; ``threads`` is that of the machine by default. ``merging``
-        (``MergingSettings``) for merged maps, ``plans_sparsely=True`` for routes on sparse maps (`SparsePlanning`),
-        ``reports=True`` for stations, which supervised policies need; with ``randomize`` each episode is an engine of
+        (``MergingSettings``) for merged maps, with ``can_talk`` as for `MergedMaps`; ``plans_sparsely=True`` for routes
+        on sparse maps (`SparsePlanning`); ``shares_map=False`` if robots plan paths on their own maps alone;
+        ``reports=True`` for stations, which supervised policies need. With ``randomize`` each episode is an engine of
         its own.
 
     Raises
@@ -100,9 +143,6 @@ class ExplorationVectorEnv(VectorEnv[Any, NDArray[Any], NDArray[Any]]):
         self.action_space = batch_space(self.batch.action_space, self.num_envs)
         self.closed = False
 
-    def __repr__(self) -> str:
-        return batch_text(self)
-
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Any, dict[str, Any]]:
@@ -136,7 +176,7 @@ class ExplorationVectorEnv(VectorEnv[Any, NDArray[Any], NDArray[Any]]):
         actions : (rows, ...) array or list of dict
             An action for each row; those of rows that repeat or begin again are ignored. At the level of waypoints an
             array of objects may hold ``Target``, ``Route`` and None. Or the actions of each episode by agent, as for
-            ``ExplorationEnv.step``: what policies return.
+            ``ExplorationEnv.step``, as policies return them.
         """
         self._check_open()
         batch = self.batch
@@ -146,8 +186,7 @@ class ExplorationVectorEnv(VectorEnv[Any, NDArray[Any], NDArray[Any]]):
             raise ValueError("actions is None; want an action for each row, row = episode * robots + robot")
         is_next = not (self._resets_in_step or batch.live.all())
         beginning = np.flatnonzero(batch.is_over) if is_next else NO_EPISODES
-        is_by_agent = isinstance(actions, list) and all(isinstance(each, Mapping) for each in actions)
-        (batch.step_teams if is_by_agent else batch.step)(actions, beginning)
+        self._run(actions, beginning)
         ended = batch.rewards, batch.terminated, batch.truncated
         infos = self._begin_ended() if self._resets_in_step else self._infos()
         return batch.observations, *ended, infos
@@ -168,31 +207,6 @@ class ExplorationVectorEnv(VectorEnv[Any, NDArray[Any], NDArray[Any]]):
 
     def _infos(self) -> dict[str, Any]:
         return {**self.batch.infos, ACTIVE: self.batch.active, f"_{ACTIVE}": np.ones(self.num_envs, np.bool_)}
-
-    @property
-    def engine(self) -> Engine:
-        """The engine of all episodes; if settings are drawn, each has its own, see ``batch.parts``."""
-        if isinstance(self.batch, RandomizedRows):
-            raise AttributeError("episodes with drawn settings have an engine each; see batch.parts")
-        return self.batch.engine
-
-    def team(self, episode: int) -> EpisodeTeam:
-        """Return the handle of an episode's team, which policies ask; see ``Policy.reset``."""
-        return self.batch.team(episode)
-
-    @property
-    def columns(self) -> tuple[tuple[str, int, int], ...]:
-        """Columns of each key of an observation in the flat form; see `flat_columns`."""
-        return self.batch.columns
-
-    @property
-    def state_space(self) -> Box:
-        """The space of the true state of each team."""
-        return state_space(self.settings)
-
-    def state(self) -> NDArray[np.float32]:
-        """Return the true state of each team, (episodes, numbers); see `team_state`."""
-        return self.batch.states()
 
     def render(self) -> tuple[NDArray[np.uint8], ...] | None:
         """Draw the episode of each row; robots of a team have the same picture. `picture` tiles one of each."""
@@ -225,12 +239,6 @@ def _mode(mode: AutoresetMode | str) -> AutoresetMode:
     if found is AutoresetMode.DISABLED:
         raise ValueError(f"autoreset_mode is {mode!r}; want NextStep or SameStep")
     return found
-
-
-def batch_text(env: Any) -> str:  # noqa: ANN401
-    """Return the representation of a batch: its rows as episodes x robots."""
-    batch = env.batch
-    return f"<{type(env).__name__}: {batch.rows} rows = {batch.episodes} episodes x {batch.robots} robots>"
 
 
 def check_render_mode(render_mode: str | None) -> None:

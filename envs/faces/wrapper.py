@@ -4,7 +4,6 @@ from typing import Any
 
 import numpy as np
 from gymnasium import spaces
-from gymnasium.vector import VectorEnv
 from numpy.typing import NDArray
 from pettingzoo import ParallelEnv
 
@@ -19,6 +18,10 @@ class TeamWrapper(ParallelEnv[str, Any, Any]):
     ----------
     env : ParallelEnv
         The environment of a team, at any level of decision.
+
+    Notes
+    -----
+    If settings are drawn, each reset replaces ``unwrapped`` and its engine: subclasses must not keep parts of them.
     """
 
     def __init__(self, env: Any) -> None:  # noqa: ANN401
@@ -48,7 +51,7 @@ class TeamWrapper(ParallelEnv[str, Any, Any]):
     ) -> tuple[dict[str, Observation], dict[str, dict[str, Any]]]:
         """Start an episode; see ``ExplorationEnv.reset``."""
         outcome: tuple[dict[str, Observation], dict[str, dict[str, Any]]] = self.env.reset(seed, options)
-        self.agents = self.env.agents
+        self.agents, self.settings = self.env.agents, self.env.settings
         return outcome
 
     def step(self, actions: Any) -> Outcome:  # noqa: ANN401
@@ -95,7 +98,7 @@ def exploration_below(env: Any, wrapper: str) -> ExplorationEnv:  # noqa: ANN401
         If it is not one of a single team.
     """
     if not isinstance(env, ExplorationEnv):
-        kind = "a batch of many episodes" if isinstance(env, VectorEnv) else "no team's environment"
+        kind = "a batch of many episodes" if hasattr(env, "num_envs") else "no team's environment"
         raise ValueError(
             f"{wrapper} is put around {type(env).__name__}, {kind}; want an environment of lidarium.parallel_env"
         )

@@ -199,9 +199,9 @@ class Floor:
     areas : Raster or None
         Solid cells of a picture with several free areas, of which one is the floor; see ``areas.around``.
     left_out_m2 : float
-        Free area of a picture that is not connected with the floor, what lies around a building apart [m2].
+        Free area of a picture that is not connected with the floor, without the surroundings of a building [m2].
     remark : str
-        Assumptions on a file that does not state them, and what of it is left out.
+        Assumptions on a file that does not state them, and the parts of it that are left out.
     """
 
     name: str

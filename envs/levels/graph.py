@@ -34,7 +34,7 @@ ON_NODE = 1e-6
 
 
 class _Lattice(NamedTuple):
-    """The points of a lattice on a map, and what is known of them.
+    """The points of a lattice on a map, and their state.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""What robots tell each other of their sparse maps, its bytes, and how a receiver lays it on its own map."""
+"""Messages of robots about their sparse maps, their size, and how a receiver adds them to its own map."""
 
 import math
 from dataclasses import dataclass, replace

@@ -1,4 +1,4 @@
-"""A node of ROS 2: publishes and reads topics of a domain, and refuses what cannot be trusted."""
+"""A node of ROS 2: publishes and reads topics of a domain, and refuses invalid messages."""
 
 import logging
 import os
@@ -26,7 +26,7 @@ MAX_DOMAIN: Final = 232
 """Highest number of a domain: its ports must exist (RTPS 9.6.1)."""
 
 MAX_MESSAGE_BYTES: Final = 1 << 25
-"""Longest message that is taken from the network: a map of 5,000 x 5,000 cells fits."""
+"""Maximum size of a message from the network: a map of 5,000 x 5,000 cells fits."""
 
 _TAKEN_AT_ONCE = 128
 
@@ -45,9 +45,9 @@ class Heard(NamedTuple):
     message : object
         Decoded, of the type of its topic.
     source : int
-        Who wrote it; different for each publisher.
+        Number of its publisher.
     sent_s : float
-        When it was written, by the clock of its publisher's machine [s].
+        Time at which it was written, by the clock of the publisher's machine [s].
     """
 
     message: Any
@@ -56,7 +56,7 @@ class Heard(NamedTuple):
 
 
 def chosen_domain(domain: int | None) -> int:
-    """Return a domain, that of the environment (``ROS_DOMAIN_ID``, else 0) if None; ValueError if it is none."""
+    """Return a checked domain; if None, that of the environment (``ROS_DOMAIN_ID``, 0 by default)."""
     text = os.environ.get("ROS_DOMAIN_ID", "") or "0"
     if domain is None and not text.isdecimal():
         raise ValueError(f"ROS_DOMAIN_ID is {shown(text)}; want a number from 0 to {MAX_DOMAIN}")
@@ -92,9 +92,9 @@ class Graph(MessageWriter):
     node : str
         Name of the node.
     domain : int or None
-        Domain; that of the environment by default.
+        Domain. That of the environment by default.
     localhost : bool or None
-        Whether only programs on this machine are reached, without multicast; as the environment says by default.
+        Whether only programs on this machine are reached, without multicast. The environment decides by default.
     is_humble : bool
         Whether the others run Humble, whose graph has longer ids of nodes; else that of Iron and later.
     """
@@ -174,7 +174,7 @@ class Graph(MessageWriter):
         return self._waiting.wait(duration(seconds=max(timeout_s, 0.0))) > 0
 
     def publishers(self, topic: str) -> int:
-        """Return how many publishers a topic has in other nodes."""
+        """Return the number of publishers of a topic in other nodes."""
         for found in self._publications.take(_TAKEN_AT_ONCE):
             if found.sample_info.valid_data:
                 self._others[found.key] = found.topic_name, found.participant_key
@@ -189,7 +189,7 @@ class Graph(MessageWriter):
         self._writers[topic].write(sample_of(wire_type(name, is_humble=self._is_humble), content))
 
     def subscribers(self, topic: str) -> int:
-        """Return how many read a topic that this node publishes."""
+        """Return the number of subscribers of a topic that this node publishes."""
         return len(self._writers[topic].get_matched_subscriptions())
 
     def close(self) -> None:
@@ -209,7 +209,7 @@ class Graph(MessageWriter):
         return self._topics[topic]
 
     def _announce(self) -> None:
-        """Tell the graph which topics are of this node, as ``rmw_dds_common`` does."""
+        """Publish the list of this node's topics, as ``rmw_dds_common`` does."""
         readers = [reader for _, reader in self._readers.values()]
         writers = [writer for topic, writer in self._writers.items() if topic != _DISCOVERY_TOPIC]
         node = self._made(

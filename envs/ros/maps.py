@@ -1,4 +1,4 @@
-"""Publishes the maps of driven robots, each one's own and the merged one, and how their frames lie."""
+"""Publishes the maps of driven robots, own and merged ones, and the transforms between their frames."""
 
 import time
 from collections.abc import Callable
@@ -43,7 +43,7 @@ class MapPublisher:
         self._next_s = 0.0
 
     def publish(self, *, is_last: bool = False) -> None:
-        """Publish where robots with maps of their own are and, if they are due, all maps."""
+        """Publish the poses of robots with their own maps and, if they are due, all maps."""
         env, world, graph = self._env, self._world, self._graph
         own = not env.settings.known_starts
         for row, link in enumerate(world.links if own else []):

@@ -22,14 +22,14 @@ def play(
 ) -> dict[str, int]:
     """Publish the messages of a bag of ROS 2 as they were recorded, with their log times as ``/clock``.
 
-    It begins when somebody reads the scans, at latest after a timeout.
+    It begins when the scans have a subscriber, or after a timeout.
 
     Parameters
     ----------
     speed : float
         Seconds of the bag in a second; 0 for as many as possible.
     timeout_s : float
-        Longest time to wait for a reader [s].
+        Maximum time to wait for a subscriber [s].
     after_scan : callable
         Called after each scan.
 

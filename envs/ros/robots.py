@@ -1,4 +1,4 @@
-"""A robot of ROS 2 as its driver hears it: scans with the odometry of their time, from messages that may be bad."""
+"""The measurements of a robot of ROS 2: scans with the odometry of their time, from messages that may be invalid."""
 
 import math
 import time
@@ -57,7 +57,7 @@ class Names(NamedTuple):
     base : str
         Frame of the body; empty for that of the odometry.
     map_frame : str
-        Frame in which the transforms say where the robot is.
+        Frame of the robot's pose in the transforms.
     map, own_map_frame : str
         Topic and frame of the robot's own map.
     """
@@ -82,7 +82,7 @@ def names_of(namespace: str, base: str = "", map_frame: str = "map") -> Names:
 
 
 class Reading(NamedTuple):
-    """A scan with what else was measured at its time.
+    """A scan with the odometry of its time.
 
     Attributes
     ----------
@@ -95,7 +95,7 @@ class Reading(NamedTuple):
     velocity : (float, float)
         Speed and turn rate [m/s, rad/s].
     mapped : (3,) float64 or None
-        x, y, theta in the map's frame, if transforms say so [m, rad].
+        x, y, theta in the map's frame [m, rad]; None if no transform gives it.
     """
 
     stamp_s: float
@@ -106,7 +106,7 @@ class Reading(NamedTuple):
 
 
 class Transforms:
-    """What ``/tf`` and ``/tf_static`` of a graph say, for all its robots."""
+    """The transforms on ``/tf`` and ``/tf_static`` of a graph, for all its robots."""
 
     def __init__(self, graph: Graph, topics: tuple[str, ...] = ("/tf", "/tf_static")) -> None:
         self._graph, self._topics = graph, topics
@@ -117,7 +117,7 @@ class Transforms:
             graph.subscribe(topic, TRANSFORMS)
 
     def hear(self) -> None:
-        """Take the transforms that have come."""
+        """Take new transforms."""
         for topic in self._topics:
             for message, *_ in self._graph.take(topic):
                 for each in message.transforms:
@@ -144,7 +144,7 @@ class Transforms:
 
 
 class RobotLink:
-    """The measurements of a robot, as messages bring them.
+    """The measurements of a robot, received as messages.
 
     Parameters
     ----------
@@ -164,7 +164,7 @@ class RobotLink:
     scan_period_s : float
         Time between scans as the first one states it; 0 if it does not [s].
     remark : str
-        What was taken for granted of the laser; empty if nothing.
+        Assumptions about the laser that its messages leave open; empty if there are none.
     """
 
     def __init__(self, graph: Graph, names: Names, transforms: Transforms) -> None:
@@ -183,12 +183,12 @@ class RobotLink:
         self._last_s, self._early = -math.inf, 0
 
     def start(self) -> NDArray[np.float64] | None:
-        """Return the pose in the map's frame, (3,), None if transforms do not say it."""
+        """Return the pose in the map's frame, (3,), None if no transform gives it."""
         moves = self._transforms.moving.get((self.names.map_frame, self.odom_frame))
         return composed(np.array(moves[-1][1]), np.array(self._wheels[-1].pose)) if moves and self._wheels else None
 
     def begin(self) -> bool:
-        """Learn the laser from the first scan; return whether all that is needed has come.
+        """Learn the laser from the first scan; return whether all necessary messages have arrived.
 
         Raises ValueError if the laser cannot be used.
         """
@@ -371,7 +371,7 @@ def _last_beam_s(scan: Any) -> float:  # noqa: ANN401
 
 
 def _reach(scan: Any) -> float:  # noqa: ANN401
-    """Return the range that means no return [m]; if the header states none, more than any range."""
+    """Return the range that means no return [m]; beyond every valid range if the header gives none."""
     stated = float(scan.range_max)
     return stated if 0.0 < stated < math.inf else 2.0 * MOST_RANGE_M
 
@@ -379,7 +379,7 @@ def _reach(scan: Any) -> float:  # noqa: ANN401
 def connected(graph: Graph, team: Sequence[Names], timeout_s: float, *, on_map: bool = False) -> list[RobotLink]:
     """Return the links to all robots of a team, when each has sent a scan and its odometry.
 
-    With ``on_map`` transforms have to say where each is in the map's frame.
+    With ``on_map`` transforms must give the pose of each in the map's frame.
 
     Raises ValueError if one has not in time, or has a laser that cannot be used.
     """
@@ -408,7 +408,7 @@ def connected(graph: Graph, team: Sequence[Names], timeout_s: float, *, on_map: 
 
 
 def begin_driving(graph: Graph, topics: Mapping[str, str], timeout_s: float = 2.0) -> list[str]:
-    """Publish topics of commands, by their types, before the first command; return those that nobody reads.
+    """Publish topics of commands, by their types, before the first command; return those without subscribers.
 
     Raises ValueError if another node publishes one.
     """

@@ -38,7 +38,7 @@ ABSENT_S: Final = 120.0
 
 @dataclass(slots=True)
 class _Driven:
-    """What a robot was told.
+    """The last command to a robot.
 
     Attributes
     ----------
@@ -191,7 +191,7 @@ class TeamServer:
             self.graph.wait(0.02)
 
     def _hear(self) -> None:
-        """Take the commands that have come."""
+        """Take new commands."""
         for row, robot in enumerate(self.env.possible_agents):
             driven, topic = self._driven[row], f"/{robot}/cmd_vel"
             for message, source, _ in self.graph.take(topic):
@@ -209,7 +209,7 @@ class TeamServer:
                     driven.target = target
 
     def _obeys(self, driven: _Driven, source: int, topic: str) -> bool:
-        """Whether a robot takes a command: it has one driver until that is silent."""
+        """Whether a robot takes a command: its driver stays the same until it is silent."""
         now = time.monotonic()
         if driven.master not in (0, source) and now - driven.heard_s < _MASTER_S:
             self.graph.refuse(topic, "from a second driver")
@@ -241,7 +241,7 @@ class TeamServer:
             each.is_new = False
 
     def _publish(self) -> None:
-        """Publish what the robots measure now."""
+        """Publish the current measurements of the robots."""
         env, graph, now = self.env, self.graph, self.time_s
         world, settings = env.world, env.settings
         odometry, tree = env.simulation.dead_reckoning, "/tf" if self.shows_truth else "/truth/tf"
@@ -260,7 +260,7 @@ class TeamServer:
                 self.counts.scans += 1
 
     def _mount(self) -> None:
-        """Publish where the lasers are on the robots, in one message: the last one is what late readers get."""
+        """Publish the poses of the lasers on the robots, in one message: late subscribers get the last one only."""
         mounts = {f"{robot}/base_link": f"{robot}/laser" for robot in self.env.possible_agents}
         self.graph.mounts(mounts, self.time_s, self.env.settings.lidar.height)
 

@@ -1,4 +1,4 @@
-"""Robots of ROS 2 as a world: commands go out as messages, scans come in, and nobody knows the truth."""
+"""Robots of ROS 2 as a world: commands and scans are messages, and ground truth is not available."""
 
 import math
 import time
@@ -38,7 +38,7 @@ _FREE_TO, _OCCUPIED_FROM = 25, 65
 
 
 def ground_around(starts: NDArray[np.float64], side_m: float) -> Floor:
-    """Return an empty area around starts (robots, 3), the middle of a square [m]: nothing is known of the floor."""
+    """Return an empty square around starts (robots, 3): the floor is unknown."""
     half = 0.5 * side_m
     (low_x, low_y), (high_x, high_y) = starts[:, :2].min(axis=0) - half, starts[:, :2].max(axis=0) + half
     return Floor("ros", (float(low_x), float(low_y), float(high_x), float(high_y)))
@@ -47,8 +47,8 @@ def ground_around(starts: NDArray[np.float64], side_m: float) -> Floor:
 class RosWorld(KinematicWorld):
     """Robots that take commands and send scans as messages of ROS 2; a ``World`` of one episode.
 
-    ``poses`` are the best that is known, not the truth: those of the transforms in the map's frame or, without these,
-    the odometry from the start. No true scan is known, so that nothing is scored: coverage stays 0.
+    ``poses`` are estimates, not the truth: those of the transforms in the map's frame or, without these,
+    the odometry from the start. True scans are not available, so coverage stays 0.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ class RosWorld(KinematicWorld):
     Attributes
     ----------
     env : ExplorationEnv or None
-        The environment, which knows the robots' targets and beliefs; set by its maker.
+        The environment with the robots' targets and beliefs; set by its maker.
     given_map : GivenMap or None
         A map that the robots begin with.
     stale_steps : int
@@ -110,7 +110,7 @@ class RosWorld(KinematicWorld):
         free: NDArray[np.bool_],
         seed: int,
     ) -> None:
-        """Begin: the robots are where they are."""
+        """Begin an episode; the robots are not moved."""
         super().place(episode, floor, starts, free, seed)
         self.true_ranges[:] = np.nan
         self._has_begun = [False] * self.robots
@@ -206,7 +206,7 @@ class RosWorld(KinematicWorld):
         self.poses[row] = pose
 
     def _go_without(self, row: int) -> None:
-        """Stop a robot without a scan: nothing is known of what is ahead."""
+        """Stop a robot without a scan: obstacles ahead are unknown."""
         self.stale_steps += 1
         self.ranges[row] = np.nan
         self._command(row, None)
@@ -218,7 +218,7 @@ class RosWorld(KinematicWorld):
 
 
 class GivenMap:
-    """A map that is known before, from a topic.
+    """A map that is given in advance, from a topic.
 
     Parameters
     ----------
@@ -228,7 +228,7 @@ class GivenMap:
     Raises
     ------
     ValueError
-        If it is none.
+        If the message is not a valid grid.
     """
 
     def __init__(self, message: Any) -> None:  # noqa: ANN401
@@ -245,7 +245,7 @@ class GivenMap:
         self._cells = self._cells.reshape(shape)
 
     def write(self, env: ExplorationEnv) -> None:
-        """Let all robots of an environment, which share its frame, know the map."""
+        """Write the map into the beliefs of all robots of an environment, which share its frame."""
         beliefs, side = env.beliefs, env.settings.occupancy.resolution
         # Half as sure as scans can make it, so that they can contradict it.
         free, occupied = (np.int8(bound // 2) for bound in env.settings.occupancy.increments[2:].tolist())

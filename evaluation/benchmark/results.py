@@ -76,7 +76,7 @@ class BenchmarkResults:
     overall : dict
         By policy: geometric mean of its ratios, and the number of tasks that it is over.
     remarks : tuple of str
-        What a reader has to know.
+        Remarks for the reader.
     """
 
     benchmark: str
@@ -158,7 +158,7 @@ def _rows_in(folder: Path) -> list[Row]:
 
 
 def _as_frozen(task: BenchmarkTask, rows: Sequence[Row]) -> tuple[list[Row], list[str]]:
-    """Return the rows whose settings, floor and starts are the benchmark's, and what is wrong with the others."""
+    """Return the rows whose settings, floor and starts are the benchmark's, and the faults of the others."""
     if task.hashes is None:
         return list(rows), []
     frozen = dict(zip(task.floors, zip(task.hashes.floors, task.hashes.starts, strict=True), strict=True))
@@ -298,7 +298,7 @@ def table_of(tasks: Sequence[BenchmarkTask], results: BenchmarkResults) -> str:
 
 
 def card_of(found: Benchmark, tasks: Sequence[BenchmarkTask], results: BenchmarkResults) -> str:
-    """Return the card: tasks, rules, floors and licences, how to cite, and what ran."""
+    """Return the card: tasks, rules, floors and licences, how to cite, and the runs."""
     header = ("id", "task", "robots", "floors, easy / full", "baseline", "settings")
     rows = [
         (

@@ -45,7 +45,7 @@ class BenchmarkTask:
     name : str
         Name, such as ``Buildings-2``.
     about : str
-        What it asks, in one line.
+        Its question, in one line.
     floors : tuple of str
         Floors of the full size; the easy size has the first ones.
     robots, easy : int
@@ -106,7 +106,7 @@ class BenchmarkTask:
 
 @dataclass(frozen=True, slots=True)
 class Benchmark:
-    """A benchmark: its name, what it asks, and its tasks by name."""
+    """A benchmark: its name, its question, and its tasks by name."""
 
     name: str
     about: str

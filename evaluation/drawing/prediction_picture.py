@@ -1,4 +1,4 @@
-"""A picture of a map and of what is predicted behind its border."""
+"""A picture of a map and of the prediction beyond its border."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Records as demonstrations: what each robot observed before each step, and how it was driven then."""
+"""Records as demonstrations: the observations of each robot before each step, and its action."""
 
 from pathlib import Path
 from typing import Any

@@ -12,8 +12,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.grids.occupancy import UNKNOWN
-from lidarium.mapping.merging.described_map import DescribedMap, check_resolution, resampled, three_levels_of
-from lidarium.mapping.merging.doubts import doubted
+from lidarium.mapping.merging.bend.hypotheses import has_unlike_scale, ranked_hypotheses
+from lidarium.mapping.merging.candidates import bendable
+from lidarium.mapping.merging.described_map import (
+    DescribedMap,
+    check_resolution,
+    describe_map,
+    resampled,
+    three_levels_of,
+)
 from lidarium.mapping.merging.frame_tree import FrameTree
 from lidarium.mapping.merging.joining import Merged, joined_tree, pair_edge
 from lidarium.mapping.merging.pair import (
@@ -26,6 +33,12 @@ from lidarium.mapping.merging.pair import (
     verify_pair,
 )
 from lidarium.mapping.merging.settings import TOLERANCES, MergeSettings
+
+_MIN_GROWTH_M = 0.05
+"""Offsets that a scale explains below this are those of cells and noise [m]."""
+
+_MIRRORED_SHARE = 0.9
+"""If the mirror image of a map has this share of the evidence, a symmetric place or a mirrored map is likely."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -191,3 +204,20 @@ def _alike(
         except ValueError as error:
             raise ValueError(f"map {name!r}: {error}") from error
     return levels, float(coarsest)
+
+
+def doubted(a: DescribedMap, b: DescribedMap, result: PairResult, settings: MergeSettings) -> PairResult:
+    """Return an accepted pair with the reason why it may be wrong although the maps agree, if there is one."""
+    if not result.is_accepted or not result.ranked:
+        return result
+    best = result.ranked[0]
+    if has_unlike_scale(best.bend.scale, best.bend.growth_share) and best.bend.growth_m > _MIN_GROWTH_M:
+        doubt = f"the scales are unlike: the second map fits better if it grows {best.bend.scale:.3f} times"
+        return replace(result, doubt=doubt)
+    mirrored = describe_map(np.ascontiguousarray(b.levels[:, ::-1]), b.resolution)
+    ranked = ranked_hypotheses(a, mirrored, (), settings.bend, bendable(a, mirrored, settings))
+    if not ranked or ranked[0].evidence_m < _MIRRORED_SHARE * best.evidence_m:
+        return result
+    share = f"{100.0 * ranked[0].evidence_m / max(best.evidence_m, 1e-9):.0f} %"
+    doubt = f"the place is symmetric or a map is mirrored: mirrored, the second map fits {share} as well"
+    return replace(result, doubt=doubt)

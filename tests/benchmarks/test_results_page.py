@@ -77,3 +77,11 @@ def test_published_pages_open_with_a_conclusion_of_five_lines_at_most(name):
     assert title.startswith("# ")
     assert 1 <= len(conclusion.splitlines()) <= 5
     assert made.startswith("Made by `")
+
+
+@pytest.mark.parametrize("page", sorted(PUBLISHED.glob("*.md")), ids=lambda page: page.stem)
+def test_results_pages_open_with_sentences_not_tables(page):
+    title, conclusion, *_ = page.read_text(encoding="utf-8").split("\n\n")
+    assert title.startswith("# ")
+    assert len(conclusion.splitlines()) <= 5
+    assert not conclusion.startswith(("|", "!", "Made by"))

@@ -59,6 +59,32 @@ def test_links_lead_to_files(page):
     assert not [target for target in targets if not (page.parent / target).exists()]
 
 
+FOLDERS = ("envs", "agents", "mapping", "evaluation", "training", "scripts", "benchmarks", "tests", "src")
+FROM_ELSEWHERE = {"ParallelPettingZooEnv", "rmw_cyclonedds"}
+"""Names of other projects."""
+
+NO_NAMES = {"d_wall", "f_i", "intel_gfs", "floor_remark"}
+"""Symbols of formulas, a log, and a key that is put together."""
+
+
+@pytest.fixture(scope="module")
+def words_of_sources():
+    paths = [path for folder in FOLDERS for end in ("py", "json", "ts") for path in (ROOT / folder).rglob(f"*.{end}")]
+    found = {word for path in paths for word in re.findall(r"\w+", path.read_text(encoding="utf-8"))}
+    return found | set(re.findall(r"\w+", text_of("pyproject.toml")))
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
+def test_pages_name_files_and_names_that_exist(page, words_of_sources):
+    text = page.read_text(encoding="utf-8")
+    files = re.findall(rf"`((?:{'|'.join(FOLDERS)})/[\w./]*)`", text)
+    # The links of an editable install are not part of the repository.
+    assert not [name for name in files if not (ROOT / name).exists() and name != "src/lidarium/envs"]
+    quoted = {word for name in re.findall(r"`([A-Za-z_.]+)(?:\(\))?`", text) for word in name.split(".")}
+    names = {word for word in quoted if re.fullmatch(r"[A-Za-z]+_\w+|[A-Z][a-z]+[A-Z]\w+", word)}
+    assert not names - words_of_sources - FROM_ELSEWHERE - NO_NAMES
+
+
 def test_the_readme_names_commands_that_exist():
     known = set(COMMANDS)
     named = set(re.findall(r"`?lidarium (?!-)([a-z]+) ?(?:--|`|\w+ --|runs)", text_of("README.md")))

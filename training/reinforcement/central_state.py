@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvStepReturn
 
-from lidarium.envs.engine.team_state import state_space
 from lidarium.envs.faces.stable_baselines import ExplorationVecEnv
 from lidarium.training.reinforcement.frontier_policy import STATE
 
@@ -23,8 +22,7 @@ class CentralState(VecEnvWrapper):
         assert isinstance(venv.unwrapped, ExplorationVecEnv)
         assert isinstance(venv.observation_space, spaces.Dict)
         self._teams = venv.unwrapped
-        space = state_space(self._teams.settings)
-        super().__init__(venv, spaces.Dict({**venv.observation_space.spaces, STATE: space}))
+        super().__init__(venv, spaces.Dict({**venv.observation_space.spaces, STATE: self._teams.state_space}))
 
     def reset(self) -> dict[str, NDArray[Any]]:
         """Begin all episodes."""

@@ -124,7 +124,7 @@ class TeamTraining:
         return self.settings.options(self.settings.realism)
 
     def _floors(self, learning: PpoSettings | ValueSettings) -> tuple[int, str]:
-        """Return how many episodes run side by side, and their floors."""
+        """Return the number of parallel episodes, and their floors."""
         return learning.environments // self.settings.robots, self.settings.floors
 
     def _first(self, network: OptionRanking, is_new: bool) -> Checkpoint:
@@ -132,7 +132,7 @@ class TeamTraining:
         return Checkpoint(0, [(0, self._validated(network))] if is_new else [])
 
     def _measured(self, network: OptionRanking, before: Checkpoint) -> float:
-        """Return what the network reaches; keep its weights if that is more than ever before."""
+        """Return the coverage that the network reaches; keep its weights if it is the best so far."""
         reached = self._validated(network)
         if reached > max((found for number, found in before.curve if number and found is not None), default=-1.0):
             zoo_files("", self.settings.level).save(self.folder / WEIGHTS_FILE, network.weights())
@@ -141,7 +141,7 @@ class TeamTraining:
     def _validated(self, network: OptionRanking) -> float:
         """Return the coverage that a network reaches, mean over the time of an episode and over the floors.
 
-        The network takes what it prefers, from the same starts each time.
+        The network takes its preferred actions, from the same starts each time.
         """
         settings, floors = self.settings, set_floors(self.settings.validation)
         options = settings.options("ideal")

@@ -43,10 +43,10 @@ REWARD_UNIT = 10.0
 """Rewards of teams are learned in these units [m2]."""
 
 STEEPNESS = 0.1
-"""What a metre of path costs at the beginning, in these units: some 4 s of an exploration."""
+"""Initial cost of a metre of path, in these units: about 4 s of an exploration."""
 
 STEEPEST = 10.0
-"""Gradients are shortened to this length."""
+"""Maximum norm of gradients."""
 
 
 def learn_values(
@@ -61,9 +61,9 @@ def learn_values(
 ) -> Generator[Checkpoint, None, None]:
     """Learn from the last checkpoint in a folder on, or from the first one, and yield each checkpoint.
 
-    Behind each checkpoint new episodes begin, and what was kept of old ones is forgotten: a training that goes on from
-    one does the same as one that was never interrupted. ``begin_at`` returns the seed of the episodes behind the
-    checkpoint of a number; ``measure`` returns the next entry of the curve.
+    After each checkpoint new episodes begin, and the replay buffer is emptied: a training that continues from a
+    checkpoint has the same results as one that was never interrupted. ``begin_at`` returns the seed of the episodes
+    after the checkpoint of a number; ``measure`` returns the next entry of the curve.
     """
     value, checkpoint = settings.value, latest_checkpoint(folder) or first
     mixer = _mixer(settings, environment)
@@ -183,7 +183,7 @@ class _Values(nn.Module):
 def _choices(
     network: OptionRanking, seen: dict[str, Any], chance: float, generator: np.random.Generator
 ) -> NDArray[np.int64]:
-    """Return the choice of each robot, (teams, robots): the most valuable, or now and then any that is allowed."""
+    """Return the choice of each robot, (teams, robots): the best one, or sometimes a random allowed one."""
     robots = seen[ROBOTS]
     with torch.no_grad():
         values = _Values(network)(*(robots[name] for name in _seen(network))).numpy()
@@ -196,7 +196,7 @@ def _choices(
 def _teams(
     environment: ExplorationVectorEnv, observations: dict[str, NDArray[Any]], active: NDArray[np.bool_] | None = None
 ) -> dict[str, Any]:
-    """Return what teams see, (teams, robots, ...), and their true state; a robot that has ended can only stay."""
+    """Return the observations of teams, (teams, robots, ...), and their true state; ended robots can only stay."""
     teams, robots = environment.batch.episodes, environment.batch.robots
     mask = observations[MASK].copy()
     if active is not None:

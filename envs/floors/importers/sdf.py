@@ -24,8 +24,7 @@ from scipy.spatial.transform import Rotation
 from lidarium.envs.floors.drawing import fill_shapes
 from lidarium.envs.floors.floor import CEILING, Floor, Solid, check_extent
 from lidarium.envs.floors.importers.common import enclosed, floor_name, read_text, refuse_resolution
-from lidarium.envs.floors.importers.meshes import vertices_of_mesh
-from lidarium.mapping.files.guarded_reading import printable
+from lidarium.mapping.files.guarded_reading import printable, read_bytes, reading
 from lidarium.mapping.geometry.bounds import shown
 
 SUFFIXES = (".sdf", ".world")
@@ -57,10 +56,14 @@ _NAMED = 10
 Pose = NDArray[np.float64]
 """Pose of a frame in the world, (4, 4)."""
 
+_MAX_MESH_BYTES = 64 << 20
+_STL_HEADER, _STL_FACET = 84, 50
+_VERTICES = re.compile(rb"^[ \t]*v(?:ertex)?[ \t]+(\S+)[ \t]+(\S+)[ \t]+(\S+)", re.MULTILINE)
+
 
 @dataclass(slots=True)
 class _Found:
-    """What a world holds.
+    """The content of a world.
 
     Attributes
     ----------
@@ -322,7 +325,7 @@ def _pose(path: Path, element: Element) -> Pose:
 
 
 def _add_shape(found: _Found, path: Path, name: str, geometry: Element, pose: Pose) -> None:
-    """Add a shape to what was found: a solid, or a mesh that is boxed or cannot be read."""
+    """Add a shape to the content: a solid, or a mesh that is boxed or cannot be read."""
     if any(geometry.find(tag) is not None for tag in ("plane", "empty")):
         return
     mesh = geometry.find("mesh")
@@ -351,7 +354,7 @@ def _mesh_box(path: Path, mesh: Element, uri: str) -> NDArray[np.float64] | None
     file = _beside(path, name)
     if file is None or mesh.find("submesh") is not None:
         return None
-    vertices = vertices_of_mesh(file)
+    vertices = _vertices_of_mesh(file)
     if vertices is None:
         return None
     scale = np.array(_numbers(path, mesh.findtext("scale") or "1 1 1", 3, "scale of a mesh"))
@@ -419,3 +422,20 @@ def _numbers(path: Path, text: str, count: int, what: str) -> list[float]:
     if len(found) != count or not np.isfinite(found).all():
         raise ValueError(f"{path} has the {what} {shown(text.strip())}; want {count} numbers")
     return found
+
+
+def _vertices_of_mesh(path: Path) -> NDArray[np.float64] | None:
+    """Return the vertices of a mesh, (n, 3) [m]; None if it is of another format."""
+    if path.suffix.lower() not in (".stl", ".obj"):
+        return None
+    content = read_bytes(path, _MAX_MESH_BYTES)
+    with reading(path, "a mesh"):
+        count = int.from_bytes(content[80:_STL_HEADER], "little")
+        if path.suffix.lower() == ".stl" and len(content) == _STL_HEADER + count * _STL_FACET:
+            facets = np.frombuffer(content, np.dtype([("numbers", "<f4", 12), ("other", "<u2")]), offset=_STL_HEADER)
+            vertices = facets["numbers"][:, 3:].reshape(-1, 3).astype(np.float64)
+        else:
+            vertices = np.array(_VERTICES.findall(content)).astype(np.float64).reshape(-1, 3)
+        if not len(vertices) or not np.isfinite(vertices).all():
+            raise ValueError("it has no vertices, or some that are not finite")
+    return vertices

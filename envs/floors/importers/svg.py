@@ -350,7 +350,7 @@ class _Drawing:
         self._pictures = self._drawn = 0
 
     def remarks(self) -> Iterator[str]:
-        """Yield what of the drawing is left out."""
+        """Yield the parts of the drawing that are left out."""
         if self._pictures:
             yield f"{self._pictures} pictures in the drawing are left out"
         if self._sheet.unread:

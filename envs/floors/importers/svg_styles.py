@@ -64,7 +64,7 @@ class StyleSheet:
         return not self._rules
 
     def declared(self, path: tuple[Element, ...]) -> Declarations:
-        """Return what the rules declare of an element, given after those around it; the more specific ones last."""
+        """Return the declarations of the rules for an element, after its ancestors; the more specific ones last."""
         if not self._rules:
             return {}
         own = _features(path[-1])

@@ -21,7 +21,6 @@ from lidarium.envs.simulation.kernels.arrays import (
     FACE_TABLE,
     FLOOR_COLUMNS,
     FLOOR_ROWS,
-    PERSON_BEAM,
     SQUARES,
     TILE_COLUMNS,
 )
@@ -258,36 +257,23 @@ def cast_scan(tables: Array, beams: Beams, ranges: Array) -> None:
 
 
 @kernel(nrt=False)
-def cut_by_disc(beams: Beams, disc_x: float, disc_y: float, disc_radius: float, ranges: Array) -> None:
-    """Shorten the beams that meet a disc (another robot).
+def cut_by_disc(
+    beams: Beams,
+    disc_x: float,
+    disc_y: float,
+    disc_radius: float,
+    ranges: Array,
+    marks: Array | None = None,
+    mark: int = 0,
+) -> bool:
+    """Shorten the beams that meet a disc (a robot or a person), and return whether it shortens any.
 
-    Positions, radius and ranges in cells.
+    ``marks`` (beams,), if given, are set for these beams. Positions, radius and ranges in cells.
     """
     directions, increment = beams.directions, beams.increment
     offset_x, offset_y = disc_x - beams.x, disc_y - beams.y
     squared = offset_x * offset_x + offset_y * offset_y
-    gap = squared - disc_radius * disc_radius
-    if gap <= 0.0 or squared > (beams.reach + disc_radius) ** 2:
-        return
-    begin, count = beams_towards(offset_x, offset_y, disc_radius, beams.heading, beams.angle_first, increment)
-    turn = 2.0 * math.pi / increment
-    for lap in range(2):
-        first = max(int(math.floor(begin - lap * turn)) - 1, 0)
-        last = min(int(math.floor(begin - lap * turn + count)) + 2, ranges.shape[0] - 1)
-        for beam in range(first, last + 1):
-            middle = offset_x * directions[0, beam] + offset_y * directions[1, beam]
-            inside = middle * middle - gap
-            if inside >= 0.0 and middle > 0.0:
-                ranges[beam] = min(ranges[beam], middle - math.sqrt(inside))
-
-
-@kernel(nrt=False)
-def cut_by_person(beams: Beams, disc_x: float, disc_y: float, disc_radius: float, ranges: Array, marks: Array) -> bool:
-    """Shorten the beams that meet a person, set their ``marks`` (beams,), and return whether any does so first."""
-    directions, increment = beams.directions, beams.increment
-    offset_x, offset_y = disc_x - beams.x, disc_y - beams.y
-    squared = offset_x * offset_x + offset_y * offset_y
-    gap, is_seen = squared - disc_radius * disc_radius, False
+    gap, is_met = squared - disc_radius * disc_radius, False
     if gap <= 0.0 or squared > (beams.reach + disc_radius) ** 2:
         return False
     begin, count = beams_towards(offset_x, offset_y, disc_radius, beams.heading, beams.angle_first, increment)
@@ -299,8 +285,10 @@ def cut_by_person(beams: Beams, disc_x: float, disc_y: float, disc_radius: float
             middle = offset_x * directions[0, beam] + offset_y * directions[1, beam]
             inside = middle * middle - gap
             if inside >= 0.0 and middle > 0.0 and middle - math.sqrt(inside) < ranges[beam]:
-                ranges[beam], marks[beam], is_seen = middle - math.sqrt(inside), PERSON_BEAM, True
-    return is_seen
+                ranges[beam], is_met = middle - math.sqrt(inside), True
+                if marks is not None:
+                    marks[beam] = mark
+    return is_met
 
 
 @kernel(nrt=False)

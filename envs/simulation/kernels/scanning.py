@@ -21,6 +21,7 @@ from lidarium.envs.simulation.kernels.arrays import (
     NOISE_FLOOR,
     NOISE_SHARE,
     OPENS,
+    PERSON_BEAM,
     PERSON_GAP,
     RANGE_MAX,
     RANGE_MIN,
@@ -33,7 +34,7 @@ from lidarium.envs.simulation.kernels.arrays import (
     walkers_of,
 )
 from lidarium.envs.simulation.kernels.contact import has_leaf, leaf_of
-from lidarium.envs.simulation.kernels.ray_casting import cast_scan, cut_by_disc, cut_by_person, cut_by_segment
+from lidarium.envs.simulation.kernels.ray_casting import cast_scan, cut_by_disc, cut_by_segment
 from lidarium.mapping.grids.scan_geometry import Beams, beam_directions
 from lidarium.mapping.grids.scan_polygon import window_rows, window_words
 from lidarium.mapping.kernels.compilation import Array, kernel
@@ -101,7 +102,7 @@ def _meet_people(world: WorldArrays, row: int, episode: int, beams: Beams, lengt
         x = (walkers[person, WALKER_X] - frame[FRAME_X]) * scale
         y = (walkers[person, WALKER_Y] - frame[FRAME_Y]) * scale
         radius = walkers[person, WALKER_RADIUS]
-        if cut_by_person(beams, x, y, radius * scale, lengths, marks):
+        if cut_by_disc(beams, x, y, radius * scale, lengths, marks, PERSON_BEAM):
             apart = math.hypot(x - beams.x, y - beams.y) / scale
             nearest = min(nearest, apart - radius - own)
     world.safety[row, PERSON_GAP] = nearest

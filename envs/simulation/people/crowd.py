@@ -1,4 +1,4 @@
-"""People and doors of an episode at one time, as pictures, records and bags show them."""
+"""People and doors of an episode at one time, for pictures, records and bags."""
 
 from dataclasses import dataclass
 
@@ -37,7 +37,7 @@ class Crowd:
 
     @property
     def leaves(self) -> NDArray[np.float64]:
-        """Ends of the parts of the leaves that stand in the openings, (doors, 4) [m]."""
+        """Ends of the parts of the leaves within the openings, (doors, 4) [m]."""
         ends = self.doors.copy()
         ends[:, 2:] = self.doors[:, :2] + (1.0 - self.opened[:, None]) * (self.doors[:, 2:] - self.doors[:, :2])
         return ends

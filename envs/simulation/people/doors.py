@@ -1,4 +1,4 @@
-"""Doors in the openings of a floor: sliding leaves that open when somebody comes, stand open or stay shut."""
+"""Doors in the openings of a floor: sliding leaves that open when somebody comes, are always open or always shut."""
 
 from functools import lru_cache
 
@@ -29,7 +29,7 @@ NARROWEST_M, WIDEST_M = 0.65, 1.6
 """Widths of openings in which a door hangs [m]."""
 
 WIDER_M, BESIDE_M = 0.08, (0.3, 0.5)
-"""On both sides of an opening, that far from its middle, there is so much more room [m]."""
+"""Minimum additional clearance on both sides of an opening, and the distances from its middle where it is found [m]."""
 
 APART_M = 1.0
 """Openings are at least this far apart [m]."""
@@ -38,11 +38,11 @@ INTO_WALL_M = 0.03
 """Leaves reach into the walls on both sides, so that no beam passes beside one [m]."""
 
 WALL_BAND_M = (1.8, 1.9)
-"""Openings are those between walls: what stands at this height [m]."""
+"""Height at which solids count as walls of an opening [m]."""
 
 KINDS = (OPENS, STANDS_OPEN, STAYS_SHUT)
 SHARES = (0.6, 0.3, 0.1)
-"""Shares of doors that open when somebody comes, stand open, stay shut."""
+"""Shares of doors that open when somebody comes, are always open, and are always shut."""
 
 MOST_DOORS = 64
 """Maximum number of doors of a floor."""

@@ -47,7 +47,7 @@ PEOPLE_STREAM = 0x70656F70
 
 
 def no_people(rows: int) -> NDArray[np.float64]:
-    """Return ``safety`` of robots that have met nobody, (rows, 11)."""
+    """Return ``safety`` of robots that have not met people, (rows, 11)."""
     safety = np.zeros((rows, SAFETY_NUMBERS))
     safety[:, [CLOSEST, PERSON_GAP]] = np.inf
     return safety
@@ -84,7 +84,7 @@ class Population:
         self._ways: list[Walkways | None] = [None] * episodes
 
     def place(self, episode: int, floor: FloorTables, starts: NDArray[np.float64], seed: int) -> None:
-        """Draw the doors and people of an episode; people stand away from the robots at ``starts`` (robots, 3)."""
+        """Draw the doors and people of an episode; people keep away from robots at ``starts`` (robots, 3)."""
         rows = slice(episode * self._robots, (episode + 1) * self._robots)
         self.safety[rows] = no_people(self._robots)
         doors = self.doors_of(episode)

@@ -1,4 +1,4 @@
-"""The part of a floor on which people walk: places that they go to, and the way to each from everywhere.
+"""The part of a floor on which people walk: their destinations, and the path to each from every cell.
 
 The places of a floor are far from each other along the ways between them (farthest-point sampling), and do not depend
 on the episode. To each a field of headings leads: the shortest way on a lattice of about 0.1 m, at a cost that rises
@@ -61,7 +61,7 @@ class Walkways:
     cell : int
         Cells of the raster along one of the lattice.
     walkable : (lattice rows, lattice columns) bool
-        Where a person can stand and walk to all places.
+        Cells in which a person fits and from which all places can be reached.
     """
 
     solid: NDArray[np.uint8]

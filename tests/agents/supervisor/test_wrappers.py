@@ -127,6 +127,49 @@ def test_episodes_of_a_batch_that_begin_again_are_supervised_anew():
     assert all(supervisor.report().supervision is not None for supervisor in batch.supervisors)
 
 
+def test_teams_whose_settings_are_newly_drawn_are_supervised_alone_and_in_batches():
+    options = {"horizon_s": 3.0, "starts": "fixed", **UNKNOWN, "randomize": {"robots": [3, 2]}}
+    alone = lidarium.Supervised(lidarium.parallel_env("apartment", **options), period_s=1.0)
+    batch = lidarium.Supervised(lidarium.vector_env(1, "apartment", reports=True, **options), period_s=1.0)
+    for seed in range(2):
+        alone.reset(seed=seed)
+        _, infos = batch.reset(seed=seed)
+        assert alone.supervisor.report().supervision is not None
+        actions = np.tile(np.array([0.4, 0.2], np.float32), (3, 1))
+        while alone.agents:
+            _, _, _, _, own = alone.step({agent: actions[robot] for robot, agent in enumerate(alone.agents)})
+            _, _, _, _, infos = batch.step(actions)
+            directed = {agent: bool(infos["directed"][alone.possible_agents.index(agent)]) for agent in own}
+            if alone.agents:
+                assert directed == {agent: info["directed"] for agent, info in own.items()}
+        assert np.array_equal(batch.unwrapped.batch.parts[0].engine.world.poses, alone.unwrapped.world.poses)
+
+
+def test_rows_for_learners_are_supervised_as_those_of_a_batch():
+    pytest.importorskip("stable_baselines3")
+    options = {"level": "frontier", "reports": True, "horizon_s": 90.0, "starts": "fixed", **UNKNOWN}
+    batch = lidarium.Supervised(
+        lidarium.vector_env(1, "apartment", autoreset_mode="SameStep", **options), masks_orders=True, period_s=4.0
+    )
+    rows = lidarium.Supervised(lidarium.sb3_vec_env(1, "apartment", **options), masks_orders=True, period_s=4.0)
+    rows.seed(2)
+    seen, (wanted, infos) = rows.reset(), batch.reset(seed=2)
+    assert [info["directed"] for info in rows.reset_infos] == infos["directed"].tolist()
+    orders = endings = 0
+    while not (orders and endings):
+        np.testing.assert_array_equal(seen["action_mask"], wanted["action_mask"])
+        np.testing.assert_array_equal(rows.env_method("action_masks"), wanted["action_mask"] != 0)
+        actions = wanted["action_mask"].argmax(axis=1)
+        wanted, _, terminated, truncated, infos = batch.step(actions)
+        seen, _, dones, row_infos = rows.step(actions)
+        assert [info["directed"] for info in row_infos] == infos["directed"].tolist()
+        assert (dones == terminated | truncated).all()
+        only_stay = (wanted["action_mask"].sum(axis=1) == 1) & (wanted["action_mask"][:, -1] == 1)
+        assert only_stay[infos["directed"]].all()
+        orders, endings = orders + infos["directed"].sum(), endings + dones.sum()
+        assert orders or not endings, "an episode of this seed has orders"
+
+
 def test_what_cannot_be_supervised_is_refused():
     with pytest.raises(ValueError, match="masks_orders is set, but there are no masks; want level='frontier'"):
         lidarium.Supervised(lidarium.parallel_env("apartment", **UNKNOWN), masks_orders=True)

@@ -69,6 +69,10 @@ TEAMS = {
     **TALKING,
     "merging": {"merging": MergingSettings(period_s=0.2, known_starts=True)},
     "drawn_sizes": {"randomize": {"robots": [3, 1]}},
+    "merging_drawn_sizes": {
+        "merging": MergingSettings(period_s=0.2, known_starts=True),
+        "randomize": {"robots": [3, 2]},
+    },
 }
 """Options that only teams take."""
 
@@ -81,6 +85,8 @@ OPTIONS = {
     "battery": {"battery": {"capacity_j": 4.0}},
     "camera": {"camera": "depth_64x48", "observe": ["pose", "map", "depth"]},
     "egocentric": {"observe": ["egocentric_map", "velocity", "bumper"], "egocentric_scales": (1, 2, 4)},
+    "pauses": {"pauses_when_blocked": True},
+    "people": {"people": 2, "doors": 1.0},
     "mixed": {"kinds": ["kobuki", "service"]},
     "drawn_settings": {"randomize": {"lidar.noise_floor": (0.0, 0.05), "reward.time": (0.0, 1.0)}},
     **TEAMS,

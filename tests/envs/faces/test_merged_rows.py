@@ -32,3 +32,13 @@ def test_settings_of_another_kind_are_refused_in_batches_and_episodes(given):
     env = lidarium.parallel_env("scene_room", **OPTIONS)
     with pytest.raises(ValueError, match=r"merging is .*; want True or MergingSettings"):
         lidarium.run_episode(lidarium.policy("nearest_frontier"), env, seed=0, merging=given)
+
+
+def test_robots_of_a_batch_that_cannot_talk_know_nothing_of_each_other():
+    merging = MergingSettings(known_starts=True)
+    for can_talk in (np.eye(2, dtype=bool), lambda time_s, poses: np.eye(2, dtype=bool)):
+        env = lidarium.vector_env(2, "scene_room", merging=merging, can_talk=can_talk, **OPTIONS)
+        observations, _ = env.reset(seed=0)
+        assert not observations["teammates"].any()
+    with pytest.raises(ValueError, match="can_talk is given, but merging is not"):
+        lidarium.vector_env(2, "scene_room", can_talk=np.eye(2, dtype=bool), **OPTIONS)

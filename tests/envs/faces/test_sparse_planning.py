@@ -163,3 +163,36 @@ def test_a_batch_drives_along_the_routes_of_single_environments():
     assert batch.engine.world.collisions[0] == 0
     with pytest.raises(ValueError, match="SparsePlanning is put around the level 'velocity'"):
         lidarium.vector_env(1, LOW_TABLE, plans_sparsely=True, **options)
+
+
+def test_routes_are_planned_on_the_maps_of_settings_newly_drawn():
+    options = {"robots": 1, "camera": CAMERA, "resolution": 0.05, "stop_coverage": None, "map_cells": 64}
+    drawn = {**options, "level": "waypoint", "starts": "fixed", "randomize": {"reward.time": (0.0, 1.0)}}
+    single = SparsePlanning(lidarium.parallel_env(LOW_TABLE, **drawn))
+    batch = lidarium.vector_env(1, LOW_TABLE, plans_sparsely=True, **drawn)
+    for seed in (0, 1):
+        single.reset(seed=seed)
+        batch.reset(seed=seed)
+        for target in [Target(4.0, 0.0)] * 12 + [Target(2.5, 0.0)]:  # the last one lies in the table
+            _, _, _, _, wanted = single.step({"robot_0": target})
+            _, _, _, _, infos = batch.step([{"robot_0": target}])
+            assert infos["route"][0] == wanted["robot_0"]["route"]
+        assert np.array_equal(batch.batch.parts[0].engine.world.poses, single.unwrapped.world.poses)
+        assert single.unwrapped.world.collisions[0] == 0
+
+
+def test_robots_of_a_batch_may_plan_on_their_own_maps_alone():
+    options = {"robots": 2, "camera": CAMERA, "resolution": 0.05, "map_cells": 64, "starts": "fixed"}
+    batch = lidarium.vector_env(1, "open_apartment", level="frontier", plans_sparsely=True, shares_map=False, **options)
+    single = lidarium.parallel_env("open_apartment", level="frontier", **options)
+    single.use_level("frontier", shares_map=False)
+    single = SparsePlanning(single, shares_map=False)
+    observations, _ = single.reset(seed=0)
+    rows, _ = batch.reset(seed=0)
+    for _ in range(6):
+        actions = {agent: int(np.flatnonzero(observations[agent]["action_mask"])[0]) for agent in single.agents}
+        observations, *_ = single.step(actions)
+        rows, *_ = batch.step([actions])
+        for robot, agent in enumerate(single.agents):
+            np.testing.assert_array_equal(rows["frontiers"][robot], observations[agent]["frontiers"])
+    assert np.array_equal(batch.engine.world.poses, single.unwrapped.world.poses)

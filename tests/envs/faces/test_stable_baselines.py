@@ -241,3 +241,26 @@ def test_teams_train_on_an_egocentric_map_and_normalised_rewards():
 def test_maskable_ppo_trains_on_frontiers():
     env = VecMonitor(lidarium.sb3_vec_env(4, ROOM, level="frontier", **{**FEW, "horizon_s": 20.0}, starts="fixed"))
     assert_trains(sb3_contrib.MaskablePPO, env, **PPO_FEW)
+
+
+def test_rows_take_orders_and_the_actions_of_each_team_by_agent():
+    options = {**FEW, "robots": 2, "horizon_s": 20.0}
+    rows = lidarium.sb3_vec_env(2, ROOM, level="waypoint", **options)
+    batch = lidarium.vector_env(2, ROOM, level="waypoint", **options)
+    rows.seed(0)
+    rows.reset()
+    batch.reset(seed=0)
+    assert rows.state_space == batch.state_space
+    assert rows.columns == batch.columns
+    target = lidarium.Target(0.5, 0.5)
+    for env in (rows, batch):
+        env.team(0).order("robot_0", lidarium.Order("pause"))
+    actions = [{"robot_1": target}, {"robot_0": lidarium.Stop("enough"), "robot_1": None}]
+    observations, rewards, dones, infos = rows.step(actions)
+    wanted = batch.step(actions)
+    for name, array in observations.items():
+        np.testing.assert_array_equal(array, wanted[0][name])
+    np.testing.assert_array_equal(rewards, wanted[1].astype(np.float32))
+    assert dones.tolist() == [False, False, True, False]
+    assert infos[0]["state"] == "paused"
+    assert infos[2]["ended_because"] == "enough"

@@ -7,8 +7,7 @@ import pytest
 from drawn_maps import RESOLUTION, about_middle, apartment, blank, bowed, hall, moved, room
 
 from lidarium.mapping.grids.occupancy import FREE
-from lidarium.mapping.merging.doubts import doubted
-from lidarium.mapping.merging.merger import Question, merge_maps
+from lidarium.mapping.merging.merger import Question, doubted, merge_maps
 from lidarium.mapping.merging.pair import described
 from lidarium.mapping.merging.settings import MergeSettings
 
