@@ -19,7 +19,7 @@ NAMES = (
         "meetings",
         "merging",
     ),
-    *("parity", "people", "prediction", "printed", "realism", "slam", "sparse", "splines", "srt", "supervisor"),
+    *("parity", "people", "prediction", "printed", "realism", "slam", "sparse", "splines", "srt", "supervisor", "zoo"),
 )
 
 
