@@ -61,7 +61,7 @@ def begin(
     if settings.doors > 0.0:
         # Doors come from the seed of the episode, and robots do not start beyond one that stays shut.
         seed = int(generator.integers(2**63))
-        body = with_shut_doors(body, draw_doors(tables, settings.doors, radius, seed))
+        body = with_shut_doors(body, draw_doors(tables, settings.doors, radius, seed, f"floor {floor.name!r}"))
     if isinstance(starts, np.ndarray):
         check_starts(body, radius, starts)
     else:

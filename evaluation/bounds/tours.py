@@ -7,7 +7,6 @@ manner (large neighbourhood search; Shaw 1998).
 
 import math
 from dataclasses import dataclass
-from importlib.util import find_spec
 
 import numpy as np
 from numpy.typing import NDArray
@@ -175,8 +174,10 @@ def _seen_count(graph: ViewGraph, stops: Stops) -> int:
 
 def check_solver() -> None:
     """Check that OR-Tools is installed, before anything is run."""
-    if find_spec("ortools") is None:
-        raise ValueError(f"bounds need OR-Tools: {install_command('bounds')}")
+    try:
+        import ortools.constraint_solver.pywrapcp  # noqa: F401
+    except ImportError as error:
+        raise ValueError(f"bounds need OR-Tools: {install_command('bounds')}") from error
 
 
 def ordered(graph: ViewGraph, stops: Stops) -> Stops:

@@ -99,13 +99,17 @@ def _openings(floor: Floor, resolution: float) -> NDArray[np.float64]:
     return openings_of(floor.raster(resolution, *WALL_BAND_M))
 
 
-def draw_doors(tables: FloorTables, share: float, radius: float, seed: int) -> NDArray[np.float64]:
+def draw_doors(
+    tables: FloorTables, share: float, radius: float, seed: int, name: str = "the floor"
+) -> NDArray[np.float64]:
     """Return the doors of an episode, (doors, 7), in a share of the openings of its floor.
 
     Parameters
     ----------
     radius : float
         Radius of the largest robot [m].
+    name : str
+        What messages call the floor: floors of other names may have the same tables.
 
     Raises
     ------
@@ -118,7 +122,6 @@ def draw_doors(tables: FloorTables, share: float, radius: float, seed: int) -> N
     else:
         openings = _openings(floor, tables.body.resolution)
     if not len(openings):
-        name = "the floor" if floor is None else f"floor {floor.name!r}"
         raise ValueError(
             f"doors is {share}, but {name} has no opening of {NARROWEST_M} to {WIDEST_M} m between walls in which a "
             "door could hang; want doors=0 or a floor with rooms"
