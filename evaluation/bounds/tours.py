@@ -175,7 +175,7 @@ def _seen_count(graph: ViewGraph, stops: Stops) -> int:
 def check_solver() -> None:
     """Check that OR-Tools is installed, before anything is run."""
     try:
-        import ortools.constraint_solver.pywrapcp  # noqa: F401
+        from ortools.constraint_solver import pywrapcp  # noqa: F401
     except ImportError as error:
         raise ValueError(f"bounds need OR-Tools: {install_command('bounds')}") from error
 
