@@ -138,36 +138,37 @@ def suites(data: Path | None, every: int = 1) -> dict[str, Suite]:
     few = max(round(every / SEEDS), 1)
     by_kind = {kind: floors[::few] for kind, floors in floors_of(data).items()}
     floors = tuple(floor for group in by_kind.values() for floor in group)
+    scenarios = SCENARIOS[::few]
     found = {
         "alone": Suite(
             policies=(ALONE,),
-            floors=SCENARIOS,
+            floors=scenarios,
             seeds=tuple(range(RUNS_ALONE))[::every],
             variants=_variants(METER),
-            starts=_starts((0,), (1,), (2,)),
+            starts=_starts(scenarios, (0,), (1,), (2,)),
         ),
         "pairs": Suite(
             policies=POLICIES,
-            floors=SCENARIOS,
+            floors=scenarios,
             robots=(2,),
             seeds=seeds,
             variants=_variants(METER),
-            starts=_starts((0, 1), (0, 2)),
+            starts=_starts(scenarios, (0, 1), (0, 2)),
         ),
         "three": Suite(
             policies=POLICIES,
-            floors=SCENARIOS[:1],
+            floors=scenarios[:1],
             robots=(3,),
             seeds=seeds,
             variants=_variants(METER),
-            starts={SCENARIOS[0]: _starts((0, 1, 2))[SCENARIOS[0]]},
+            starts=_starts(scenarios[:1], (0, 1, 2)),
         ),
         "one": Suite(policies=(ALONE,), floors=floors, robots=(1,), seeds=seeds, variants=_variants()),
         "teams": Suite(policies=POLICIES, floors=floors, robots=(2, 3), seeds=seeds, variants=_variants()),
         "five": Suite(policies=POLICIES, floors=five_floors(floors), robots=(5,), seeds=seeds, variants=_variants()),
         "bumper": Suite(
             policies=("supervised", *RESUMING),
-            floors=SCENARIOS,
+            floors=scenarios,
             robots=(2, 3),
             seeds=seeds,
             policy_settings=RESUMING,
@@ -212,10 +213,12 @@ def _variants(more: Mapping[str, Any] | None = None) -> dict[str, Mapping[str, A
     return {DEFAULT_VARIANT: {**SETTINGS, **(more or {})}}
 
 
-def _starts(*teams: tuple[int, ...]) -> dict[str, tuple[tuple[tuple[float, float, float], ...], ...]]:
-    """Return teams of the starts of both scenarios, by the numbers of the starts."""
+def _starts(
+    scenarios: tuple[str, ...], *teams: tuple[int, ...]
+) -> dict[str, tuple[tuple[tuple[float, float, float], ...], ...]]:
+    """Return teams of the starts of scenarios, by the numbers of the starts."""
     found = {}
-    for name in SCENARIOS:
+    for name in scenarios:
         places = [(float(x), float(y), float(theta)) for x, y, theta in load_floor(name).starts]
         found[name] = tuple(tuple(places[start] for start in team) for team in teams)
     return found
