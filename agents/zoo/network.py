@@ -1,4 +1,4 @@
-"""Attention to what is on offer and to teammates in plain numpy: the networks of `FrontierPolicy` and `TourPolicy`.
+"""Attention to options and teammates in plain numpy: the networks of `FrontierPolicy` and `TourPolicy`.
 
 At the level of frontiers the network corrects the ranking of explore_lite, three times the path less the size
 (J. Horner, "Map-merging for multi-robot system", 2016); at that of tours it corrects a preference for the first stop,
@@ -37,7 +37,7 @@ TEAMMATE_UNITS = np.array([METRES, METRES, math.pi, METRES, METRES, 1.0, SECONDS
 """Scales of the numbers of a teammate: position, heading, target, whether it has one, age, whether it is known."""
 
 TOUR_UNITS = np.array([METRES, METRES, METRES, SQUARE_METRES, METRES, PLACES, 1.0, 1.0], np.float32)
-"""Scales of what is known of a stop, see ``STOP_NUMBERS`` of `TourLevel`."""
+"""Scales of the numbers of a stop, see ``STOP_NUMBERS`` of `TourLevel`."""
 
 OPTION_NUMBERS = {"frontier": 7, "tour": 12}
 """Numbers of an option that networks see, by level."""
@@ -58,7 +58,10 @@ def network_shapes(level: str) -> Shapes:
 
 @dataclass(frozen=True, slots=True)
 class OptionNetwork(AttentionNetwork):
-    """Ranks what is on offer to a robot; teammates and options are sets: their order changes nothing."""
+    """Ranks the options of a robot.
+
+    The order of teammates and frontiers changes nothing; of stops of tours the first one is marked.
+    """
 
     level: ClassVar[str]
 

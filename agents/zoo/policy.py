@@ -31,7 +31,7 @@ class ZooTeam(Policy):
 
     def __init__(self, name: str, weights: str | Path = "", level: str = "frontier") -> None:
         self.level = level
-        self.observes = OBSERVED[level][1:]  # the level itself shows what is on offer
+        self.observes = OBSERVED[level][1:]  # the level adds the options
         self._network = NETWORKS[level](zoo_files(name, level).load(weights))
 
     def reset(self, team: Team, seed: int = 0) -> None:

@@ -36,7 +36,7 @@ SIZES, LARGE = (2, 4), 8
 """Sizes of teams; networks of these teams drive large ones too."""
 
 LARGE_FLOORS = 16
-"""Large teams run on the first so many floors."""
+"""Number of floors for large teams, the first ones of the set."""
 
 HORIZON_S, SHARE, EARLY_S = 1200.0, 0.99, 60.0
 

@@ -73,7 +73,7 @@ ENDINGS = {"no_frontier", "frontier_unreachable"}
 @pytest.mark.parametrize("backend", ["kinematic", "bullet"])
 def test_both_rooms_are_seen_in_both_worlds(backend):
     if backend == "bullet":
-        pytest.importorskip("pybullet")
+        pytest.importorskip("pybullet", reason="the extra bullet is not installed")
     env = made(backend=backend)
     explored(env)
     assert seen_share(env) > 0.97

@@ -146,7 +146,7 @@ def test_teams_whose_settings_are_newly_drawn_are_supervised_alone_and_in_batche
 
 
 def test_rows_for_learners_are_supervised_as_those_of_a_batch():
-    pytest.importorskip("stable_baselines3")
+    pytest.importorskip("stable_baselines3", reason='stable-baselines3 is not installed: extra "rl"')
     options = {"level": "frontier", "reports": True, "horizon_s": 90.0, "starts": "fixed", **UNKNOWN}
     batch = lidarium.Supervised(
         lidarium.vector_env(1, "apartment", autoreset_mode="SameStep", **options), masks_orders=True, period_s=4.0
