@@ -4,6 +4,7 @@ Lists name kernels by module and the types of their arguments. This module also 
 compiles: it reads one kernel per line, and answers each with a line.
 """
 
+import contextlib
 import importlib
 import json
 import os
@@ -159,21 +160,23 @@ def _start_worker() -> "subprocess.Popen[str]":
 def _drive(
     worker: "subprocess.Popen[str]", plan: _Plan, entries: Sequence[Entry], names: "SimpleQueue[str | None]"
 ) -> None:
-    """Give a process one kernel after the other."""
+    """Give a process one kernel after the other, until it ends or no kernel is left."""
     assert worker.stdin is not None
     assert worker.stdout is not None
-    with worker.stdin, worker.stdout:
-        while (number := plan.take()) is not None:
-            try:
-                worker.stdin.write(json.dumps(entries[number]) + "\n")
-                worker.stdin.flush()
-                is_answered = worker.stdout.readline() != ""
-            except (OSError, ValueError):  # the process has ended
-                is_answered = False
-            plan.finish(number)
-            if not is_answered:
-                break
+    is_answered = True
+    while is_answered and (number := plan.take()) is not None:
+        try:
+            worker.stdin.write(json.dumps(entries[number]) + "\n")
+            worker.stdin.flush()
+            is_answered = worker.stdout.readline() != ""
+        except (OSError, ValueError):  # the process has ended
+            is_answered = False
+        plan.finish(number)
+        if is_answered:
             names.put(entries[number]["name"])
+    with contextlib.suppress(OSError):  # what the process has not read is written once more
+        worker.stdin.close()
+    worker.stdout.close()
     names.put(None)
 
 

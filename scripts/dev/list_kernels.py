@@ -11,7 +11,9 @@ import os
 import subprocess
 import sys
 import tempfile
+from collections.abc import Mapping
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 from lidarium.mapping.kernels.first_start import encode_type
@@ -20,13 +22,13 @@ from lidarium.scripts.first_start import LIST, count_compiled
 CHILD = "--child"
 
 
-def called_kernels() -> list[dict[str, Any]]:
-    """Return the kernels that this process has called from Python, largest machine code first."""
+def called_kernels(modules: Mapping[str, ModuleType]) -> list[dict[str, Any]]:
+    """Return the kernels of modules that this process has called from Python, largest machine code first."""
     from numba.core.dispatcher import Dispatcher
 
     found = [
         (_code_size(value), {"name": f"{name}:{key}", "signature": [encode_type(each) for each in signature]})
-        for name, module in sorted(sys.modules.items())
+        for name, module in sorted(modules.items())
         if name.startswith("lidarium.")
         for key, value in vars(module).items()
         if isinstance(value, Dispatcher) and value.__module__ == name
@@ -62,7 +64,7 @@ def _child(folder: str) -> None:
 
     first_start.compile_first = lambda is_quiet: None
     assert main(["run", "--out", f"{folder}/run"]) == 0
-    print(json.dumps(called_kernels()))
+    print(json.dumps(called_kernels(sys.modules)))
 
 
 def _write() -> None:

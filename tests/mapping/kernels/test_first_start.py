@@ -115,6 +115,16 @@ def test_a_caller_that_goes_away_ends_the_processes():
     names.close()
 
 
+def test_a_process_that_has_ended_leaves_the_kernels_to_their_first_calls(monkeypatch):
+    def ended():
+        worker = subprocess.Popen([sys.executable, "-c", ""], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        worker.wait()
+        return worker
+
+    monkeypatch.setattr(first_start, "_start_worker", ended)
+    assert list(compile_in_processes([TAKE], 1)) == []
+
+
 def test_each_kernel_is_answered_and_one_that_fails_is_left_out(monkeypatch, capsys):
     asked = []
 

@@ -11,7 +11,7 @@ from lidarium.scripts.dev.list_kernels import called_kernels
 def test_a_kernel_that_was_called_is_listed_where_it_stands():
     windows = np.zeros((1, 4), np.int64)
     map_tally.note_changes(windows, windows.copy())
-    listed = called_kernels()
+    listed = called_kernels({module.__name__: module for module in (map_tally, recorder, map_deltas)})
     signatures = {entry["name"]: entry["signature"] for entry in listed}
     names = list(signatures)
     assert len(signatures["lidarium.evaluation.truth.map_tally:note_changes"]) == 2
