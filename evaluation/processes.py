@@ -263,6 +263,10 @@ CHECK_PERIOD_S = 10.0
 """Wall time between two checks whether a worker is stopped [s]."""
 
 
+UNGUARDED = 86
+"""Exit status of a worker whose program would start workers while it is loaded."""
+
+
 class WorkerDiedError(RuntimeError):
     """Raised, as a task's result, if its process died whenever it was tried."""
 
@@ -272,7 +276,8 @@ def shared_out(
 ) -> Generator[tuple[Task, Result | Exception], None, None]:
     """Do tasks in this process or in several; yield each with its result when ready.
 
-    One worker means this process, more mean processes of their own.
+    One worker means this process, more mean processes of their own. Raises RuntimeError if the program starts
+    workers as it is loaded: each of them loads it, too.
     """
     if workers <= 1 and not is_apart:
         for task in tasks:
@@ -299,6 +304,8 @@ def _in_pool(
 
     Returns those that were lost because a process died.
     """
+    if getattr(multiprocessing.current_process(), "_inheriting", False):  # as multiprocessing asks itself
+        sys.exit(UNGUARDED)
     context = multiprocessing.get_context("spawn")
     lost: list[Task] = []
     running: dict[Future[Result], Task] = {}
@@ -308,6 +315,7 @@ def _in_pool(
     # Raised at once, an interrupt could fall into a callback of the pool, and be lost there.
     with PatientInterrupt(GRACE_S) as interrupt:
         pool = ProcessPoolExecutor(workers, mp_context=context, initializer=_begin_worker)
+        inner: Any = pool
         is_whole, watch = False, _Watch()
         try:
             for task in islice(tasks, WAITING_PER_WORKER * workers):
@@ -322,6 +330,11 @@ def _in_pool(
                     task = running.pop(future)
                     error = future.exception()
                     if isinstance(error, BrokenProcessPool):
+                        if UNGUARDED in (process.exitcode for process in inner._processes.values()):
+                            raise RuntimeError(
+                                "workers load the program that starts them, and would start workers of their own; "
+                                'put its calls below `if __name__ == "__main__":`, or use one worker'
+                            )
                         lost.append(task)
                         continue
                     if error is not None and not isinstance(error, Exception):

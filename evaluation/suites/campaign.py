@@ -141,7 +141,8 @@ def evaluate(
         Options as for `parallel_env`. By default ``horizon_s`` is 1800 and ``stop_coverage`` 0.99.
     workers : int, optional
         Number of processes, 1 by default. Processes know policies that are registered in an installed
-        module or in one that ``LIDARIUM_IMPORT`` names.
+        module or in one that ``LIDARIUM_IMPORT`` names. They load the calling program: with more than 1 the
+        call has to be below ``if __name__ == "__main__":``.
     records : bool, optional
         Whether a record of every episode is written, for replays; False by default.
     bounds : bool, optional
@@ -161,7 +162,7 @@ def evaluate(
     ValueError
         If a name or a number is unknown, or the folder holds episodes of other settings.
     RuntimeError
-        If an episode failed.
+        If an episode failed, or the program starts processes while they load it.
 
     Examples
     --------

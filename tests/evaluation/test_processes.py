@@ -254,6 +254,16 @@ def test_workers_end_with_a_parent_that_is_killed_though_they_hold_the_interpret
     waited(lambda: not any(is_running(number) for number in numbers))
 
 
+def test_a_program_that_starts_workers_as_it_is_loaded_is_told_how_to_guard_it(tmp_path):
+    script = tmp_path / "unguarded.py"
+    script.write_text("from lidarium.evaluation.processes import shared_out\nprint(list(shared_out(abs, [1, 2], 2)))\n")
+    told = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, check=False)
+    assert told.returncode == 1
+    assert told.stdout == ""
+    assert told.stderr.count("Traceback") == 1  # none of a worker
+    assert 'put its calls below `if __name__ == "__main__":`, or use one worker' in told.stderr.splitlines()[-1]
+
+
 def waited(condition):
     """Wait for a condition as long as a busy machine may take."""
     ends = time.monotonic() + 120.0
