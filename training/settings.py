@@ -247,6 +247,9 @@ class TeamSettings:
         World of the episodes to learn in; validation is in that of ``lidarium evaluate``.
     validation : str
         Floors on which checkpoints are compared; the best one is kept.
+    supervised : bool
+        Whether the team learns under a supervisor: starts are unknown, the station merges the maps, and robots follow
+        its orders. With ``ppo`` alone.
     settings : dict
         More options of the environment, for learning and validation.
     ppo, value : PpoSettings, ValueSettings
@@ -262,6 +265,7 @@ class TeamSettings:
     horizon_s: Annotated[float, above(0.0, 1e6)] = 120.0
     realism: str = "fast"
     validation: str = "set:validation:16"
+    supervised: bool = False
     settings: Mapping[str, Any] = field(default_factory=dict)
     ppo: PpoSettings = field(default_factory=lambda: PpoSettings(**{**TEAM_PPO, "decisions": 65536}))
     value: ValueSettings = field(default_factory=lambda: ValueSettings(decisions=65536))
@@ -279,6 +283,8 @@ class TeamSettings:
             )
         if not learning.decisions:
             raise ValueError(f"decisions of {name} is 0; want how many the team makes while it learns")
+        if self.supervised and self.algorithm != "ppo":
+            raise ValueError(f"algorithm of a team under a supervisor is {self.algorithm!r}; want ppo")
         taken = sorted({"robots", "horizon_s", "realism", "observe"} & set(self.settings))
         if taken:
             raise ValueError(f"settings of team has {shown(taken[0])}; the table [team] sets it, observe is fixed")
@@ -303,6 +309,7 @@ class TeamSettings:
         options = {
             "stop_coverage": 0.99,
             "state_cells": STATE_CELLS,
+            "known_starts": not self.supervised,
             **self.settings,
             "robots": self.robots,
             "horizon_s": self.horizon_s,

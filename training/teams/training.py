@@ -16,6 +16,7 @@ import torch
 from sb3_contrib import MaskablePPO
 from stable_baselines3.common.vec_env import VecEnv, VecMonitor
 
+from lidarium.agents.supervisor.policy import Supervised
 from lidarium.agents.zoo.policy import zoo_files
 from lidarium.envs.faces.makers import sb3_vec_env, vector_env
 from lidarium.envs.floors.catalogue.names import set_floors
@@ -72,7 +73,10 @@ class TeamTraining:
     def _learn_policy(self, is_new: bool) -> Generator[Checkpoint, None, None]:
         """Learn by PPO or MAPPO."""
         settings, ppo = self.settings, self.settings.ppo
-        rows: VecEnv = sb3_vec_env(*self._floors(ppo), level=settings.level, threads=1, **self._world)
+        options = {"level": settings.level, "threads": 1, "reports": settings.supervised, **self._world}
+        rows: VecEnv = sb3_vec_env(*self._floors(ppo), **options)
+        if settings.supervised:
+            rows = Supervised(rows, masks_orders=True)
         if settings.algorithm == "mappo":
             rows = CentralState(rows)
         with closing(VecMonitor(rows)) as environment:
@@ -145,11 +149,13 @@ class TeamTraining:
         """
         settings, floors = self.settings, set_floors(self.settings.validation)
         options = settings.options("ideal")
-        environment = vector_env(len(floors), floors[0], level=settings.level, threads=1, copy=False, **options)
+        options |= {"level": settings.level, "threads": 1, "copy": False, "reports": settings.supervised}
+        batch = vector_env(len(floors), floors[0], **options)
+        environment = Supervised(batch, masks_orders=True) if settings.supervised else batch
         with closing(environment):
             seen, infos = environment.reset(seed=[0] * len(floors), options={"floor": list(floors)})
             reached, is_over = infos["truth"]["coverage"].copy(), np.zeros(environment.num_envs, np.bool_)
-            decisions, total = math.ceil(settings.horizon_s / environment.engine.level.period_s), 0.0
+            decisions, total = math.ceil(settings.horizon_s / batch.engine.level.period_s), 0.0
             for _ in range(decisions):
                 seen, _, terminated, truncated, infos = environment.step(network.preferred(seen))
                 reached[~is_over] = infos["truth"]["coverage"][~is_over]

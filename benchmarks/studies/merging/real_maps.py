@@ -45,7 +45,18 @@ ONE_BUILDING = {
 PARTS = ("gdc_floor2_raw", "gdc_floor3_northeast")
 """Maps that are versions or parts of others."""
 
-STRANGERS_OF_HALMSTAD = ("E5_01", "E5_08", "KPT4A_01", "KPT4A_03")
+STRANGERS_OF_HALMSTAD = (
+    "E5_01",
+    "E5_08",
+    "KPT4A_01",
+    "KPT4A_03",
+    "E5_03",
+    "E5_05",
+    "E5_12",
+    "KPT4A_02",
+    "KPT4A_04",
+    "E5_10",
+)
 
 
 class Grid(NamedTuple):

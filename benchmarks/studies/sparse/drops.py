@@ -8,17 +8,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.benchmarks.studies.shared.study import Progress, Task, do_missing
+from lidarium.benchmarks.studies.shared.study import Progress, do_missing
 from lidarium.benchmarks.studies.sparse.maps import FRAME_CODES, FULL_CODES, RANGE_M, cloud_of
 from lidarium.benchmarks.studies.sparse.places import (
     BODY,
     CLEAR_M,
-    PLACES,
+    TURNS,
     Frame,
     Place,
+    PlaceTask,
     frames_of,
     load_place,
     place_of,
+    place_tasks,
     requests_of,
 )
 from lidarium.envs.floors.floor import Solid
@@ -86,9 +88,9 @@ def with_areas(place: Place, areas: Areas) -> tuple[Place, Place]:
     return seen, place_of(place.name, true)
 
 
-def frames_with_areas(place: Place, areas: Areas) -> Iterator[Frame]:
+def frames_with_areas(place: Place, areas: Areas, turns: int = TURNS) -> Iterator[Frame]:
     """Yield the frames of a survey: without the floor in holes, and with stairs for that of stairwells."""
-    for frame in frames_of(place):
+    for frame in frames_of(place, turns):
         points, eye = frame.in_map, frame.pose[:3, 3]
         on_floor = points[:, 2] < 0.02
         is_gone = on_floor & _are_in(points, areas.of("hole"))
@@ -123,20 +125,13 @@ def _on_stairs(points: NDArray[np.float64], eye: NDArray[np.float64], box: NDArr
 DROPS_FILE = "drops.jsonl"
 
 
-@dataclass(frozen=True, slots=True)
-class DropsTask(Task):
-    """One of the places."""
-
-    name: str
-
-
-def measure(task: DropsTask) -> dict[str, Any]:
+def measure(task: PlaceTask) -> dict[str, Any]:
     """Map a place with areas; count the requests that are answered, and the paths over areas."""
     place = load_place(task.name)
     areas = areas_of(place)
     seen, true = with_areas(place, areas)
     mapper, parts = IncrementalMapper(FRAME_CODES, MapperSettings(range_m=RANGE_M)), []
-    for frame in frames_with_areas(seen, areas):
+    for frame in frames_with_areas(seen, areas, task.turns):
         mapper.add(frame.points, frame.pose)
         parts.append(frame)
     maps = {"incremental": mapper.map, "full": map_cloud(cloud_of(parts), FULL_CODES)}
@@ -157,8 +152,7 @@ def _counts(true: Place, found: SparseMap, requests: NDArray[np.float64]) -> dic
 
 def work(folder: Path, every: int) -> Progress:
     """Measure every N-th place."""
-    tasks = [DropsTask(name) for name in PLACES[::every]]
-    yield from do_missing(folder / DROPS_FILE, "drops", tasks, measure, 1)
+    yield from do_missing(folder / DROPS_FILE, "drops", place_tasks(every), measure, 1)
 
 
 def drops_table(lines: list[dict[str, Any]]) -> str:

@@ -64,9 +64,9 @@ class Survey:
     tree: TreeSizes
 
 
-def survey(place: Place) -> Survey:
-    """Drive through a place, make all maps of it, and the planners on them."""
-    frames = list(_kept_frames(place))
+def survey(place: Place, turns: int) -> Survey:
+    """Drive through a place, turn by a number of frames, make all maps of it, and the planners on them."""
+    frames = _kept_frames(place, turns)
     octomap, mapper = OctoMap(), IncrementalMapper(FRAME_CODES, MapperSettings(range_m=RANGE_M))
     for frame in frames:
         octomap.add(frame)
@@ -90,20 +90,20 @@ def survey(place: Place) -> Survey:
     return Survey(len(frames), sparse, graphs, planners, octomap.sizes())
 
 
-def noisy_maps(place: Place) -> dict[str, SparseMap]:
+def noisy_maps(place: Place, turns: int) -> dict[str, SparseMap]:
     """Return the incremental maps of a place by a camera with noise: of all its points, and of the precise ones."""
     camera = replace(CAMERAS["xtion_noisy"], height=CAMERA.height, pitch=CAMERA.pitch)
     ranges = {"all": RANGE_M, "precise": camera.precise_m}
     mappers = {name: IncrementalMapper(FRAME_CODES, MapperSettings(range_m=far)) for name, far in ranges.items()}
-    for frame in frames_of(place, camera):
+    for frame in frames_of(place, turns, camera):
         for mapper in mappers.values():
             mapper.add(frame.points, frame.pose)
     return {name: mapper.map for name, mapper in mappers.items()}
 
 
-def _kept_frames(place: Place) -> list[Frame]:
+def _kept_frames(place: Place, turns: int) -> list[Frame]:
     """Return the frames, of half the pixels' precision: as many fit into memory."""
-    return [replace(frame, points=frame.points.astype(np.float32)) for frame in frames_of(place)]
+    return [replace(frame, points=frame.points.astype(np.float32)) for frame in frames_of(place, turns)]
 
 
 def cloud_of(frames: list[Frame]) -> NDArray[np.float32]:

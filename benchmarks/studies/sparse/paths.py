@@ -1,7 +1,6 @@
 """Paths on sparse maps, and the optimum they are compared with."""
 
 import time
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -11,10 +10,18 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
-from lidarium.benchmarks.studies.shared.study import Progress, Task, do_missing
+from lidarium.benchmarks.studies.shared.study import Progress, do_missing
 from lidarium.benchmarks.studies.sparse.grids import LASER_M, laser_grid
 from lidarium.benchmarks.studies.sparse.maps import Planner, noisy_maps, size_of, survey
-from lidarium.benchmarks.studies.sparse.places import BODY, CELL_M, PLACES, Place, load_place, requests_of
+from lidarium.benchmarks.studies.sparse.places import (
+    BODY,
+    CELL_M,
+    Place,
+    PlaceTask,
+    load_place,
+    place_tasks,
+    requests_of,
+)
 from lidarium.mapping.sparse.graph import TopologicalGraph, build_graph
 from lidarium.mapping.sparse.planning import measure_path, plan
 from lidarium.mapping.sparse.sparse_map import SparseMap
@@ -93,22 +100,16 @@ LENGTH, POINTS, SECONDS, DISPERSION, TURNING, RAW_DISPERSION, RAW_TURNING, COLLI
 """Places of what is kept of an answer."""
 
 
-@dataclass(frozen=True, slots=True)
-class PlaceTask(Task):
-    """One of the places."""
-
-    name: str
-
-
 def measure(task: PlaceTask) -> dict[str, Any]:
     """Map a place in all modes and answer its requests; return what is kept of each answer."""
     place = load_place(task.name)
-    found, requests = survey(place), requests_of(place)
+    found, requests = survey(place, task.turns), requests_of(place)
     optimum = ShortestPaths(place)
     for planner in found.planners.values():
         planner(*requests[0])  # compiles
     return {
         "place": task.name,
+        "turns": task.turns,
         "frames": found.frames,
         "requests": len(requests),
         "straight": np.linalg.norm(requests[:, 1] - requests[:, 0], axis=1).round(4).tolist(),
@@ -118,7 +119,7 @@ def measure(task: PlaceTask) -> dict[str, Any]:
         "graphs": {name: [len(each.nodes), len(each.edges)] for name, each in found.graphs.items()},
         "tree": [found.tree.bits, found.tree.full, found.tree.bits_deflated],
         "tops": _tops(place, found.graphs),
-        "noisy": {name: _noisy(place, each, requests) for name, each in noisy_maps(place).items()},
+        "noisy": {name: _noisy(place, each, requests) for name, each in noisy_maps(place, task.turns).items()},
     }
 
 
@@ -168,5 +169,4 @@ def _noisy(place: Place, noisy: SparseMap, requests: NDArray[np.float64]) -> dic
 
 def work(folder: Path, every: int) -> Progress:
     """Measure every N-th place; plans are timed, so one after the other."""
-    tasks = [PlaceTask(name) for name in PLACES[::every]]
-    yield from do_missing(folder / PATHS_FILE, "places", tasks, measure, 1)
+    yield from do_missing(folder / PATHS_FILE, "places", place_tasks(every), measure, 1)

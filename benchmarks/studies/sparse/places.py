@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from lidarium.benchmarks.studies.shared.study import Task
 from lidarium.envs.floors.catalogue.names import load_floor
 from lidarium.envs.floors.faces import faces_of
 from lidarium.envs.floors.floor import Floor
@@ -86,6 +87,19 @@ def requests_of(place: Place) -> NDArray[np.float64]:
     return place.drawn_points(BODY.radius + CLEAR_M, 2 * REQUESTS, seed=0).reshape(-1, 2, 2)
 
 
+@dataclass(frozen=True, slots=True)
+class PlaceTask(Task):
+    """One of the places, and the frames of a turn there."""
+
+    name: str
+    turns: int
+
+
+def place_tasks(every: int) -> list[PlaceTask]:
+    """Return every N-th place. Of a part, turns have half the frames: these see all round as well."""
+    return [PlaceTask(name, TURNS if every == 1 else TURNS // 2) for name in PLACES[::every]]
+
+
 SPACING_M = 0.6
 """Between the points at which the robot turns [m]."""
 
@@ -141,13 +155,13 @@ def _first_open(part: NDArray[np.bool_], row: int, column: int) -> tuple[int, in
     return row + int(nearest[0]), column + int(nearest[1])
 
 
-def frames_of(place: Place, camera: DepthCamera = CAMERA, seed: int = 0) -> Iterator[Frame]:
-    """Yield the frames of a survey, with the camera's noise."""
+def frames_of(place: Place, turns: int = TURNS, camera: DepthCamera = CAMERA, seed: int = 0) -> Iterator[Frame]:
+    """Yield the frames of a survey, with the camera's noise; a turn has a number of them."""
     faces, numbers = faces_of(place.floor), ROBOTS[ROBOT].numbers[None]
     mount, generator = camera_pose(camera), np.random.default_rng(seed)
     for stop in stops_of(place):
-        for turn in range(TURNS):
-            base = np.array([*stop, turn * math.tau / TURNS])
+        for turn in range(turns):
+            base = np.array([*stop, turn * math.tau / turns])
             depth = image_of(faces, base[None], np.zeros((1, 3)), numbers, 0, camera)
             points = points_of_depth(_disturbed(depth, camera, generator), camera.intrinsics)
             yield Frame(points.astype(np.float64), map_from_base(Transform(*base)) @ mount, base)

@@ -89,7 +89,7 @@ def _points(clouds: Path | None, task: CloudTask) -> NDArray[np.float32]:
         place = load_place("apartment")
         camera = replace(CAMERA, columns=640, rows=480, depth_max=50.0)
         step = SIMULATED_STEP * int(task.name)
-        for number, frame in enumerate(frames_of(place, camera)):
+        for number, frame in enumerate(frames_of(place, camera=camera)):
             if number == step:
                 return frame.points.astype(np.float32)
     assert clouds is not None

@@ -11,7 +11,7 @@ from lidarium.benchmarks.studies.shared.study import Progress, Study, kept_lines
 from lidarium.benchmarks.studies.sparse import drops, paths, quantisation
 from lidarium.benchmarks.studies.sparse.figures import figure_table
 from lidarium.benchmarks.studies.sparse.pictures import draw_errors, draw_paths
-from lidarium.benchmarks.studies.sparse.places import CELL_M, CLEAR_M, REQUESTS, SPACING_M, TURNS
+from lidarium.benchmarks.studies.sparse.places import CELL_M, CLEAR_M, REQUESTS, SPACING_M
 from lidarium.benchmarks.studies.sparse.tables import (
     MEASURES,
     error_table,
@@ -117,7 +117,7 @@ compare; K-means++ there labels on a GPU. {gpu}
 
 
 def work(folder: Path, data: Path | None, every: int, _workers: int) -> Progress:
-    """Measure every N-th place and cloud in this process, as times are taken."""
+    """Measure every N-th place and cloud in this process, as times are taken; places of a part by fewer frames."""
     yield from paths.work(folder, every)
     yield from drops.work(folder, every)
     yield from quantisation.work(folder, data, every)
@@ -133,7 +133,7 @@ def page(folder: Path) -> str:
     )
     return PAGE.format(
         spacing=SPACING_M,
-        turns=TURNS,
+        turns=lines[0]["turns"],
         requests=f"{REQUESTS:,}",
         clear=100.0 * CLEAR_M,
         cell=100.0 * CELL_M,

@@ -59,7 +59,7 @@ LOOSE = ValidationSettings(hit_distance_m=0.3, miss_distance_m=0.6)
 MIN_OVERLAP_M2, MIN_EVIDENCE_M, MAX_RIVAL_SHARE = 15.0, 4.0, 0.6
 """Overlap of a room, which is like others [m2], least evidence [m], and most that a rival may have."""
 
-MAX_STRAIN, MAX_STRAIN_OF_ROOMS = 0.05, 0.035
+MAX_STRAIN, MAX_STRAIN_OF_ROOMS = 0.06, 0.035
 """Most that a map is stretched against another of the same place, and if both know a few rooms alone: maps drift
 on their way, and rooms of strangers bend until they fit."""
 

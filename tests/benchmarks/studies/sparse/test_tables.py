@@ -10,7 +10,7 @@ from lidarium.benchmarks.studies.sparse import thesis_figures as thesis
 from lidarium.benchmarks.studies.sparse.figures import figure_table
 from lidarium.benchmarks.studies.sparse.maps import THESIS, THESIS_FRAME_CODES
 from lidarium.benchmarks.studies.sparse.pictures import draw_errors, draw_paths
-from lidarium.benchmarks.studies.sparse.places import PLACES
+from lidarium.benchmarks.studies.sparse.places import PLACES, TURNS, place_tasks
 from lidarium.benchmarks.studies.sparse.quantisation import CODES
 from lidarium.benchmarks.studies.sparse.tables import (
     MEASURES,
@@ -39,6 +39,7 @@ def line_of(place, missing=1, collide=0.0, seconds=5e-5):
     size = {"occupied": 500, "free": 400, "text": 30_000, "binary": 4000, "thesis_binary": 14_400}
     return {
         "place": place,
+        "turns": TURNS,
         "requests": 2,
         "straight": [3.5, 5.5],
         "optimum": [4.0, 5.8],
@@ -143,3 +144,8 @@ def test_the_page_of_stored_figures_is_that_which_is_published(tmp_path, lines, 
     keep(tmp_path / drops.DROPS_FILE, [{"place": place, "requests": 1000, **usages} for place in PLACES])
     assert "| apartment | full | 97.5 | 0 | 400 |" in study.page(tmp_path)
     assert_published("sparse", study.page(tmp_path), tmp_path)
+
+
+def test_a_part_of_the_study_takes_fewer_places_and_frames():
+    assert [(task.name, task.turns) for task in place_tasks(1)] == [(place, TURNS) for place in PLACES]
+    assert [(task.name, task.turns) for task in place_tasks(10)] == [(PLACES[0], TURNS // 2)]
