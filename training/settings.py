@@ -6,6 +6,7 @@ from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
+from lidarium.agents.supervisor.settings import SupervisorSettings
 from lidarium.agents.zoo.network import OBSERVED, TOURS
 from lidarium.envs.floors.generation.buildings import KINDS
 from lidarium.envs.settings.exploration import ExplorationSettings
@@ -247,9 +248,9 @@ class TeamSettings:
         World of the episodes to learn in; validation is in that of ``lidarium evaluate``.
     validation : str
         Floors on which checkpoints are compared; the best one is kept.
-    supervised : bool
-        Whether the team learns under a supervisor: starts are unknown, the station merges the maps, and robots follow
-        its orders. With ``ppo`` alone.
+    supervisor : dict, optional
+        Settings of a supervisor by name: starts are then unknown, the station merges the maps, and robots follow its
+        orders. With ``ppo`` alone; by default there is no supervisor.
     settings : dict
         More options of the environment, for learning and validation.
     ppo, value : PpoSettings, ValueSettings
@@ -265,7 +266,7 @@ class TeamSettings:
     horizon_s: Annotated[float, above(0.0, 1e6)] = 120.0
     realism: str = "fast"
     validation: str = "set:validation:16"
-    supervised: bool = False
+    supervisor: Mapping[str, Any] | None = None
     settings: Mapping[str, Any] = field(default_factory=dict)
     ppo: PpoSettings = field(default_factory=lambda: PpoSettings(**{**TEAM_PPO, "decisions": 65536}))
     value: ValueSettings = field(default_factory=lambda: ValueSettings(decisions=65536))
@@ -283,8 +284,12 @@ class TeamSettings:
             )
         if not learning.decisions:
             raise ValueError(f"decisions of {name} is 0; want how many the team makes while it learns")
-        if self.supervised and self.algorithm != "ppo":
+        if self.supervisor is not None and self.algorithm != "ppo":
             raise ValueError(f"algorithm of a team under a supervisor is {self.algorithm!r}; want ppo")
+        try:
+            SupervisorSettings(**(self.supervisor or {}))
+        except TypeError as error:
+            raise ValueError(f"supervisor of team cannot be used: {error}") from error
         taken = sorted({"robots", "horizon_s", "realism", "observe"} & set(self.settings))
         if taken:
             raise ValueError(f"settings of team has {shown(taken[0])}; the table [team] sets it, observe is fixed")
@@ -309,7 +314,7 @@ class TeamSettings:
         options = {
             "stop_coverage": 0.99,
             "state_cells": STATE_CELLS,
-            "known_starts": not self.supervised,
+            "known_starts": self.supervisor is None,
             **self.settings,
             "robots": self.robots,
             "horizon_s": self.horizon_s,

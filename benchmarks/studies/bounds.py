@@ -190,4 +190,4 @@ def page(folder: Path) -> str:
     return text + (f"\nPlans whose drive did not see 99 %: {missed}, left out.\n" if missed else "")
 
 
-STUDY = Study(page, work=work, quick=10)
+STUDY = Study(page, work=work, quick=10, needs={"bounds": ("ortools",)})

@@ -324,4 +324,4 @@ def page(folder: Path) -> str:
     )
 
 
-STUDY = Study(page, work=work, quick=20)
+STUDY = Study(page, work=work, quick=20, needs={"ray": ("ray",)})

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from tyro.conf import Positional
 
+from lidarium.extras import check_installed
 from lidarium.scripts.common import DEFECT, INTERRUPTED, Answer, Command, counted, notify
 
 if TYPE_CHECKING:
@@ -58,6 +59,8 @@ def execute(command: Reproduce) -> Answer:
     out = command.out or DEFAULT_FOLDER
     study = STUDIES[command.name]
     every = _every(command, study.quick)
+    for extra, packages in study.needs.items():
+        check_installed(f"the study {command.name}", packages, extra)
     check_writable(out)
     folder = command.runs / command.name
     workers = command.workers or len(os.sched_getaffinity(0))

@@ -1,6 +1,5 @@
 """`lidarium train`: train explorers by a teacher and by rewards, into a folder."""
 
-import importlib.util
 import json
 import os
 import shlex
@@ -14,7 +13,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from tyro.conf import Positional
 
-from lidarium.extras import install_command
+from lidarium.extras import check_installed
 from lidarium.scripts import first_start
 from lidarium.scripts.common import INTERRUPTED, LINE_PERIOD_S, Answer, Command, notify, table
 
@@ -80,9 +79,9 @@ def execute(command: _Train) -> Answer:
 
     settings = read_any_training(_file_of(command.config))
     is_prediction, is_team = isinstance(settings, PredictionSettings), isinstance(settings, TeamSettings)
-    _check_extra(EXTRA[:1] if is_prediction else EXTRA)
+    check_installed("training", EXTRA[:1] if is_prediction else EXTRA, "rl")
     if isinstance(settings, TeamSettings) and settings.table == "value":
-        _check_extra(("torchrl",), "torchrl")
+        check_installed("training", ("torchrl",), "torchrl")
     if command.device != "cpu" and not is_prediction:
         raise ValueError(f"--device is {command.device}, and explorers are trained on the cpu; leave it out")
     folder = command.out or DEFAULT_FOLDER
@@ -157,13 +156,6 @@ def _training_of(
     from lidarium.training.prediction.training import PredictionTraining
 
     return PredictionTraining(settings, folder, workers, device)
-
-
-def _check_extra(packages: Sequence[str], extra: str = "rl") -> None:
-    """Check that an extra is installed, as far as it is needed."""
-    missing = [name for name in packages if importlib.util.find_spec(name) is None]
-    if missing:
-        raise ValueError(f"training needs {', '.join(missing)}: {install_command(extra)}")
 
 
 class _Shown:

@@ -1,7 +1,9 @@
 """How to install an extra of the installation at hand: a checkout, or a wheel."""
 
+import importlib.util
 import json
 import re
+from collections.abc import Sequence
 from importlib.metadata import PackageNotFoundError, distribution
 
 _IN_CHECKOUT = 'pip install -c constraints.txt -e ".[{}]"'
@@ -32,6 +34,13 @@ def install_command(extra: str) -> str:
         return _IN_CHECKOUT.format(extra)
     packages = _packages(extra, found.requires or [])
     return f"pip install {' '.join(repr(package) for package in packages)}" if packages else _IN_CHECKOUT.format(extra)
+
+
+def check_installed(what: str, packages: Sequence[str], extra: str) -> None:
+    """Raise ValueError if modules of an extra are missing, before work that needs them begins."""
+    missing = [name for name in packages if importlib.util.find_spec(name) is None]
+    if missing:
+        raise ValueError(f"{what} needs {', '.join(missing)}: {install_command(extra)}")
 
 
 def _packages(extra: str, required: list[str]) -> list[str]:

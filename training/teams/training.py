@@ -73,10 +73,8 @@ class TeamTraining:
     def _learn_policy(self, is_new: bool) -> Generator[Checkpoint, None, None]:
         """Learn by PPO or MAPPO."""
         settings, ppo = self.settings, self.settings.ppo
-        options = {"level": settings.level, "threads": 1, "reports": settings.supervised, **self._world}
-        rows: VecEnv = sb3_vec_env(*self._floors(ppo), **options)
-        if settings.supervised:
-            rows = Supervised(rows, masks_orders=True)
+        options = {"level": settings.level, "threads": 1, **self._world}
+        rows: VecEnv = self._led(sb3_vec_env(*self._floors(ppo), reports=self._is_led, **options))
         if settings.algorithm == "mappo":
             rows = CentralState(rows)
         with closing(VecMonitor(rows)) as environment:
@@ -124,6 +122,15 @@ class TeamTraining:
             )
 
     @property
+    def _is_led(self) -> bool:
+        return self.settings.supervisor is not None
+
+    def _led(self, environment: Any) -> Any:  # noqa: ANN401
+        """Return a batch, under a supervisor if the team has one."""
+        led = self.settings.supervisor
+        return environment if led is None else Supervised(environment, masks_orders=True, **led)
+
+    @property
     def _world(self) -> dict[str, Any]:
         return self.settings.options(self.settings.realism)
 
@@ -149,9 +156,9 @@ class TeamTraining:
         """
         settings, floors = self.settings, set_floors(self.settings.validation)
         options = settings.options("ideal")
-        options |= {"level": settings.level, "threads": 1, "copy": False, "reports": settings.supervised}
+        options |= {"level": settings.level, "threads": 1, "copy": False, "reports": self._is_led}
         batch = vector_env(len(floors), floors[0], **options)
-        environment = Supervised(batch, masks_orders=True) if settings.supervised else batch
+        environment = self._led(batch)
         with closing(environment):
             seen, infos = environment.reset(seed=[0] * len(floors), options={"floor": list(floors)})
             reached, is_over = infos["truth"]["coverage"].copy(), np.zeros(environment.num_envs, np.bool_)

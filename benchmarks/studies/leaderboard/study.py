@@ -186,4 +186,4 @@ def _browser_page(folder: Path) -> Path:
     return folder / ALL / "report" / "report.html"
 
 
-STUDY = Study(page, suites, work, beside, quick=200)
+STUDY = Study(page, suites, work, beside, quick=200, needs={"bounds": ("ortools",)})

@@ -3,7 +3,7 @@
 import json
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -42,6 +42,8 @@ class Study:
         Takes the folder and that of the page, and draws the page's pictures.
     quick : int
         Every how many-th part ``--quick`` runs: at most five minutes on two slow cores.
+    needs : mapping of str to tuple of str
+        Modules that the work needs, by the extra that has them.
     """
 
     page: Callable[[Path], str]
@@ -49,6 +51,7 @@ class Study:
     work: Callable[[Path, Path | None, int, int], Iterator[tuple[str, int, int]]] | None = None
     pictures: Callable[[Path, Path], None] | None = None
     quick: int = 100
+    needs: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
 
 VERSION = "version"

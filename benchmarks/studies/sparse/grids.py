@@ -5,7 +5,6 @@ the robot's radius, on which A* finds paths that keep off obstacles.
 """
 
 import importlib
-import importlib.util
 import zlib
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.benchmarks.studies.sparse.places import BODY, Frame, Place
-from lidarium.extras import install_command
 from lidarium.mapping.planning.clearance import ClearanceField
 from lidarium.mapping.planning.footprint import Footprint
 from lidarium.mapping.planning.grid_planning import cells_of, centres_of, plan
@@ -92,8 +90,6 @@ class OctoMap:
     """An OctoMap of frames, made by the octomap library."""
 
     def __init__(self) -> None:
-        if importlib.util.find_spec("octomap") is None:
-            raise ModuleNotFoundError(f"the library octomap is missing: {install_command('bench')}")
         library: Any = importlib.import_module("octomap")
         self._tree: Any = library.OcTree(RESOLUTION_M)
 

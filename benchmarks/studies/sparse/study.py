@@ -179,4 +179,4 @@ def pictures(folder: Path, images: Path) -> None:
     draw_errors(images / ERRORS_PICTURE, kept_lines(folder / quantisation.QUANTISATION_FILE))
 
 
-STUDY = Study(page, work=work, pictures=pictures, quick=10)
+STUDY = Study(page, work=work, pictures=pictures, quick=10, needs={"bench": ("octomap", "shapely")})

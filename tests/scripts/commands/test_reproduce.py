@@ -1,9 +1,11 @@
 """Parts of a study that are asked for, and the command that a page names."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+from lidarium.benchmarks.studies import bounds
 from lidarium.scripts.commands.reproduce import Reproduce, _command_line, _every, _worked, execute
 
 
@@ -40,6 +42,13 @@ def test_bad_parts_are_refused_before_anything_is_written(options, message, tmp_
     with pytest.raises(ValueError, match=message):
         execute(Reproduce(name="floors", out=tmp_path / "out", runs=tmp_path / "runs", **options))
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_study_whose_packages_are_missing_says_so_before_it_runs(tmp_path, monkeypatch):
+    monkeypatch.setattr(bounds, "STUDY", replace(bounds.STUDY, needs={"ray": ("no_such_package",)}))
+    with pytest.raises(ValueError, match=r"the study bounds needs no_such_package: pip install .*ray"):
+        execute(Reproduce(name="bounds", out=tmp_path / "out", runs=tmp_path / "runs"))
+    assert not list(tmp_path.iterdir())
 
 
 def test_work_shows_each_new_part_and_ends_where_it_is_broken_off(capsys):

@@ -60,7 +60,7 @@ ALGORITHMS = {
     "ppo": TINY,
     "tours": TINY.replace("robots = 2", 'robots = 2\nlevel = "tour"'),
     "mappo": TINY.replace("robots = 2", 'robots = 2\nalgorithm = "mappo"'),
-    "supervised": TINY.replace("robots = 2", "robots = 2\nsupervised = true"),
+    "supervised": TINY.replace("robots = 2", "robots = 2\nsupervisor = { merge_period_s = 4.0 }"),
     "qmix": VALUES,
     "vdn": VALUES.replace("qmix", "vdn"),
 }
@@ -180,7 +180,8 @@ def test_before_a_training_a_team_does_as_tours_do():
         ("decisions = 32", "decisions = 0", "decisions of ppo is 0"),
         ("seed = 3", "seed = 3\nfit = {}", "a training of teams by ppo has no 'fit'"),
         ("robots = 2", 'robots = 2\nalgorithm = "qmix"', "a training of teams by qmix has no 'ppo'"),
-        ("robots = 2", 'robots = 2\nsupervised = true\nalgorithm = "mappo"', "under a supervisor is 'mappo'; want ppo"),
+        ("robots = 2", 'robots = 2\nsupervisor = {}\nalgorithm = "mappo"', "under a supervisor is 'mappo'; want ppo"),
+        ("robots = 2", "robots = 2\nsupervisor = { merge_s = 1 }", "supervisor of team cannot be used"),
         ("[ppo]", "[value]", "a training of teams by ppo has no 'value'"),
         ('"validation:2"', '"castle:3"', "castle"),
     ],
