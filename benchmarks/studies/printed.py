@@ -17,7 +17,7 @@ from lidarium.evaluation.statistics.estimates import paired_ratio
 from lidarium.evaluation.suites.campaign import EPISODES_FILE
 from lidarium.evaluation.suites.episodes_file import read_episodes
 from lidarium.evaluation.suites.presets import PRESETS, preset_suite
-from lidarium.evaluation.suites.suite import Suite
+from lidarium.evaluation.suites.suite import Starts, Suite
 
 NODES = ("nearest_node", "utility_node")
 WAYPOINTS = ("nearest_frontier", "utility_frontier", "explore_lite", "tour_frontier", "learned")
@@ -97,8 +97,14 @@ def suites(data: Path | None, every: int = 1) -> dict[str, Suite]:
 
 
 def _part(suite: Suite, every: int) -> Suite:
-    floors = suite.floors[::every]
-    return replace(suite, floors=floors, starts={floor: suite.starts[floor] for floor in floors if suite.starts})
+    """Return every N-th floor, or every N-th start where floors have some."""
+    if not suite.starts:
+        return replace(suite, floors=suite.floors[::every])
+    places = [(floor, start) for floor in suite.floors for start in suite.starts[floor]]
+    starts: dict[str, list[Starts]] = {}
+    for floor, start in places[::every]:
+        starts.setdefault(floor, []).append(start)
+    return replace(suite, floors=tuple(starts), starts=starts)
 
 
 def page(folder: Path) -> str:
