@@ -12,7 +12,16 @@ from numpy.typing import NDArray
 from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.onboard.radio.messages import Target
 from lidarium.envs.ros.graph import Graph
-from lidarium.mapping.files.bags.messages import CLOCK, GRID, LASER_SCAN, ODOMETRY, POSE_STAMPED, TRANSFORMS, TWIST
+from lidarium.mapping.files.bags.messages import (
+    CLOCK,
+    GRID,
+    LASER_SCAN,
+    ODOMETRY,
+    POSE_STAMPED,
+    TRANSFORMS,
+    TWIST,
+    TWIST_STAMPED,
+)
 from lidarium.mapping.files.bags.reading import frame_of, in_plane
 from lidarium.mapping.geometry.rigid import composed, relative
 from lidarium.mapping.grids.occupancy import FREE, OCCUPIED
@@ -118,7 +127,7 @@ class TeamServer:
         for robot in self.env.possible_agents:
             self.graph.advertise(f"/{robot}/scan", LASER_SCAN)
             self.graph.advertise(f"/{robot}/odom", ODOMETRY)
-            self.graph.subscribe(f"/{robot}/cmd_vel", TWIST)
+            self.graph.subscribe(f"/{robot}/cmd_vel", TWIST, TWIST_STAMPED)
             self.graph.subscribe(f"/{robot}/goal_pose", POSE_STAMPED)
         self._mount()
         self._draw()
@@ -195,7 +204,8 @@ class TeamServer:
         for row, robot in enumerate(self.env.possible_agents):
             driven, topic = self._driven[row], f"/{robot}/cmd_vel"
             for message, source, _ in self.graph.take(topic):
-                velocity = float(message.linear.x), float(message.angular.z)
+                twist = getattr(message, "twist", message)
+                velocity = float(twist.linear.x), float(twist.angular.z)
                 if not all(map(math.isfinite, velocity)):
                     self.graph.refuse(topic, "nan or infinite")
                 elif self._obeys(driven, source, topic):

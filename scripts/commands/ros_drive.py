@@ -130,7 +130,9 @@ def _driven(command: _RosDrive, policy: "Policy", graph: "Graph") -> "tuple[Epis
         commands = {each.command: TWIST_STAMPED if command.stamped else TWIST for each in names}
     unread = begin_driving(graph, commands)
     if unread:
-        notify(f"nobody reads {', '.join(unread)} yet: want a robot that is driven by it")
+        type_name = commands[unread[0]].rpartition("/")[2]
+        other = "" if command.sends == "goals" else f", or {'no ' if command.stamped else ''}--stamped"
+        notify(f"nobody reads {', '.join(unread)} as {type_name} yet: want a robot that does{other}")
     # Robots that do not know their starts are somewhere: apart, so that they may begin.
     starts = np.array([link.start() if on_map else (2.0 * k, 0.0, 0.0) for k, link in enumerate(links)])
 

@@ -27,7 +27,7 @@ class Robot:
         self.odometry(0.9, (0.0, 0.0, 0.0))
         self.scan(1.0)
         until(lambda: robot.subscribers(NAMES.scan) and robot.subscribers(NAMES.odometry))
-        until(lambda: driver._readers["/tf_static"][1].get_matched_publications())
+        until(lambda: driver._readers["/tf_static"][TRANSFORMS].get_matched_publications())
         until(self._begins)
         self.link.readings()
 
