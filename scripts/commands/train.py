@@ -49,7 +49,7 @@ class _Train(Command):
     compiles: ClassVar[bool] = True
 
     config: Positional[Path | None] = None
-    """TOML file of the training, with its seed, as docs/tutorials/train_a_team.md shows one; or a name of --list"""
+    """TOML file of the training, with its seed, such as `lidarium examples copy` gives; or a name of --list"""
     list: bool = False
     """list the trainings that ship, and end"""
     workers: int = 0
