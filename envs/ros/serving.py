@@ -157,15 +157,17 @@ class TeamServer:
         period = self.env.settings.time_step / speed if speed > 0.0 else 0.0
         self._publish()
         due, began, cpu = time.monotonic(), time.monotonic(), time.process_time()
-        while self.env.agents and not is_over():
-            due = self._pace(due, period)
-            if waits and not self._await():
-                break
-            self._hear()
-            self._step()
-            self._publish()
-        self.counts.wall_s += time.monotonic() - began
-        self.counts.cpu_s += time.process_time() - cpu
+        try:
+            while self.env.agents and not is_over():
+                due = self._pace(due, period)
+                if waits and not self._await():
+                    break
+                self._hear()
+                self._step()
+                self._publish()
+        finally:  # also of Ctrl-C, which is the usual end
+            self.counts.wall_s += time.monotonic() - began
+            self.counts.cpu_s += time.process_time() - cpu
 
     def _pace(self, due: float, period: float) -> float:
         """Sleep until a step is due; return when the next is."""

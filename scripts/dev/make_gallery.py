@@ -6,6 +6,7 @@ made again only with ``--films``; they take minutes.
 """
 
 import argparse
+import json
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
@@ -240,7 +241,7 @@ def _standings(found: Benchmark, task: BenchmarkTask) -> str:
 def _from_starts(has_camera: bool) -> str:
     """Return how policies do by the settings of the ids of one robot, from starts drawn by the seeds."""
     policies = ("sparse_frontier",) if has_camera else ("learned", "tour_frontier", "nearest_frontier", "random_walk")
-    settings = {"starts": "drawn", "horizon_s": HORIZON_S, **({"camera": "xtion"} if has_camera else {})}
+    settings = {"horizon_s": HORIZON_S, **({"camera": "xtion"} if has_camera else {})}
     rows = lidarium.evaluate(policies, floors=[FLOOR], robots=1, seeds=SEEDS, settings=settings, progress=False)
     lines = []
     for policy in policies:
@@ -249,8 +250,7 @@ def _from_starts(has_camera: bool) -> str:
         share = f"{100.0 * sum(map(math.isfinite, times)) / len(times):.0f}"
         lines.append((f"`{policy}`", share, f"{middle} [{first}, {last}]"))
     header = ("policy", "runs that see 99 % [%]", "median time to 99 % [s]")
-    given = f'"mine:Policy", robots=1, seeds={SEEDS}, settings={{"horizon_s": {HORIZON_S}}}'
-    command = f"`lidarium.evaluate({given})`"
+    command = f'`lidarium.evaluate("mine:Policy", robots=1, seeds={SEEDS}, settings={json.dumps(settings)})`'
     return (
         f"{markdown_table(header, lines)}\n\nFrom {SEEDS} starts on `{FLOOR}`, in brackets the soonest and the latest; "
         f"each policy decides at its own level. Your own policy: {command}."

@@ -142,3 +142,17 @@ def test_bad_commands_and_those_of_a_second_driver_are_refused_and_counted(nodes
         "/robot_0/goal_pose: not a pose in frame map": 1,
     }
     assert server._driven[0].velocity == (0.1, 0.0)
+
+
+def test_an_interrupted_run_is_counted_as_well(nodes):
+    server = TeamServer(environment(), nodes[0])
+
+    def is_over():
+        if server.counts.steps == 3:
+            raise KeyboardInterrupt
+        return False
+
+    with pytest.raises(KeyboardInterrupt):
+        server.run(0.0, is_over=is_over)
+    assert server.counts.wall_s > 0.0
+    assert server.counts.cpu_s > 0.0
