@@ -42,6 +42,8 @@ class _RosDrive(RosOptions):
     """settings of the supervisor as KEY=VALUE; --supervisor.KEY VALUE is the same"""
     namespaces: tuple[str, ...] = ("robot_0",)
     """namespaces of the robots, one for each; / for a robot without"""
+    transforms: Literal["shared", "own"] = "shared"
+    """transforms of all robots on `/tf`, or of each in its namespace, such as `/robot_0/tf`, as nav2 starts teams"""
     robot: str = "kobuki"
     """body and limits of the robots; `lidarium show robots` lists them"""
     localization: Literal["slam", "tf"] = "slam"
@@ -118,7 +120,8 @@ def _driven(command: _RosDrive, policy: "Policy", graph: "Graph") -> "tuple[Epis
     from lidarium.mapping.files.bags.messages import POSE_STAMPED, TWIST, TWIST_STAMPED
 
     on_map = command.localization == "tf"
-    names = [names_of(each, command.base) for each in command.namespaces]
+    has_own = command.transforms == "own"
+    names = [names_of(each, command.base, has_transforms=has_own) for each in command.namespaces]
     links = connected(graph, names, command.timeout_s, on_map=on_map)
     for link in links:
         if link.remark:
