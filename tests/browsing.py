@@ -19,7 +19,7 @@ def headless_chromium(graphics=PLAIN):
     try:
         from selenium import webdriver
     except ImportError as error:
-        raise ValueError('selenium is not installed; pip install "lidarium[browser]"') from error
+        raise ValueError("selenium is not installed: extra [browser]") from error
     browser = next((path for path in map(shutil.which, BROWSERS) if path), None)
     driver = shutil.which("chromedriver")
     if browser is None or driver is None:

@@ -1,5 +1,6 @@
 """Notebooks run, and objects show themselves there."""
 
+import importlib.util
 import io
 import re
 from pathlib import Path
@@ -45,9 +46,21 @@ def items():
     batch = lidarium.vector_env(3, "apartment", horizon_s=2.0)
     batch.reset(seed=0)
     yield "batch", batch
+    yield "batch in a wrapper", lidarium.gymnasium.wrappers.vector.RecordEpisodeStatistics(batch)
+    if importlib.util.find_spec("stable_baselines3"):
+        rows = lidarium.sb3_vec_env(2, "apartment", horizon_s=2.0)
+        rows.reset()
+        yield "batch of stable-baselines3", rows
     solo = lidarium.gymnasium.make("lidarium/Exploration-v1")
     solo.reset(seed=0)
     yield "Gymnasium environment", solo
+    yield "Gymnasium environment without wrappers", solo.unwrapped
+    turns = lidarium.env("apartment", robots=2, horizon_s=2.0)
+    turns.reset(seed=0)
+    yield "environment of turns", turns
+    supervised = lidarium.Supervised(lidarium.parallel_env("apartment", robots=2, known_starts=False, horizon_s=2.0))
+    supervised.reset(seed=0)
+    yield "environment in a wrapper", supervised
     yield "floor", lidarium.load_floor("apartment")
     record = lidarium.record("nearest_frontier", settings=lidarium.make_settings(horizon_s=3.0))
     yield "record", record
@@ -78,8 +91,9 @@ def test_maps_and_merged_maps_show_themselves(shell, tmp_path):
     assert picture_of(shell, merged).std() > 3.0
 
 
-def test_an_environment_before_its_reset_is_text(shell):
-    for env in (lidarium.parallel_env("apartment"), lidarium.vector_env(2, "apartment")):
+def test_environments_before_their_reset_and_of_others_are_text(shell):
+    others = lidarium.gymnasium.make("CartPole-v1"), lidarium.gymnasium.make_vec("CartPole-v1", num_envs=2)
+    for env in (lidarium.parallel_env("apartment"), lidarium.vector_env(2, "apartment"), *others):
         assert "image/png" not in shell.format(env)[0]
 
 

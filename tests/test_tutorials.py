@@ -58,7 +58,7 @@ def test_the_furnished_apartment_is_mapped_as_the_tutorial_says(capsys):
 
 @pytest.mark.filterwarnings("ignore")  # of stable-baselines3, about rows that it reads only
 def test_the_explorer_of_the_tutorial_is_trained_and_compared(capsys):
-    pytest.importorskip("sb3_contrib", reason='sb3-contrib is not installed: pip install "lidarium[rl]"')
+    pytest.importorskip("sb3_contrib", reason="sb3-contrib is not installed: extra [rl]")
     code = code_of("train_an_explorer.md").replace("set:train:64", "scene_room").replace("2_000", "100")
     exec(compile(code.replace('"validation:8"', '"validation:2"'), "train_an_explorer.md", "exec"), {})
     lines = capsys.readouterr().out.splitlines()

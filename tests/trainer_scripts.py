@@ -20,7 +20,7 @@ def script(name: str, needs: str, extra: str) -> ModuleType:
     """Return a script as a module; the test is skipped where the trainer is not installed."""
     wanted = (needs, RLLIB_NEEDS) if needs == "ray" else (needs,)
     if any(importlib.util.find_spec(each) is None for each in wanted):
-        pytest.skip(f'{needs} is not installed: pip install "lidarium[{extra}]"')
+        pytest.skip(f"{needs} is not installed: extra [{extra}]")
     if str(SCRIPTS) not in sys.path:  # trainers pickle what a script defines, by its name
         sys.path.append(str(SCRIPTS))
     return importlib.import_module(name)

@@ -4,6 +4,7 @@ import json
 import os
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -113,20 +114,26 @@ class MlflowLogger(Logger):
 LOGGERS: dict[str, type[Logger]] = {logger.name: logger for logger in (WandbLogger, MlflowLogger)}
 
 
-def make_logger(name: str, folder: Path, settings: Mapping[str, Any]) -> Logger:
-    """Return a logger by name.
+def check_logger(name: str) -> None:
+    """Check that there is such a logger, and that its package is installed.
 
     Raises
     ------
     ValueError
-        If there is no such logger, or its package is missing.
+        If one of both is not the case.
     """
     if name not in LOGGERS:
         raise ValueError(f"there is no logger {name!r}; want {' or '.join(LOGGERS)}")
     try:
-        return LOGGERS[name](folder, settings)
+        import_module(name)
     except ImportError as error:
         raise ValueError(f"logging to {name} needs a package: {install_command('loggers')} ({error})") from error
+
+
+def make_logger(name: str, folder: Path, settings: Mapping[str, Any]) -> Logger:
+    """Return a logger by name, in the folder of a training that has begun; see `check_logger`."""
+    check_logger(name)
+    return LOGGERS[name](folder, settings)
 
 
 def _runs_of(folder: Path) -> dict[str, str]:

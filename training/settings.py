@@ -417,7 +417,7 @@ def read_any_training(path: Path) -> TrainingSettings | PredictionSettings | Tea
     """
     path = Path(path)
     if not path.exists():
-        raise FileNotFoundError(f"no training {path}; want a TOML file, as docs/tutorials/train_a_team.md shows one")
+        raise FileNotFoundError(f"no training {path}; want a TOML file, such as `lidarium examples copy` gives")
     text = read_text(path, MOST_BYTES)
     with reading(path, "TOML"):
         content = tomllib.loads(text)

@@ -19,7 +19,7 @@ from lidarium.mapping.planning.touring.map_crops import FREE, OCCUPIED
 CROP_WIDTH = 48
 """Inner numbers of a crop."""
 
-SHIPPED, CARD = "learned.safetensors", "learned.json"
+SHIPPED, CARD = "learned.safetensors.xz", "learned.json"
 """Shipped weights and their card."""
 
 

@@ -12,7 +12,7 @@ from lidarium.mapping.files.weight_files import WeightFiles
 def zoo_files(name: str, level: str = "frontier") -> WeightFiles:
     """Return the files of a team of the zoo at a level, such as ``ppo-2``."""
     return WeightFiles(
-        network_shapes(level), "lidarium.agents.zoo", f"{name}.safetensors", f"{name}.json", is_half=True
+        network_shapes(level), "lidarium.agents.zoo", f"{name}.safetensors.xz", f"{name}.json", is_half=True
     )
 
 

@@ -112,9 +112,9 @@ class Graph(MessageWriter):
         except DDSException as error:
             raise ValueError(f"DDS cannot open domain {self.domain}: {error}; see CYCLONEDDS_URI") from error
         self._node, self._is_humble, self._store = node, is_humble, definitions(is_humble=is_humble)
-        self._topics: dict[str, Topic[Any]] = {}
+        self._topics: dict[tuple[str, str], Topic[Any]] = {}
         self._writers: dict[str, DataWriter[Any]] = {}
-        self._readers: dict[str, tuple[str, DataReader[Any]]] = {}
+        self._readers: dict[str, dict[str, DataReader[Any]]] = {}
         self._conditions: list[ReadCondition] = []
         self._waiting = WaitSet(self._participant)
         self._publications = BuiltinDataReader(self._participant, BuiltinTopicDcpsPublication)
@@ -129,41 +129,43 @@ class Graph(MessageWriter):
         )
         self._announce()
 
-    def subscribe(self, topic: str, name: str) -> None:
-        """Read a topic of a type of message from now on."""
+    def subscribe(self, topic: str, *names: str) -> None:
+        """Read a topic from now on, whichever of these types of message its publishers use."""
         if topic in self._readers:
             return
-        reader = DataReader(self._participant, self._topic(topic, name), quality(topic, name, is_read=True))
-        self._readers[topic] = name, reader
-        condition = ReadCondition(reader, SampleState.NotRead | ViewState.Any | InstanceState.Any)
-        self._conditions.append(condition)
-        self._waiting.attach(condition)
+        self._readers[topic] = {}
+        for name in names:
+            reader = DataReader(self._participant, self._topic(topic, name), quality(topic, name, is_read=True))
+            self._readers[topic][name] = reader
+            condition = ReadCondition(reader, SampleState.NotRead | ViewState.Any | InstanceState.Any)
+            self._conditions.append(condition)
+            self._waiting.attach(condition)
         self._announce()
 
     def take(self, topic: str) -> Iterator[Heard]:
-        """Yield the messages of a topic that have come since the last call, in order."""
-        name, reader = self._readers[topic]
-        try:
-            samples = reader.take(_TAKEN_AT_ONCE)
-        except DDSException as error:
-            self.refuse(topic, "DDS cannot read it")
-            logging.getLogger(__name__).debug("%s: %s", topic, error)
-            return
-        for sample in samples:
-            content = getattr(sample, "content", None)
-            if content is None:  # a publisher has left
-                continue
-            if len(content) > MAX_MESSAGE_BYTES:
-                self.refuse(topic, "too long")
-                continue
+        """Yield the messages of a topic that have come since the last call, those of each type in order."""
+        for name, reader in self._readers[topic].items():
             try:
-                message = self._store.deserialize_cdr(content, name)
-            # Generated code of rosbags meets the ends of arrays in several ways.
-            except (SerdeError, ValueError, IndexError, AssertionError, OverflowError, MemoryError):
-                self.refuse(topic, "malformed")
+                samples = reader.take(_TAKEN_AT_ONCE)
+            except DDSException as error:
+                self.refuse(topic, "DDS cannot read it")
+                logging.getLogger(__name__).debug("%s: %s", topic, error)
                 continue
-            about = sample.sample_info
-            yield Heard(message, int(about.publication_handle), 1e-9 * about.source_timestamp)
+            for sample in samples:
+                content = getattr(sample, "content", None)
+                if content is None:  # a publisher has left
+                    continue
+                if len(content) > MAX_MESSAGE_BYTES:
+                    self.refuse(topic, "too long")
+                    continue
+                try:
+                    message = self._store.deserialize_cdr(content, name)
+                # Generated code of rosbags meets the ends of arrays in several ways.
+                except (SerdeError, ValueError, IndexError, AssertionError, OverflowError, MemoryError):
+                    self.refuse(topic, "malformed")
+                    continue
+                about = sample.sample_info
+                yield Heard(message, int(about.publication_handle), 1e-9 * about.source_timestamp)
 
     def refuse(self, topic: str, reason: str) -> None:
         """Count a message that is not used."""
@@ -203,14 +205,14 @@ class Graph(MessageWriter):
         self.publish(topic, name, bytes(self._store.serialize_cdr(self._made(name, **fields), name)))
 
     def _topic(self, topic: str, name: str) -> Topic[Any]:
-        if topic not in self._topics:
+        if (topic, name) not in self._topics:
             mangled = topic if name == DISCOVERY else f"rt{topic}"
-            self._topics[topic] = Topic(self._participant, mangled, wire_type(name, is_humble=self._is_humble))
-        return self._topics[topic]
+            self._topics[topic, name] = Topic(self._participant, mangled, wire_type(name, is_humble=self._is_humble))
+        return self._topics[topic, name]
 
     def _announce(self) -> None:
         """Publish the list of this node's topics, as ``rmw_dds_common`` does."""
-        readers = [reader for _, reader in self._readers.values()]
+        readers = [reader for of_type in self._readers.values() for reader in of_type.values()]
         writers = [writer for topic, writer in self._writers.items() if topic != _DISCOVERY_TOPIC]
         node = self._made(
             "rmw_dds_common/msg/NodeEntitiesInfo",

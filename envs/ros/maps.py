@@ -48,7 +48,8 @@ class MapPublisher:
         own = not env.settings.known_starts
         for row, link in enumerate(world.links if own else []):
             origin = composed(env.beliefs.believed[row], relative(world.odometry_of(row), np.zeros(3)))
-            graph.transform(link.names.own_map_frame, link.odom_frame, link.stamp_s, origin)
+            names = link.names
+            graph.transform(names.own_map_frame, link.odom_frame, link.stamp_s, origin, topic=names.transforms)
         if not is_last and time.monotonic() < self._next_s:
             return
         self._next_s = time.monotonic() + MAP_PERIOD_S

@@ -60,6 +60,8 @@ class Names(NamedTuple):
         Frame of the robot's pose in the transforms.
     map, own_map_frame : str
         Topic and frame of the robot's own map.
+    transforms : str
+        Topic of the transforms; fixed ones are on that with ``_static`` behind it.
     """
 
     scan: str
@@ -70,15 +72,17 @@ class Names(NamedTuple):
     map_frame: str = "map"
     map: str = "/map"
     own_map_frame: str = "map"
+    transforms: str = "/tf"
 
 
-def names_of(namespace: str, base: str = "", map_frame: str = "map") -> Names:
-    """Return the usual names below a namespace, which may be empty."""
+def names_of(namespace: str, base: str = "", map_frame: str = "map", *, has_transforms: bool = False) -> Names:
+    """Return the usual names below a namespace, which may be empty, and may have transforms of its own."""
     before = f"/{namespace.strip('/')}" if namespace.strip("/") else ""
     scan, odometry, command, goal, own = (
         f"{before}/{name}" for name in ("scan", "odom", "cmd_vel", "goal_pose", "map")
     )
-    return Names(scan, odometry, command, goal, base, map_frame, own, own.removeprefix("/"))
+    transforms = f"{before}/tf" if has_transforms else "/tf"
+    return Names(scan, odometry, command, goal, base, map_frame, own, own.removeprefix("/"), transforms)
 
 
 class Reading(NamedTuple):
@@ -106,15 +110,15 @@ class Reading(NamedTuple):
 
 
 class Transforms:
-    """The transforms on ``/tf`` and ``/tf_static`` of a graph, for all its robots."""
+    """The transforms on a topic, and on that of fixed ones, for all robots that use it."""
 
-    def __init__(self, graph: Graph, topics: tuple[str, ...] = ("/tf", "/tf_static")) -> None:
-        self._graph, self._topics = graph, topics
+    def __init__(self, graph: Graph, topic: str = "/tf") -> None:
+        self._graph, self._topics = graph, (topic, f"{topic}_static")
         self.frames = Frames()
         self.moving: dict[tuple[str, str], deque[tuple[float, tuple[float, float, float]]]] = {}
         self._known: set[tuple[str, str]] = set()
-        for topic in topics:
-            graph.subscribe(topic, TRANSFORMS)
+        for each in self._topics:
+            graph.subscribe(each, TRANSFORMS)
 
     def hear(self) -> None:
         """Take new transforms."""
@@ -153,7 +157,7 @@ class RobotLink:
     names : Names
         Topics and frames.
     transforms : Transforms
-        Those of the graph.
+        Those of the robot's topic.
 
     Attributes
     ----------
@@ -285,7 +289,7 @@ class RobotLink:
                 self.odom_frame = parent
                 for stamp, pose in moves:
                     if not self._stamps or stamp > self._stamps[-1]:
-                        self._take_wheels("/tf", stamp, _Wheels(pose, self._speed(stamp, pose)))
+                        self._take_wheels(self.names.transforms, stamp, _Wheels(pose, self._speed(stamp, pose)))
 
     def _speed(self, stamp: float, pose: tuple[float, float, float]) -> tuple[float, float]:
         """Return speed and turn rate since the last reading [m/s, rad/s]."""
@@ -383,8 +387,8 @@ def connected(graph: Graph, team: Sequence[Names], timeout_s: float, *, on_map: 
 
     Raises ValueError if one has not in time, or has a laser that cannot be used.
     """
-    transforms = Transforms(graph)
-    links = [RobotLink(graph, names, transforms) for names in team]
+    transforms = {topic: Transforms(graph, topic) for topic in {names.transforms for names in team}}
+    links = [RobotLink(graph, names, transforms[names.transforms]) for names in team]
     until = time.monotonic() + timeout_s
     begun = [False] * len(links)
     while not all(begun):
@@ -394,8 +398,9 @@ def connected(graph: Graph, team: Sequence[Names], timeout_s: float, *, on_map: 
             silent = links[begun.index(False)].names
             refused = "; ".join(f"{reason} ({count} x)" for reason, count in graph.refused.items())
             raise ValueError(
-                f"in domain {graph.domain} nothing usable came on {silent.scan} and {silent.odometry} (or /tf)"
-                f"{f', or no transform from {silent.map_frame}' if on_map else ''} within {timeout_s:g} s"
+                f"in domain {graph.domain} nothing usable came on {silent.scan} and {silent.odometry} "
+                f"(or {silent.transforms}){f', or no transform from {silent.map_frame}' if on_map else ''} "
+                f"within {timeout_s:g} s"
                 f"{f' (refused: {refused})' if refused else ''}; want a robot that publishes both there, another "
                 "--domain, or other --namespaces"
             )

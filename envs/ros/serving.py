@@ -12,7 +12,16 @@ from numpy.typing import NDArray
 from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.onboard.radio.messages import Target
 from lidarium.envs.ros.graph import Graph
-from lidarium.mapping.files.bags.messages import CLOCK, GRID, LASER_SCAN, ODOMETRY, POSE_STAMPED, TRANSFORMS, TWIST
+from lidarium.mapping.files.bags.messages import (
+    CLOCK,
+    GRID,
+    LASER_SCAN,
+    ODOMETRY,
+    POSE_STAMPED,
+    TRANSFORMS,
+    TWIST,
+    TWIST_STAMPED,
+)
 from lidarium.mapping.files.bags.reading import frame_of, in_plane
 from lidarium.mapping.geometry.rigid import composed, relative
 from lidarium.mapping.grids.occupancy import FREE, OCCUPIED
@@ -118,7 +127,7 @@ class TeamServer:
         for robot in self.env.possible_agents:
             self.graph.advertise(f"/{robot}/scan", LASER_SCAN)
             self.graph.advertise(f"/{robot}/odom", ODOMETRY)
-            self.graph.subscribe(f"/{robot}/cmd_vel", TWIST)
+            self.graph.subscribe(f"/{robot}/cmd_vel", TWIST, TWIST_STAMPED)
             self.graph.subscribe(f"/{robot}/goal_pose", POSE_STAMPED)
         self._mount()
         self._draw()
@@ -148,15 +157,17 @@ class TeamServer:
         period = self.env.settings.time_step / speed if speed > 0.0 else 0.0
         self._publish()
         due, began, cpu = time.monotonic(), time.monotonic(), time.process_time()
-        while self.env.agents and not is_over():
-            due = self._pace(due, period)
-            if waits and not self._await():
-                break
-            self._hear()
-            self._step()
-            self._publish()
-        self.counts.wall_s += time.monotonic() - began
-        self.counts.cpu_s += time.process_time() - cpu
+        try:
+            while self.env.agents and not is_over():
+                due = self._pace(due, period)
+                if waits and not self._await():
+                    break
+                self._hear()
+                self._step()
+                self._publish()
+        finally:  # also of Ctrl-C, which is the usual end
+            self.counts.wall_s += time.monotonic() - began
+            self.counts.cpu_s += time.process_time() - cpu
 
     def _pace(self, due: float, period: float) -> float:
         """Sleep until a step is due; return when the next is."""
@@ -195,7 +206,8 @@ class TeamServer:
         for row, robot in enumerate(self.env.possible_agents):
             driven, topic = self._driven[row], f"/{robot}/cmd_vel"
             for message, source, _ in self.graph.take(topic):
-                velocity = float(message.linear.x), float(message.angular.z)
+                twist = getattr(message, "twist", message)
+                velocity = float(twist.linear.x), float(twist.angular.z)
                 if not all(map(math.isfinite, velocity)):
                     self.graph.refuse(topic, "nan or infinite")
                 elif self._obeys(driven, source, topic):

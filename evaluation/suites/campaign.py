@@ -149,7 +149,7 @@ def evaluate(
         Whether each episode is compared with the bound of a team that has the floor plan; False by default.
         Needs the extra ``bounds``.
     progress : bool, optional
-        Whether a progress bar is shown, in a notebook as a widget or as text; False by default.
+        Whether a progress bar is shown, in notebooks too as text; False by default.
 
     Returns
     -------

@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import lzma
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib import resources
@@ -34,7 +35,7 @@ class WeightFiles:
     package : str
         The package whose folder ``data`` has the weights that are shipped.
     shipped, card : str
-        Names of their file and of its card, which has its SHA-256.
+        Names of their file, compressed by ``xz``, and of its card, which has the SHA-256 of its content.
     is_half : bool
         Whether files hold half precision, which takes half the space.
     """
@@ -93,9 +94,9 @@ class WeightFiles:
         """Return the package's weights, checked against the hash that their card names."""
         folder = resources.files(self.package) / "data"
         try:
-            content = (folder / self.shipped).read_bytes()
+            content = lzma.decompress((folder / self.shipped).read_bytes())
             wanted = json.loads((folder / self.card).read_text(encoding="utf-8"))["sha256"]
-        except (OSError, ValueError, LookupError, TypeError) as error:
+        except (OSError, lzma.LZMAError, ValueError, LookupError, TypeError) as error:
             raise ValueError(
                 f"{self.shipped} of the package or its card {self.card} cannot be read ({reason(error)}); install "
                 "the package again, or name a file of weights: weights=FILE"

@@ -55,7 +55,7 @@ def shapes() -> dict[str, tuple[int, ...]]:
     return table
 
 
-FILES = WeightFiles(shapes(), "lidarium.mapping.prediction", "prediction.safetensors", "prediction.json")
+FILES = WeightFiles(shapes(), "lidarium.mapping.prediction", "prediction.safetensors.xz", "prediction.json")
 """Files of this network's weights."""
 
 

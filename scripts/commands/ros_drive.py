@@ -42,6 +42,8 @@ class _RosDrive(RosOptions):
     """settings of the supervisor as KEY=VALUE; --supervisor.KEY VALUE is the same"""
     namespaces: tuple[str, ...] = ("robot_0",)
     """namespaces of the robots, one for each; / for a robot without"""
+    transforms: Literal["shared", "own"] = "shared"
+    """transforms of all robots on `/tf`, or of each in its namespace, such as `/robot_0/tf`, as nav2 starts teams"""
     robot: str = "kobuki"
     """body and limits of the robots; `lidarium show robots` lists them"""
     localization: Literal["slam", "tf"] = "slam"
@@ -118,7 +120,8 @@ def _driven(command: _RosDrive, policy: "Policy", graph: "Graph") -> "tuple[Epis
     from lidarium.mapping.files.bags.messages import POSE_STAMPED, TWIST, TWIST_STAMPED
 
     on_map = command.localization == "tf"
-    names = [names_of(each, command.base) for each in command.namespaces]
+    has_own = command.transforms == "own"
+    names = [names_of(each, command.base, has_transforms=has_own) for each in command.namespaces]
     links = connected(graph, names, command.timeout_s, on_map=on_map)
     for link in links:
         if link.remark:
@@ -130,7 +133,9 @@ def _driven(command: _RosDrive, policy: "Policy", graph: "Graph") -> "tuple[Epis
         commands = {each.command: TWIST_STAMPED if command.stamped else TWIST for each in names}
     unread = begin_driving(graph, commands)
     if unread:
-        notify(f"nobody reads {', '.join(unread)} yet: want a robot that is driven by it")
+        type_name = commands[unread[0]].rpartition("/")[2]
+        other = "" if command.sends == "goals" else f", or {'no ' if command.stamped else ''}--stamped"
+        notify(f"nobody reads {', '.join(unread)} as {type_name} yet: want a robot that does{other}")
     # Robots that do not know their starts are somewhere: apart, so that they may begin.
     starts = np.array([link.start() if on_map else (2.0 * k, 0.0, 0.0) for k, link in enumerate(links)])
 

@@ -48,7 +48,7 @@ class _Train(Command):
     compiles: ClassVar[bool] = True
 
     config: Positional[Path | None] = None
-    """TOML file of the training, with its seed, as docs/tutorials/train_a_team.md shows one; or a name of --list"""
+    """TOML file of the training, with its seed, such as `lidarium examples copy` gives; or a name of --list"""
     list: bool = False
     """list the trainings that ship, and end"""
     workers: int = 0
@@ -74,6 +74,7 @@ def execute(command: _Train) -> Answer:
             f"--seed is {command.seed}, and a training draws from the seed of its file; write "
             f"seed = {command.seed} at the top of {command.config}"
         )
+    from lidarium.training.loggers import check_logger
     from lidarium.training.prediction.settings import PredictionSettings
     from lidarium.training.settings import TeamSettings, read_any_training
 
@@ -86,12 +87,16 @@ def execute(command: _Train) -> Answer:
         raise ValueError(f"--device is {command.device}, and explorers are trained on the cpu; leave it out")
     folder = command.out or DEFAULT_FOLDER
     check_writable(folder)
+    for name in command.log:
+        check_logger(name)
     first_start.compile_first(command.json)
     training = _training_of(settings, folder, command.workers or len(os.sched_getaffinity(0)), command.device)
-    loggers = _loggers(command.log, folder, settings)
     steps, show, is_interrupted, is_whole = training.run(), _Shown(command.json), False, False
+    loggers: list[Logger] = []
     try:
         for step in steps:
+            # A training refuses a folder with files of others, so that loggers write theirs after its first step.
+            loggers = loggers or _loggers(command.log, folder, settings)
             show(step)
             for logger in loggers:
                 logger.log(step)

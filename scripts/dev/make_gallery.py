@@ -6,9 +6,13 @@ made again only with ``--films``; they take minutes.
 """
 
 import argparse
+import json
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
+from statistics import median
 from tempfile import TemporaryDirectory
 from typing import Any
 
@@ -24,7 +28,7 @@ from lidarium.evaluation.drawing.films import FILMS, FilmSettings, filmed, frame
 from lidarium.evaluation.drawing.run_picture import save_floor_picture
 from lidarium.evaluation.episodes.runner import run_episode
 from lidarium.evaluation.episodes.watching import WatchedExploration
-from lidarium.evaluation.report.tables import interval, markdown_table
+from lidarium.evaluation.report.tables import interval, markdown_table, number
 from lidarium.mapping.files.output import write_text
 
 DOCS = Path(__file__).parents[2] / "docs"
@@ -53,6 +57,9 @@ FLOORS = (
     "robot_map:aaf_care_home",
 )
 """Floors of the gallery."""
+
+FLOOR, SEEDS, HORIZON_S = "apartment", 10, 600.0
+"""Floor, number of starts and horizon [s] of the figures on the pages of one robot."""
 
 OF_GYMNASIUM = {
     "Exploration": "One robot with a laser; an action is speed and turn rate for 0.1 s.",
@@ -117,6 +124,7 @@ def page(entry: Entry, found: Benchmark) -> str:
     """Return the page of an environment."""
     env = _made(entry)
     about = entry.about if entry.about.endswith(".") else f"{entry.about}."
+    standings = _from_starts("camera" in entry.settings) if entry.task is None else _standings(found, entry.task)
     parts = [
         f"# {entry.name}",
         f"![{entry.policy} on {entry.floor}](../images/gallery/{entry.name}.webp)",
@@ -136,9 +144,9 @@ def page(entry: Entry, found: Benchmark) -> str:
         _settings(entry),
         "## Versions",
         _versions(entry),
+        "## Reference policies",
+        standings,
     ]
-    if entry.task is not None:
-        parts += ["## Reference policies", _standings(found, entry.task)]
     env.close()
     return "\n\n".join(parts) + "\n"
 
@@ -227,6 +235,26 @@ def _standings(found: Benchmark, task: BenchmarkTask) -> str:
     header = ("policy", "runs that see 99 % [%]", "median time to 99 % [s]", "time over the baseline's")
     command = f"`lidarium benchmark {found.name} --tasks {task.name} --policies mine:Policy`"
     return f"{markdown_table(header, rows)}\n\nIn brackets 95 % intervals over floors. Your own policy: {command}."
+
+
+@cache
+def _from_starts(has_camera: bool) -> str:
+    """Return how policies do by the settings of the ids of one robot, from starts drawn by the seeds."""
+    policies = ("sparse_frontier",) if has_camera else ("learned", "tour_frontier", "nearest_frontier", "random_walk")
+    settings = {"horizon_s": HORIZON_S, **({"camera": "xtion"} if has_camera else {})}
+    rows = lidarium.evaluate(policies, floors=[FLOOR], robots=1, seeds=SEEDS, settings=settings, progress=False)
+    lines = []
+    for policy in policies:
+        times = sorted(math.inf if row["t99_s"] is None else row["t99_s"] for row in rows if row["policy"] == policy)
+        first, middle, last = (number(each, HORIZON_S, 0) for each in (times[0], median(times), times[-1]))
+        share = f"{100.0 * sum(map(math.isfinite, times)) / len(times):.0f}"
+        lines.append((f"`{policy}`", share, f"{middle} [{first}, {last}]"))
+    header = ("policy", "runs that see 99 % [%]", "median time to 99 % [s]")
+    command = f'`lidarium.evaluate("mine:Policy", robots=1, seeds={SEEDS}, settings={json.dumps(settings)})`'
+    return (
+        f"{markdown_table(header, lines)}\n\nFrom {SEEDS} starts on `{FLOOR}`, in brackets the soonest and the latest; "
+        f"each policy decides at its own level. Your own policy: {command}."
+    )
 
 
 def index(listed: list[Entry]) -> str:

@@ -40,17 +40,12 @@ def _cells(levels: NDArray[np.uint8]) -> bytes:
 
 
 def _env(env: Any) -> bytes | None:  # noqa: ANN401
-    """Return a frame of an environment; nothing before its first reset."""
+    """Return a frame of an environment of ours, in any form and in wrappers; nothing of others, or before a reset."""
     from lidarium.envs.drawing.rendering import draw_frame
+    from lidarium.envs.faces.parallel import ExplorationEnv
 
-    return None if env.floor is None else _png(draw_frame(env.scene()))
-
-
-def _wrapped(env: Any) -> bytes | None:  # noqa: ANN401
-    """Return a frame of a Gymnasium environment of ours in wrappers; nothing of others."""
-    parallel = getattr(env.unwrapped, "parallel", None)
-    module = type(env.unwrapped).__module__
-    return _env(parallel) if parallel is not None and module.startswith("lidarium.") else None
+    inner = getattr(env.unwrapped, "parallel", env).unwrapped
+    return _png(draw_frame(inner.scene())) if isinstance(inner, ExplorationEnv) and inner.floor is not None else None
 
 
 def _floor(floor: Any) -> bytes:  # noqa: ANN401
@@ -61,10 +56,13 @@ def _floor(floor: Any) -> bytes:  # noqa: ANN401
 
 
 def _batch(batch: Any) -> bytes | None:  # noqa: ANN401
-    """Return a frame of each episode of a batch, tiled; nothing before its first reset."""
+    """Return a frame of each episode of a batch of ours, tiled; nothing of others, or before its first reset."""
     from lidarium.envs.drawing.batch_frames import batch_frames, tiled
+    from lidarium.envs.faces.vector_env import BatchFace
 
-    scenes = batch.batch.scenes()
+    if not isinstance(batch.unwrapped, BatchFace):
+        return None
+    scenes = batch.unwrapped.batch.scenes()
     return None if any(scene.name == "" for scene in scenes) else _png(tiled(batch_frames(scenes)))
 
 
@@ -117,9 +115,11 @@ def _listed(values: Sequence[Any]) -> str:
 
 
 PICTURES: dict[str, Callable[[Any], bytes | None]] = {
-    "gymnasium.core.Wrapper": _wrapped,
-    "lidarium.envs.faces.parallel.ExplorationEnv": _env,
-    "lidarium.envs.faces.vector_env.ExplorationVectorEnv": _batch,
+    "gymnasium.core.Env": _env,
+    "pettingzoo.utils.env.AECEnv": _env,
+    "pettingzoo.utils.env.ParallelEnv": _env,
+    "gymnasium.vector.vector_env.VectorEnv": _batch,
+    "lidarium.envs.faces.vector_env.BatchFace": _batch,
     "lidarium.envs.floors.floor.Floor": _floor,
     "lidarium.mapping.files.map_files.MapImage": lambda image: _cells(image.levels),
     "lidarium.mapping.grids.occupancy.OccupancyGrid": lambda grid: _cells(grid.levels()),

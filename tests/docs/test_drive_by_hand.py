@@ -9,7 +9,7 @@ import pytest
 import lidarium
 from lidarium.scripts.main import main
 
-pytest.importorskip("torch", reason='torch is not installed: pip install "lidarium[rl]"')
+pytest.importorskip("torch", reason="torch is not installed: extra [rl]")
 PAGE = Path(__file__).parents[2] / "docs" / "tutorials" / "drive_by_hand.md"
 
 

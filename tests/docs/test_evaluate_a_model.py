@@ -8,7 +8,7 @@ import pytest
 
 from lidarium.scripts.main import main
 
-pytest.importorskip("sb3_contrib", reason='sb3-contrib is not installed: pip install "lidarium[rl]"')
+pytest.importorskip("sb3_contrib", reason="sb3-contrib is not installed: extra [rl]")
 PAGE = Path(__file__).parents[2] / "docs" / "how_to" / "evaluate_a_model.md"
 
 

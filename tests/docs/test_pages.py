@@ -60,7 +60,7 @@ def test_links_lead_to_files(page):
 
 
 FOLDERS = ("envs", "agents", "mapping", "evaluation", "training", "scripts", "benchmarks", "tests", "src")
-FROM_ELSEWHERE = {"ParallelPettingZooEnv", "rmw_cyclonedds"}
+FROM_ELSEWHERE = {"ParallelPettingZooEnv", "bt_navigator", "navigate_to_pose", "rmw_cyclonedds"}
 """Names of other projects."""
 
 NO_NAMES = {"d_wall", "f_i", "intel_gfs", "floor_remark"}

@@ -9,7 +9,7 @@ from trainer_scripts import ROOM, script
 
 @pytest.fixture(autouse=True)
 def one_thread():
-    torch = pytest.importorskip("torch", reason='torch is not installed: pip install "lidarium[rl]"')
+    torch = pytest.importorskip("torch", reason="torch is not installed: extra [rl]")
     before = torch.get_num_threads()
     torch.set_num_threads(1)
     yield

@@ -62,14 +62,14 @@ def test_a_training_that_goes_on_continues_its_run(wandb, tmp_path):
     assert [run.ended for run in wandb] == [1, 0]
 
 
-def test_unknown_loggers_and_missing_packages_are_told(tmp_path, monkeypatch):
+def test_unknown_loggers_and_missing_packages_are_told(wandb, tmp_path, monkeypatch):
     with pytest.raises(ValueError, match="there is no logger 'paper'; want wandb or mlflow"):
         make_logger("paper", tmp_path, {})
-    monkeypatch.setitem(sys.modules, "wandb", None)
-    with pytest.raises(ValueError, match="logging to wandb needs a package: pip install"):
-        make_logger("wandb", tmp_path, {})
     (tmp_path / RUNS_FILE).write_text("[]")
     with pytest.raises(ValueError, match="remove it, and new ones begin"):
+        make_logger("wandb", tmp_path, {})
+    monkeypatch.setitem(sys.modules, "wandb", None)
+    with pytest.raises(ValueError, match="logging to wandb needs a package: pip install"):
         make_logger("wandb", tmp_path, {})
 
 
@@ -102,7 +102,7 @@ def test_mlflow_in_the_folder(tmp_path, monkeypatch):
     assert found.info.status == "FINISHED"
 
 
-def test_the_command_hands_steps_to_its_loggers(tmp_path, monkeypatch):
+def test_the_command_hands_steps_to_its_loggers(wandb, tmp_path, monkeypatch):
     from lidarium.scripts.commands import train
 
     told = []

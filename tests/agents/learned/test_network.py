@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import lzma
 import pickle
 import re
 from importlib import resources
@@ -129,12 +130,19 @@ def test_weights_of_another_network_are_not_written(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
+def save_packed(path, weights):
+    """Save weights as the package has them; return the hash of what is packed."""
+    digest = save_weights(path, weights)
+    path.write_bytes(lzma.compress(path.read_bytes()))
+    return digest
+
+
 @pytest.fixture
 def package(tmp_path, monkeypatch):
     """A package whose weights are in another folder."""
     monkeypatch.setattr(weight_files.resources, "files", lambda name: tmp_path)
     network._shipped.cache_clear()
-    digest = save_weights(tmp_path / "data" / SHIPPED, drawn())
+    digest = save_packed(tmp_path / "data" / SHIPPED, drawn())
     (tmp_path / "data" / CARD).write_text(json.dumps({"sha256": digest}))
     yield tmp_path / "data"
     network._shipped.cache_clear()
@@ -147,7 +155,7 @@ def test_weights_of_the_package_are_those_that_their_card_names(package):
 def test_weights_of_the_package_that_were_changed_are_refused(package):
     other = drawn()
     other["steepness"][0] += 1.0
-    save_weights(package / SHIPPED, other)
+    save_packed(package / SHIPPED, other)
     with pytest.raises(ValueError, match=r"not what its card learned\.json names; install"):
         load_weights()
 
@@ -200,7 +208,7 @@ def test_no_source_of_training_and_policy_loads_pickles():
 
 def test_the_package_ships_weights_that_are_what_their_card_names():
     folder = resources.files("lidarium.agents.learned") / "data"
-    content = (folder / SHIPPED).read_bytes()
+    content = lzma.decompress((folder / SHIPPED).read_bytes())
     card = json.loads((folder / CARD).read_text(encoding="utf-8"))
     assert hashlib.sha256(content).hexdigest() == card["sha256"]
     assert len(content) <= 5_000_000

@@ -6,7 +6,7 @@ import pytest
 
 import lidarium
 
-pytest.importorskip("moviepy", reason='moviepy is not installed: pip install "lidarium[video]"')
+pytest.importorskip("moviepy", reason="moviepy is not installed: extra [video]")
 # Recorders warn that they write, and about each other's versions.
 pytestmark = pytest.mark.filterwarnings("ignore")
 

@@ -11,10 +11,8 @@ import lidarium
 from lidarium.envs.floors.floor import Floor, Solid
 from lidarium.envs.settings.lidar import Lidar
 
-stable_baselines3 = pytest.importorskip(
-    "stable_baselines3", reason='stable-baselines3 is not installed: pip install "lidarium[rl]"'
-)
-sb3_contrib = pytest.importorskip("sb3_contrib", reason='sb3-contrib is not installed: pip install "lidarium[rl]"')
+stable_baselines3 = pytest.importorskip("stable_baselines3", reason="stable-baselines3 is not installed: extra [rl]")
+sb3_contrib = pytest.importorskip("sb3_contrib", reason="sb3-contrib is not installed: extra [rl]")
 
 import torch  # noqa: E402
 from sb3_contrib.common.maskable.utils import get_action_masks, is_masking_supported  # noqa: E402

@@ -82,10 +82,10 @@ def test_messages_that_are_malformed_or_too_long_are_refused_and_counted(monkeyp
     with node() as a:
         a.subscribe("/cmd_vel", TWIST)
         samples = [SimpleNamespace(content=content, sample_info=info) for content in bad]
-        monkeypatch.setitem(a._readers, "/cmd_vel", (TWIST, SimpleNamespace(take=lambda _: samples)))
+        monkeypatch.setitem(a._readers, "/cmd_vel", {TWIST: SimpleNamespace(take=lambda _: samples)})
         assert list(a.take("/cmd_vel")) == []
         assert a.refused == {"/cmd_vel: malformed": 4, "/cmd_vel: too long": 1}
-        monkeypatch.setitem(a._readers, "/cmd_vel", (TWIST, SimpleNamespace(take=lambda _: [])))
+        monkeypatch.setitem(a._readers, "/cmd_vel", {TWIST: SimpleNamespace(take=lambda _: [])})
 
 
 def test_other_publishers_of_a_topic_are_counted():

@@ -12,6 +12,7 @@ pytest.importorskip("cyclonedds", reason="cyclonedds (extra ros) is not installe
 from ros_graphs import DOMAIN, node, until
 
 import lidarium
+from lidarium.envs.ros import robots
 from lidarium.envs.ros.playing import play
 from lidarium.envs.ros.robots import RobotLink, Transforms, names_of
 from lidarium.envs.ros.serving import TeamServer
@@ -87,9 +88,12 @@ def test_robots_are_driven_by_goals_in_the_frame_of_the_transforms(tmp_path, cap
     assert not server.graph.refused
 
 
-def test_a_robot_that_is_given_the_map_has_nothing_to_explore(tmp_path, capsys):
+def test_a_robot_that_is_given_the_map_has_nothing_to_explore(tmp_path, capsys, monkeypatch):
+    begin = robots.begin_driving
+    monkeypatch.setattr(robots, "begin_driving", lambda graph, topics: begin(graph, topics) or list(topics))
     with served(1) as server:
         code, result = drive(tmp_path, "--horizon-s", "60", "--localization", "tf", "--map", "--stale-s", "60")
+    assert "nobody reads /robot_0/cmd_vel as Twist yet: want a robot that does, or --stamped" in capsys.readouterr().err
     assert code == 0
     assert result["free_m2"]["robot_0"] > 40.0
     assert result["travelled_m"]["robot_0"] < 1.0

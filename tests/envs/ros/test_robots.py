@@ -1,6 +1,7 @@
 """A robot is heard as its messages say, and bad messages are refused and counted."""
 
 import math
+import threading
 
 import numpy as np
 import pytest
@@ -27,7 +28,7 @@ class Robot:
         self.odometry(0.9, (0.0, 0.0, 0.0))
         self.scan(1.0)
         until(lambda: robot.subscribers(NAMES.scan) and robot.subscribers(NAMES.odometry))
-        until(lambda: driver._readers["/tf_static"][1].get_matched_publications())
+        until(lambda: driver._readers["/tf_static"][TRANSFORMS].get_matched_publications())
         until(self._begins)
         self.link.readings()
 
@@ -74,6 +75,32 @@ def test_transforms_say_where_the_robot_is_on_the_map(nodes):
     robot.odometry(2.0, (1.0, 0.0, 0.0))
     robot.scan(2.0)
     np.testing.assert_allclose(robot.reading().mapped, [5.0, 7.0, math.pi / 2], atol=1e-9)
+
+
+def test_robots_with_transforms_of_their_own_may_have_the_same_frames(nodes):
+    robot, driver = nodes
+    team = [names_of(f"robot_{k}", has_transforms=True) for k in range(2)]
+    for k, names in enumerate(team):
+        robot.transform("base", "laser", 1.0, (0.1 * k, 0.0, 0.0), is_static=True, topic=f"{names.transforms}_static")
+    sending, over = threading.Thread(target=lambda: _send(robot, team, over)), threading.Event()
+    sending.start()
+    try:
+        links = connected(driver, team, 20.0, on_map=True)
+    finally:
+        over.set()
+        sending.join()
+    assert [link._mounting.pose[0] for link in links] == pytest.approx([0.0, 0.1])
+    assert [link.start()[0] for link in links] == pytest.approx([0.0, 5.0])
+
+
+def _send(robot, team, over):
+    time_s = 1.0
+    while not over.wait(0.02):
+        time_s += 0.1
+        for k, names in enumerate(team):
+            robot.transform("map", "odom", time_s, (5.0 * k, 0.0, 0.0), topic=names.transforms)
+            robot.odometry(names.odometry, "odom", "base", time_s, (0.0, 0.0, 0.0), (0.0, 0.0))
+            robot.scan(names.scan, "laser", time_s, SCAN, GEOMETRY)
 
 
 def test_scans_in_another_frame_or_back_in_time_are_refused_and_counted(nodes):

@@ -11,7 +11,16 @@ from ros_graphs import heard, node, until
 
 import lidarium
 from lidarium.envs.ros.serving import BEGINNING_S, TeamServer
-from lidarium.mapping.files.bags.messages import CLOCK, GRID, LASER_SCAN, ODOMETRY, POSE_STAMPED, TRANSFORMS, TWIST
+from lidarium.mapping.files.bags.messages import (
+    CLOCK,
+    GRID,
+    LASER_SCAN,
+    ODOMETRY,
+    POSE_STAMPED,
+    TRANSFORMS,
+    TWIST,
+    TWIST_STAMPED,
+)
 from lidarium.mapping.files.bags.reading import in_plane
 
 
@@ -83,13 +92,14 @@ def test_the_truth_is_shown_or_put_aside(nodes, shows_truth, topics):
     np.testing.assert_array_equal(grid.data.reshape(grid.info.height, -1) == 100, tables.laser.solid != 0)
 
 
-def test_a_robot_drives_as_commanded_and_stops_when_commands_do(nodes):
+@pytest.mark.parametrize(("name", "frame"), [(TWIST, None), (TWIST_STAMPED, "robot_0/base_link")])
+def test_a_robot_drives_as_commanded_and_stops_when_commands_do(nodes, name, frame):
     robots, driver = nodes
     env = environment()
     server = TeamServer(env, robots)
-    driver.advertise("/robot_0/cmd_vel", TWIST)
+    driver.advertise("/robot_0/cmd_vel", name)
     until(lambda: driver.subscribers("/robot_0/cmd_vel"))
-    driver.velocity("/robot_0/cmd_vel", None, 0.0, (0.2, 0.5))
+    driver.velocity("/robot_0/cmd_vel", frame, 0.0, (0.2, 0.5))
     until(lambda: robots.wait(0.1))
     run(server, 4)
     np.testing.assert_allclose(env.world.velocities[0], [0.2, 0.5])
@@ -115,15 +125,15 @@ def test_bad_commands_and_those_of_a_second_driver_are_refused_and_counted(nodes
     robots, driver = nodes
     server = TeamServer(environment(), robots)
     with node("rival") as rival:
-        for each in (driver, rival):
-            each.advertise("/robot_0/cmd_vel", TWIST)
+        for each, name in ((driver, TWIST), (rival, TWIST_STAMPED)):
+            each.advertise("/robot_0/cmd_vel", name)
             until(lambda each=each: each.subscribers("/robot_0/cmd_vel"))
         driver.advertise("/robot_0/goal_pose", POSE_STAMPED)
         until(lambda: driver.subscribers("/robot_0/goal_pose"))
         driver.velocity("/robot_0/cmd_vel", None, 0.0, (math.nan, 0.0))
         driver.velocity("/robot_0/cmd_vel", None, 0.0, (0.1, 0.0))
         until(lambda: server._hear() or server.counts.commands == 1)
-        rival.velocity("/robot_0/cmd_vel", None, 0.0, (-0.5, 0.0))
+        rival.velocity("/robot_0/cmd_vel", "robot_0/base_link", 0.0, (-0.5, 0.0))
         driver.goal("/robot_0/goal_pose", "nowhere", 0.0, (0.0, 0.0, 0.0))
         until(lambda: server._hear() or len(robots.refused) == 3)
     assert robots.refused == {
@@ -132,3 +142,17 @@ def test_bad_commands_and_those_of_a_second_driver_are_refused_and_counted(nodes
         "/robot_0/goal_pose: not a pose in frame map": 1,
     }
     assert server._driven[0].velocity == (0.1, 0.0)
+
+
+def test_an_interrupted_run_is_counted_as_well(nodes):
+    server = TeamServer(environment(), nodes[0])
+
+    def is_over():
+        if server.counts.steps == 3:
+            raise KeyboardInterrupt
+        return False
+
+    with pytest.raises(KeyboardInterrupt):
+        server.run(0.0, is_over=is_over)
+    assert server.counts.wall_s > 0.0
+    assert server.counts.cpu_s > 0.0

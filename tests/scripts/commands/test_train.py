@@ -7,6 +7,8 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
+from types import ModuleType, SimpleNamespace
 
 import pytest
 
@@ -64,7 +66,7 @@ def test_bad_files_are_refused_before_anything_is_written(change, words, tmp_pat
 
 
 def test_a_missing_file_is_named_and_where_to_find_one(tmp_path, capsys):
-    refused([tmp_path / "nowhere.toml"], tmp_path / "out", capsys, "nowhere.toml", "train_a_team.md")
+    refused([tmp_path / "nowhere.toml"], tmp_path / "out", capsys, "nowhere.toml", "lidarium examples copy")
 
 
 def test_numbers_that_cannot_be_used_are_refused(config, tmp_path, capsys):
@@ -77,6 +79,26 @@ def test_a_missing_extra_is_named(config, tmp_path, capsys, monkeypatch, missing
     find = importlib.util.find_spec
     monkeypatch.setattr(importlib.util, "find_spec", lambda name, *rest: None if name == missing else find(name, *rest))
     refused([config], tmp_path / "out", capsys, f"training needs {missing}", install_command("rl"))
+
+
+def test_loggers_that_cannot_be_used_are_refused(config, tmp_path, capsys, monkeypatch):
+    refused([config, "--log", "paper"], tmp_path / "out", capsys, "no logger 'paper'; want wandb or mlflow")
+    monkeypatch.setitem(sys.modules, "wandb", None)
+    refused([config, "--log", "wandb"], tmp_path / "out", capsys, "logging to wandb", install_command("loggers"))
+
+
+@pytest.fixture
+def logged(monkeypatch):
+    """What Weights & Biases is told; like the real one it writes into the folder at once."""
+    module, lines = ModuleType("wandb"), []
+
+    def init(dir, **given):
+        (Path(dir) / "wandb").mkdir(exist_ok=True)
+        return SimpleNamespace(id="abc", log=lines.append, define_metric=lambda *_, **__: None, finish=lambda **_: None)
+
+    module.init = init
+    monkeypatch.setitem(sys.modules, "wandb", module)
+    return lines
 
 
 def test_a_folder_of_other_files_is_left_as_it_is(config, tmp_path, capsys):
@@ -92,10 +114,11 @@ def test_a_folder_that_is_a_file_is_refused(config, tmp_path, capsys):
     refused([config], out, capsys, "not a folder")
 
 
-def test_a_training_answers_with_its_card(config, tmp_path, capsys):
+def test_a_training_answers_with_its_card(config, tmp_path, capsys, logged):
     out = tmp_path / "out"
     arguments = ["train", str(config), "--workers", "1", "--out", str(out)]
-    assert main([*arguments, "--json"]) == 0
+    assert main([*arguments, "--json", "--log", "wandb"]) == 0
+    assert logged[-1] == {"best weights/done": 1}
     captured = capsys.readouterr()
     card = json.loads(captured.out)
     assert card["best"] == "round-0"
