@@ -1,6 +1,7 @@
 """The study ``zoo``: teams that learned by rewards, five trainings of each, beside classic teams on unseen floors."""
 
 import itertools
+import json
 import math
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -13,6 +14,7 @@ import numpy as np
 
 from lidarium.agents.catalogue import make_policy
 from lidarium.agents.policy import settings_for
+from lidarium.agents.supervisor.policy import Supervised
 from lidarium.agents.zoo.network import network_shapes
 from lidarium.agents.zoo.policy import zoo_files
 from lidarium.benchmarks.studies.shared.study import Progress, Study, Task, do_missing, kept_lines
@@ -22,14 +24,22 @@ from lidarium.evaluation.episodes.history import History
 from lidarium.evaluation.episodes.runner import run_episode
 from lidarium.evaluation.episodes.watching import WatchedExploration
 from lidarium.evaluation.statistics import FEWEST_FOR_INTERVAL, Interval, paired_ratio
+from lidarium.mapping.files.output import write_text
 
-TEAMS = ("tours-2", "ppo-2", "mappo-2", "qmix-2", "ppo-4")
+TEAMS = ("tours-2", "ppo-2", "mappo-2", "qmix-2", "ppo-4", "signal-2", "supervised-2")
 """Trainings that ship; the number is the size of the team in training."""
+
+WORLDS: Mapping[str, Mapping[str, Any]] = {"": {}, "signal": {"radio": "signal"}, "supervised": {"known_starts": False}}
+"""Settings of the worlds that teams are trained for, by the first word of their name; "" is that of all others."""
+
+WORLD_NAMES = {"signal": "Teams of 2 whose radio breaks", "supervised": "Teams of 2 under a supervisor"}
 
 SEEDS = tuple(range(5))
 
 CLASSICS = ("nearest_frontier", "utility_frontier", "explore_lite", "tour_frontier", "learned", "predicted_tours")
 NEAREST, TOURS, UNTRAINED, SHIPPED = "nearest_frontier", "tour_frontier", "untrained", "shipped"
+BESIDE = (NEAREST, TOURS, "zoo:ppo-2")
+"""Who is beside a team in its own world: ppo-2 was trained without it."""
 
 FLOORS = set_floors("set:test:50")
 SIZES, LARGE = (2, 4), 8
@@ -41,7 +51,7 @@ LARGE_FLOORS = 16
 HORIZON_S, SHARE, EARLY_S = 1200.0, 0.99, 60.0
 
 LESSONS_FILE, RUNS_FILE, LESSONS = "lessons.jsonl", "runs.jsonl", "lessons"
-CURVES_PICTURE = "zoo_curves.png"
+CURVE, WEIGHTS, CURVES_PICTURE = "curve.csv", "weights.safetensors", "zoo_curves.png"
 
 PAGE = """# The zoo
 
@@ -67,6 +77,8 @@ intervals over floors and seeds: runs of a floor are not independent.
 Networks of smaller teams, with 8 robots.
 
 {large}
+
+{worlds}
 
 ## By training
 
@@ -100,10 +112,11 @@ class Run(Task):
     floor: str
     robots: int
     weights: Path | None
+    world: str = ""
 
 
 def learn(lesson: Lesson) -> dict[str, Any]:
-    """Train a team; return its curve, and the processor time that it took."""
+    """Train a team; return the processor time that it took."""
     from lidarium.training.settings import TeamSettings, read_any_training
     from lidarium.training.teams.training import TeamTraining
 
@@ -112,13 +125,43 @@ def learn(lesson: Lesson) -> dict[str, Any]:
     began = time.process_time()
     *_, last = TeamTraining(replace(settings, seed=lesson.seed), lesson.folder).run()
     assert last.done
-    curve = [line.split(",") for line in (lesson.folder / "curve.csv").read_text(encoding="utf-8").splitlines()[1:]]
     return {
         "team": lesson.team,
         "seed": lesson.seed,
-        "curve": [[int(step), float(coverage)] for step, coverage in curve],
         "processor_s": time.process_time() - began,
     }
+
+
+def _curve(path: Path) -> list[list[float]]:
+    """Return decisions and coverage of the points of a training's curve."""
+    lines = (path / CURVE).read_text(encoding="utf-8").splitlines()[1:]
+    return [[int(step), float(coverage)] for step, coverage in (line.split(",") for line in lines)]
+
+
+def _trainings(folder: Path) -> dict[tuple[str, str], Path]:
+    """Return the folders of trainings by team and seed, in the order of the teams."""
+    return {
+        (team, path.name.rpartition("-")[2]): path
+        for team in TEAMS
+        for path in sorted((folder / LESSONS).glob(f"{team}-*"))
+        if (path / WEIGHTS).exists()
+    }
+
+
+def _take_shipped(folder: Path) -> None:
+    """Write weights and curves that ship, of teams of which there is no training."""
+    there = {team for team, _ in _trainings(folder)}
+    data = resources.files("lidarium.agents.zoo") / "data"
+    for team in TEAMS:
+        card = data / f"{team}.json"
+        if team in there or not card.is_file():
+            continue
+        taken = folder / LESSONS / f"{team}-{SHIPPED}"
+        taken.mkdir(parents=True, exist_ok=True)
+        curve = json.loads(card.read_text(encoding="utf-8"))["curve"]
+        write_text(taken / CURVE, "step,coverage\n" + "".join(f"{step},{coverage}\n" for step, coverage in curve))
+        files = zoo_files(team, "tour" if team.startswith("tours") else "frontier")
+        files.save(taken / WEIGHTS, files.load(""))
 
 
 def measure(run: Run) -> dict[str, Any]:
@@ -126,32 +169,40 @@ def measure(run: Run) -> dict[str, Any]:
     options: dict[str, Any] = {} if run.weights is None else {"weights": run.weights}
     name = "zoo:ppo-2" if run.policy == UNTRAINED else run.policy
     policy = make_policy(name, **options)
-    settings = settings_for(policy, make_settings(robots=run.robots, stop_coverage=SHARE, horizon_s=HORIZON_S))
+    policy = Supervised(policy) if run.world == "supervised" else policy
+    settings = settings_for(
+        policy, make_settings(robots=run.robots, stop_coverage=SHARE, horizon_s=HORIZON_S, **WORLDS[run.world])
+    )
     history = History()
     run_episode(policy, WatchedExploration(run.floor, settings, watchers=[history]), 0)
     curves = history.curves
     seen = np.flatnonzero(curves.c_free >= SHARE)
     return {
-        **{name: getattr(run, name) for name in ("policy", "training", "floor", "robots")},
+        **{name: getattr(run, name) for name in ("policy", "training", "floor", "robots", "world")},
         "early": float(np.interp(EARLY_S, curves.times, curves.c_free)),
         "time_s": float(curves.times[seen[0]]) if len(seen) else None,
+        "joined_s": next((join.time_s for join in policy.joins), None) if isinstance(policy, Supervised) else None,
     }
 
 
 def work(folder: Path, _data: Path | None, every: int, workers: int) -> Progress:
-    """Train all teams, and run them beside classic ones on every N-th floor; a part runs the teams that ship."""
+    """Train all teams, and run them beside classic ones on every N-th floor.
+
+    A part trains none: it runs trainings that are there, and the weights that ship of other teams.
+    """
     floors = FLOORS[::every]
-    networks: dict[tuple[str, str], Path | None] = {(team, SHIPPED): None for team in TEAMS}
     if every == 1:
         lessons = [Lesson(team, seed, folder / LESSONS / f"{team}-{seed}") for seed in SEEDS for team in TEAMS]
         yield from do_missing(folder / LESSONS_FILE, "lessons", lessons, learn, workers)
-        networks = {(each.team, str(each.seed)): each.folder / "weights.safetensors" for each in lessons}
+    else:
+        _take_shipped(folder)
     untrained = folder / f"{UNTRAINED}.safetensors"
     zeros = {name: np.zeros(shape, np.float32) for name, shape in network_shapes("frontier").items()}
     zoo_files("").save(untrained, {**zeros, "steepness": np.ones(1, np.float32)})
     teams: list[tuple[str, str, Path | None]] = [(name, "", None) for name in CLASSICS]
     teams += [(UNTRAINED, "", untrained)]
-    teams += [(f"zoo:{team}", training, weights) for (team, training), weights in networks.items()]
+    zoo = [(f"zoo:{team}", seed, trained / WEIGHTS) for (team, seed), trained in _trainings(folder).items()]
+    teams += [team for team in zoo if not _world(team[0])]
     runs = [
         Run(name, training, floor, robots, weights)
         for floor in floors
@@ -165,6 +216,13 @@ def work(folder: Path, _data: Path | None, every: int, workers: int) -> Progress
         for floor in floors[:LARGE_FLOORS]
         for name, training, weights in ship
     ]
+    for own in filter(_world, TEAMS):
+        beside: list[tuple[str, str, Path | None]] = [(name, "", None) for name in BESIDE]
+        runs += [
+            Run(name, training, floor, _size(own), weights, _world(own))
+            for floor in floors
+            for name, training, weights in (*beside, *(team for team in zoo if team[0] == f"zoo:{own}"))
+        ]
     yield from do_missing(folder / RUNS_FILE, "runs", runs, measure, workers)
 
 
@@ -174,6 +232,12 @@ Line = Mapping[str, Any]
 def _size(name: str) -> int:
     """Return the size of the team in the training of a team of the zoo."""
     return int(name.rpartition("-")[2])
+
+
+def _world(name: str) -> str:
+    """Return the world that a team of the zoo is trained for."""
+    first = name.removeprefix("zoo:").partition("-")[0]
+    return first if first in WORLDS else ""
 
 
 def _seconds(line: Line) -> float:
@@ -195,11 +259,11 @@ def _mean(lines: Sequence[Line], of: Callable[[Line], float]) -> float:
     return float(np.mean([of(line) for line in lines]))
 
 
-def _by_policy(lines: Sequence[Line], robots: int) -> dict[str, list[Line]]:
-    """Return the runs of teams of a size, by policy."""
+def _by_policy(lines: Sequence[Line], robots: int, world: str = "") -> dict[str, list[Line]]:
+    """Return the runs of teams of a size in a world, by policy."""
     found: dict[str, list[Line]] = {}
     for line in lines:
-        if line["robots"] == robots:
+        if line["robots"] == robots and line["world"] == world:
             found.setdefault(line["policy"], []).append(line)
     return found
 
@@ -228,6 +292,25 @@ def _table(found: Mapping[str, Sequence[Line]]) -> str:
         f"| time over `{TOURS}` | reached 99 % |\n|---|---:|---:|---:|---:|---:|---:|"
     )
     return "\n".join([header, *rows])
+
+
+def _worlds(lines: Sequence[Line]) -> str:
+    """Return the tables of the worlds that some teams were trained for."""
+    parts = []
+    for world, title in WORLD_NAMES.items():
+        found = _by_policy(lines, 2, world)
+        if not found:
+            continue
+        parts.append(f"## {title}\n\n{_table(found)}")
+        if world == "supervised":
+            rows = []
+            for name, each in found.items():
+                times = [line["joined_s"] for line in each if line["joined_s"] is not None]
+                after = f"{np.median(times):.1f} s" if times else "-"
+                rows.append(f"| {_named(name)} | {len(times)} of {len(each)} | {after} |")
+            header = "| policy | joined | after, median |\n|---|---:|---:|"
+            parts.append("\n".join(["The station joined the maps of both robots:\n", header, *rows]))
+    return "\n\n".join(parts)
 
 
 def _best(found: Mapping[str, Sequence[Line]], is_by_tours: bool) -> str | None:
@@ -280,13 +363,14 @@ def _seed_rows(lines: Sequence[Line], lessons: Sequence[Line]) -> str:
     for lesson in lessons:
         curve = lesson["curve"]
         robots = _size(lesson["team"])
-        found = _by_policy(lines, robots)
+        found = _by_policy(lines, robots, _world(lesson["team"]))
         own = [line for line in found.get(f"zoo:{lesson['team']}", []) if line["training"] == str(lesson["seed"])]
         best = max(curve[1:], key=lambda entry: entry[1])
+        spent = "-" if lesson["processor_s"] is None else f"{lesson['processor_s'] / 60:.1f} min"
         rows.append(
             f"| `{lesson['team']}` | {lesson['seed']} | {curve[-1][0]:,} | {100 * curve[0][1]:.1f} % "
             f"| {100 * best[1]:.1f} % | {_written(_ratio(own, found.get(NEAREST, [])))} "
-            f"| {lesson['processor_s'] / 60:.1f} min |"
+            f"| {spent} |"
         )
     header = (
         "| team | seed | decisions | validation before | best | time over `nearest_frontier` | processor time |\n"
@@ -296,9 +380,13 @@ def _seed_rows(lines: Sequence[Line], lessons: Sequence[Line]) -> str:
 
 
 def _lessons(folder: Path) -> list[dict[str, Any]]:
-    """Return the trainings, in the order of the teams; a part of the study has none."""
-    found = kept_lines(folder / LESSONS_FILE) if (folder / LESSONS_FILE).exists() else []
-    return sorted(found, key=lambda line: (TEAMS.index(line["team"]), line["seed"]))
+    """Return the trainings, in the order of the teams; of those of other calls nobody knows how long they took."""
+    timed = kept_lines(folder / LESSONS_FILE) if (folder / LESSONS_FILE).exists() else []
+    spent = {(line["team"], str(line["seed"])): line["processor_s"] for line in timed}
+    return [
+        {"team": team, "seed": seed, "curve": _curve(path), "processor_s": spent.get((team, seed))}
+        for (team, seed), path in _trainings(folder).items()
+    ]
 
 
 def _curve_rows(lessons: Sequence[Line]) -> str:
@@ -325,6 +413,7 @@ def page(folder: Path) -> str:
         goals=_goals(lines),
         tables="\n\n".join(f"## Teams of {robots}\n\n{_table(_by_policy(lines, robots))}" for robots in SIZES),
         large=_table(_by_policy(lines, LARGE)),
+        worlds=_worlds(lines),
         by_seed=_seed_rows(lines, lessons),
         picture=CURVES_PICTURE,
         curves=_curve_rows(lessons),
@@ -336,13 +425,13 @@ def pictures(folder: Path, out: Path) -> None:
     from lidarium.evaluation.analysis.learning_curves import joined
     from lidarium.evaluation.drawing.curves_picture import save_learning_curves
 
+    trained = _trainings(folder)
     curves = [
-        joined(team, [folder / LESSONS / f"{team}-{seed}" / "curve.csv" for seed in SEEDS], "step", "coverage")
+        joined(team, paths, "step", "coverage")
         for team in TEAMS
-        if any(line["team"] == team for line in _lessons(folder))
+        if (paths := [path / CURVE for (name, _), path in trained.items() if name == team])
     ]
-    if curves:
-        save_learning_curves(out / CURVES_PICTURE, curves, "decisions", "coverage")
+    save_learning_curves(out / CURVES_PICTURE, curves, "decisions", "coverage")
 
 
 STUDY = Study(page, work=work, pictures=pictures, quick=25)

@@ -15,6 +15,8 @@ NAMES = {
     "zoo:ppo-4": "frontier",
     "zoo:mappo-2": "frontier",
     "zoo:qmix-2": "frontier",
+    "zoo:signal-2": "frontier",
+    "zoo:supervised-2": "frontier",
 }
 
 

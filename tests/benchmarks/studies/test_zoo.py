@@ -7,13 +7,17 @@ from published_pages import assert_published, keep
 from lidarium.agents.zoo.policy import zoo_files
 from lidarium.benchmarks.studies import zoo
 
+NEAREST = "nearest_frontier"
 
-def line(policy, floor, time_s, robots=2, training=""):
+
+def line(policy, floor, time_s, robots=2, training="", world="", joined_s=None):
     return {
         "policy": policy,
         "training": training,
         "floor": floor,
         "robots": robots,
+        "world": world,
+        "joined_s": joined_s,
         "early": 0.5 if time_s is None else min(60.0 / time_s, 1.0),
         "time_s": time_s,
     }
@@ -40,6 +44,31 @@ def test_a_part_runs_the_teams_that_ship(tmp_path, monkeypatch):
     ]
     assert zoo_files("").load(tmp_path / "untrained.safetensors")["steepness"] == 1.0
     assert "| `nearest_frontier` | 1 |" in zoo.page(tmp_path)
+
+
+def test_a_team_for_another_world_runs_there_beside_others(tmp_path, monkeypatch):
+    monkeypatch.setattr(zoo, "FLOORS", ("apartment:7",))
+    monkeypatch.setattr(zoo, "CLASSICS", ())
+    monkeypatch.setattr(zoo, "SIZES", ())
+    monkeypatch.setattr(zoo, "LARGE_FLOORS", 0)
+    monkeypatch.setattr(zoo, "BESIDE", (NEAREST,))
+    monkeypatch.setattr(zoo, "TEAMS", ("signal-2", "supervised-2"))
+    monkeypatch.setattr(zoo, "HORIZON_S", 20.0)
+    list(zoo.work(tmp_path, None, 2, 1))
+    lines = zoo.kept_lines(tmp_path / zoo.RUNS_FILE)
+    assert [(each["policy"], each["world"]) for each in lines] == [
+        (NEAREST, "signal"),
+        ("zoo:signal-2", "signal"),
+        (NEAREST, "supervised"),
+        ("zoo:supervised-2", "supervised"),
+    ]
+    assert len({each["early"] for each in lines}) == 4
+
+
+def test_a_part_shows_the_curves_of_the_trainings_that_ship(tmp_path):
+    lessons = zoo._lessons(tmp_path)
+    assert [each["team"] for each in lessons] == list(zoo.TEAMS)
+    assert all(each["curve"][0][0] == 0 and len(each["curve"]) > 2 for each in lessons)
 
 
 def test_trainings_that_are_there_are_not_run_again(tmp_path):
@@ -75,6 +104,12 @@ def test_the_page_tells_what_is_reached_over_floors_and_seeds(tmp_path):
         {"team": "ppo-2", "seed": seed, "curve": [[0, 0.5], [10, 0.6 + seed / 10]], "processor_s": 90.0}
         for seed in (0, 1)
     ]
+    lines += [line("zoo:signal-2", floor, 80.0, world="signal") for floor in floors]
+    lines += [line(NEAREST, floor, 100.0, world="signal") for floor in floors]
+    lines += [
+        line("zoo:supervised-2", floor, 90.0, world="supervised", joined_s=30.0 + k) for k, floor in enumerate(floors)
+    ]
+    lines += [line(NEAREST, floor, 100.0, world="supervised", joined_s=None) for floor in floors]
     keep(tmp_path / zoo.RUNS_FILE, lines)
     keep(tmp_path / zoo.LESSONS_FILE, lessons)
     page = zoo.page(tmp_path)
@@ -88,5 +123,9 @@ def test_the_page_tells_what_is_reached_over_floors_and_seeds(tmp_path):
     )
     assert "| untrained network | 8 | 50.0 % | 1200.0 s |" in page
     assert "| `ppo-2` | 1 | 10 | 50.0 % | 70.0 % |" in page
-    assert "| 10 | - | 65.0 % | - | - | - |" in page
+    assert "| 10 | - | 65.0 % | - | - | - | - | - |" in page
+    assert "## Teams of 2 whose radio breaks" in page
+    assert "| `zoo:signal-2` | 8 | 75.0 % | 80.0 s | 0.80" in page
+    assert "| `zoo:supervised-2` | 8 of 8 | 33.5 s |" in page
+    assert "| `nearest_frontier` | 0 of 8 | - |" in page
     assert "| 4 robots, `zoo:ppo-4` over `nearest_frontier` | at most 0.90, interval below 1 | 1.00" in page
