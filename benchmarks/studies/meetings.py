@@ -39,6 +39,12 @@ LOST_AT_S = 15.0
 OTHERS = ((2, "signal"), (8, "signal"), (4, "range"), (4, "line_of_sight"))
 """Other teams and radios."""
 
+COLUMNS = (
+    *("policy", "robots", "radio", "runs", "reached", "all know [s]"),
+    *("team [s]", "station", "station [s]", "apart", "sent [kB]", "told [kB]"),
+)
+"""Columns of the table of teams."""
+
 RUNS_FILE, RULES_FILE = "runs.jsonl", "rules.jsonl"
 
 PAGE = """# Meetings
@@ -71,7 +77,7 @@ together. *Station*: what a listener at the first start holds when all know. *St
 99 %, and in how many runs; teams go on until their policy ends. *Apart*: share of the time in which the team was not
 one cluster. Agreements and news cost *told* beside the maps. Bytes and *apart* are until all know.
 
-| policy | robots | radio | runs | reached | all know [s] | team [s] | station | station [s] | apart | sent [kB] | told [kB] |
+{columns}
 |---|---:|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|
 {teams}
 
@@ -310,6 +316,7 @@ def page(folder: Path) -> str:
         together=_together(_chosen(lines, "oblivious")),
         ideal=_ratio(_chosen(lines, "tour_frontier", "all"), _chosen(lines, "oblivious")) or "-",
         kinds="\n".join(_kind_row(lines, other) for other in POLICIES if other != OURS),
+        columns=f"| {' | '.join(COLUMNS)} |",
         teams="\n".join(_team_row(teams[key]) for key in sorted(teams)),
         rules="\n".join(
             f"| `{rule}` | {len(_pairs(found, by_chance)[0])} | {_ratio(found, by_chance)} |"
