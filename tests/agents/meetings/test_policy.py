@@ -5,6 +5,7 @@ import pytest
 
 import lidarium
 from lidarium.agents.meetings.policy import MeetingFrontier, MeetingTours
+from lidarium.agents.meetings.tethered import Tethered
 from lidarium.envs.floors.floor import Floor, Solid
 from lidarium.envs.settings.faults import Fault, FaultSettings
 from lidarium.envs.settings.making import make_settings
@@ -85,12 +86,27 @@ def test_a_tethered_team_keeps_in_touch():
     assert all(not book.given_up for book in policy.notebooks.values())
 
 
-def test_without_any_radio_robots_explore_alone_as_with_tour_frontier():
-    policy = MeetingTours()
-    ours, _ = finished(policy, corridor(2), robots=2, radio="none")
-    alone, _ = finished(lidarium.policy("tour_frontier"), corridor(2), robots=2, radio="none")
-    assert policy.told_bytes == 0
-    assert np.array_equal(ours.env.world.poses, alone.env.world.poses)
+@pytest.mark.parametrize("make", [MeetingTours, MeetingFrontier, Tethered])
+@pytest.mark.parametrize(
+    "radio",
+    [
+        "none",
+        {"kind": "range", "reach": 0.3},
+        {"kind": "line_of_sight", "reach": 0.3},
+        {"kind": "signal", "power": -300.0},
+        {"kind": "signal", "threshold": 0.0},
+    ],
+)
+def test_a_radio_that_never_connects_is_refused(make, radio):
+    with pytest.raises(
+        ValueError, match=rf"{make.__name__} needs a radio, but '\w+' never connects .* 0\.36 m apart; want"
+    ):
+        finished(make(), corridor(2), robots=2, radio=radio)
+
+
+def test_a_radio_that_connects_by_chance_or_over_half_a_metre_is_not():
+    for radio in ({"kind": "range", "reach": 0.5}, {"kind": "signal", "power": -40.0, "shadowing": 4.0}):
+        finished(MeetingTours(), corridor(2), robots=2, radio=radio, horizon_s=2.0)
 
 
 def test_robots_with_unknown_starts_are_refused():
