@@ -2,6 +2,9 @@
 
 import numpy as np
 import pytest
+from scipy import ndimage
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import dijkstra
 
 import lidarium
 from lidarium.agents.meetings.policy import MeetingFrontier, MeetingTours
@@ -62,7 +65,7 @@ def test_all_that_live_know_the_floor_if_a_teammate_dies():
     assert any("robot_1" in policy.notebooks[agent].given_up for agent in ("robot_0", "robot_2"))
 
 
-@pytest.mark.parametrize("loss", [0.1, 0.5, 0.9])
+@pytest.mark.parametrize("loss", [0.0, 0.1, 0.5, 0.9])
 @pytest.mark.parametrize("rule", ["meeting", "pursuit"])
 def test_lost_messages_delay_a_team_and_do_not_end_it(loss, rule):
     episode, history = finished(MeetingTours(rule=rule), corridor(2), robots=2, radio={**NEAR, "loss": loss})
@@ -116,3 +119,47 @@ def test_robots_with_unknown_starts_are_refused():
         MeetingTours(hurry=1.0)
     with pytest.raises(ValueError, match="'hurry'"):
         MeetingFrontier(hurry=1.0)
+
+
+class SlowlyChecked(MeetingTours):
+    """Compares each position of a meeting with the best of a slow search over all cells."""
+
+    def _best_place(self, agent, members, cells):
+        place = super()._best_place(agent, members, cells)
+        navigation, news = self.navigation(agent), self.notebooks[agent].news
+        goals = [*(self._cell_of(agent, news[name].goal) for name in members), *map(tuple, cells)]
+        lengths = [lengths_from(goal, navigation, self.team.belief(agent).radius) for goal in goals]
+        longest = np.max(lengths, axis=0)
+        if np.isfinite(longest).any():
+            self.compared.append((longest[self._cell_of(agent, place)], longest[np.isfinite(longest)]))
+        return place
+
+
+def lengths_from(cell, navigation, radius):
+    """Return the lengths of the shortest paths of a body from a cell, or the room nearest to it, to all cells [m]."""
+    side = navigation.resolution
+    room = ndimage.distance_transform_edt(navigation.log_odds < 0) * side > radius
+    rows, columns = np.nonzero(room)
+    number = np.full(room.shape, -1)
+    number[rows, columns] = np.arange(len(rows))
+    ends, weights = [], []
+    for down, right in ((0, 1), (1, 0), (1, 1), (1, -1)):
+        there = number[np.clip(rows + down, 0, len(room) - 1), np.clip(columns + right, 0, room.shape[1] - 1)]
+        ends.append(np.stack([np.arange(len(rows)), there])[:, there >= 0])
+        weights.append(np.full(ends[-1].shape[1], side * np.hypot(down, right)))
+    graph = coo_array((np.concatenate(weights), np.concatenate(ends, axis=1)), shape=(len(rows), len(rows)))
+    nearest = int(np.argmin(np.hypot(rows - cell[0], columns - cell[1])))
+    found = np.full(room.shape, np.inf)
+    found[rows, columns] = dijkstra(graph, directed=False, indices=nearest)
+    return found
+
+
+def test_meetings_are_where_the_longest_way_is_shortest():
+    policy = SlowlyChecked()
+    policy.compared = []
+    finished(policy, "building:4", robots=3, radio="signal", horizon_s=60.0)
+    assert len(policy.compared) > 5
+    for chosen, others in policy.compared:
+        # Planned paths keep off walls, which makes some ways longer.
+        assert others.min() <= chosen <= others.min() + 1.0
+        assert chosen < 0.8 * np.median(others)
