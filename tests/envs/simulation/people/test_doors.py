@@ -38,6 +38,15 @@ def test_a_door_where_no_opening_is_is_refused():
         env.reset(seed=0)
 
 
+def test_a_drawn_floor_without_openings_has_no_doors():
+    env = ExplorationEnv([HALL, ROOMS], make_settings(robots=1, doors=1.0))
+    doors = {}
+    for seed in range(8):
+        env.reset(seed=seed)
+        doors[env.floor.name] = int((env.simulation.population.doors_of(0)[:, DOOR_KIND] > 0).sum())
+    assert doors == {"hall": 0, "rooms": 1}
+
+
 def test_a_door_opens_when_a_robot_comes_and_shuts_behind_it():
     env, door = robot_at_door()
     opened, places = [], []
