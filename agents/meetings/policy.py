@@ -204,14 +204,14 @@ class Meetings(FrontierExplorer):
         return self._on_floor(agent, centres_of(cell, belief.map_origin, navigation.resolution))
 
     def _give_up_missing(self, agent: str) -> None:
-        """Give up members that have not arrived after the time of patience."""
+        """Give up teammates that have not arrived after the time of patience, those too that never agreed."""
         book, now, near = self.notebooks[agent], self.team.time_s, self.near(agent)
         agreement = book.agreement
         if agreement is None:
             return
-        for name in agreement.members:
+        for name, told in book.news.items():
             if name != agent and name not in near and name not in book.given_up:
-                way_s = math.dist(book.news[name].goal, agreement.place) / self._speed(agent)
+                way_s = math.dist(told.goal, agreement.place) / self._speed(agent)
                 if now > agreement.time_s + self.meetings.patience_s + 0.5 * way_s:
                     book.given_up.add(name)
 

@@ -65,6 +65,15 @@ def test_all_that_live_know_the_floor_if_a_teammate_dies():
     assert any("robot_1" in policy.notebooks[agent].given_up for agent in ("robot_0", "robot_2"))
 
 
+def test_robots_do_not_wait_for_ever_for_one_that_agreed_on_another_meeting():
+    faults = FaultSettings(schedule=(Fault(kind="dead_robot", robot=3, at_s=15.0),))
+    policy = MeetingTours()
+    _, history = finished(policy, "building:3000022", robots=4, radio="signal", faults=faults, horizon_s=650.0)
+    first = [each for each in policy.agreed if each.time_s < 450.0]
+    assert len({each.place for each in first if each.number == first[-1].number}) > 1
+    assert history.curves.c_own[-1][:3].min() >= 0.99
+
+
 @pytest.mark.parametrize("loss", [0.0, 0.1, 0.5, 0.9])
 @pytest.mark.parametrize("rule", ["meeting", "pursuit"])
 def test_lost_messages_delay_a_team_and_do_not_end_it(loss, rule):
