@@ -59,4 +59,7 @@ class RandomWalk(Policy):
                 return np.array([0.0, max(-0.5, min(0.5, error))], np.float32)
             wanted = None
         self._headings[agent] = wanted
-        return np.array([0.0 if is_near else self._speed, 0.0], np.float32)
+        if is_near:
+            return np.zeros(2, np.float32)
+        belief = self._team.belief(agent)
+        return np.array([self._speed * belief.yielding(self._speed * belief.robot.max_speed), 0.0], np.float32)

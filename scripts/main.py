@@ -6,7 +6,7 @@ import sys
 import traceback
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from typing import Any, TextIO, get_type_hints
+from typing import Any, TextIO, get_origin, get_type_hints
 
 import lidarium
 from lidarium.registry import import_own
@@ -118,7 +118,7 @@ def _answered(words: list[str]) -> int:
     if words[0] not in COMMANDS:
         find_installed()
     execute = COMMANDS[words[0]]
-    command = _options(execute, words[0], gathered(words[1:]))
+    command = _options(execute, words[0], words[1:])
     if command.compiles:
         announce_compiling()
     answer = execute(command)
@@ -149,8 +149,10 @@ def _options(execute: Callable[[Any], Answer], name: str, words: list[str]) -> C
     config = (tyro.conf.OmitArgPrefixes, tyro.conf.OmitSubcommandPrefixes, tyro.conf.FlagCreatePairsOff)
     parameter = next(iter(inspect.signature(execute).parameters))
     options: type[Command] = get_type_hints(execute)[parameter]
+    hints = get_type_hints(options, include_extras=True)
+    lists = {f"--{key.replace('_', '-')}" for key, hint in hints.items() if get_origin(hint) is tuple}
     try:
-        return tyro.cli(options, prog=f"lidarium {name}", args=words, config=config)
+        return tyro.cli(options, prog=f"lidarium {name}", args=gathered(words, lists), config=config)
     except BrokenPipeError as error:  # the reader of the help has ended
         _silence(sys.stdout)
         raise SystemExit(DONE) from error

@@ -1,6 +1,6 @@
 """Options that several commands share: settings of policies and the supervisor, films, the live view, ROS 2."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Container, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -48,26 +48,40 @@ def options_by_policy(assignments: Iterable[str], policies: Sequence[str]) -> di
 PREFIX = "--supervisor."
 
 
-def gathered(words: Sequence[str]) -> list[str]:
-    """Return a command line in which all settings of the supervisor are one option.
+def gathered(words: Sequence[str], lists: Container[str] = ()) -> list[str]:
+    """Return a command line in which options that take several words stand once, at its end.
 
-    ``--supervisor.KEY VALUE`` and ``--supervisor.KEY=VALUE`` become ``--supervisor KEY=VALUE ...`` at its end;
-    dashes in a key are underscores.
+    ``--set A --set B`` becomes ``--set A B``. ``--supervisor.KEY VALUE`` and ``--supervisor.KEY=VALUE`` become
+    ``--supervisor KEY=VALUE``; dashes in a key are underscores.
+
+    Parameters
+    ----------
+    lists : container of str
+        Options that take several words, with dashes.
     """
     rest: list[str] = []
-    found: list[str] = []
-    left = iter(words)
+    found: dict[str, list[str]] = {}
+    taking, left = rest, iter(words)
     for word in left:
-        if not word.startswith(PREFIX):
-            rest.append(word)
-            continue
-        key, equals, value = word.removeprefix(PREFIX).partition("=")
-        if not equals:
-            value = next(left, "--")
-            if value.startswith("--"):
-                raise ValueError(f"{word} has no value; want {word} VALUE")
-        found.append(f"{key.replace('-', '_')}={value}")
-    return [*rest, "--supervisor", *found] if found else rest
+        option, equals, value = word.partition("=")
+        name = option.replace("_", "-")
+        if word.startswith(PREFIX):
+            if not equals:
+                value = next(left, "--")
+                if value.startswith("--"):
+                    raise ValueError(f"{word} has no value; want {word} VALUE")
+            key = option.removeprefix(PREFIX).replace("-", "_")
+            found.setdefault("--supervisor", []).append(f"{key}={value}")
+            taking = rest
+        elif name in lists:
+            taking = found.setdefault(name, [])
+            if equals:
+                taking.append(value)
+                taking = rest
+        else:
+            taking = rest if word.startswith("--") else taking
+            taking.append(word)
+    return [*rest, *(word for option, taken in found.items() for word in (option, *taken))]
 
 
 def supervisor_options(assignments: Iterable[str]) -> dict[str, Any]:

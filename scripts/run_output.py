@@ -293,6 +293,7 @@ def run_summary(policy: str, episode: "Episode", result: dict[str, Any], folder:
             "together",
             f"{sum(result['path_m']):.1f} m driven, overlap {result['overlap']:.2f}, {result['collisions']} collisions",
         ),
+        *_among_people(result),
         ("map", f"IoU of occupied cells {result['iou_occupied']:.3f}"),
         ("given up", _given_up(result["given_up"])),
         ("speed", f"{episode.wall_seconds:.1f} s, {result['steps_per_s'] or 0.0:,.0f} steps/s"),
@@ -305,6 +306,20 @@ def run_summary(policy: str, episode: "Episode", result: dict[str, Any], folder:
     if episode.merges:
         parts += ["", table(_joined(episode), ("joined", "at [s]", "off by [m]", "[deg]"))]
     return "\n".join(parts)
+
+
+def _among_people(result: dict[str, Any]) -> list[tuple[str, str]]:
+    """Return a line about people; none without any."""
+    if result["closest_approach_m"] is None:
+        return []
+    return [
+        (
+            "people",
+            f"{result['contacts_by_robot']} contacts by robots, {result['contacts_by_person']} by people, "
+            f"{result['near_misses']} near misses, closest {result['closest_approach_m']:.2f} m, "
+            f"{result['yielding_s']:.1f} s lost by yielding",
+        )
+    ]
 
 
 def _of_station(result: dict[str, Any]) -> list[tuple[str, str]]:

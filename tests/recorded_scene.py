@@ -35,6 +35,9 @@ class Scene:
     def reset(self):
         self.nodes.clear()
 
+    def add_mesh_simple(self, name, vertices, triangles, **named):
+        return self._add(name, vertices, triangles, vertices=vertices, **named)
+
     def _add(self, name, *given, **named):
         node = self.nodes[name] = Node(given=given, remove=lambda: self.nodes.pop(name), **named)
         return node

@@ -39,6 +39,7 @@ from lidarium.agents.tours.planning import Tourist
 from lidarium.agents.tours.policy import TourFrontier
 from lidarium.envs.faces.parallel import Observation
 from lidarium.envs.onboard.radio.messages import Target
+from lidarium.envs.simulation.disturbances.radio import connects
 from lidarium.mapping.planning.grid_planning import Cell, cells_of, centres_of, plan, search
 
 RENEWED_S = 5.0
@@ -75,6 +76,13 @@ class Meetings(FrontierExplorer):
             raise ValueError(
                 f"{type(self).__name__} agrees on places, which robots with unknown starts cannot; want "
                 "known_starts=True, or the policy 'supervised_tours'"
+            )
+        touching_m = 2.0 * settings.robot.radius
+        if self.is_apart and not connects(settings.radio, touching_m):
+            raise ValueError(
+                f"{type(self).__name__} needs a radio, but {settings.radio.kind!r} never connects two robots, even "
+                f"where they touch, {touching_m:.2f} m apart; want other settings of the radio, or the policy "
+                "'tour_frontier'"
             )
         self.notebooks = {agent: Notebook() for agent in team.agents}
         self.told_bytes = 0
@@ -196,14 +204,14 @@ class Meetings(FrontierExplorer):
         return self._on_floor(agent, centres_of(cell, belief.map_origin, navigation.resolution))
 
     def _give_up_missing(self, agent: str) -> None:
-        """Give up members that have not arrived after the time of patience."""
+        """Give up teammates that have not arrived after the time of patience, those too that never agreed."""
         book, now, near = self.notebooks[agent], self.team.time_s, self.near(agent)
         agreement = book.agreement
         if agreement is None:
             return
-        for name in agreement.members:
+        for name, told in book.news.items():
             if name != agent and name not in near and name not in book.given_up:
-                way_s = math.dist(book.news[name].goal, agreement.place) / self._speed(agent)
+                way_s = math.dist(told.goal, agreement.place) / self._speed(agent)
                 if now > agreement.time_s + self.meetings.patience_s + 0.5 * way_s:
                     book.given_up.add(name)
 

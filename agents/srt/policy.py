@@ -77,6 +77,7 @@ class SensorBasedRandomTree(Policy):
             targets = [teammate.target for teammate in in_contact if teammate.target is not None]
             memory = memory_of(belief, [self.tree.nodes[number] for number in sorted(explorer.known)], self.settings)
             speed, turn_rate = explorer.step(senses_of(self._team.time_s, observation, belief), memory, targets)
+            speed *= belief.yielding(speed)
             actions[agent] = _shares(speed / belief.robot.max_speed, turn_rate / belief.robot.max_turn_rate)
         explorers = [self._explorers[agent] for agent in observations]
         if all(explorer.is_home for explorer in explorers):

@@ -11,6 +11,7 @@ from scipy.sparse.csgraph import connected_components
 
 from lidarium.agents.catalogue import make_policy
 from lidarium.agents.meetings.policy import Meetings
+from lidarium.agents.policy import Policy
 from lidarium.benchmarks.studies.shared.study import Progress, Study, Task, do_missing, kept_lines
 from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.settings.faults import Fault, FaultSettings
@@ -26,7 +27,7 @@ RULES = ("meeting", "pursuit", "none")
 
 ROBOTS, RADIO, HORIZON_S, SHARE = 4, "signal", 1200.0, 0.99
 
-FLOORS = tuple(f"{kind}:{3_000_000 + k}" for k in range(30) for kind in ("office", "building"))
+SEEDS, KINDS = range(3_000_000, 3_000_030), ("office", "building")
 """Floors of the figures: seeds of the set ``test``, large floors and small ones."""
 
 CHOSEN_ON = tuple(f"office:{2_000_000 + k}" for k in range(6))
@@ -37,6 +38,12 @@ LOST_AT_S = 15.0
 
 OTHERS = ((2, "signal"), (8, "signal"), (4, "range"), (4, "line_of_sight"))
 """Other teams and radios."""
+
+COLUMNS = (
+    *("policy", "robots", "radio", "runs", "reached", "all know [s]"),
+    *("team [s]", "station", "station [s]", "apart", "sent [kB]", "told [kB]"),
+)
+"""Columns of the table of teams."""
 
 RUNS_FILE, RULES_FILE = "runs.jsonl", "rules.jsonl"
 
@@ -66,11 +73,12 @@ that, less the ways to them.
 ## By radio and team
 
 *All know*: mean time until every robot knows 99 %; *reached*: runs in which they do. *Team*: until they know it
-together. *Station*: what a listener at the first start holds by then. *Apart*: share of the time in which the team was
-not one cluster. Agreements and news cost *told* beside the maps.
+together. *Station*: what a listener at the first start holds when all know. *Station [s]*: mean time until it knows
+99 %, and in how many runs; teams go on until their policy ends. *Apart*: share of the time in which the team was not
+one cluster. Agreements and news cost *told* beside the maps. Bytes and *apart* are until all know.
 
-| policy | robots | radio | runs | reached | all know [s] | team [s] | station | apart | sent [kB] | told [kB] |
-|---|---:|---|---:|---:|---:|---:|---:|---:|---:|---:|
+{columns}
+|---|---:|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|
 {teams}
 
 ## The rule
@@ -97,22 +105,42 @@ class Run(Task):
 
 
 class _Watch:
-    """Ends an episode when all that live know the floor, and notes how the team was joined."""
+    """Notes when all that live know the floor, and when the station does; then it ends the episode.
 
-    def __init__(self, history: History) -> None:
-        self._history = history
-        self.apart: list[bool] = []
-        self.is_known = False
+    Attributes
+    ----------
+    figures : dict
+        Figures of the team when all knew, or of the end.
+    """
+
+    def __init__(self, history: History, policy: Policy) -> None:
+        self._history, self._policy = history, policy
+        self._apart: list[bool] = []
+        self.all_know_s: float | None = None
+        self.station_s: float | None = None
+        self.figures: dict[str, float] = {}
 
     def __call__(self, env: ExplorationEnv) -> None:
-        lives = env.world.failed == 0
-        if len(env.perception.exchanges):
-            links = env.perception.exchanges[0].links[np.ix_(lives, lives)]
-            self.apart.append(int(connected_components(links, directed=False)[0]) > 1)
-        self.is_known |= bool(self._history.curves.c_own[-1][lives].min() >= SHARE)
-        if self.is_known:
+        station = _station_share(env, self._history)
+        if self.station_s is None and station >= SHARE:
+            self.station_s = env.scorer.time
+        if self.all_know_s is None:
+            self._note(env, station)
+        if self.all_know_s is not None and self.station_s is not None:
             for agent in env.agents:
                 env.stop(agent, "all_know")
+
+    def _note(self, env: ExplorationEnv, station: float) -> None:
+        lives, sent, policy = env.world.failed == 0, 0, self._policy
+        if len(env.perception.exchanges):
+            exchange = env.perception.exchanges[0]
+            links, sent = exchange.links[np.ix_(lives, lives)], int(exchange.bytes_sent.sum())
+            self._apart.append(int(connected_components(links, directed=False)[0]) > 1)
+        if self._history.curves.c_own[-1][lives].min() >= SHARE:
+            self.all_know_s = env.scorer.time
+        told = policy.told_bytes if isinstance(policy, Meetings) else 0
+        apart = float(np.mean(self._apart)) if self._apart else 0.0
+        self.figures = {"station": station, "apart": apart, "sent": sent, "told": told}
 
 
 def measure(run: Run) -> dict[str, Any]:
@@ -131,25 +159,23 @@ def measure(run: Run) -> dict[str, Any]:
     history = History()
     env = WatchedExploration(run.floor, settings, watchers=[history])
     policy = make_policy(run.policy, **({"rule": run.rule} if run.rule else {}))
-    watch = _Watch(history)
+    watch = _Watch(history, policy)
     run_episode(policy, env, 0, on_decision=watch)
     curves = history.curves
     team = np.flatnonzero(curves.c_free >= SHARE)
     return {
         **{name: getattr(run, name) for name in ("policy", "floor", "robots", "radio", "lost", "rule")},
-        "all_know_s": env.scorer.time if watch.is_known else None,
+        "all_know_s": watch.all_know_s,
         "team_s": float(curves.times[team[0]]) if len(team) else None,
-        "station": _station_share(env, history),
-        "apart": float(np.mean(watch.apart)) if watch.apart else 0.0,
-        "sent": int(env.perception.exchanges[0].bytes_sent.sum()) if env.perception.exchanges else 0,
-        "told": policy.told_bytes if isinstance(policy, Meetings) else 0,
+        "station_s": watch.station_s,
+        **watch.figures,
     }
 
 
 def _station_share(env: ExplorationEnv, history: History) -> float:
     """Return the share of F that the maps that the station holds show to be free."""
     if not env.perception.exchanges:
-        return 1.0
+        return float(history.curves.c_free[-1])
     held = [copy for copy in env.perception.exchanges[0].copies[-1] if copy.size]
     if not held:
         return 0.0
@@ -161,7 +187,7 @@ def _station_share(env: ExplorationEnv, history: History) -> float:
 
 def work(folder: Path, _data: Path | None, every: int, workers: int) -> Progress:
     """Run all teams, and the rules that were to be chosen from; every N-th floor."""
-    floors = FLOORS[::every]
+    floors = [f"{kind}:{seed}" for seed in SEEDS[::every] for kind in KINDS]
     small = [floor for floor in floors if floor.startswith("building")]
     runs = [Run(policy, floor, ROBOTS, RADIO) for floor in floors for policy in ("oblivious", OURS)]
     runs += [Run(policy, floor, ROBOTS, "all") for floor in small for policy in ("tour_frontier", OURS)]
@@ -260,9 +286,15 @@ def _team_row(lines: Sequence[Line]) -> str:
     know = sum(line["all_know_s"] is not None for line in lines)
     return (
         f"| `{first['policy']}` | {team} | `{first['radio']}` | {len(lines)} | {know} | {times} | "
-        f"{np.mean(together):.0f} | {mean('station'):.3f} | {mean('apart'):.2f} | {mean('sent') / 1e3:.0f} | "
-        f"{mean('told') / 1e3:.0f} |"
+        f"{np.mean(together):.0f} | {mean('station'):.3f} | {_station_knows(lines)} | {mean('apart'):.2f} | "
+        f"{mean('sent') / 1e3:.0f} | {mean('told') / 1e3:.0f} |"
     )
+
+
+def _station_knows(lines: Sequence[Line]) -> str:
+    """Return the mean time until the station knows the floor, of the runs in which it does, and their number."""
+    times = [line["station_s"] for line in lines if line.get("station_s") is not None]
+    return f"{np.mean(times):.0f} ({len(times)})" if times else "- (0)"
 
 
 def page(folder: Path) -> str:
@@ -284,6 +316,7 @@ def page(folder: Path) -> str:
         together=_together(_chosen(lines, "oblivious")),
         ideal=_ratio(_chosen(lines, "tour_frontier", "all"), _chosen(lines, "oblivious")) or "-",
         kinds="\n".join(_kind_row(lines, other) for other in POLICIES if other != OURS),
+        columns=f"| {' | '.join(COLUMNS)} |",
         teams="\n".join(_team_row(teams[key]) for key in sorted(teams)),
         rules="\n".join(
             f"| `{rule}` | {len(_pairs(found, by_chance)[0])} | {_ratio(found, by_chance)} |"
@@ -293,5 +326,5 @@ def page(folder: Path) -> str:
     )
 
 
-STUDY = Study(page, work=work, quick=20)
+STUDY = Study(page, work=work, quick=30)
 """The study of meetings."""

@@ -16,7 +16,7 @@ from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.settings.reset_options import Curriculum, ResetOptions, of_curriculum
 from lidarium.envs.simulation.backends import BACKENDS
 from lidarium.envs.simulation.kernels.floor_cache import FloorTables, floor_tables
-from lidarium.envs.simulation.people.doors import draw_doors, with_shut_doors
+from lidarium.envs.simulation.people.doors import NARROWEST_M, WIDEST_M, draw_doors, with_shut_doors
 from lidarium.envs.simulation.simulation import Simulation
 
 
@@ -61,7 +61,13 @@ def begin(
     if settings.doors > 0.0:
         # Doors come from the seed of the episode, and robots do not start beyond one that stays shut.
         seed = int(generator.integers(2**63))
-        body = with_shut_doors(body, draw_doors(tables, settings.doors, radius, seed, f"floor {floor.name!r}"))
+        doors = draw_doors(tables, settings.doors, radius, seed)
+        if not len(doors) and not choice_here.is_set:
+            raise ValueError(
+                f"doors is {settings.doors}, but floor {floor.name!r} has no opening of {NARROWEST_M} to {WIDEST_M} m "
+                "between walls in which a door could hang; want doors=0 or a floor with rooms"
+            )
+        body = with_shut_doors(body, doors)
     if isinstance(starts, np.ndarray):
         check_starts(body, radius, starts)
     else:

@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from lidarium.envs.onboard.driving.safety_stop import yielding_speed
 from lidarium.envs.onboard.known_poses import Teammate
 from lidarium.envs.onboard.navigation import NavigationMap
 from lidarium.envs.onboard.perception import Perception
@@ -128,6 +129,14 @@ class Belief:
         """The energy left in the battery [J]; None if it has no limit."""
         meters = self._perception.meters
         return None if meters is None else meters.left_j(self._row)
+
+    def yielding(self, speed: float) -> float:
+        """Return the share of a speed [m/s] at which to drive near the people in sight; 1 without any.
+
+        The time that it costs counts as lost by yielding. Robots that drive to targets yield by themselves.
+        """
+        safety = self._perception.simulation.safety[self._row]
+        return float(yielding_speed(safety, speed, speed)) / speed if speed else 1.0
 
     @property
     def goal(self) -> NDArray[np.float64] | None:

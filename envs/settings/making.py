@@ -207,7 +207,10 @@ def assign(settings: ExplorationSettings, assignments: Iterable[str]) -> Explora
             settings = replace(settings, localizer=localizer_settings(settings.localization, {}))
         if path[0] in OPTIONAL_PARTS and len(path) > 1 and getattr(settings, path[0]) is None:
             settings = replace(settings, **{path[0]: PARTS[path[0]]()})
-        settings = _replaced(settings, path, value_of(text.strip()), name.strip())
+        value = value_of(text.strip())
+        if value is None and len(path) == 1 and path[0] in REGISTRIES and "none" in registry(path[0]):
+            value = "none"  # the name of a radio or battery
+        settings = _replaced(settings, path, value, name.strip())
     return settings
 
 

@@ -14,12 +14,14 @@ from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.patches import Circle
 from matplotlib.patheffects import Normal, Stroke
 from matplotlib.text import Text
 from numpy.typing import NDArray
 
-from lidarium.envs.drawing.frame_parts import team_colours
+from lidarium.envs.drawing.frame_parts import DOOR, PERSON, Colour, team_colours
+from lidarium.envs.simulation.people.crowd import Crowd
 from lidarium.mapping.files.guarded_reading import printable
 from lidarium.mapping.files.output import whole_file
 
@@ -190,6 +192,20 @@ def draw_trajectories(axes: Axes, track: NDArray[np.float64], radius: float) -> 
         draw_start(axes, robot, float(track[0, robot, 0]), float(track[0, robot, 1]), colour)
 
 
+def draw_people_and_doors(axes: Axes, crowd: Crowd | None) -> list[Line2D]:
+    """Draw people, and the leaves of doors that are not open; return the entries of the legend."""
+    if crowd is None:
+        return []
+    person, door = _hex(PERSON), _hex(DOOR)
+    for x, y, to_x, to_y in crowd.leaves[crowd.opened < 1.0]:
+        axes.plot([x, to_x], [y, to_y], color=door, linewidth=2.4, zorder=3.5)
+    for x, y, radius in crowd.people:
+        axes.add_patch(Circle((x, y), radius, facecolor=person, edgecolor="white", linewidth=1.0, zorder=5))
+    people = [Line2D([], [], marker="o", markersize=9, color=person, linewidth=0, label="person at the end")]
+    doors = [Line2D([], [], color=door, linewidth=2.4, label="door")]
+    return people * bool(len(crowd.people)) + doors * bool(len(crowd.doors))
+
+
 def draw_start(axes: Axes, number: int, x: float, y: float, colour: str) -> None:
     """Draw the start of robot ``number``."""
     axes.plot(
@@ -217,7 +233,12 @@ def draw_start(axes: Axes, number: int, x: float, y: float, colour: str) -> None
 
 def hex_colours(robots: int) -> list[str]:
     """Return the colour of each robot."""
-    return [f"#{red:02x}{green:02x}{blue:02x}" for red, green, blue in team_colours(robots)]
+    return [_hex(colour) for colour in team_colours(robots)]
+
+
+def _hex(colour: Colour) -> str:
+    red, green, blue = colour
+    return f"#{red:02x}{green:02x}{blue:02x}"
 
 
 def draw_curve(

@@ -42,6 +42,7 @@ from lidarium.evaluation.drawing.picture_parts import (
     SOLID,
     box_around,
     draw_curve,
+    draw_people_and_doors,
     draw_trajectories,
     drawn_together,
     list_robots,
@@ -177,7 +178,7 @@ def save_track_picture(path: Path, record: EpisodeRecord) -> None:
     palette = np.stack([rgb(colour) for colour in (_UNSEEN, "#ffffff", INK)])
     show_cells(floor_axes, palette[drawn_together(classes[box.rows, box.columns])], box, _UNSEEN)
     draw_trajectories(floor_axes, display.poses, radius_of(record))
-    _draw_legend(figure)
+    _draw_legend(figure, draw_people_and_doors(floor_axes, display.crowd_at(math.inf)))
     end, coverage = float(display.times[-1]), float(display.coverage[-1, 1])
     reached = {
         share: float(display.coverage[display.coverage[:, 1] >= share, 0][0])
@@ -223,7 +224,7 @@ def _counts(events: list[dict[str, Any]]) -> dict[str, int]:
     return {names.get(kind, kind): kinds.count(kind) for kind in dict.fromkeys(kinds)}
 
 
-def _draw_legend(figure: Figure) -> None:
+def _draw_legend(figure: Figure, more: list[Line2D]) -> None:
     start: dict[str, Any] = {"markerfacecolor": "white", "markeredgecolor": INK, "markeredgewidth": 1.6}
     entries: list[Patch | Line2D] = [
         Patch(facecolor="white", edgecolor=SOLID, label="free on the team's map"),
@@ -231,6 +232,7 @@ def _draw_legend(figure: Figure) -> None:
         Patch(facecolor=_UNSEEN, label="unknown"),
         Line2D([], [], marker="o", markersize=9, linewidth=0, label="start", **start),
         Line2D([], [], marker="o", markersize=9, color=INK, linewidth=0, label="end"),
+        *more,
     ]
     figure.legend(
         handles=entries,

@@ -18,11 +18,13 @@ from numpy.typing import NDArray
 
 from lidarium.envs.floors.floor import Floor
 from lidarium.envs.simulation.coverage import unpack_bits
+from lidarium.envs.simulation.people.crowd import crowd_of
 from lidarium.evaluation.drawing.picture_parts import (
     INK,
     SOLID,
     box_around,
     draw_curve,
+    draw_people_and_doors,
     draw_start,
     draw_trajectories,
     drawn_together,
@@ -62,7 +64,8 @@ def save_run_picture(path: Path, episode: Episode, policy: str) -> None:
         np.stack([poses for _, poses in scorer.track] + [env.world.poses]),
         env.settings.robot.radius,
     )
-    entries = draw_supervision(floor_axes, env, episode.report)
+    entries = draw_people_and_doors(floor_axes, crowd_of(env.simulation.population))
+    entries += draw_supervision(floor_axes, env, episode.report)
     _draw_legend(figure, *_draw_frontiers(floor_axes, episode), entries)
     draw_curve(curve_axes, scorer.curve, scorer.times, scorer.time)
     _list_robots(team_axes, episode)

@@ -64,8 +64,10 @@ class StopRule:
 
     def is_met(self, env: ExplorationEnv, history: History, decisions: int) -> bool:
         """Whether the episode ends now, after that many decisions."""
-        if self.decisions is not None and decisions >= self.decisions:
-            return True
+        return (self.decisions is not None and decisions >= self.decisions) or self.is_reached(env, history)
+
+    def is_reached(self, env: ExplorationEnv, history: History) -> bool:
+        """Whether the figure is good enough; False for a rule of decisions alone."""
         if self.figure is None:
             return False
         value = _FIGURES[self.figure](env, history)

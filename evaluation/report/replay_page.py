@@ -179,6 +179,7 @@ class ReplaySampler(Watcher):
         return sides[0], sides[1]
 
 
+_HUNDREDTHS = 1e2
 _MILLI = 1e3
 _SHARES = 1e6
 SCAN_UNIT_M = 0.02
@@ -230,6 +231,8 @@ def replay_of(record: EpisodeRecord, floor: str | Floor | None = None) -> Replay
         "known_starts": bool(header["settings"].get("known_starts", True)),
         "colours": [f"#{r:02x}{g:02x}{b:02x}" for r, g, b in team_colours(header["robots"])],
         "events": [_plain(event) for event in display.events],
+        "people_radius_m": [] if display.crowd is None else display.crowd.people[0, :, 2].tolist(),
+        "doors": [] if display.crowd is None else display.crowd.doors.tolist(),
         **more,
     }
     return Replay(title, packed(about, {**_track(record), **streams}), lacks)
@@ -251,16 +254,21 @@ def _plain(event: dict[str, Any]) -> dict[str, Any]:
 
 
 def _track(record: EpisodeRecord) -> Streams:
-    """Return paths and coverage, coded as small differences."""
-    display = record.display
+    """Return paths, coverage, people and doors, coded as small differences."""
+    display, crowd = record.display, record.display.crowd
     poses = display.poses.reshape(len(display.times), -1, 3).copy()
     poses[..., 2] = np.unwrap(poses[..., 2], axis=0)
-    return {
+    streams = {
         "pose_times": _differences(display.times, _MILLI),
         "poses": _differences(poses.reshape(len(poses), -1), _MILLI),
         "coverage_times": _differences(display.coverage[:, 0], _MILLI),
         "coverage": _differences(display.coverage[:, 1], _SHARES),
     }
+    if crowd is not None:
+        streams["crowd_times"] = _differences(crowd.times, _MILLI)
+        streams["people"] = _differences(crowd.people[..., :2].reshape(len(crowd.times), -1), _MILLI)
+        streams["opened"] = _differences(crowd.opened, _HUNDREDTHS)
+    return streams
 
 
 def _differences(values: Any, scale: float) -> bytes:  # noqa: ANN401

@@ -85,6 +85,8 @@ def run_trial(suite: Suite, trial: Trial, records: Path | None = None) -> dict[s
         **suite.run_options(trial.variant),
     )
     result = result_of(episode, trial.policy, history)
+    if rule is not None and rule.figure is not None:
+        result["success"] = rule.is_reached(env, history)
     if records is not None:
         _keep_record(records / f"{trial.file_name}.npz", recorder.finish())
     where = [[round(float(number), 6) for number in start] for start in env.world.starts]

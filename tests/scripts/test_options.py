@@ -323,3 +323,20 @@ def test_an_interrupt_ends_the_process_of_a_page_that_stays(tmp_path):
     assert process.returncode == 0, errors
     assert "Traceback" not in errors
     assert json.loads(out)["interrupted"] is False
+
+
+def test_options_of_several_words_may_be_given_again():
+    lists = {"--set", "--policy-set", "--supervisor"}
+    words = ["--set", "a=1", "b=2", "--robots", "2", "--policy_set=c=3", "--set=d=-4", "--set", "e=5", "--json"]
+    words += ["--supervisor", "f=6", "--supervisor.g-h", "7", "--supervisor", "i=8"]
+    assert " ".join(gathered(words, lists)) == (
+        "--robots 2 --json --set a=1 b=2 d=-4 e=5 --policy-set c=3 --supervisor f=6 g_h=7 i=8"
+    )
+
+
+def test_all_settings_count_if_the_option_is_repeated(tmp_path, capsys):
+    words = ["run", "--policy", "random_walk", "--set", "people=2", "--set", "horizon_s=1", "--set", "robots=1"]
+    assert main([*words, "--out", str(tmp_path)]) == 0
+    assert "0 contacts by robots, 0 by people" in capsys.readouterr().out
+    result = json.loads((tmp_path / "result.json").read_text())
+    assert (result["robots"], result["horizon_s"], result["contacts_by_robot"]) == (1, 1.0, 0)

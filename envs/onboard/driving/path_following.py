@@ -21,7 +21,6 @@ from lidarium.envs.onboard.driving.safety_stop import (
     yielding_speed,
 )
 from lidarium.envs.onboard.radio.messages import MOST_POINTS
-from lidarium.envs.simulation.kernels.arrays import PERSON_GAP
 from lidarium.mapping.kernels.compilation import Array, kernel
 
 IDLE, DRIVING, ARRIVED, BLOCKED = range(4)
@@ -84,9 +83,6 @@ FACING = 0.1
 BACKING_SPEED = 0.05
 """A robot that a wall blocks backs out along its path at this speed [m/s]."""
 
-BACKING_GAP = 0.3
-"""A robot does not back out if a person is nearer than this [m]."""
-
 BLOCKED_S = 1.0
 """A robot that wants to drive and has stood for this long is blocked [s]."""
 
@@ -138,8 +134,7 @@ def follow_paths(sensed: Sensed, courses: Courses, bodies: Bodies, commands: Arr
             courses.stood[robot] = courses.backing[robot] = 0
         elif courses.backing[robot] > 0:
             courses.backing[robot] -= 1
-            # Nobody looks behind: not near a person.
-            commands[robot, 0] = 0.0 if sensed.safety[robot, PERSON_GAP] < BACKING_GAP else -BACKING_SPEED
+            commands[robot, 0] = yielding_speed(sensed.safety[robot], -BACKING_SPEED, -BACKING_SPEED)
         else:
             _pass_points(sensed, courses, robot)
             if _is_at_end(sensed, courses, robot):
@@ -161,7 +156,7 @@ def _drive_on(sensed: Sensed, courses: Courses, bodies: Bodies, robot: int, comm
         return
     speed = bodies.limits[CRUISE] * (1.0 - SLOWING * abs(error) / tolerance)
     speed = min(speed, _speed_to_next(sensed, courses, bodies.limits, robot, tolerance))
-    speed = yielding_speed(sensed, robot, speed, min(speed, safe_speed(sensed, bodies, robot)))
+    speed = yielding_speed(sensed.safety[robot], speed, min(speed, safe_speed(sensed, bodies, robot)))
     commands[robot, 0] = speed
     if speed < STANDING_SPEED:
         courses.stood[robot] += 1

@@ -39,6 +39,9 @@ YIELD_M = 0.8
 YIELD_PER_M, CREEP = 0.6, 0.12
 """Speed near a person per metre of the gap, and minimum [1/s, m/s]."""
 
+BACKING_GAP = 0.3
+"""Gap to a person below which a robot does not back [m]."""
+
 FORESIGHT_TIMES = np.array([0.0, 0.4, 0.8])
 """Times at which the robot with the higher number predicts the other's position [s]."""
 
@@ -182,13 +185,18 @@ def _gap_to_heard(robot: int, sensed: Sensed, bodies: Bodies) -> float:
 
 
 @kernel(forceinline=True, nrt=False)
-def yielding_speed(sensed: Sensed, robot: int, wanted: float, speed: float) -> float:
-    """Return the speed near people of a robot that wants one and may drive at ``speed`` [m/s]; note the time lost."""
-    gap = sensed.safety[robot, PERSON_GAP]
+def yielding_speed(safety: Array, wanted: float, speed: float) -> float:
+    """Return the speed near people of a robot that wants one and may drive at ``speed`` [m/s]; note the time lost.
+
+    ``safety`` is the robot's row. Nobody looks behind: a robot does not back near a person.
+    """
+    gap = safety[PERSON_GAP]
+    if speed < 0.0:
+        return 0.0 if gap < BACKING_GAP else speed
     if gap < YIELD_M:
         speed = min(speed, max(YIELD_PER_M * gap, CREEP))
         if wanted > 0.0:
-            sensed.safety[robot, YIELDED] += 1.0 - min(speed / wanted, 1.0)
+            safety[YIELDED] += 1.0 - min(speed / wanted, 1.0)
     return speed
 
 

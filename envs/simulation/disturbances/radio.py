@@ -97,6 +97,12 @@ def path_loss(
     return np.asarray(loss + np.where(walls > 0.0, through, 0.0), np.float64)
 
 
+def connects(settings: RadioSettings, distance: float) -> bool:
+    """Whether robots may reach each other over a distance [m] with nothing between; by shadowing, they may."""
+    is_lucky = settings.kind == "signal" and settings.shadowing > 0.0
+    return is_lucky or bool(_reached(settings, np.array(distance), np.array(0.0), None))
+
+
 def _reached(
     settings: RadioSettings,
     distance: NDArray[np.float64],

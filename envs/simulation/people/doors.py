@@ -99,22 +99,10 @@ def _openings(floor: Floor, resolution: float) -> NDArray[np.float64]:
     return openings_of(floor.raster(resolution, *WALL_BAND_M))
 
 
-def draw_doors(
-    tables: FloorTables, share: float, radius: float, seed: int, name: str = "the floor"
-) -> NDArray[np.float64]:
-    """Return the doors of an episode, (doors, 7), in a share of the openings of its floor.
+def draw_doors(tables: FloorTables, share: float, radius: float, seed: int) -> NDArray[np.float64]:
+    """Return the doors of an episode, (doors, 7), in a share of the openings of its floor, one at least.
 
-    Parameters
-    ----------
-    radius : float
-        Radius of the largest robot [m].
-    name : str
-        What messages call the floor: floors of other names may have the same tables.
-
-    Raises
-    ------
-    ValueError
-        If the floor has no opening for a door.
+    A floor without openings has none. ``radius`` is that of the largest robot [m].
     """
     floor = tables.floor
     if floor is None:
@@ -122,10 +110,7 @@ def draw_doors(
     else:
         openings = _openings(floor, tables.body.resolution)
     if not len(openings):
-        raise ValueError(
-            f"doors is {share}, but {name} has no opening of {NARROWEST_M} to {WIDEST_M} m between walls in which a "
-            "door could hang; want doors=0 or a floor with rooms"
-        )
+        return np.zeros((0, DOOR_NUMBERS))
     generator = np.random.default_rng([seed, DOOR_STREAM])
     count = min(max(round(share * len(openings)), 1), MOST_DOORS)
     chosen = np.sort(generator.permutation(len(openings))[:count])

@@ -2,9 +2,13 @@
 
 import numpy as np
 import pytest
+from scipy import ndimage
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import dijkstra
 
 import lidarium
 from lidarium.agents.meetings.policy import MeetingFrontier, MeetingTours
+from lidarium.agents.meetings.tethered import Tethered
 from lidarium.envs.floors.floor import Floor, Solid
 from lidarium.envs.settings.faults import Fault, FaultSettings
 from lidarium.envs.settings.making import make_settings
@@ -61,7 +65,16 @@ def test_all_that_live_know_the_floor_if_a_teammate_dies():
     assert any("robot_1" in policy.notebooks[agent].given_up for agent in ("robot_0", "robot_2"))
 
 
-@pytest.mark.parametrize("loss", [0.1, 0.5, 0.9])
+def test_robots_do_not_wait_for_ever_for_one_that_agreed_on_another_meeting():
+    faults = FaultSettings(schedule=(Fault(kind="dead_robot", robot=3, at_s=15.0),))
+    policy = MeetingTours()
+    _, history = finished(policy, "building:3000022", robots=4, radio="signal", faults=faults, horizon_s=650.0)
+    first = [each for each in policy.agreed if each.time_s < 450.0]
+    assert len({each.place for each in first if each.number == first[-1].number}) > 1
+    assert history.curves.c_own[-1][:3].min() >= 0.99
+
+
+@pytest.mark.parametrize("loss", [0.0, 0.1, 0.5, 0.9])
 @pytest.mark.parametrize("rule", ["meeting", "pursuit"])
 def test_lost_messages_delay_a_team_and_do_not_end_it(loss, rule):
     episode, history = finished(MeetingTours(rule=rule), corridor(2), robots=2, radio={**NEAR, "loss": loss})
@@ -85,12 +98,27 @@ def test_a_tethered_team_keeps_in_touch():
     assert all(not book.given_up for book in policy.notebooks.values())
 
 
-def test_without_any_radio_robots_explore_alone_as_with_tour_frontier():
-    policy = MeetingTours()
-    ours, _ = finished(policy, corridor(2), robots=2, radio="none")
-    alone, _ = finished(lidarium.policy("tour_frontier"), corridor(2), robots=2, radio="none")
-    assert policy.told_bytes == 0
-    assert np.array_equal(ours.env.world.poses, alone.env.world.poses)
+@pytest.mark.parametrize("make", [MeetingTours, MeetingFrontier, Tethered])
+@pytest.mark.parametrize(
+    "radio",
+    [
+        "none",
+        {"kind": "range", "reach": 0.3},
+        {"kind": "line_of_sight", "reach": 0.3},
+        {"kind": "signal", "power": -300.0},
+        {"kind": "signal", "threshold": 0.0},
+    ],
+)
+def test_a_radio_that_never_connects_is_refused(make, radio):
+    with pytest.raises(
+        ValueError, match=rf"{make.__name__} needs a radio, but '\w+' never connects .* 0\.36 m apart; want"
+    ):
+        finished(make(), corridor(2), robots=2, radio=radio)
+
+
+def test_a_radio_that_connects_by_chance_or_over_half_a_metre_is_not():
+    for radio in ({"kind": "range", "reach": 0.5}, {"kind": "signal", "power": -40.0, "shadowing": 4.0}):
+        finished(MeetingTours(), corridor(2), robots=2, radio=radio, horizon_s=2.0)
 
 
 def test_robots_with_unknown_starts_are_refused():
@@ -100,3 +128,47 @@ def test_robots_with_unknown_starts_are_refused():
         MeetingTours(hurry=1.0)
     with pytest.raises(ValueError, match="'hurry'"):
         MeetingFrontier(hurry=1.0)
+
+
+class SlowlyChecked(MeetingTours):
+    """Compares each position of a meeting with the best of a slow search over all cells."""
+
+    def _best_place(self, agent, members, cells):
+        place = super()._best_place(agent, members, cells)
+        navigation, news = self.navigation(agent), self.notebooks[agent].news
+        goals = [*(self._cell_of(agent, news[name].goal) for name in members), *map(tuple, cells)]
+        lengths = [lengths_from(goal, navigation, self.team.belief(agent).radius) for goal in goals]
+        longest = np.max(lengths, axis=0)
+        if np.isfinite(longest).any():
+            self.compared.append((longest[self._cell_of(agent, place)], longest[np.isfinite(longest)]))
+        return place
+
+
+def lengths_from(cell, navigation, radius):
+    """Return the lengths of the shortest paths of a body from a cell, or the room nearest to it, to all cells [m]."""
+    side = navigation.resolution
+    room = ndimage.distance_transform_edt(navigation.log_odds < 0) * side > radius
+    rows, columns = np.nonzero(room)
+    number = np.full(room.shape, -1)
+    number[rows, columns] = np.arange(len(rows))
+    ends, weights = [], []
+    for down, right in ((0, 1), (1, 0), (1, 1), (1, -1)):
+        there = number[np.clip(rows + down, 0, len(room) - 1), np.clip(columns + right, 0, room.shape[1] - 1)]
+        ends.append(np.stack([np.arange(len(rows)), there])[:, there >= 0])
+        weights.append(np.full(ends[-1].shape[1], side * np.hypot(down, right)))
+    graph = coo_array((np.concatenate(weights), np.concatenate(ends, axis=1)), shape=(len(rows), len(rows)))
+    nearest = int(np.argmin(np.hypot(rows - cell[0], columns - cell[1])))
+    found = np.full(room.shape, np.inf)
+    found[rows, columns] = dijkstra(graph, directed=False, indices=nearest)
+    return found
+
+
+def test_meetings_are_where_the_longest_way_is_shortest():
+    policy = SlowlyChecked()
+    policy.compared = []
+    finished(policy, "building:4", robots=3, radio="signal", horizon_s=60.0)
+    assert len(policy.compared) > 5
+    for chosen, others in policy.compared:
+        # Planned paths keep off walls, which makes some ways longer.
+        assert others.min() <= chosen <= others.min() + 1.0
+        assert chosen < 0.8 * np.median(others)

@@ -6,6 +6,7 @@ from dataclasses import asdict
 import pytest
 
 from lidarium.envs.settings import ExplorationSettings, make_settings
+from lidarium.envs.settings.battery import BATTERIES
 from lidarium.envs.settings.making import assign
 from lidarium.evaluation.episodes.settings_identity import settings_sha256
 from lidarium.mapping.localization.settings import SlamSettings
@@ -93,3 +94,11 @@ def test_settings_without_new_parts_keep_the_hash_of_older_records():
     assert settings_sha256(ExplorationSettings()) == (
         "29aa8ba6befade6f28ca824d3f7a82bea9e057c5d83f03c51901b1d1ee1306a7"
     )
+
+
+def test_none_is_a_name_where_there_is_one_and_nothing_elsewhere():
+    assigned = ["radio=none", "battery=none", "camera=none", "horizon_s=none"]
+    settings = make_settings(assigned=assigned)
+    assert settings.radio.kind == "none"
+    assert settings.battery == BATTERIES["none"]
+    assert (settings.camera, settings.horizon_s) == (None, None)

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from browsing import Browser, chromium
 
+from lidarium.envs.drawing.frame_parts import DOOR, PERSON
 from lidarium.evaluation.record import write_record
 from lidarium.evaluation.report import write_report
 from lidarium.evaluation.report.page import write_replay_page
@@ -269,6 +270,31 @@ def test_merges_and_orders_are_on_the_time_line_and_lead_to_their_time(driver, s
     assert page.find("#replay .events [aria-current]").text
     assert (canvas_of(page) != apart).any()
     assert page.complaints() == []
+
+
+def test_people_and_doors_are_a_layer_of_episodes_that_have_them(driver, recorded, report, tmp_path):
+    record, _ = recorded(people=3, doors=1.0, resolution=0.05, horizon_s=10.0)
+    write_replay_page(tmp_path / "people.html", replay_of(record))
+    page = Browser(driver)
+    page.open(tmp_path / "people.html")
+    ready(page)
+    box = page.labelled("People, doors", "#replay")
+    first = canvas_of(page)
+    scrub(page, 1.0)
+    last = canvas_of(page)
+    box.click()
+    without = canvas_of(page)
+    for colour in (PERSON, DOOR):
+        counts = [int((shown == np.array(colour)[::-1]).all(axis=2).sum()) for shown in (first, last, without)]
+        assert counts[0] > 20
+        assert counts[1] > 20
+        assert counts[2] == 0
+    is_person = [(shown == np.array(PERSON)[::-1]).all(axis=2) for shown in (first, last)]
+    assert (is_person[0] != is_person[1]).any()
+    assert page.complaints() == []
+    page.open(report)
+    ready(page)
+    assert "People, doors" not in [each.text for each in page.find_all("#replay .layers label")]
 
 
 @pytest.mark.parametrize("theme", ["light", "dark"])

@@ -36,6 +36,21 @@ def test_a_line_says_what_was_run_from_where(tmp_path):
     assert read_record(path).header["starts"] == [[2.5, 4.0, 0.5]]
 
 
+@pytest.mark.parametrize(("share", "is_reached"), [(0.1, True), (0.9, False)])
+def test_success_is_by_the_figure_of_the_rule(share, is_reached):
+    suite = Suite(
+        policies=("nearest_frontier",),
+        floors=("apartment",),
+        robots=(2,),
+        variants={"apart": {**SETTINGS, "horizon_s": 20.0, "stop_coverage": 0.3, "radio": "line_of_sight"}},
+        stop={"figure": "c_own_min", "at_least": share, "decisions": 5},
+    )
+    line = run_trial(suite, next(suite.trials()))
+    assert (line["c_own_min_final"] >= share) is is_reached
+    assert line["success"] is is_reached
+    assert (line["coverage_final"] >= 0.3) is not is_reached
+
+
 def test_without_a_folder_there_is_no_record():
     suite = Suite(policies=("random_walk",), floors=("apartment",), variants={"default": SETTINGS})
     (trial,) = suite.trials()

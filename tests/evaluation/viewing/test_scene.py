@@ -17,6 +17,8 @@ from lidarium.envs.floors.catalogue.names import load_floor
 from lidarium.envs.floors.floor import Solid
 from lidarium.envs.settings.making import make_settings
 from lidarium.envs.settings.robots import ROBOTS
+from lidarium.envs.simulation.depth.frames import LEAF_HEIGHT_M
+from lidarium.envs.simulation.people.crowd import Crowd
 from lidarium.evaluation.episodes.runner import run_episode
 from lidarium.evaluation.episodes.watching import WatchedExploration
 from lidarium.evaluation.truth.true_map import truth_of
@@ -102,6 +104,29 @@ def test_each_robot_is_drawn_at_its_place(shown, env):
     scene.draw(moment_of(env))
     for row, agent in enumerate(env.possible_agents):
         assert server.scene.nodes[f"/robots/{agent}"].position[:2] == pytest.approx(TWO_ROOMS.starts[row, :2])
+
+
+def test_people_are_cylinders_and_doors_leaves_that_slide(shown, env):
+    scene, server, _ = shown
+    ends = np.array([(1.0, 1.0, 2.0, 1.0), (3.0, 1.0, 3.0, 2.0)])
+
+    def draw(x, *opened):
+        crowd = Crowd(np.array([(x, 2.0, 0.25), (4.0, 3.0, 0.3)]), ends, np.array(opened))
+        scene.draw(replace(moment_of(env), crowd=crowd))
+
+    def leaves():
+        return np.asarray(server.scene.nodes["/doors"].vertices)
+
+    draw(1.0, 0.0, 0.25)
+    assert leaves()[:, :2].max(axis=0) == pytest.approx((3.0, 1.75))
+    draw(1.5, 0.5, 0.5)
+    assert leaves().max(axis=0) == pytest.approx((3.0, 1.5, LEAF_HEIGHT_M))
+    assert server.scene.nodes["/people/person_0"].position == pytest.approx((1.5, 2.0, 0.0))
+    body = np.asarray(server.scene.nodes["/people/person_1"].vertices)
+    assert np.hypot(*body[:, :2].T).max() == pytest.approx(0.3)
+    for opened, count in ((0.5, 4), (1.0, 0), (0.5, 4)):
+        draw(1.5, 1.0, opened)
+        assert len(leaves()) == count
 
 
 def test_layers_that_are_not_chosen_are_hidden(shown):

@@ -14,9 +14,11 @@ from lidarium.envs.simulation.kernels.arrays import (
     DOOR_OPEN,
     OPENS,
     STAYS_SHUT,
+    WALKER_RADIUS,
     WALKER_X,
     WALKER_Y,
 )
+from lidarium.envs.simulation.people.crowd import crowd_of
 from lidarium.envs.simulation.people.doors import middles_of, openings_of
 
 HALL = Floor("hall", (0.0, 0.0, 6.0, 4.0))
@@ -34,6 +36,15 @@ def test_a_door_where_no_opening_is_is_refused():
     env = ExplorationEnv(HALL, make_settings(robots=1, doors=0.5))
     with pytest.raises(ValueError, match=r"doors is 0\.5, but floor 'hall' has no opening of 0\.65 to 1\.6 m"):
         env.reset(seed=0)
+
+
+def test_a_drawn_floor_without_openings_has_no_doors():
+    env = ExplorationEnv([HALL, ROOMS], make_settings(robots=1, doors=1.0))
+    doors = {}
+    for seed in range(8):
+        env.reset(seed=seed)
+        doors[env.floor.name] = int((env.simulation.population.doors_of(0)[:, DOOR_KIND] > 0).sum())
+    assert doors == {"hall": 0, "rooms": 1}
 
 
 def test_a_door_opens_when_a_robot_comes_and_shuts_behind_it():
@@ -93,12 +104,24 @@ def test_people_open_doors_too_and_no_leaf_shuts_on_them():
     env, door = robot_at_door(people=2)
     people = env.simulation.population.people_of(0)
     middle = middles_of(door[None])[0]
-    widths = []
+    widths, gaps = [], []
     for _ in range(400):
         env.step({"robot_0": np.zeros(2, np.float32)})
         if (np.hypot(*(people[:, [WALKER_X, WALKER_Y]] - middle).T) < 0.3).any():
             widths.append(door[DOOR_OPEN])
-    assert not widths or min(widths) > 0.5
+        (leaf,) = crowd_of(env.simulation.population).leaves
+        gaps += [gap_to(leaf, person) for person in people] if door[DOOR_OPEN] < 1.0 else []
+    assert len(widths) > 10
+    assert min(widths) > 0.5
+    assert min(gaps) > -1e-6
+
+
+def gap_to(leaf, person):
+    """Return the gap between a person and a leaf [m]."""
+    along = leaf[2:] - leaf[:2]
+    away = person[[WALKER_X, WALKER_Y]] - leaf[:2]
+    share = np.clip(away @ along / max(along @ along, 1e-12), 0.0, 1.0)
+    return np.hypot(*(away - share * along)) - person[WALKER_RADIUS]
 
 
 def test_a_door_that_stays_shut_does_not_cut_off_a_start_of_the_floor():

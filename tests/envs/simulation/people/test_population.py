@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy import ndimage
 
 from lidarium.agents.catalogue import make_policy
 from lidarium.envs.faces.parallel import ExplorationEnv
@@ -10,6 +11,8 @@ from lidarium.envs.settings.making import make_settings
 from lidarium.envs.simulation.kernels.arrays import WALKER_X, WALKER_Y
 from lidarium.evaluation.episodes.result import result_of
 from lidarium.evaluation.episodes.runner import run_episode
+from lidarium.evaluation.truth.beliefs import team_log_odds
+from lidarium.evaluation.truth.true_map import occupied_in_truth
 
 CLOSET = Floor("closet", (0.0, 0.0, 1.2, 1.2))
 SLOT = Floor("slot", (0.0, 0.0, 4.0, 0.5))
@@ -59,11 +62,19 @@ def test_the_floor_that_counts_and_the_start_are_the_same_with_people():
     assert np.array_equal(without.world.poses, among.world.poses)
 
 
+def ghosts_in(env):
+    """Return how many cells of the robots' maps are occupied far from all that is solid."""
+    log_odds, _ = team_log_odds(env)
+    far = ndimage.distance_transform_edt(~occupied_in_truth(env)) * env.settings.occupancy.resolution
+    return int(((log_odds > 0) & (far > 0.2)).sum())
+
+
 def test_people_leave_no_ghosts_in_the_maps_of_robots():
     results = []
     for people in (0, 8):
         env = ExplorationEnv("office:2", make_settings(robots=2, people=people, starts="drawn", resolution=0.05))
         results.append(result_of(run_episode(make_policy("nearest_frontier"), env, 1)))
+        assert ghosts_in(env) == 0
     without, among = results
     assert among["iou_occupied"] >= 0.97 * without["iou_occupied"]
     assert among["coverage_final"] >= 0.99

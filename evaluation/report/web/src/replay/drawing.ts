@@ -3,7 +3,7 @@ import { type Episode, FREE, OCCUPIED, UNKNOWN } from "./episode";
 import { colour, isDark, mixed, onGround, rgb } from "../theme";
 
 export type Layers = Record<
-  "truth" | "frontiers" | "scans" | "paths" | "targets" | "events" | "believed", boolean>;
+  "truth" | "frontiers" | "scans" | "paths" | "targets" | "events" | "believed" | "crowd", boolean>;
 export type Look = { time: number; map: string; layers: Layers; follow: number | null };
 
 /** Map of the page that shows who is joined with whom. */
@@ -132,6 +132,7 @@ export class Picture {
       if (target !== null) drawTarget(context, episode.poseAt(robot, look.time), target, own, pixel);
     });
     if (look.layers.events) this.drawEvents(context, look.time, colours, pixel);
+    if (look.layers.crowd) this.drawCrowd(context, look.time, pixel);
     episode.agents.forEach((_, robot) => this.drawRobot(context, robot, look, colours[robot] ?? "#808080", pixel));
   }
 
@@ -195,6 +196,26 @@ export class Picture {
     context.setLineDash([3 * pixel, 3 * pixel]);
     context.stroke();
     context.setLineDash([]);
+  }
+
+  /** Draws people, and the leaves of doors that are not open. */
+  private drawCrowd(context: CanvasRenderingContext2D, time: number, pixel: number): void {
+    context.strokeStyle = colour("map-door");
+    context.lineWidth = Math.max(0.07, 2 * pixel);
+    for (const [x, y, toX, toY] of this.episode.leavesAt(time)) {
+      context.beginPath();
+      context.moveTo(x, y);
+      context.lineTo(toX, toY);
+      context.stroke();
+    }
+    context.fillStyle = colour("map-person");
+    context.strokeStyle = colour("ground");
+    context.lineWidth = 1.5 * pixel;
+    for (const { x, y, radius } of this.episode.peopleAt(time)) {
+      disc(context, x, y, radius);
+      context.fill();
+      context.stroke();
+    }
   }
 
   /** Draws merges and orders of the last seconds where they happened. */

@@ -15,7 +15,9 @@ export type Header = {
   title: string; floor: string; policy: string; seed: number | null; robots: number; version: string;
   interrupted: boolean; lacks: string; duration_s: number; radius_m: number; known_starts: boolean;
   colours: string[]; events: Happening[]; grid: Grid; layers: string[]; has_truth: boolean;
-  beam_angles: number[]; scan_unit_m: number; has_beliefs: boolean;
+  beam_angles: number[]; scan_unit_m: number; has_beliefs: boolean; people_radius_m: number[];
+  /** Ends x, y, x, y of the openings; leaves slide away to the first. */
+  doors: [number, number, number, number][];
 };
 export type Pose = { x: number; y: number; theta: number };
 export type Scan = { pose: Pose; ranges: Float32Array };
@@ -82,6 +84,9 @@ export class Episode {
     private readonly scanTimes: Float64Array,
     private readonly ranges: Float32Array,
     private readonly beliefs: Float64Array | null,
+    private readonly crowdTimes: Float64Array,
+    private readonly people: Float64Array,
+    private readonly opened: Float64Array,
     streams: ReadonlyMap<string, Uint8Array>,
   ) {
     const cells = header.grid.rows * header.grid.columns;
@@ -99,7 +104,9 @@ export class Episode {
       header, of("map_times", 1, 1e-3), of("pose_times", 1, 1e-3), of("poses", 3 * header.robots, 1e-3),
       of("coverage_times", 1, 1e-3), of("coverage", 1, 1e-6), of("scan_times", 1, 1e-3),
       scanRanges(streams.get("scans") ?? new Uint8Array(), header.beam_angles.length, header.scan_unit_m),
-      header.has_beliefs ? of("believed", 3 * header.robots, 1e-3) : null, streams,
+      header.has_beliefs ? of("believed", 3 * header.robots, 1e-3) : null,
+      of("crowd_times", 1, 1e-3), of("people", 2 * header.people_radius_m.length, 1e-3),
+      of("opened", header.doors.length, 1e-2), streams,
     );
   }
 
@@ -121,14 +128,25 @@ export class Episode {
 
   /** Returns where a robot is, between the recorded poses. */
   poseAt(robot: number, time: number): Pose {
-    const last = this.poseTimes.length - 1;
-    const first = before(this.poseTimes, time);
-    const next = Math.min(first + 1, last);
-    const [t0, t1] = [this.poseTimes[first]!, this.poseTimes[next]!];
-    const share = t1 > t0 ? Math.min(Math.max((time - t0) / (t1 - t0), 0), 1) : 0;
-    const at = (row: number, k: number): number => this.poses[3 * (row * this.header.robots + robot) + k]!;
-    const between = (k: number): number => at(first, k) + share * (at(next, k) - at(first, k));
-    return { x: between(0), y: between(1), theta: between(2) };
+    const at = between(this.poseTimes, this.poses, 3 * this.header.robots, time);
+    return { x: at(3 * robot), y: at(3 * robot + 1), theta: at(3 * robot + 2) };
+  }
+
+  /** Returns where people are at a time. */
+  peopleAt(time: number): { x: number; y: number; radius: number }[] {
+    const { people_radius_m: radii } = this.header;
+    const at = between(this.crowdTimes, this.people, 2 * radii.length, time);
+    return radii.map((radius, person) => ({ x: at(2 * person), y: at(2 * person + 1), radius }));
+  }
+
+  /** Returns the ends of the leaves of doors that are not open at a time. */
+  leavesAt(time: number): [number, number, number, number][] {
+    const { doors } = this.header;
+    const at = between(this.crowdTimes, this.opened, doors.length, time);
+    return doors.flatMap(([x, y, toX, toY], door) => {
+      const left = 1 - at(door);
+      return left > 0 ? [[x, y, x + left * (toX - x), y + left * (toY - y)]] : [];
+    });
   }
 
   /** Calls back with each recorded position of a robot from one time to another. */
@@ -204,6 +222,15 @@ function stream(streams: ReadonlyMap<string, Uint8Array>, name: string): Uint8Ar
   const found = streams.get(name);
   if (found === undefined) throw new Error(`a replay of the page has no part ${name}; make the page again`);
   return found;
+}
+
+/** Returns the numbers of a row of values at a time, between the recorded rows. */
+function between(times: Float64Array, values: Float64Array, width: number, time: number): (k: number) => number {
+  const first = before(times, time);
+  const next = Math.min(first + 1, times.length - 1);
+  const [t0, t1] = [times[first]!, times[next]!];
+  const share = t1 > t0 ? Math.min(Math.max((time - t0) / (t1 - t0), 0), 1) : 0;
+  return (k) => values[first * width + k]! + share * (values[next * width + k]! - values[first * width + k]!);
 }
 
 /** Returns the place of the last of ascending times up to a time, at least 0. */
