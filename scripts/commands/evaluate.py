@@ -3,13 +3,14 @@
 import os
 import re
 import statistics
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Container, Mapping, Sequence
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from tyro.conf import Positional
 
+from lidarium.mapping.geometry.bounds import shown
 from lidarium.scripts import first_start
 from lidarium.scripts.common import DEFECT, DONE, DOUBTFUL, INTERRUPTED, Answer, TeamCommand, counted, notify, table
 from lidarium.scripts.options import check_supervised, is_supervised, options_by_policy, supervisor_options
@@ -123,14 +124,11 @@ def _suite(command: _Evaluate) -> "Suite":
     from lidarium.evaluation.suites.suite import Suite, read_suite
     from lidarium.evaluation.suites.trial import DEFAULT_VARIANT
 
-    if command.suite is not None or command.preset is not None:
-        for given, what in ((command.supervisor, "the supervisor"), (command.policy_set, "policies")):
-            if given:
-                raise ValueError(
-                    f"settings of {what} are given beside a suite or a preset; want them in its policy_settings"
-                )
     if command.suite is not None:
+        _check_options(command, {"suite", "own_policies"}, "the suite")
         return read_suite(command.suite, command.own_policies)
+    if command.preset is not None:
+        _check_options(command, {"preset", "data", "policies", "floors", "seed", "seeds"}, f"the preset {command.preset}")
     if command.seeds < 1:
         raise ValueError(f"--seeds is {command.seeds}; want at least 1")
     seeds = tuple(range(command.seed, command.seed + command.seeds))
@@ -154,6 +152,19 @@ def _suite(command: _Evaluate) -> "Suite":
         image_resolution=command.resolution,
         policy_settings=_policy_settings(command),
     )
+
+
+_OF_RUNS = {"out", "json", "workers", "ray", "shard", "records"}
+"""Options that say how episodes are run, not which."""
+
+
+def _check_options(command: _Evaluate, taken: Container[str], by: str) -> None:
+    """Check that no option is given that a suite or a preset sets itself."""
+    for each in fields(command):
+        value = getattr(command, each.name)
+        if each.name not in _OF_RUNS and each.name not in taken and value != each.default:
+            option = f"--{each.name.replace('_', '-')}"
+            raise ValueError(f"{option} is {shown(value)}, and {by} sets it; leave it out, or write a suite of your own")
 
 
 def _policy_settings(command: _Evaluate) -> dict[str, dict[str, Any]]:
