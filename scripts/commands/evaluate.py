@@ -128,7 +128,8 @@ def _suite(command: _Evaluate) -> "Suite":
         _check_options(command, {"suite", "own_policies"}, "the suite")
         return read_suite(command.suite, command.own_policies)
     if command.preset is not None:
-        _check_options(command, {"preset", "data", "policies", "floors", "seed", "seeds"}, f"the preset {command.preset}")
+        taken = {"preset", "data", "policies", "floors", "seed", "seeds"}
+        _check_options(command, taken, f"the preset {command.preset}")
     if command.seeds < 1:
         raise ValueError(f"--seeds is {command.seeds}; want at least 1")
     seeds = tuple(range(command.seed, command.seed + command.seeds))
@@ -164,7 +165,7 @@ def _check_options(command: _Evaluate, taken: Container[str], by: str) -> None:
         value = getattr(command, each.name)
         if each.name not in _OF_RUNS and each.name not in taken and value != each.default:
             option = f"--{each.name.replace('_', '-')}"
-            raise ValueError(f"{option} is {shown(value)}, and {by} sets it; leave it out, or write a suite of your own")
+            raise ValueError(f"{option} is {shown(value)}, and {by} sets it; leave it out, or write your own suite")
 
 
 def _policy_settings(command: _Evaluate) -> dict[str, dict[str, Any]]:
