@@ -105,11 +105,6 @@ POLICIES.register(
     "at the level of frontiers: two robots that share a network trained by MAPPO",
 )
 POLICIES.register(
-    "zoo:qmix-2",
-    "lidarium.agents.zoo.policy:qmix_2",
-    "at the level of frontiers: two robots that share a network of values, trained by QMIX",
-)
-POLICIES.register(
     "zoo:signal-2",
     "lidarium.agents.zoo.policy:signal_2",
     "as zoo:ppo-2, trained with a radio that breaks behind walls",

@@ -57,11 +57,6 @@ def mappo_2(weights: str | Path = "") -> ZooTeam:
     return ZooTeam("mappo-2", weights)
 
 
-def qmix_2(weights: str | Path = "") -> ZooTeam:
-    """Return the team of two that was trained by QMIX."""
-    return ZooTeam("qmix-2", weights)
-
-
 def signal_2(weights: str | Path = "") -> ZooTeam:
     """Return the team of two that was trained by PPO with a radio that breaks."""
     return ZooTeam("signal-2", weights)

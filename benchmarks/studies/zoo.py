@@ -16,7 +16,7 @@ from lidarium.agents.catalogue import make_policy
 from lidarium.agents.policy import settings_for
 from lidarium.agents.supervisor.policy import Supervised
 from lidarium.agents.zoo.network import network_shapes
-from lidarium.agents.zoo.policy import zoo_files
+from lidarium.agents.zoo.policy import ZooTeam, zoo_files
 from lidarium.benchmarks.studies.shared.study import Progress, Study, Task, do_missing, kept_lines
 from lidarium.envs.floors.catalogue.names import set_floors
 from lidarium.envs.settings.making import make_settings
@@ -27,7 +27,7 @@ from lidarium.evaluation.statistics import FEWEST_FOR_INTERVAL, Interval, paired
 from lidarium.mapping.files.output import write_text
 
 TEAMS = ("tours-2", "ppo-2", "mappo-2", "qmix-2", "ppo-4", "signal-2", "supervised-2")
-"""Trainings that ship; the number is the size of the team in training."""
+"""Trainings; the number is the size of the team in training."""
 
 WORLDS: Mapping[str, Mapping[str, Any]] = {"": {}, "signal": {"radio": "signal"}, "supervised": {"known_starts": False}}
 """Settings of the worlds that teams are trained for, by the first word of their name; "" is that of all others."""
@@ -148,6 +148,10 @@ def _trainings(folder: Path) -> dict[tuple[str, str], Path]:
     }
 
 
+def _level(team: str) -> str:
+    return "tour" if "tours" in team else "frontier"
+
+
 def _take_shipped(folder: Path) -> None:
     """Write weights and curves that ship, of teams of which there is no training."""
     there = {team for team, _ in _trainings(folder)}
@@ -160,15 +164,13 @@ def _take_shipped(folder: Path) -> None:
         taken.mkdir(parents=True, exist_ok=True)
         curve = json.loads(card.read_text(encoding="utf-8"))["curve"]
         write_text(taken / CURVE, "step,coverage\n" + "".join(f"{step},{coverage}\n" for step, coverage in curve))
-        files = zoo_files(team, "tour" if team.startswith("tours") else "frontier")
+        files = zoo_files(team, _level(team))
         files.save(taken / WEIGHTS, files.load(""))
 
 
 def measure(run: Run) -> dict[str, Any]:
     """Run an episode; return its figures."""
-    options: dict[str, Any] = {} if run.weights is None else {"weights": run.weights}
-    name = "zoo:ppo-2" if run.policy == UNTRAINED else run.policy
-    policy = make_policy(name, **options)
+    policy = make_policy(run.policy) if run.weights is None else ZooTeam(run.policy, run.weights, _level(run.policy))
     policy = Supervised(policy) if run.world == "supervised" else policy
     settings = settings_for(
         policy, make_settings(robots=run.robots, stop_coverage=SHARE, horizon_s=HORIZON_S, **WORLDS[run.world])

@@ -102,6 +102,7 @@ def test_policies_read_beliefs_and_never_the_truth():
         "teammates",
         "energy_left_j",
         "goal",
+        "yielding",
     }
 
 

@@ -14,7 +14,6 @@ NAMES = {
     "zoo:ppo-2": "frontier",
     "zoo:ppo-4": "frontier",
     "zoo:mappo-2": "frontier",
-    "zoo:qmix-2": "frontier",
     "zoo:signal-2": "frontier",
     "zoo:supervised-2": "frontier",
 }
