@@ -95,6 +95,8 @@ import numpy as np, lidarium
 envs = lidarium.vector_env(6, "set:train", level="tour", robots=2, threads=2, resolution=0.05)
 envs.reset(seed=0)
 envs.step(np.zeros(12, np.int64))
+# A shell that starts the tests in the background lets their children ignore interrupts.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 threading.Timer(0.3, signal.raise_signal, (signal.SIGINT,)).start()
 try:
     while True:
