@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from published_pages import assert_published, keep
 
+from lidarium.agents.zoo.network import network_shapes
 from lidarium.agents.zoo.policy import zoo_files
 from lidarium.benchmarks.studies import zoo
 
@@ -21,6 +22,15 @@ def line(policy, floor, time_s, robots=2, training="", world="", joined_s=None):
         "early": 0.5 if time_s is None else min(60.0 / time_s, 1.0),
         "time_s": time_s,
     }
+
+
+def keep_training(folder, team, seed, coverage):
+    """A training of two points whose network ranks frontiers as explore_lite does."""
+    trained = folder / zoo.LESSONS / f"{team}-{seed}"
+    trained.mkdir(parents=True)
+    (trained / zoo.CURVE).write_text(f"step,coverage\n0,0.5\n10,{coverage}\n")
+    zeros = {name: np.zeros(shape, np.float32) for name, shape in network_shapes("frontier").items()}
+    zoo_files("").save(trained / zoo.WEIGHTS, {**zeros, "steepness": np.ones(1, np.float32)})
 
 
 def test_a_part_runs_the_teams_that_ship(tmp_path, monkeypatch):
@@ -54,6 +64,7 @@ def test_a_team_for_another_world_runs_there_beside_others(tmp_path, monkeypatch
     monkeypatch.setattr(zoo, "BESIDE", (NEAREST,))
     monkeypatch.setattr(zoo, "TEAMS", ("signal-2", "supervised-2"))
     monkeypatch.setattr(zoo, "HORIZON_S", 20.0)
+    keep_training(tmp_path, "supervised-2", 0, 0.6)
     list(zoo.work(tmp_path, None, 2, 1))
     lines = zoo.kept_lines(tmp_path / zoo.RUNS_FILE)
     assert [(each["policy"], each["world"]) for each in lines] == [
@@ -62,24 +73,21 @@ def test_a_team_for_another_world_runs_there_beside_others(tmp_path, monkeypatch
         (NEAREST, "supervised"),
         ("zoo:supervised-2", "supervised"),
     ]
-    assert len({each["early"] for each in lines}) == 4
-
-
-def test_a_part_shows_the_curves_of_the_trainings_that_ship(tmp_path):
-    lessons = zoo._lessons(tmp_path)
-    assert [each["team"] for each in lessons] == list(zoo.TEAMS)
-    assert all(each["curve"][0][0] == 0 and len(each["curve"]) > 2 for each in lessons)
+    assert [each["training"] for each in lines] == ["", zoo.SHIPPED, "", "0"]
+    page = zoo.page(tmp_path)
+    assert "| `signal-2` | shipped | 204,800 | 67.3 % | 73.5 % |" in page
+    assert "| `supervised-2` | 0 | 10 | 50.0 % | 60.0 % |" in page
 
 
 def test_trainings_that_are_there_are_not_run_again(tmp_path):
     pytest.importorskip("torch", reason='PyTorch is not installed: extra "rl"')
     lesson = zoo.Lesson("ppo-2", 3, tmp_path / "ppo-2-3")
-    kept = [{"team": "ppo-2", "seed": 3, "curve": [[0, 0.5], [10, 0.6]], "processor_s": 60.0}]
+    kept = [{"team": "ppo-2", "seed": 3, "processor_s": 60.0}]
     (tmp_path / zoo.LESSONS_FILE).write_text(
         json.dumps({"key": lesson.key, **kept[0], "version": zoo_version()}) + "\n"
     )
     assert list(zoo.do_missing(tmp_path / zoo.LESSONS_FILE, "lessons", [lesson], zoo.learn, 1)) == []
-    assert zoo.kept_lines(tmp_path / zoo.LESSONS_FILE)[0]["curve"] == kept[0]["curve"]
+    assert zoo.kept_lines(tmp_path / zoo.LESSONS_FILE)[0]["processor_s"] == 60.0
 
 
 def zoo_version():
@@ -100,10 +108,9 @@ def test_the_page_tells_what_is_reached_over_floors_and_seeds(tmp_path):
     ]
     lines += [line(policy, floor, 50.0, robots=8) for floor in floors for policy in ("nearest_frontier", "zoo:ppo-2")]
     lines += [line(policy, floor, 60.0, robots=4) for floor in floors for policy in ("nearest_frontier", "zoo:ppo-4")]
-    lessons = [
-        {"team": "ppo-2", "seed": seed, "curve": [[0, 0.5], [10, 0.6 + seed / 10]], "processor_s": 90.0}
-        for seed in (0, 1)
-    ]
+    for seed in (0, 1):
+        keep_training(tmp_path, "ppo-2", seed, 0.6 + seed / 10)
+    lessons = [{"team": "ppo-2", "seed": seed, "processor_s": 90.0} for seed in (0, 1)]
     lines += [line("zoo:signal-2", floor, 80.0, world="signal") for floor in floors]
     lines += [line(NEAREST, floor, 100.0, world="signal") for floor in floors]
     lines += [
@@ -122,7 +129,8 @@ def test_the_page_tells_what_is_reached_over_floors_and_seeds(tmp_path):
         in page
     )
     assert "| untrained network | 8 | 50.0 % | 1200.0 s |" in page
-    assert "| `ppo-2` | 1 | 10 | 50.0 % | 70.0 % |" in page
+    assert "| `ppo-2` | 1 | 10 | 50.0 % | 70.0 % | 0.80" in page
+    assert "| 1.5 min |" in page
     assert "| 10 | - | 65.0 % | - | - | - | - | - |" in page
     assert "## Teams of 2 whose radio breaks" in page
     assert "| `zoo:signal-2` | 8 | 75.0 % | 80.0 s | 0.80" in page
