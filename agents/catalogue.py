@@ -110,11 +110,6 @@ POLICIES.register(
     "as zoo:ppo-2, trained with a radio that breaks behind walls",
 )
 POLICIES.register(
-    "zoo:supervised-2",
-    "lidarium.agents.zoo.policy:supervised_2",
-    "as zoo:ppo-2, trained with unknown starts under the supervisor",
-)
-POLICIES.register(
     "zoo:tours-2",
     "lidarium.agents.zoo.policy:tours_2",
     "at the level of tours: two robots that share a network trained by PPO, which begins as tour_frontier",

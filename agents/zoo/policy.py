@@ -62,11 +62,6 @@ def signal_2(weights: str | Path = "") -> ZooTeam:
     return ZooTeam("signal-2", weights)
 
 
-def supervised_2(weights: str | Path = "") -> ZooTeam:
-    """Return the team of two that was trained by PPO under a supervisor."""
-    return ZooTeam("supervised-2", weights)
-
-
 def tours_2(weights: str | Path = "") -> ZooTeam:
     """Return the team of two that was trained by PPO at the level of tours."""
     return ZooTeam("tours-2", weights, "tour")

@@ -15,7 +15,6 @@ NAMES = {
     "zoo:ppo-4": "frontier",
     "zoo:mappo-2": "frontier",
     "zoo:signal-2": "frontier",
-    "zoo:supervised-2": "frontier",
 }
 
 
