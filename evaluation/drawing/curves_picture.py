@@ -35,7 +35,9 @@ def save_learning_curves(path: Path, curves: Sequence[LearningCurve], x: str, y:
             band(axes, curve.x, curve.low, curve.high, chosen[index])
     dress(axes, "", x, y)
     handles = [Line2D([], [], color=chosen[k], linestyle=dash(k), linewidth=1.9) for k in range(len(curves))]
-    legend(figure, [f"{curve.name} ({len(curve.seeds)} trainings)" for curve in curves], handles)
+    counts = [len(curve.seeds) for curve in curves]
+    names = [f"{curve.name} ({n} training{'s' * (n > 1)})" for curve, n in zip(curves, counts, strict=True)]
+    legend(figure, names, handles)
     has_bands = any(curve.has_band for curve in curves)
     shaded = "shaded: 95 % band that holds the whole mean curve" if has_bands else "too few for a band"
     save(path, figure, f"{y} over {x}", f"mean of trainings; {shaded}; thin: each training")
