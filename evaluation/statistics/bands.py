@@ -12,8 +12,8 @@ from scipy import stats
 
 from lidarium.evaluation.statistics.samples import Values, checked_confidence
 
-FEWEST_FOR_BANDS = 3
-"""Number of curves from which there is a band."""
+FEWEST_FOR_BANDS = 5
+"""Number of curves from which there is a band: t values of fewer are so large that bands tell nothing."""
 
 DRAWS = 4000
 

@@ -29,18 +29,18 @@ def test_bands_hold_whole_curves_where_pointwise_intervals_do_not(count, points)
 
 
 def test_one_point_has_students_interval():
-    values = np.array([[1.0], [2.0], [4.0], [7.0]])
+    values = np.array([[1.0], [2.0], [4.0], [7.0], [8.0]])
     mean, low, high = mean_bands(values)[:, 0]
-    width = stats.t.ppf(0.975, 3) * values.std(ddof=1) / 2.0
+    width = stats.t.ppf(0.975, 4) * values.std(ddof=1) / np.sqrt(5.0)
     assert (low, high) == pytest.approx((mean - width, mean + width), abs=0.1 * width)
 
 
 def test_curves_that_agree_have_no_width_there_and_few_have_no_band():
-    curves = np.array([[1.0, 2.0], [1.0, 3.0], [1.0, 5.0]])
+    curves = np.array([[1.0, 2.0], [1.0, 3.0], [1.0, 5.0], [1.0, 4.0], [1.0, 2.0]])
     mean, low, high = mean_bands(curves)
     assert low[0] == mean[0] == high[0] == 1.0
     assert high[1] > mean[1] > low[1]
-    assert np.isinf(mean_bands(curves[:2])[1:]).all()
+    assert np.isinf(mean_bands(curves[:4])[1:]).all()
 
 
 def test_curves_that_are_not_finite_are_refused():

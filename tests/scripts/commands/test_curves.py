@@ -12,7 +12,7 @@ from lidarium.scripts.main import main
 @pytest.fixture
 def trainings(tmp_path):
     generator = np.random.default_rng(0)
-    for seed in range(4):
+    for seed in range(5):
         steps = np.arange(0, 1000 + 50 * seed, 50)
         rewards = steps / 1000.0 + 0.1 * generator.standard_normal(len(steps))
         lines = [f"{step},{reward},1" for step, reward in zip(steps, rewards, strict=True)]
@@ -25,7 +25,7 @@ def test_seeds_are_joined_where_all_are_known(trainings, capsys):
     assert main(["curves", pattern, "--x", "steps", "--y", "reward", "--out", str(trainings / "out")]) == 0
     assert "PPO" in capsys.readouterr().out
     curve = json.loads((trainings / "out" / "curves.json").read_text())["curves"]["PPO"]
-    assert (curve["seeds"], curve["x"][0], curve["x"][-1]) == (4, 0.0, 950.0)
+    assert (curve["seeds"], curve["x"][0], curve["x"][-1]) == (5, 0.0, 950.0)
     assert np.abs(np.array(curve["mean"]) - np.array(curve["x"]) / 1000.0).max() < 0.2
     assert (np.array(curve["low"]) < curve["mean"]).all()
     assert (trainings / "out" / "curves.png").stat().st_size > 10_000
