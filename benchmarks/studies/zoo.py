@@ -88,7 +88,8 @@ Networks of smaller teams, with 8 robots.
 
 ![Coverage on the validation floors]({picture})
 
-Coverage on the validation floors, mean over the time of an episode of 120 s; thin lines are single trainings, and a band comes with five.
+Coverage on the validation floors, mean over the time of an episode of 120 s; thin lines are single trainings, and a
+band comes with five.
 
 {curves}
 """
