@@ -292,7 +292,7 @@ def _team_row(lines: Sequence[Line]) -> str:
 
 
 def _station_knows(lines: Sequence[Line]) -> str:
-    """Return the mean time until the station knows the floor, of the runs in which it does, and their number."""
+    """Return the mean time until the station knows the floor over the runs in which it does, and how many they are."""
     times = [line["station_s"] for line in lines if line.get("station_s") is not None]
     return f"{np.mean(times):.0f} ({len(times)})" if times else "- (0)"
 

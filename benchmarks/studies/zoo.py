@@ -39,7 +39,7 @@ SEEDS = tuple(range(5))
 CLASSICS = ("nearest_frontier", "utility_frontier", "explore_lite", "tour_frontier", "learned", "predicted_tours")
 NEAREST, TOURS, UNTRAINED, SHIPPED = "nearest_frontier", "tour_frontier", "untrained", "shipped"
 BESIDE = (NEAREST, TOURS, "zoo:ppo-2")
-"""Who is beside a team in its own world: ppo-2 was trained without it."""
+"""Policies with which a team is compared in its own world; ppo-2 was trained in the plain one."""
 
 FLOORS = set_floors("set:test:50")
 SIZES, LARGE = (2, 4), 8
@@ -134,7 +134,7 @@ def learn(lesson: Lesson) -> dict[str, Any]:
 
 
 def _curve(path: Path) -> list[list[float]]:
-    """Return decisions and coverage of the points of a training's curve."""
+    """Return the points of a training's curve: decisions and coverage."""
     lines = (path / CURVE).read_text(encoding="utf-8").splitlines()[1:]
     return [[int(step), float(coverage)] for step, coverage in (line.split(",") for line in lines)]
 
@@ -154,7 +154,7 @@ def _level(team: str) -> str:
 
 
 def _take_shipped(folder: Path) -> None:
-    """Write weights and curves that ship, of teams of which there is no training."""
+    """Write the shipped weights and curves of teams without a training in the folder."""
     there = {team for team, _ in _trainings(folder)}
     data = resources.files("lidarium.agents.zoo") / "data"
     for team in TEAMS:
@@ -189,9 +189,9 @@ def measure(run: Run) -> dict[str, Any]:
 
 
 def work(folder: Path, _data: Path | None, every: int, workers: int) -> Progress:
-    """Train all teams, and run them beside classic ones on every N-th floor.
+    """Train all teams, and compare them with classic ones on every N-th floor.
 
-    A part trains none: it runs trainings that are there, and the weights that ship of other teams.
+    A part of the study trains nothing: it uses the trainings in the folder, and shipped weights for other teams.
     """
     floors = FLOORS[::every]
     if every == 1:
@@ -383,7 +383,7 @@ def _seed_rows(lines: Sequence[Line], lessons: Sequence[Line]) -> str:
 
 
 def _lessons(folder: Path) -> list[dict[str, Any]]:
-    """Return the trainings, in the order of the teams; of those of other calls nobody knows how long they took."""
+    """Return the trainings in the order of the teams; processor times are known of those made by the study."""
     timed = kept_lines(folder / LESSONS_FILE) if (folder / LESSONS_FILE).exists() else []
     spent = {(line["team"], str(line["seed"])): line["processor_s"] for line in timed}
     return [
