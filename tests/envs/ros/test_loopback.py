@@ -111,7 +111,7 @@ def test_a_team_goes_on_without_a_robot_that_falls_silent(tmp_path, capsys, monk
 
         monkeypatch.setattr(server.graph, "scan", scan)
         code, result = drive(
-            tmp_path, "--horizon-s", "10", "--stale-s", "1", "--lost-s", "1.2",
+            tmp_path, "--horizon-s", "10", "--stale-s", "4", "--lost-s", "3",
             "--namespaces", "robot_0", "robot_1", "--policy", "nearest_frontier",
         )  # fmt: skip
         assert server._driven[1].velocity == (0.0, 0.0)
