@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.envs.onboard.known_poses import KnownPoses
+from lidarium.envs.onboard.people_in_sight import bodies_recognised
 from lidarium.envs.onboard.radio.exchange import Exchange
 from lidarium.envs.onboard.sparse_belief import SparseBelief
 from lidarium.envs.onboard.sparse_shares import SparseShare
@@ -189,7 +190,7 @@ class SparseMapper:
         depth : (rows, columns) float32 or None
             The image [m]; None if the camera took no image in this step.
         bodies : (K, 3) float64
-            x, y and radius of other robots, which are not mapped [m].
+            x, y and radius of other robots, people and doors, which are not mapped [m].
         """
         if self.axes is None and depth is not None:
             self.axes = self._axes_of_walls(pose, depth)
@@ -270,7 +271,7 @@ class SparseMapper:
     def _usable_points(
         self, depth: NDArray[np.float32], frame: NDArray[np.float64], bodies: NDArray[np.float64]
     ) -> NDArray[np.float64]:
-        """Return the points of an image within range that are not on other robots."""
+        """Return the points of an image within range that are not on the bodies (K, 3)."""
         points = points_of_depth(depth, self._intrinsics).astype(np.float64)
         points = points[np.einsum("ij,ij->i", points, points) <= self._range**2]
         if len(bodies) == 0 or len(points) == 0:
@@ -433,6 +434,13 @@ class SparseMaps:
         mapper.sense(step * self._settings.time_step, pose, depth, self._bodies(row))
 
     def _bodies(self, row: int) -> NDArray[np.float64]:
+        """Return who is known to stand around a robot, with a margin, (K, 3) [m]."""
+        camera = self._settings.camera
+        assert camera is not None
+        people = bodies_recognised(self._simulation, row, camera.depth_max)
+        return np.concatenate([self._teammates(row), people + np.array([0.0, 0.0, BODY_MARGIN_M])])
+
+    def _teammates(self, row: int) -> NDArray[np.float64]:
         """Return the known positions of other robots, with a margin around them, (K, 3) [m]."""
         known, robots = self._known_poses, self._settings.robots
         if not self._settings.known_starts:

@@ -15,6 +15,7 @@ from lidarium.envs.simulation.kernels.arrays import (
     DOOR_OPEN,
     DOOR_X,
     DOOR_Y,
+    OPENS,
     STAYS_SHUT,
     WALKER_RADIUS,
     WALKER_WAIT,
@@ -22,6 +23,7 @@ from lidarium.envs.simulation.kernels.arrays import (
     WALKER_Y,
 )
 from lidarium.envs.simulation.people.crowd import crowd_of
+from lidarium.mapping.geometry.rigid import Transform
 
 HALL = Floor("hall", (0.0, 0.0, 8.0, 6.0))
 START = {"starts": [(2.0, 3.0, 0.0)]}
@@ -55,6 +57,37 @@ def test_a_depth_camera_sees_a_leaf():
         depths.append(float(env.simulation.camera.frames[0, 10, env.settings.camera.columns // 2]))
     assert depths[0] == pytest.approx(3.0 - env.settings.camera.forward, abs=0.2)
     assert depths[1] == 0.0 or depths[1] > depths[0] + 1.0
+
+
+def boxes_within(env, low, high):
+    """Return the number of boxes of the robot's sparse map in a part of the floor."""
+    share = env.perception.sparse_maps.share(0)
+    middles = Transform(theta=share.axes).apply(share.boxes.mean(axis=1)[:, :2])
+    return int(np.all((middles > low) & (middles < high), axis=1).sum())
+
+
+def test_people_stay_out_of_sparse_maps():
+    env = begun(people=1, camera="xtion", observe=("depth",))
+    walker = env.simulation.population.people_of(0)[0]
+    walker[[WALKER_X, WALKER_Y, WALKER_WAIT]] = 3.5, 3.0, 1e6
+    env.perception.sparse_maps.of(0)
+    for turn in (1.0,) * 6 + (-1.0,) * 6:
+        env.step({"robot_0": [0.0, turn]})
+    assert boxes_within(env, (2.8, 2.3), (4.2, 3.7)) == 0
+
+
+@pytest.mark.parametrize(("kind", "is_mapped"), [(OPENS, False), (STAYS_SHUT, True)])
+def test_leaves_of_doors_that_open_stay_out_of_sparse_maps(kind, is_mapped):
+    env, door = robot_at_door(kind, camera="xtion", observe=("depth",))
+    env.perception.sparse_maps.of(0)
+    for turn in (1.0,) * 6 + (-1.0,) * 6:
+        env.step({"robot_0": [0.0, turn]})
+        door[DOOR_OPEN] = 0.0
+    ends = door[[DOOR_X, DOOR_Y, DOOR_END_X, DOOR_END_Y]].reshape(2, 2)
+    # The jambs beside the leaf are walls.
+    inside = np.array([-0.15, 0.2])
+    low, high = ends.min(axis=0) + inside, ends.max(axis=0) - inside
+    assert (boxes_within(env, low, high) > 0) == is_mapped
 
 
 def test_in_pybullet_a_robot_that_drives_into_a_person_touches_him():
