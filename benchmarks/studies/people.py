@@ -19,7 +19,15 @@ from lidarium.evaluation.episodes.runner import run_episode
 from lidarium.evaluation.episodes.watching import WatchedExploration
 from lidarium.evaluation.statistics.estimates import paired_ratio
 
-EXPLORERS = ("nearest_frontier", "utility_frontier", "explore_lite", "srt", "tour_frontier", "learned")
+EXPLORERS = (
+    "nearest_frontier",
+    "utility_frontier",
+    "explore_lite",
+    "srt",
+    "sparse_frontier",
+    "tour_frontier",
+    "learned",
+)
 POLICIES = (*EXPLORERS, "random_walk")
 """The reference policies of the benchmark; the last one does not explore to an end."""
 
@@ -29,6 +37,7 @@ SEEDS: dict[str, int] = {
     "utility_frontier": 9,
     "explore_lite": 9,
     "srt": 1,
+    "sparse_frontier": 1,
     "tour_frontier": 3,
     "learned": 3,
     "random_walk": 9,
@@ -167,7 +176,7 @@ def measure_step(timing: Timing) -> dict[str, Any]:
 
 
 def work(folder: Path, _data: Path | None, every: int, workers: int) -> Progress:
-    """Time a batch, run SLAM, then all policies; every N-th seed."""
+    """Time a batch, run SLAM, then all policies; every N-th seed, or floor where there is one seed."""
     yield from do_missing(folder / STEPS_FILE, "batches", [Timing(PEOPLE)], measure_step, 1)
     slam = [
         Run("nearest_frontier", floor, seed, people, "0", "lab")
@@ -181,7 +190,7 @@ def work(folder: Path, _data: Path | None, every: int, workers: int) -> Progress
         for seed in range(0, max(SEEDS.values()), every)
         for policy in POLICIES
         if seed < SEEDS[policy]
-        for floor in FLOORS
+        for floor in (FLOORS if SEEDS[policy] > 1 else FLOORS[::every])
         for people, doors in _worlds(policy, seed)
     ]
     yield from do_missing(folder / RUNS_FILE, "runs", runs, measure, workers)
