@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from lidarium.agents.catalogue import make_policy
+from lidarium.agents.policy import settings_for
 from lidarium.benchmarks.studies.shared.study import Progress, Study, Task, do_missing, kept_lines
 from lidarium.envs.engine.engine import Engine
 from lidarium.envs.levels.level import STEPS
@@ -137,6 +138,7 @@ class Timing(Task):
 
 def measure(run: Run) -> dict[str, Any]:
     """Run an episode; return its figures."""
+    policy = make_policy(run.policy)
     settings = make_settings(
         robots=ROBOTS,
         people=run.people,
@@ -145,10 +147,11 @@ def measure(run: Run) -> dict[str, Any]:
         starts="drawn",
         horizon_s=HORIZON_S,
         resolution=0.05,
+        camera="xtion_tilted" if "depth" in policy.observes else None,
     )
-    history = History()
+    history, settings = History(), settings_for(policy, settings)
     env = WatchedExploration(run.floor, settings, watchers=[history] if run.realism == "lab" else [])
-    episode = run_episode(make_policy(run.policy), env, run.seed)
+    episode = run_episode(policy, env, run.seed)
     data = EpisodeData(env, episode, history if run.realism == "lab" else None)
     about = {name: getattr(run, name) for name in ("policy", "floor", "seed", "people", "doors")}
     return {**about, **figures_of(data, FIGURES)}
