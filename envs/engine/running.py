@@ -14,7 +14,6 @@ from lidarium.envs.simulation.endings import Rules, ending_of
 from lidarium.envs.simulation.kernels.arrays import WorldArrays, world_at
 from lidarium.envs.simulation.kernels.stepping import step_episode
 from lidarium.mapping.kernels.compilation import Array, kernel
-from lidarium.mapping.kernels.on_threads import call_at, on_threads
 from lidarium.mapping.kernels.work_queue import Work, share_of, take_next
 
 
@@ -116,12 +115,13 @@ def _run_episode(run: Run, episode: int, drives: Drives, following: Following, r
             follow_team(
                 drives, following, first, last, world.believed, world.measured, world.ranges, world.scanned, commands
             )
-        step_episode(run.table, episode, robots, commands, mode != SENSES, True)
+        step_episode(run.table, episode, robots, commands, mode != SENSES, mode != WAITS)
         if _ends(world, episode, robots, drives, rules, run.waiting, mode == DECIDES):
             break
 
 
-def _run_episodes(run: Run, drives: Drives, following: Following, rules: Rules, observed: Arrays, work: Work) -> None:
+@kernel(apart=True)
+def run_serial(run: Run, drives: Drives, following: Following, rules: Rules, observed: Arrays, work: Work) -> None:
     """Run the episodes by their modes, in the order of the work's items.
 
     An episode's observations are written right after its run, while its maps are in the thread's cache.
@@ -139,15 +139,8 @@ def _run_episodes(run: Run, drives: Drives, following: Following, rules: Rules, 
                         write_row(row, run.sources, observed)
 
 
-run_serial = kernel(_run_episodes)
-
-
 @kernel(parallel=True)
-def _run_on_threads(
-    address: int, run: Run, drives: Drives, following: Following, rules: Rules, observed: Arrays, work: Work
-) -> None:
+def run_parallel(run: Run, drives: Drives, following: Following, rules: Rules, observed: Arrays, work: Work) -> None:
+    """Run the episodes on threads; see ``run_serial``."""
     for thread in numba.prange(work.threads):
-        call_at(address, (run, drives, following, rules, observed, share_of(work, thread)))
-
-
-run_parallel = on_threads(run_serial, _run_on_threads)
+        run_serial(run, drives, following, rules, observed, share_of(work, thread))

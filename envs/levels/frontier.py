@@ -31,7 +31,6 @@ from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.settings.limits import GAINS
 from lidarium.mapping.geometry.bounds import shown
 from lidarium.mapping.kernels.compilation import kernel
-from lidarium.mapping.kernels.on_threads import call_at, on_threads
 from lidarium.mapping.kernels.work_queue import Work, new_work, share_of
 from lidarium.mapping.planning.frontiers.approach import default_reach
 from lidarium.mapping.planning.search.search_state import disc_spans
@@ -41,12 +40,11 @@ REASONS = ("", "unseen", "blocked", "no_progress")
 """Reasons for giving up a chosen frontier, by number; 0 if it is not given up."""
 
 
-_renew_teams_serial = kernel(renew_teams)
+_renew_teams_serial = kernel(apart=True)(renew_teams)
 
 
 @kernel(parallel=True)
-def _renew_on_threads(
-    address: int,
+def _renew_teams_parallel(
     planning: Planning,
     maps: TeamMaps,
     drives: Drives,
@@ -57,10 +55,7 @@ def _renew_on_threads(
     work: Work,
 ) -> None:
     for thread in numba.prange(work.threads):
-        call_at(address, (planning, maps, drives, view, offers, choices, renewal, share_of(work, thread)))
-
-
-_renew_teams_parallel = on_threads(_renew_teams_serial, _renew_on_threads)
+        _renew_teams_serial(planning, maps, drives, view, offers, choices, renewal, share_of(work, thread))
 
 
 class FrontierOffers:

@@ -15,6 +15,7 @@ a division by zero gives inf or nan. Python's numbers differ, so each kernel get
 import functools
 import gc
 import hashlib
+import importlib
 import os
 import re
 import sys
@@ -23,6 +24,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import llvmlite.binding
 import numba
 import numpy as np
 from numba.core import config, event
@@ -45,6 +47,7 @@ Array = NDArray[Any]
 _numba_config: Any = config
 _caching: Any = FunctionCache
 _events: Any = event
+_llvm: Any = llvmlite.binding
 
 IS_INTERPRETED = bool(_numba_config.DISABLE_JIT)
 """Whether Python runs the kernels, as they are written."""
@@ -109,8 +112,13 @@ def kernel(
     forceinline: bool = False,
     inline: str = "never",
     nrt: bool = True,
+    apart: bool = False,
 ) -> Any:  # noqa: ANN401
-    """Compile a function with ``numba.njit``: with exact floating point, without the GIL, and cached."""
+    """Compile a function with ``numba.njit``: with exact floating point, without the GIL, and cached.
+
+    Kernels that call one that is compiled ``apart`` find its code at run time. Otherwise numba links it into each of
+    them, and optimizes it there again.
+    """
     if IS_INTERPRETED:
         return _interpreted if function is None else _interpreted(function)
 
@@ -138,11 +146,63 @@ def kernel(
             compiled = numba.njit(**options)(target)
             if _CAN_CACHE:
                 _keep(compiled)
+            if apart:
+                _set_apart(compiled)
             return compiled
         finally:
             _numba_config.CACHE_DIR = previous
 
     return decorate if function is None else decorate(function)
+
+
+# -- Kernels apart -----------------------------------------------------------------------------------------
+
+_apart: dict[tuple[str, str], Any] = {}
+
+
+class _Elsewhere:
+    """What numba links in place of a kernel that is compiled apart: nothing.
+
+    ``reach`` is kept with the code of each caller, and called before that is loaded from the cache.
+    """
+
+    def __init__(self, reach: Callable[[], None]) -> None:
+        self._reload_init = {reach}
+
+    def _ensure_finalized(self) -> None:
+        pass
+
+    def _get_module_for_linking(self) -> Any:  # noqa: ANN401
+        return _llvm.parse_assembly("")
+
+
+def _set_apart(compiled: Any) -> None:  # noqa: ANN401
+    """Let kernels call the compiled forms of a function by the names of their machine code."""
+    origin = compiled.py_func.__module__, compiled.py_func.__qualname__
+    _apart[origin] = compiled
+    add_overload = compiled.add_overload
+
+    def add(form: Any) -> None:  # noqa: ANN401
+        add_overload(form)
+        symbol, context = form.fndesc.llvm_func_name, compiled.targetctx
+        _publish(form, symbol)
+        reach = functools.partial(_reach, *origin, tuple(form.signature.args), symbol)
+        context.remove_user_function(form.entry_point)
+        context.insert_user_function(form.entry_point, form.fndesc, [_Elsewhere(reach)])
+
+    compiled.add_overload = add
+
+
+def _reach(module: str, name: str, kinds: tuple[Any, ...], symbol: str) -> None:
+    """Have a kernel apart compiled or loaded, and known by the name under which a cached caller calls it."""
+    importlib.import_module(module)
+    compiled = _apart[module, name]
+    compiled.compile(kinds)
+    _publish(compiled.overloads[kinds], symbol)
+
+
+def _publish(form: Any, symbol: str) -> None:  # noqa: ANN401
+    _llvm.add_symbol(symbol, form.library.get_pointer_to_function(form.fndesc.llvm_func_name))
 
 
 class _WithoutCollection(_events.Listener):

@@ -195,7 +195,7 @@ def any_newly_done(drives: Drives, first: int, last: int, live: Array, waiting: 
     return newly_done > 0
 
 
-@kernel(nrt=False)
+@kernel(apart=True, nrt=False)
 def follow_team(
     drives: Drives,
     following: Following,

@@ -16,7 +16,6 @@ from lidarium.envs.onboard.navigation import COLUMNS, ROWS, closeness_of, log_od
 from lidarium.envs.onboard.people_in_sight import BODY_M
 from lidarium.envs.onboard.team_maps import TeamMaps, refresh_team
 from lidarium.mapping.kernels.compilation import Array, kernel
-from lidarium.mapping.kernels.on_threads import call_at, on_threads
 from lidarium.mapping.kernels.work_queue import Work, share_of, take_next
 from lidarium.mapping.planning.path_smoothing import kept_places, line_is_clear
 from lidarium.mapping.planning.search.path_search import budget_of, find_path
@@ -297,7 +296,8 @@ def _standing(planning: Planning, drives: Drives, row: int) -> tuple[Array, Arra
     return avoided, ended
 
 
-def _prepare_teams(planning: Planning, drives: Drives, maps: TeamMaps, work: Work, is_blocked: Array) -> None:
+@kernel(apart=True)
+def prepare_teams_serial(planning: Planning, drives: Drives, maps: TeamMaps, work: Work, is_blocked: Array) -> None:
     """Prepare the live robots of some teams, in their order, on fresh maps.
 
     The items of the work are episodes; it is noted if a robot is blocked.
@@ -320,15 +320,8 @@ def _prepare_teams(planning: Planning, drives: Drives, maps: TeamMaps, work: Wor
             k = take_next(work.taken)
 
 
-prepare_teams_serial = kernel(_prepare_teams)
-
-
 @kernel(parallel=True)
-def _prepare_on_threads(
-    address: int, planning: Planning, drives: Drives, maps: TeamMaps, work: Work, is_blocked: Array
-) -> None:
+def prepare_teams_parallel(planning: Planning, drives: Drives, maps: TeamMaps, work: Work, is_blocked: Array) -> None:
+    """Prepare teams on threads; see ``prepare_teams_serial``."""
     for thread in numba.prange(work.threads):
-        call_at(address, (planning, drives, maps, share_of(work, thread), is_blocked))
-
-
-prepare_teams_parallel = on_threads(prepare_teams_serial, _prepare_on_threads)
+        prepare_teams_serial(planning, drives, maps, share_of(work, thread), is_blocked)

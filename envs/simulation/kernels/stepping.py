@@ -116,17 +116,24 @@ def _encode(world: WorldArrays, episode: int, robots: int, velocities: Array) ->
         )
 
 
-@kernel(inline="always")
-def move_people(world: WorldArrays, episode: int, robots: int) -> None:
+@kernel(apart=True)
+def _move_people(table: Array, episode: int, robots: int) -> None:
     """Move the doors and the people of an episode, who see the robots where they are."""
+    world = world_at(table)
     if world.doors.shape[0] > 0:
         move_doors(world, episode, robots)
     if world.walkers.shape[0] > 0:
         walk_people(world, episode, robots)
 
 
+@kernel(apart=True)
+def _note_people(table: Array, episode: int, robots: int) -> None:
+    """Note how near robots are to people, after both have moved."""
+    note_people(world_at(table), episode, robots)
+
+
 @kernel(inline="always")
-def _move(world: WorldArrays, episode: int, robots: int, commands: Array, moves_bodies: bool) -> None:
+def _move(table: Array, world: WorldArrays, episode: int, robots: int, commands: Array, moves_bodies: bool) -> None:
     """Move the bodies of an episode by ``commands`` (rows, 2), and read their encoders."""
     first, last = episode * robots, (episode + 1) * robots
     has_odometry = world.odometry_model.shape[0] > 0
@@ -134,11 +141,12 @@ def _move(world: WorldArrays, episode: int, robots: int, commands: Array, moves_
         if has_odometry or world.faults.shape[1] > 0:
             _drive(world, episode, robots, commands)
             commands = world.driven
-        move_people(world, episode, robots)
+        if world.doors.shape[0] > 0 or world.walkers.shape[0] > 0:
+            _move_people(table, episode, robots)
         grids = body_grids(world.floor_rows[episode], world.frames[episode])
         move_robots(grids, team_of(world, first, last), commands[first:last], world.sensor[0, TIME_STEP])
         if world.walkers.shape[0] > 0:
-            note_people(world, episode, robots)
+            _note_people(table, episode, robots)
     if moves_bodies and has_odometry:
         _encode(world, episode, robots, world.velocities)
 
@@ -190,31 +198,31 @@ def _share(world: WorldArrays, episode: int, robots: int) -> None:
     )
 
 
-@kernel
-def _sense_episode(table: Array, episode: int, robots: int, perceives: bool) -> None:
-    """Let the robots of an episode sense, score and (if ``perceives``) map."""
+@kernel(apart=True)
+def _sense_rows(table: Array, rows: tuple[int, int], robots: int, perceives: bool) -> None:
+    """Let the robots of the rows from the first up to the last sense, score and (if ``perceives``) map."""
     world = world_at(table)
     scratch = scan_scratch(world)
-    for row in range(episode * robots, (episode + 1) * robots):
+    for row in range(rows[0], rows[1]):
         if not world.flags[row] & ENDED:
-            sense_and_perceive(world, row, episode * robots, robots, perceives, scratch)
+            sense_and_perceive(world, row, row // robots * robots, robots, perceives, scratch)
 
 
-@kernel(nrt=False)
+@kernel(apart=True, nrt=False)
 def step_episode(table: Array, episode: int, robots: int, commands: Array, moves_bodies: bool, perceives: bool) -> None:
     """Run a step of one episode: move, and if robots scan in it, sense, score and (if ``perceives``) map."""
     world = world_at(table)
-    _move(world, episode, robots, commands, moves_bodies)
+    _move(table, world, episode, robots, commands, moves_bodies)
     _localize(world, episode, robots)
     if is_scanning(world, episode):
-        _sense_episode(table, episode, robots, perceives)
+        _sense_rows(table, (episode * robots, (episode + 1) * robots), robots, perceives)
     _share(world, episode, robots)
 
 
 @kernel
 def _move_episode(table: Array, episode: int, robots: int, commands: Array, moves_bodies: bool) -> None:
     world = world_at(table)
-    _move(world, episode, robots, commands, moves_bodies)
+    _move(table, world, episode, robots, commands, moves_bodies)
     _localize(world, episode, robots)
 
 
@@ -226,12 +234,11 @@ def _share_episode(table: Array, episode: int, robots: int) -> None:
 @kernel
 def _step_row(table: Array, row: int, robots: int, perceives: bool) -> None:
     """Run both stages for the robot of a row, if it scans in this step and has not ended."""
-    world = world_at(table)
-    if is_scanning(world, row // robots) and not world.flags[row] & ENDED:
-        sense_and_perceive(world, row, row // robots * robots, robots, perceives, scan_scratch(world))
+    if is_scanning(world_at(table), row // robots):
+        _sense_rows(table, (row, row + 1), robots, perceives)
 
 
-@kernel
+@kernel(apart=True)
 def _perceive_row(table: Array, row: int, robots: int, runs: Array) -> None:
     world, episode = world_at(table), row // robots
     # The step is counted.
@@ -255,10 +262,9 @@ def drive(table: Array, robots: int, commands: Array, runs: Array) -> None:
 @kernel
 def walk(table: Array, robots: int, runs: Array) -> None:
     """Move the people and doors of the episodes with ``runs`` (episodes,)."""
-    world = world_at(table)
     for episode in range(runs.shape[0]):
         if runs[episode]:
-            move_people(world, episode, robots)
+            _move_people(table, episode, robots)
 
 
 @kernel
@@ -267,7 +273,7 @@ def note_approaches(table: Array, robots: int, runs: Array) -> None:
     world = world_at(table)
     for episode in range(runs.shape[0]):
         if runs[episode] and world.walkers.shape[0] > 0:
-            note_people(world, episode, robots)
+            _note_people(table, episode, robots)
 
 
 @kernel
@@ -307,7 +313,7 @@ def move_and_sense(table: Array, robots: int, commands: Array, runs: Array, move
     for episode in range(runs.shape[0]):
         if not runs[episode]:
             continue
-        _move(world, episode, robots, commands, moves_bodies)
+        _move(table, world, episode, robots, commands, moves_bodies)
         if not is_scanning(world, episode):
             continue
         for row in range(episode * robots, (episode + 1) * robots):

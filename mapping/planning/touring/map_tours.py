@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from lidarium.mapping.grids.grid_lines import line_is_open
 from lidarium.mapping.kernels.compilation import Array, kernel
-from lidarium.mapping.kernels.on_threads import call_at, on_threads
 from lidarium.mapping.kernels.views import arrays_at
 from lidarium.mapping.kernels.work_queue import Work, share_of, take_next
 from lidarium.mapping.planning.frontiers.views import ViewFrame, view_gain
@@ -229,9 +228,9 @@ class TourMemory:
         return TourMemory, self._made_of
 
 
-@kernel
-def _plan(tables: Array, robots: Robots, rules: PlanRules, sight: ViewFrame, plans: Plans, work: Work) -> None:
-    """Plan the tours of the maps that are left."""
+@kernel(apart=True)
+def plan_serial(tables: Array, robots: Robots, rules: PlanRules, sight: ViewFrame, plans: Plans, work: Work) -> None:
+    """Plan the tours of the maps that are left: tables (M, fields of ``_Kept``, 3)."""
     item = take_next(work.taken)
     while item < len(work.items):
         number = work.items[item]
@@ -240,15 +239,10 @@ def _plan(tables: Array, robots: Robots, rules: PlanRules, sight: ViewFrame, pla
 
 
 @kernel(parallel=True)
-def _plan_on_threads(
-    address: int, tables: Array, robots: Robots, rules: PlanRules, sight: ViewFrame, plans: Plans, work: Work
-) -> None:
+def plan_parallel(tables: Array, robots: Robots, rules: PlanRules, sight: ViewFrame, plans: Plans, work: Work) -> None:
+    """Plan the tours on threads; see ``plan_serial``."""
     for thread in numba.prange(work.threads):
-        call_at(address, (tables, robots, rules, sight, plans, share_of(work, thread)))
-
-
-plan_serial, plan_parallel = _plan, on_threads(_plan, _plan_on_threads)
-"""Plan the tours of maps (kernels): tables (M, fields of ``_Kept``, 3), robots, rules, sight, plans (written), work."""
+        plan_serial(tables, robots, rules, sight, plans, share_of(work, thread))
 
 
 @kernel

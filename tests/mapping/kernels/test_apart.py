@@ -1,0 +1,85 @@
+"""Kernels that are compiled apart are called by name, also by callers that come from the cache."""
+
+import os
+import subprocess
+import sys
+import textwrap
+
+import numba
+import numpy as np
+import pytest
+
+from lidarium.mapping.kernels.compilation import IS_INTERPRETED, Array, kernel
+from lidarium.mapping.kernels.work_queue import Work, new_work, share_of, take_next
+
+
+@kernel(apart=True)
+def _square(values: Array, out: Array, work: Work) -> None:
+    """Square the items of the work, and note the thread that did."""
+    for thread in range(work.first, work.first + work.threads):
+        k = take_next(work.taken)
+        while k < len(work.items):
+            item = work.items[k]
+            out[item, 0], out[item, 1] = values[item] ** 2, thread
+            k = take_next(work.taken)
+
+
+@kernel(parallel=True)
+def _square_on_threads(values: Array, out: Array, work: Work) -> None:
+    for thread in numba.prange(work.threads):
+        _square(values, out, share_of(work, thread))
+
+
+@pytest.mark.parametrize("is_writeable", [True, False])
+def test_a_parallel_loop_works_off_all_items_whatever_the_types_of_arguments(is_writeable):
+    values, out = np.arange(50.0), np.full((50, 2), -1.0)
+    values.flags.writeable = is_writeable  # another type to numba, and so other code
+    _square_on_threads(values, out, new_work(np.arange(50), 3))
+    assert np.array_equal(out[:, 0], values**2)
+    assert set(out[:, 1]) <= {0.0, 1.0, 2.0}
+    serial = np.empty_like(out)
+    _square(values, serial, new_work(np.arange(50), 1))
+    assert np.array_equal(serial[:, 0], out[:, 0])
+    assert not serial[:, 1].any()
+
+
+SOURCE = """
+    from lidarium.mapping.kernels.compilation import kernel
+
+    @kernel(apart=True)
+    def inner(value): return 2.0 * value
+
+    @kernel
+    def middle(value): return inner(value) + 1.0
+
+    @kernel
+    def outer(value): return middle(value) + 1.0
+"""
+
+PROGRAM = """
+    import sys
+    import sources
+    print(sources.outer(20.0), len(sources.outer.stats.cache_hits))
+"""
+
+
+@pytest.mark.skipif(IS_INTERPRETED, reason="Python runs the kernels")
+def test_a_cached_caller_finds_a_kernel_whose_own_code_was_lost(tmp_path):
+    (tmp_path / "sources.py").write_text(textwrap.dedent(SOURCE))
+    (tmp_path / "program.py").write_text(textwrap.dedent(PROGRAM))
+    cache = tmp_path / "cache"
+
+    def run():
+        environment = {**os.environ, "NUMBA_CACHE_DIR": str(cache)}
+        done = subprocess.run(
+            [sys.executable, str(tmp_path / "program.py")], env=environment, capture_output=True, text=True, check=True
+        )
+        return done.stdout.split()
+
+    assert run() == ["42.0", "0"]
+    assert run() == ["42.0", "1"]
+    lost = [path for path in cache.rglob("*") if path.is_file() and "inner" in path.name]
+    assert lost
+    for path in lost:
+        path.unlink()
+    assert run() == ["42.0", "1"]
