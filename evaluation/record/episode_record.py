@@ -174,6 +174,11 @@ class EpisodeRecord:
     commands: NDArray[np.float64]
     display: DisplayTrack
 
+    @property
+    def predicts(self) -> bool:
+        """Whether robots predicted their maps by the network, so that replays show it; older records do not say so."""
+        return self.header.get("predicts") is True
+
 
 class NewerFormatError(ValueError):
     """A record is of a format that this version does not know yet."""
