@@ -7,7 +7,7 @@ from lidarium.envs.drawing.frame_parts import Colour, Frame
 from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.simulation.maps_on_floor import map_on_floor
 from lidarium.envs.simulation.simulation import Simulation
-from lidarium.mapping.prediction.levels import UNKNOWN, factor_of, levels_of
+from lidarium.mapping.prediction.levels import factor_of, levels_of
 from lidarium.mapping.prediction.predictors import PartialMap, make_predictor, predicted
 
 PREDICTED: Colour = (37, 99, 235)
@@ -31,7 +31,7 @@ class PredictionLayer:
     def squares(
         self, log_odds: NDArray[np.signedinteger], resolution: float, name: str = ""
     ) -> tuple[NDArray[np.float32], int]:
-        """Return the probability that each unknown square of a map is free, 0 for known ones, and cells along a square.
+        """Return the probability that each square of a map is free, 1 or 0 for known ones, and cells along a square.
 
         Maps of several names are remembered beside each other.
         """
@@ -39,10 +39,10 @@ class PredictionLayer:
         levels = levels_of(np.sign(log_odds).astype(np.int8), factor)
         found = predicted(self._predictor, PartialMap(levels, factor * resolution, name))
         assert found is not None
-        return np.where(levels == UNKNOWN, found, np.float32(0.0)), factor
+        return found, factor
 
     def cells(self, log_odds: NDArray[np.signedinteger], resolution: float, name: str = "") -> NDArray[np.float32]:
-        """Return the same for each cell of the map, 0 for known cells; that of a known square's rest is 0, too."""
+        """Return the same for each unknown cell of the map, 0 for known ones."""
         found, factor = self.squares(log_odds, resolution, name)
         rows, columns = log_odds.shape
         whole = np.repeat(np.repeat(found, factor, axis=0), factor, axis=1)[:rows, :columns]

@@ -5,7 +5,6 @@ They show the explored area, the robots and the range of their lasers.
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TypeVar
 
 import cv2
 import numpy as np
@@ -19,6 +18,7 @@ from lidarium.envs.drawing.frame_parts import (
     SIZE,
     UNEXPLORED,
     WALL,
+    Cell,
     Colour,
     Frame,
     View,
@@ -27,6 +27,7 @@ from lidarium.envs.drawing.frame_parts import (
     draw_robots,
     enlarged,
     team_colours,
+    thinned,
     view_around,
     with_header,
 )
@@ -36,8 +37,6 @@ from lidarium.envs.simulation.coverage import unpack_bits
 from lidarium.envs.simulation.kernels.floor_cache import FloorTables
 from lidarium.envs.simulation.people.crowd import crowd_of
 from lidarium.envs.simulation.simulation import Simulation
-
-T = TypeVar("T", np.uint8, np.float32)
 
 _NEAR = 0.125
 _FAN_OPACITY = 0.22
@@ -161,7 +160,7 @@ def _draw_floor(scene: Scene, tables: FloorTables, view: View) -> Frame:
     picture = PALETTE[classes]
     if scene.prediction is not None:
         free = scene.prediction.on_floor(scene.simulation, scene.settings, scene.episode)
-        free = _thinned(_spread(free, raster.solid.shape, multiple)[view.rows, view.columns], view.block)
+        free = thinned(_spread(free, raster.solid.shape, multiple)[view.rows, view.columns], view.block)
         picture = tinted(picture, STRENGTH * free * ((classes == _SOLID) | (classes == _UNEXPLORED)))
     return enlarged(picture, view)
 
@@ -171,7 +170,7 @@ def _on_raster(mask: NDArray[np.uint64], shape: tuple[int, int], multiple: int) 
     return _spread(unpack_bits(mask, -(-shape[1] // multiple)).view(np.uint8), shape, multiple)
 
 
-def _spread(cells: NDArray[T], shape: tuple[int, int], multiple: int) -> NDArray[T]:
+def _spread(cells: NDArray[Cell], shape: tuple[int, int], multiple: int) -> NDArray[Cell]:
     """Return cells on a raster; they are ``multiple`` of its cells wide and begin at the same corner."""
     if multiple > 1:
         cells = np.repeat(np.repeat(cells, multiple, axis=0), multiple, axis=1)
@@ -185,12 +184,6 @@ def _shrunk(cells: NDArray[np.uint8], block: int) -> NDArray[np.uint8]:
     rows, columns = (side // block for side in cells.shape)
     whole = cells[: rows * block, : columns * block]
     return np.asarray(whole.reshape(rows, block, columns * block).max(axis=1).reshape(rows, columns, block).max(axis=2))
-
-
-def _thinned(values: NDArray[T], block: int) -> NDArray[T]:
-    """Return the first value of each block of ``block`` x ``block`` cells."""
-    rows, columns = (side // block * block for side in values.shape)
-    return values[:rows:block, :columns:block]
 
 
 def classify(

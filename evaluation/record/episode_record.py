@@ -252,6 +252,10 @@ _WANTED: dict[str, tuple[str, Callable[[Any], bool]]] = {
 """Valid values of each key of a header, in words and as a test."""
 
 
+_MAY_HAVE = {"predicts": _WANTED["interrupted"]}
+"""The same of keys that older records do not have."""
+
+
 def check_header(header: Any) -> None:  # noqa: ANN401
     """Check the header of a record as read from a file.
 
@@ -267,7 +271,8 @@ def check_header(header: Any) -> None:  # noqa: ANN401
             f"this is lidarium {lidarium.__version__}, which reads formats up to {FORMAT}: use the newer "
             "version"
         )
-    for name, (wanted, is_good) in _WANTED.items():
+    known = {**_WANTED, **{name: rule for name, rule in _MAY_HAVE.items() if name in header}}
+    for name, (wanted, is_good) in known.items():
         if name not in header:
             raise ValueError(f"its header has no key {name}")
         if not is_good(header[name]):
