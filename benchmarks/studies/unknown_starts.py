@@ -69,7 +69,8 @@ def joins_rows(episodes: Iterable[Mapping[str, Any]]) -> str:
 def page(folder: Path) -> str:
     """Return the results as markdown."""
     episodes = read_episodes(folder / WORLD / EPISODES_FILE)
-    pairs = [(WORLD, policy, BASELINE) for policy in EXPLORERS]
+    tours, predicted = EXPLORERS
+    pairs = [*((WORLD, policy, BASELINE) for policy in EXPLORERS), (WORLD, predicted, tours)]
     return PAGE.format(
         horizon=HORIZON_S,
         pairs=pairs_table({WORLD: episodes}, {WORLD: WORLDS[WORLD].about}, pairs),

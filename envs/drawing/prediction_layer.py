@@ -1,5 +1,7 @@
 """What the network of the package predicts beyond the maps of a team, and its colour in pictures."""
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -17,9 +19,10 @@ STRENGTH = 0.6
 """Share of that colour in frames where unknown space is surely free: robots and paths stand out from it."""
 
 
-def tinted(picture: Frame, shares: NDArray[np.floating]) -> Frame:
+def tinted(picture: Frame, shares: NDArray[np.floating[Any]]) -> Frame:
     """Return colours (..., 3), mixed with that of the prediction by shares (...) from 0 to 1."""
-    return np.rint(picture + (np.array(PREDICTED) - picture) * np.asarray(shares)[..., None]).astype(np.uint8)
+    mixed = picture + (np.array(PREDICTED) - picture) * np.asarray(shares)[..., None]
+    return np.asarray(np.rint(mixed), np.uint8)
 
 
 class PredictionLayer:
@@ -29,7 +32,7 @@ class PredictionLayer:
         self._predictor = make_predictor("network")
 
     def squares(
-        self, log_odds: NDArray[np.signedinteger], resolution: float, name: str = ""
+        self, log_odds: NDArray[np.signedinteger[Any]], resolution: float, name: str = ""
     ) -> tuple[NDArray[np.float32], int]:
         """Return the probability that each square of a map is free, 1 or 0 for known ones, and cells along a square.
 
@@ -41,7 +44,7 @@ class PredictionLayer:
         assert found is not None
         return found, factor
 
-    def cells(self, log_odds: NDArray[np.signedinteger], resolution: float, name: str = "") -> NDArray[np.float32]:
+    def cells(self, log_odds: NDArray[np.signedinteger[Any]], resolution: float, name: str = "") -> NDArray[np.float32]:
         """Return the same for each unknown cell of the map, 0 for known ones."""
         found, factor = self.squares(log_odds, resolution, name)
         rows, columns = log_odds.shape

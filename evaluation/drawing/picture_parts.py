@@ -172,7 +172,8 @@ def with_prediction(
 
 def prediction_patch(unknown: str) -> Patch:
     """Return the entry of a legend for unknown cells of a colour that are probably free."""
-    return Patch(facecolor=tinted(rgb(unknown), np.array(STRENGTH)) / 255.0, label="unknown, probably free")
+    red, green, blue = tinted(rgb(unknown), np.array(STRENGTH)).tolist()
+    return Patch(facecolor=_hex((red, green, blue)), label="unknown, probably free")
 
 
 def draw_trajectories(axes: Axes, track: NDArray[np.float64], radius: float) -> None:

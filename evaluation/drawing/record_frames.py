@@ -207,7 +207,7 @@ def save_track_picture(path: Path, record: EpisodeRecord, predicts: bool = False
         more.append(prediction_patch(_UNSEEN))
     show_cells(floor_axes, cells, box, _UNSEEN)
     draw_trajectories(floor_axes, display.poses, radius_of(record))
-    _draw_legend(figure, more + draw_people_and_doors(floor_axes, display.crowd_at(math.inf)))
+    _draw_legend(figure, [*more, *draw_people_and_doors(floor_axes, display.crowd_at(math.inf))])
     end, coverage = float(display.times[-1]), float(display.coverage[-1, 1])
     reached = {
         share: float(display.coverage[display.coverage[:, 1] >= share, 0][0])

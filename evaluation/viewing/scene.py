@@ -183,8 +183,10 @@ class TeamMaps:
         """Return the sum of the maps of some robots, in cells of the lattice."""
         window = self._grid.window
         sides = [side.stop - side.start for side in window]
-        maps = [np.zeros(sides, np.int16), *(map_within(env, robot, *window) for robot in sorted(group))]
-        return np.asarray(np.sum(maps, axis=0, dtype=np.int16))
+        together = np.zeros(sides, np.int16)
+        for robot in sorted(group):
+            together += map_within(env, robot, *window)
+        return together
 
     def _coarse(self, log_odds: NDArray[np.signedinteger[Any]]) -> Levels:
         classes = coarse(np.asarray(log_odds > 0), np.asarray(log_odds < 0), self._grid.block)
