@@ -145,6 +145,11 @@ POLICIES.register(
     "as supervised, with robots that explore by tours",
 )
 POLICIES.register(
+    "supervised_predicted",
+    "lidarium.agents.supervisor.factories:supervised_predicted",
+    "as supervised, with robots that explore by tours on predicted maps",
+)
+POLICIES.register(
     "supervised_learned",
     "lidarium.agents.supervisor.factories:supervised_learned",
     "as supervised, with robots that were trained",

@@ -115,10 +115,13 @@ class Policy(ABC):
         The observations that it reads, of ``settings.observe``; a run checks it before the first step.
     decision_period_s : float or None
         How often it decides at the level of waypoints [s]; None for as often as the settings say.
+    predicts : bool
+        Whether it predicts maps by the network of the package; frames, the live view and replays then show that.
     """
 
     level: str
     shares_map: bool = True
+    predicts: bool = False
     observes: tuple[str, ...] = ()
     decision_period_s: float | None = None
 
@@ -202,6 +205,8 @@ def _checked(reset: Callable[..., None]) -> Callable[..., None]:
             )
         if (settings := getattr(team, "settings", None)) is not None:
             check_observed(policy, type(policy).__name__, settings.observe)
+        if policy.predicts and isinstance(team, EpisodeTeam):
+            team.show_predictions()
         policy._driven = team
         policy._pace = _Pace(policy, team) if (policy.level, level) == ("waypoint", "velocity") else None
         reset(policy, team, seed)
@@ -322,7 +327,7 @@ class PerRobot(Policy):
         self._factory = factory
         probe = factory()
         self.level, self.shares_map, self.observes = probe.level, probe.shares_map, probe.observes
-        self.decision_period_s = probe.decision_period_s
+        self.decision_period_s, self.predicts = probe.decision_period_s, probe.predicts
         self._policies: dict[str, Policy] = {}
 
     @property

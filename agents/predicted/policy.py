@@ -18,6 +18,7 @@ from lidarium.agents.tours.planning import TourOptions, first_options
 from lidarium.agents.tours.policy import TourFrontier
 from lidarium.mapping.geometry.bounds import shown
 from lidarium.mapping.prediction.levels import factor_of, levels_of, shares_unknown
+from lidarium.mapping.prediction.network_predictor import NetworkPredictor
 from lidarium.mapping.prediction.predictors import (
     PartialMap,
     Predictor,
@@ -62,6 +63,7 @@ class PredictedTours(TourFrontier):
             predictor = make_predictor(predictor, **({} if weights == "" else {"weights": weights}))
         check_predictor(predictor)
         self.predictor = predictor
+        self.predicts = isinstance(predictor, NetworkPredictor)
         self._falls_back = falls_back
 
     def reset(self, team: Team, seed: int = 0) -> None:

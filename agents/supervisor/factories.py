@@ -26,6 +26,17 @@ def supervised_tours(**options: Any) -> Supervised:  # noqa: ANN401
     return supervised("tour_frontier", **options)
 
 
+def supervised_predicted(
+    predictor: str = "network",
+    weights: str = "",
+    falls_back: bool = False,
+    **options: Any,  # noqa: ANN401
+) -> Supervised:
+    """Return explorers on predicted maps under a supervisor; robots predict the map that they have been sent."""
+    explorer = make_policy("predicted_tours", predictor=predictor, weights=weights, falls_back=falls_back)
+    return Supervised(explorer, **options)
+
+
 def supervised_learned(weights: str = "", **options: Any) -> Supervised:  # noqa: ANN401
     """Return trained explorers under a supervisor."""
     return Supervised(make_policy("learned", weights=weights), **options)

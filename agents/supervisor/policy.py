@@ -248,7 +248,7 @@ class Supervised(Policy):
                 f"settings of the supervisor are {shown(settings)}; want SupervisorSettings, or settings by name"
             )
         self.level, self.observes = policy.level, policy.observes
-        self.decision_period_s = policy.decision_period_s
+        self.decision_period_s, self.predicts = policy.decision_period_s, policy.predicts
         self.has_begun = False
         self.tick_seconds: list[float] = []
         self.merge_seconds: list[float] = []

@@ -16,11 +16,11 @@ from lidarium.benchmarks.studies.shared.study import Progress, Study, Task, do_m
 from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.settings.faults import Fault, FaultSettings
 from lidarium.envs.settings.making import make_settings
+from lidarium.envs.simulation.maps_on_floor import cells_beyond
 from lidarium.evaluation.episodes.history import History
 from lidarium.evaluation.episodes.runner import run_episode
 from lidarium.evaluation.episodes.watching import WatchedExploration
 from lidarium.evaluation.statistics import FEWEST_FOR_INTERVAL, paired_ratio
-from lidarium.evaluation.truth.beliefs import cells_beyond
 
 OURS, POLICIES = "meeting_tours", ("oblivious", "tethered", "meeting_tours")
 RULES = ("meeting", "pursuit", "none")
@@ -181,7 +181,7 @@ def _station_share(env: ExplorationEnv, history: History) -> float:
         return 0.0
     summed: NDArray[np.int16] = np.sum(np.stack(held), axis=0, dtype=np.int16)
     counted = history.truth.counted
-    row, column = cells_beyond(env, 0)
+    row, column = cells_beyond(env.simulation, 0, 0)
     return float((summed[row : row + counted.shape[0], column : column + counted.shape[1]] < 0)[counted].mean())
 
 

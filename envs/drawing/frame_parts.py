@@ -7,6 +7,7 @@ import colorsys
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 import cv2
 import numpy as np
@@ -16,6 +17,7 @@ from lidarium.envs.simulation.people.crowd import Crowd
 
 Frame = NDArray[np.uint8]
 Colour = tuple[int, int, int]
+Cell = TypeVar("Cell", np.uint8, np.float32)
 
 SIZE = 960
 """Longer side of the floor in a frame by default [pixels]."""
@@ -141,6 +143,12 @@ def blocks_of(levels: NDArray[np.uint8], view: View) -> NDArray[np.uint8]:
     # Along rows first: a whole row of cells at a time.
     lowest = whole.reshape(rows, view.block, columns * view.block).min(axis=1)
     return np.asarray(lowest.reshape(rows, columns, view.block).min(axis=2))
+
+
+def thinned(cells: NDArray[Cell], block: int) -> NDArray[Cell]:
+    """Return the first cell of each block of ``block`` x ``block`` cells."""
+    rows, columns = (side // block * block for side in cells.shape)
+    return cells[:rows:block, :columns:block]
 
 
 def enlarged(picture: Frame, view: View) -> Frame:

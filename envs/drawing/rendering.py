@@ -18,6 +18,7 @@ from lidarium.envs.drawing.frame_parts import (
     SIZE,
     UNEXPLORED,
     WALL,
+    Cell,
     Colour,
     Frame,
     View,
@@ -26,9 +27,11 @@ from lidarium.envs.drawing.frame_parts import (
     draw_robots,
     enlarged,
     team_colours,
+    thinned,
     view_around,
     with_header,
 )
+from lidarium.envs.drawing.prediction_layer import STRENGTH, PredictionLayer, tinted
 from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.simulation.coverage import unpack_bits
 from lidarium.envs.simulation.kernels.floor_cache import FloorTables
@@ -60,6 +63,8 @@ class Scene:
         True poses of the last time; none if they are not kept.
     episode : int
         Which episode.
+    prediction : PredictionLayer or None
+        Shows what is probably free beyond the team's maps; None for frames without it.
     """
 
     simulation: Simulation
@@ -68,6 +73,7 @@ class Scene:
     has_ended: list[bool]
     track: list[NDArray[np.float64]]
     episode: int = 0
+    prediction: PredictionLayer | None = None
 
     @property
     def rows(self) -> slice:
@@ -95,7 +101,8 @@ def draw_frame(scene: Scene, size: int = SIZE, draw_over: Callable[[Frame, View]
 
     True state: free floor is faint if unexplored and white if the team has sensed it, walls are dark if the
     team has been near. On it the robots with their headings, their last scans as fans, and their paths of the last
-    minute. If robots have cameras, the view of the first one is at its side.
+    minute. If robots have cameras, the view of the first one is at its side. With a prediction, what is not explored is
+    the bluer the more probably it is free.
 
     Returns
     -------
@@ -149,16 +156,22 @@ def _draw_floor(scene: Scene, tables: FloorTables, view: View) -> Frame:
             scene.simulation.score.counted_masks[scene.episode],
         )
     )
-    picture = PALETTE[classify(solid, seen, counted, raster.resolution * view.block)]
+    classes = classify(solid, seen, counted, raster.resolution * view.block)
+    picture = PALETTE[classes]
+    if scene.prediction is not None:
+        free = scene.prediction.on_floor(scene.simulation, scene.settings, scene.episode)
+        free = thinned(_spread(free, raster.solid.shape, multiple)[view.rows, view.columns], view.block)
+        picture = tinted(picture, STRENGTH * free * ((classes == _SOLID) | (classes == _UNEXPLORED)))
     return enlarged(picture, view)
 
 
 def _on_raster(mask: NDArray[np.uint64], shape: tuple[int, int], multiple: int) -> NDArray[np.uint8]:
-    """Unpack a mask and enlarge its cells.
+    """Unpack a mask and enlarge its cells, as `_spread` does."""
+    return _spread(unpack_bits(mask, -(-shape[1] // multiple)).view(np.uint8), shape, multiple)
 
-    They are ``multiple`` cells of the raster wide and begin at the same corner.
-    """
-    cells = unpack_bits(mask, -(-shape[1] // multiple)).view(np.uint8)
+
+def _spread(cells: NDArray[Cell], shape: tuple[int, int], multiple: int) -> NDArray[Cell]:
+    """Return cells on a raster; they are ``multiple`` of its cells wide and begin at the same corner."""
     if multiple > 1:
         cells = np.repeat(np.repeat(cells, multiple, axis=0), multiple, axis=1)
     return cells[: shape[0], : shape[1]]

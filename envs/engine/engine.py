@@ -51,6 +51,7 @@ from lidarium.mapping.kernels.views import table_of
 from lidarium.mapping.kernels.work_queue import new_work
 
 if TYPE_CHECKING:
+    from lidarium.envs.drawing.prediction_layer import PredictionLayer
     from lidarium.envs.drawing.rendering import Scene
 
 Arrays = dict[str, NDArray[Any]]
@@ -147,6 +148,7 @@ class Engine:
         self._offsets = np.zeros((self.rows, 2))
         self._goals = np.full((self.rows, 2), np.nan)
         self.perception = Perception(self.simulation, settings, self._offsets)
+        self._prediction: PredictionLayer | None = None
         self._software = Software(self.perception, settings)
         # Without localizers and radios of their own on board, a step is that of the simulation alone.
         self._step = self._software.step if self._software.is_staged else self.simulation.step
@@ -567,6 +569,16 @@ class Engine:
             for name, array in self.observations.items():
                 array[~seen] = before[name][~seen]
 
+    def prediction(self) -> "PredictionLayer | None":
+        """Return the layer of pictures that shows predictions; None if no robot predicts."""
+        if not self.perception.predicts:
+            return None
+        if self._prediction is None:
+            from lidarium.envs.drawing.prediction_layer import PredictionLayer
+
+            self._prediction = PredictionLayer()
+        return self._prediction
+
     def scenes(self) -> list["Scene"]:
         """Return the content of a picture of each episode.
 
@@ -581,14 +593,14 @@ class Engine:
             raise RuntimeError("the environment was not reset; call reset() before render()")
         ended = ~self.live.reshape(self.episodes, self.robots)
         return [
-            Scene(self.simulation, self.settings, floor.name, ended[episode].tolist(), [], episode)
+            Scene(self.simulation, self.settings, floor.name, ended[episode].tolist(), [], episode, self.prediction())
             for episode, floor in enumerate(self.floors)
             if floor is not None
         ]
 
     def __getstate__(self) -> dict[str, Any]:
         # A copy's arrays lie elsewhere.
-        return {**self.__dict__, "_tables": None}
+        return {**self.__dict__, "_tables": None, "_prediction": None}
 
 
 def _check_memory(episodes: int, settings: ExplorationSettings, has_goal: bool) -> None:

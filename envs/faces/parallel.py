@@ -453,7 +453,7 @@ class ExplorationEnv(ParallelEnv[str, Any, Any]):
         has_ended = (~self.engine.live).tolist()
         name = "" if self.floor is None else self.floor.name
         track = [poses for _, poses in self.scorer.track[-round(RECENT_S / TRACK_PERIOD_S) :]]
-        return Scene(self.simulation, self.settings, name, has_ended, track)
+        return Scene(self.simulation, self.settings, name, has_ended, track, prediction=self.engine.prediction())
 
     def close(self) -> None:
         """Close the window and the world, if they hold anything; closing again does nothing."""

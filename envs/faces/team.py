@@ -79,6 +79,10 @@ class EpisodeTeam:
         """Return the handle on the belief of an agent's onboard software."""
         return Belief(self._engine.perception, self.row(agent))
 
+    def show_predictions(self) -> None:
+        """Let frames, the live view and replays show what the network predicts beyond the team's maps."""
+        self._engine.perception.predicts = True
+
     def drive_state(self, agent: str) -> DriveState:
         """Return the state of an agent's drive to its target."""
         driver, row = self._engine.level.driver, self.row(agent)

@@ -99,7 +99,7 @@ class Belief:
 
         Squares of 0.2 m begin at ``map_origin``; 1 and 0 where the map is known. It takes 12 ms for each 32 x 32 m.
         """
-        navigation = self.map
+        navigation, self._perception.predicts = self.map, True
         factor = factor_of(navigation.resolution)
         side = factor * navigation.resolution
         found = predicted(make_predictor("network"), PartialMap(levels_of(navigation.log_odds, factor), side))

@@ -65,6 +65,9 @@ class Perception:
         The sparse maps that they make by their depth cameras, if these were asked for.
     meters : Meters or None
         Odometers and battery gauges of the robots of a lone episode; None in batches.
+    predicts : bool
+        Whether robots predict their maps by the network of the package; if so, frames, the live view and replays show
+        what it predicts. It may be set, so that they do in any case.
     """
 
     def __init__(self, simulation: Simulation, settings: ExplorationSettings, offsets: NDArray[np.float64]) -> None:
@@ -91,6 +94,7 @@ class Perception:
         self.trails = ForgottenTrails(simulation, settings, self.poses, self._fresh_at)
         self.sparse_maps = SparseMaps(simulation, settings, self.poses, self.exchanges)
         self.meters: Meters | None = None
+        self.predicts = "predicted_map" in settings.observe
 
     @property
     def hears(self) -> bool:

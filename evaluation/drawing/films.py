@@ -9,7 +9,7 @@ import math
 import subprocess
 from collections.abc import Callable, Generator, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any, Protocol
@@ -20,7 +20,8 @@ from numpy.typing import NDArray
 
 from lidarium.agents.policy import Policy
 from lidarium.envs.drawing.frame_parts import BORDER, Frame, even
-from lidarium.envs.drawing.rendering import draw_frame
+from lidarium.envs.drawing.prediction_layer import PredictionLayer
+from lidarium.envs.drawing.rendering import Scene, draw_frame
 from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.evaluation.drawing.supervision_marks import recent_supervision
 from lidarium.evaluation.episodes.watching import Watcher
@@ -273,6 +274,11 @@ FILMS.register(
     "what each robot knows and how maps are joined, of robots that do not know their starts",
 )
 FILMS.register(
+    "prediction",
+    "lidarium.evaluation.drawing.films:PredictionFrames",
+    "as scans, and what a network predicts beyond the explored part",
+)
+FILMS.register(
     "scans",
     "lidarium.evaluation.drawing.films:ScanFrames",
     "what is explored, the robots, and what their lasers see",
@@ -337,7 +343,21 @@ class ScanFrames:
     def draw(self, env: ExplorationEnv) -> Frame:
         """Return the frame of this moment."""
         over = None if self._draw_over is None else partial(self._draw_over, env)
-        return draw_frame(env.scene(), self._size, over)
+        return draw_frame(self._scene(env), self._size, over)
+
+    def _scene(self, env: ExplorationEnv) -> Scene:
+        return env.scene()
+
+
+class PredictionFrames(ScanFrames):
+    """The same, with what the network predicts, whoever explores."""
+
+    def __init__(self, policy: Policy, width: int) -> None:
+        super().__init__(policy, width)
+        self._prediction = PredictionLayer()
+
+    def _scene(self, env: ExplorationEnv) -> Scene:
+        return replace(env.scene(), prediction=self._prediction)
 
 
 class Film(Watcher):

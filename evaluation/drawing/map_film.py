@@ -18,6 +18,7 @@ from lidarium.envs.drawing.frame_parts import (
     INK,
     SHIFT,
     UNEXPLORED,
+    Cell,
     Colour,
     Frame,
     View,
@@ -29,9 +30,11 @@ from lidarium.envs.drawing.frame_parts import (
     line_of_text,
     pale,
     team_colours,
+    thinned,
     view_around,
     with_header,
 )
+from lidarium.envs.drawing.prediction_layer import STRENGTH, tinted
 from lidarium.envs.drawing.rendering import view_of
 from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.settings.exploration import ExplorationSettings
@@ -92,8 +95,13 @@ class OwnMaps:
         colour = self._colours[robot]
         palette = np.zeros((256, 3), np.uint8)
         palette[[OCCUPIED, UNKNOWN, FREE]] = colour, UNEXPLORED, pale(colour)
-        levels = three_levels(env.beliefs.log_odds[robot][view.rows, view.columns])
-        drawn = enlarged(palette[blocks_of(levels, view)], view)
+        log_odds = env.beliefs.log_odds[robot]
+        levels = blocks_of(three_levels(log_odds[view.rows, view.columns]), view)
+        picture, layer = palette[levels], env.engine.prediction()
+        if layer is not None:
+            free = layer.cells(log_odds, _resolution(env), f"of {robot}")[view.rows, view.columns]
+            picture = tinted(picture, STRENGTH * (levels == UNKNOWN) * thinned(free, view.block))
+        drawn = enlarged(picture, view)
         pose = env.beliefs.believed[robot, None]
         draw_robots(drawn, view, pose, env.settings.team[robot].radius, [False], [colour])
         return drawn
@@ -221,6 +229,10 @@ def _known(env: ExplorationEnv, view: View, groups: Sequence[set[int]], colours:
     multiple = round(env.settings.occupancy.resolution / raster.resolution)
     solid = np.where(raster.solid[view.rows, view.columns] != 0, np.uint8(OCCUPIED), np.uint8(FREE))
     picture = np.array([BACKGROUND, UNEXPLORED], np.uint8)[(blocks_of(solid, view) == FREE).astype(np.uint8)]
+    layer = env.engine.prediction()
+    if layer is not None:
+        free = _enlarged_cells(layer.on_floor(env.simulation, env.settings, 0), multiple)[view.rows, view.columns]
+        picture = tinted(picture, STRENGTH * thinned(free, view.block))
     known = []
     for group in groups:
         levels = three_levels(np.sum(maps[sorted(group)], axis=0, dtype=np.int16))
@@ -229,6 +241,6 @@ def _known(env: ExplorationEnv, view: View, groups: Sequence[set[int]], colours:
     return enlarged(overlaid(picture, known, [shades_of(group, colours) for group in groups]), view)
 
 
-def _enlarged_cells(levels: NDArray[np.uint8], multiple: int) -> NDArray[np.uint8]:
+def _enlarged_cells(cells: NDArray[Cell], multiple: int) -> NDArray[Cell]:
     """Return a map of cells that are that many cells of the floor's raster wide."""
-    return levels if multiple == 1 else np.repeat(np.repeat(levels, multiple, axis=0), multiple, axis=1)
+    return cells if multiple == 1 else np.repeat(np.repeat(cells, multiple, axis=0), multiple, axis=1)

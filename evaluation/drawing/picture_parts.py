@@ -15,12 +15,13 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.patches import Circle
+from matplotlib.patches import Circle, Patch
 from matplotlib.patheffects import Normal, Stroke
 from matplotlib.text import Text
 from numpy.typing import NDArray
 
 from lidarium.envs.drawing.frame_parts import DOOR, PERSON, Colour, team_colours
+from lidarium.envs.drawing.prediction_layer import STRENGTH, tinted
 from lidarium.envs.simulation.people.crowd import Crowd
 from lidarium.mapping.files.guarded_reading import printable
 from lidarium.mapping.files.output import whole_file
@@ -159,6 +160,20 @@ def drawn_together(classes: NDArray[np.uint8]) -> NDArray[np.uint8]:
     rows, columns = (-(-side // block) * block for side in classes.shape)
     padded = np.pad(classes, ((0, rows - classes.shape[0]), (0, columns - classes.shape[1])), mode="edge")
     return np.asarray(padded.reshape(rows // block, block, columns // block, block).max(axis=1).max(axis=2))
+
+
+def with_prediction(
+    picture: NDArray[np.uint8], is_unknown: NDArray[np.bool_], free: NDArray[np.float32]
+) -> NDArray[np.uint8]:
+    """Return a picture of cells that may be drawn together, its unknown ones tinted by how probably they are free."""
+    block = -(-max(free.shape) // _MOST_PIXELS)
+    return tinted(picture, STRENGTH * is_unknown * free[::block, ::block])
+
+
+def prediction_patch(unknown: str) -> Patch:
+    """Return the entry of a legend for unknown cells of a colour that are probably free."""
+    red, green, blue = tinted(rgb(unknown), np.array(STRENGTH)).tolist()
+    return Patch(facecolor=_hex((red, green, blue)), label="unknown, probably free")
 
 
 def draw_trajectories(axes: Axes, track: NDArray[np.float64], radius: float) -> None:

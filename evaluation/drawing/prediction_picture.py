@@ -6,12 +6,13 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from lidarium.envs.drawing.prediction_layer import tinted
 from lidarium.evaluation.drawing.picture_parts import INK, box_around, rgb, save_titled_figure, show_cells
 from lidarium.mapping.prediction.levels import FREE, OCCUPIED, UNKNOWN
 from lidarium.mapping.prediction.whole_maps import PredictedMap
 
-OUTSIDE, PREDICTED = "#e5e7eb", "#2563eb"
-"""Colours of unknown squares that are probably not free, and of those that surely are."""
+OUTSIDE = "#e5e7eb"
+"""Colour of unknown squares that are probably not free."""
 
 SHOWN = 0.05
 """Squares that are free with a smaller probability need not be in the picture."""
@@ -30,8 +31,7 @@ def save_prediction_picture(path: Path, found: PredictedMap, title: str) -> None
 
 def coloured(levels: NDArray[np.int8], probability: NDArray[np.float32]) -> NDArray[np.uint8]:
     """Return the colours of squares, (rows, columns, 3) uint8."""
-    low, high = rgb(OUTSIDE).astype(np.float32), rgb(PREDICTED).astype(np.float32)
-    colours = (low + (high - low) * probability[..., None]).astype(np.uint8)
+    colours = tinted(np.broadcast_to(rgb(OUTSIDE), (*levels.shape, 3)), probability)
     colours[levels == FREE] = 255
     colours[levels == OCCUPIED] = rgb(INK)
     return colours

@@ -28,9 +28,11 @@ from lidarium.envs.drawing.frame_parts import (
     draw_robots,
     enlarged,
     team_colours,
+    thinned,
     view_around,
     with_header,
 )
+from lidarium.envs.drawing.prediction_layer import STRENGTH, PredictionLayer, tinted
 from lidarium.envs.drawing.views import camera_panel, views_of
 from lidarium.envs.engine.tally import THRESHOLDS
 from lidarium.envs.floors.floor import Floor
@@ -47,12 +49,14 @@ from lidarium.evaluation.drawing.picture_parts import (
     drawn_together,
     list_robots,
     page,
+    prediction_patch,
     rgb,
     save_titled_figure,
     show_cells,
+    with_prediction,
 )
 from lidarium.evaluation.metrics.progress import path_lengths
-from lidarium.evaluation.record.episode_record import EpisodeRecord
+from lidarium.evaluation.record.episode_record import DisplayTrack, EpisodeRecord
 from lidarium.mapping.grids.occupancy import FREE, OCCUPIED, UNKNOWN
 from lidarium.mapping.grids.speckle_filter import without_small_components
 
@@ -69,6 +73,9 @@ class TrackFrames:
     ----------
     shown : (rows, columns) bool or None
         Cells of the team's map that frames show; those that the team knows at the end if None.
+    predicts : bool
+        Whether unknown space is the bluer the more probably it is free; if the robots predicted their maps, it always
+        is.
     """
 
     def __init__(
@@ -77,11 +84,13 @@ class TrackFrames:
         size: int = SIZE,
         floor: Floor | None = None,
         shown: NDArray[np.bool_] | None = None,
+        predicts: bool = False,
     ) -> None:
         self._record, self._display = record, record.display
         display = record.display
         shown = known_at_end(record) if shown is None else shown
         self.view = view_around(shown, display.origin, display.resolution, size)
+        self._prediction = PredictionLayer() if predicts or record.predicts else None
         self._sample, self._map = -1, np.zeros((0, 0, 3), np.uint8)
         self._agents = [f"robot_{robot}" for robot in range(display.poses.shape[1])]
         self._colours = team_colours(len(self._agents))
@@ -124,8 +133,15 @@ class TrackFrames:
         sample = int(np.searchsorted(self._display.changes.times, time_s + 1e-9, side="right"))
         if sample != self._sample:
             view = self.view
-            levels = without_small_components(self._display.map_at(time_s))[view.rows, view.columns]
-            self._sample, self._map = sample, enlarged(_PALETTE[blocks_of(levels, view)], view)
+            whole = without_small_components(self._display.map_at(time_s))
+            levels = blocks_of(whole[view.rows, view.columns], view)
+            picture = _PALETTE[levels]
+            if self._prediction is not None:
+                free = thinned(
+                    _free_beyond(self._prediction, whole, self._display)[view.rows, view.columns], view.block
+                )
+                picture = tinted(picture, STRENGTH * (levels == UNKNOWN) * free)
+            self._sample, self._map = sample, enlarged(picture, view)
         return self._map.copy()
 
     def _with_panel(self, frame: Frame, camera: DepthCamera, poses: NDArray[np.float64]) -> Frame:
@@ -158,15 +174,21 @@ class TrackFrames:
                 cv2.circle(frame, there, radius << SHIFT, colour, 2, cv2.LINE_AA, SHIFT)
 
 
+def _free_beyond(layer: PredictionLayer, levels: NDArray[np.uint8], display: DisplayTrack) -> NDArray[np.float32]:
+    """Return the probability that unknown cells of the team's map are free, 0 for known ones."""
+    return layer.cells((levels == OCCUPIED).astype(np.int8) - (levels == FREE), display.resolution)
+
+
 def known_at_end(record: EpisodeRecord) -> NDArray[np.bool_]:
     """Return which cells of the team's map are known at the end, (rows, columns)."""
     return np.asarray(record.display.map_at(math.inf) != UNKNOWN)
 
 
-def save_track_picture(path: Path, record: EpisodeRecord) -> None:
+def save_track_picture(path: Path, record: EpisodeRecord, predicts: bool = False) -> None:
     """Draw the end of a record (PNG, written whole or not at all).
 
-    It shows the team's map, all paths, coverage over time and endings.
+    It shows the team's map, all paths, coverage over time and endings; with ``predicts``, or if the robots predicted
+    their maps, also what is probably free beyond.
     """
     header, display = record.header, record.display
     levels = without_small_components(display.map_at(math.inf))
@@ -176,9 +198,16 @@ def save_track_picture(path: Path, record: EpisodeRecord) -> None:
     classes = np.zeros(levels.shape, np.uint8)
     classes[levels == FREE], classes[levels == OCCUPIED] = 1, 2
     palette = np.stack([rgb(colour) for colour in (_UNSEEN, "#ffffff", INK)])
-    show_cells(floor_axes, palette[drawn_together(classes[box.rows, box.columns])], box, _UNSEEN)
+    drawn = drawn_together(classes[box.rows, box.columns])
+    cells = palette[drawn]
+    more: list[Patch | Line2D] = []
+    if predicts or record.predicts:
+        free = _free_beyond(PredictionLayer(), levels, display)[box.rows, box.columns]
+        cells = with_prediction(cells, drawn == 0, free)
+        more.append(prediction_patch(_UNSEEN))
+    show_cells(floor_axes, cells, box, _UNSEEN)
     draw_trajectories(floor_axes, display.poses, radius_of(record))
-    _draw_legend(figure, draw_people_and_doors(floor_axes, display.crowd_at(math.inf)))
+    _draw_legend(figure, [*more, *draw_people_and_doors(floor_axes, display.crowd_at(math.inf))])
     end, coverage = float(display.times[-1]), float(display.coverage[-1, 1])
     reached = {
         share: float(display.coverage[display.coverage[:, 1] >= share, 0][0])
@@ -224,7 +253,7 @@ def _counts(events: list[dict[str, Any]]) -> dict[str, int]:
     return {names.get(kind, kind): kinds.count(kind) for kind in dict.fromkeys(kinds)}
 
 
-def _draw_legend(figure: Figure, more: list[Line2D]) -> None:
+def _draw_legend(figure: Figure, more: list[Patch | Line2D]) -> None:
     start: dict[str, Any] = {"markerfacecolor": "white", "markeredgecolor": INK, "markeredgewidth": 1.6}
     entries: list[Patch | Line2D] = [
         Patch(facecolor="white", edgecolor=SOLID, label="free on the team's map"),
@@ -237,7 +266,7 @@ def _draw_legend(figure: Figure, more: list[Line2D]) -> None:
     figure.legend(
         handles=entries,
         loc="outside lower left",
-        ncols=5,
+        ncols=6,
         frameon=False,
         fontsize=8.5,
         labelcolor=INK,

@@ -34,11 +34,15 @@ GAP, LINE, BAR, TITLE = 6, 26, 6, 38
 
 
 def save_track_film(
-    path: Path, record: EpisodeRecord, settings: FilmSettings | None = None, floor: Floor | None = None
+    path: Path,
+    record: EpisodeRecord,
+    settings: FilmSettings | None = None,
+    floor: Floor | None = None,
+    predicts: bool = False,
 ) -> None:
     """Film a record (mp4, GIF or WebP by the ending of the name)."""
     settings = settings or FilmSettings()
-    frames = TrackFrames(record, settings.width_of(path) - 2 * BORDER, floor)
+    frames = TrackFrames(record, settings.width_of(path) - 2 * BORDER, floor, predicts=predicts)
     _write(path, frames.draw, _end_of(record), settings)
 
 

@@ -118,6 +118,7 @@ def run_episode(
     """
     check_observed(policy, type(policy).__name__, env.settings.observe)
     env.use_level(level or policy.level, policy.shares_map, policy.decision_period_s)
+    env.perception.predicts |= policy.predicts  # before the first frame
     if plans_sparsely and env.driver is None:
         raise ValueError("plans_sparsely is set, but the policy decides speeds; want waypoints or frontiers")
     world: World = SparsePlanning(env, policy.shares_map) if plans_sparsely else env

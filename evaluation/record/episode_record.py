@@ -174,6 +174,11 @@ class EpisodeRecord:
     commands: NDArray[np.float64]
     display: DisplayTrack
 
+    @property
+    def predicts(self) -> bool:
+        """Whether robots predicted their maps by the network, so that replays show it; older records do not say so."""
+        return self.header.get("predicts") is True
+
 
 class NewerFormatError(ValueError):
     """A record is of a format that this version does not know yet."""
@@ -247,6 +252,10 @@ _WANTED: dict[str, tuple[str, Callable[[Any], bool]]] = {
 """Valid values of each key of a header, in words and as a test."""
 
 
+_MAY_HAVE = {"predicts": _WANTED["interrupted"]}
+"""The same of keys that older records do not have."""
+
+
 def check_header(header: Any) -> None:  # noqa: ANN401
     """Check the header of a record as read from a file.
 
@@ -262,7 +271,8 @@ def check_header(header: Any) -> None:  # noqa: ANN401
             f"this is lidarium {lidarium.__version__}, which reads formats up to {FORMAT}: use the newer "
             "version"
         )
-    for name, (wanted, is_good) in _WANTED.items():
+    known = {**_WANTED, **{name: rule for name, rule in _MAY_HAVE.items() if name in header}}
+    for name, (wanted, is_good) in known.items():
         if name not in header:
             raise ValueError(f"its header has no key {name}")
         if not is_good(header[name]):

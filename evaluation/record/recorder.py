@@ -23,6 +23,7 @@ from lidarium.envs.floors.floor import Floor
 from lidarium.envs.onboard.radio.messages import Orders
 from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.settings.making import make_settings
+from lidarium.envs.simulation.maps_on_floor import cells_beyond
 from lidarium.envs.simulation.people.crowd import Crowd, crowd_of
 from lidarium.evaluation.episodes.events import operating_events, place_of
 from lidarium.evaluation.episodes.runner import run_episode
@@ -31,7 +32,6 @@ from lidarium.evaluation.episodes.watching import WatchedExploration, Watcher
 from lidarium.evaluation.record.episode_record import FORMAT, CrowdTrack, DisplayTrack, EpisodeRecord, MapChanges
 from lidarium.evaluation.record.file import write_record
 from lidarium.evaluation.record.replay import state_sha256
-from lidarium.evaluation.truth.beliefs import cells_beyond
 from lidarium.mapping.grids.map_deltas import OverlaidMaps, note_changes, note_overlaid_changes
 
 PACKAGES = {"bullet": "pybullet"}
@@ -91,7 +91,7 @@ class MapSampler:
         self._maps = env.beliefs.belief_rows.copy()
         if settings.known_starts:
             for row in range(settings.robots):
-                first_row, first_column = cells_beyond(env, row)
+                first_row, first_column = cells_beyond(env.simulation, row, 0)
                 self._maps[row, 0] += first_row * self._maps[row, 2] + first_column
         self._renderings = env.beliefs.renderings.copy()
         self._placements = _overlays_of(env, self.origin)
@@ -265,6 +265,7 @@ class Recorder(Watcher):
             "map_shape": list(self._maps.shape),
             "endings": [list(ending) for ending in self._endings],
             "interrupted": is_interrupted,
+            "predicts": env.perception.predicts,
             # If broken off within a step, the world is ahead of the record.
             "final_sha256": state_sha256(env) if steps == len(commands) else None,
         }

@@ -175,6 +175,7 @@ def replay(
     html: Path | str | None = None,
     film: Path | str | None = None,
     speed: float = 10.0,
+    predicts: bool = False,
 ) -> ExplorationEnv:
     """Run a recorded episode again, and write a page or a film of it if asked to.
 
@@ -192,6 +193,8 @@ def replay(
         File of a film: ``.gif``, ``.webp`` or ``.mp4``.
     speed : float, optional
         Simulated seconds per second of the film, 10 by default.
+    predicts : bool, optional
+        Whether page and film show what a network predicts beyond the maps; if robots predicted, they do in any case.
 
     Returns
     -------
@@ -213,9 +216,9 @@ def replay(
     found = record if isinstance(record, EpisodeRecord) else read_record(Path(record))
     env = rerun(found, floor)
     if html is not None:
-        write_replay_page(Path(html), replay_of(found, None if floor is None else env.floor))
+        write_replay_page(Path(html), replay_of(found, None if floor is None else env.floor, predicts))
     if film is not None:
-        save_track_film(Path(film), found, FilmSettings(speed=speed), env.floor)
+        save_track_film(Path(film), found, FilmSettings(speed=speed), env.floor, predicts)
     return env
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.envs.drawing.frame_parts import team_colours
+from lidarium.envs.drawing.prediction_layer import PredictionLayer
 from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.floors.floor import Floor
 from lidarium.envs.settings.exploration import ExplorationSettings
@@ -18,6 +19,7 @@ from lidarium.evaluation.drawing.record_frames import radius_of
 from lidarium.evaluation.episodes.watching import Watcher
 from lidarium.evaluation.record.episode_record import EpisodeRecord
 from lidarium.evaluation.record.replay import drive_again, first_difference, is_same
+from lidarium.evaluation.report import map_layers
 from lidarium.evaluation.report.map_layers import (
     Grid,
     Layer,
@@ -31,12 +33,22 @@ from lidarium.evaluation.truth.beliefs import believed_on_floor, map_within
 from lidarium.evaluation.truth.true_map import occupied_in_truth, truth_of
 from lidarium.mapping.files.guarded_reading import printable
 from lidarium.mapping.grids.occupancy import FREE, OCCUPIED, UNKNOWN
+from lidarium.mapping.prediction.levels import factor_of
 
 MAP_PERIOD_S, SCAN_PERIOD_S = 1.0, 0.4
 """Minimum time between samples of maps, and of scans [s]; that of scans is a multiple of that of poses."""
 
 MOST_MAPS, MOST_SCANS = 600, 1500
 """Maximum number of samples of an episode; those of a longer one are further apart."""
+
+PREDICTION_PERIOD_S = 2.0
+"""Minimum time between samples of the prediction [s]."""
+
+PROBABILITIES = 8
+"""The page tells so many probabilities above 0 apart."""
+
+_LEAST_CHANGE = 0.75
+"""Changes of a probability that are shown are larger, in steps of the page."""
 
 MOST_BEAMS = 60
 """Maximum number of beams of a scan of the page."""
@@ -74,12 +86,35 @@ class _Samples:
     believed: list[NDArray[np.float64]] = field(default_factory=list)
 
 
+class _PredictionTrack:
+    """What the network predicts beyond the team's map of the page, from sample to sample."""
+
+    def __init__(self, grid: Grid, cell_m: float) -> None:
+        self._cell_m, self._layer, self._due_s = cell_m, PredictionLayer(), 0.0
+        factor = factor_of(cell_m)
+        rows, columns = -(-grid.rows // factor), -(-grid.columns // factor)
+        self.squares = Layer(np.zeros((rows, columns), np.uint8))
+        self.header = {"rows": rows, "columns": columns, "cells": factor, "steps": PROBABILITIES}
+
+    def add(self, levels: NDArray[np.uint8], time_s: float, *, is_last: bool = False) -> None:
+        """Take a sample of the map of the page; between those of the prediction it stays as it is."""
+        found = self.squares.levels
+        if time_s >= self._due_s - 1e-9 or is_last:
+            self._due_s = time_s + PREDICTION_PERIOD_S
+            known = (levels == map_layers.OCCUPIED).astype(np.int8) - (levels == map_layers.FREE)
+            free = PROBABILITIES * self._layer.squares(known, self._cell_m)[0]
+            # Small changes are left out: they would be most of the page.
+            found = np.where(np.abs(free - found) > _LEAST_CHANGE, np.rint(free), found).astype(np.uint8)
+        self.squares.add(found)
+
+
 class ReplaySampler(Watcher):
     """Samples an episode as it runs."""
 
     samples: _Samples
 
-    def __init__(self, duration_s: float) -> None:
+    def __init__(self, duration_s: float, predicts: bool = False) -> None:
+        self._predicts = predicts
         self._map_period = max(MAP_PERIOD_S, duration_s / MOST_MAPS)
         scans = max(SCAN_PERIOD_S, duration_s / MOST_SCANS)
         self._scan_period = SCAN_PERIOD_S * math.ceil(scans / SCAN_PERIOD_S - 1e-9)
@@ -90,6 +125,7 @@ class ReplaySampler(Watcher):
         grid = grid_around(truth.knowable, settings.occupancy.resolution)
         own = settings.robots if settings.robots > 1 else 0
         self.samples = _Samples(grid, Layer.blank(grid), Layer.blank(grid), [Layer.blank(grid) for _ in range(own)])
+        self.prediction = _PredictionTrack(grid, grid.block * settings.occupancy.resolution) if self._predicts else None
         occupied = occupied_in_truth(env)[grid.window]
         self.samples.truth.add(coarse(occupied, np.zeros_like(occupied), grid.block))
         self._reach = settings.lidar.range_max + settings.speed_limits[:, 0].max() * self._map_period + 0.5
@@ -161,6 +197,8 @@ class ReplaySampler(Watcher):
             levels[rows, columns] = coarse(np.asarray(log_odds > 0), np.asarray(log_odds < 0), block)
             layer.add(levels)
         samples.map_times.append(int(env.world.steps[0]) * env.settings.time_step)
+        if self.prediction is not None:
+            self.prediction.add(samples.team.levels, samples.map_times[-1], is_last=is_whole)
 
     def _changed(self, env: ExplorationEnv, places: NDArray[np.float64], is_whole: bool) -> tuple[slice, slice]:
         """Return the rows and columns of the page's grid that may have changed."""
@@ -207,15 +245,15 @@ class Replay:
     lacks: str = ""
 
 
-def replay_of(record: EpisodeRecord, floor: str | Floor | None = None) -> Replay:
-    """Return the replay of a record."""
-    header, display = record.header, record.display
+def replay_of(record: EpisodeRecord, floor: str | Floor | None = None, predicts: bool = False) -> Replay:
+    """Return the replay of a record; the prediction is in it with ``predicts``, or if the robots predicted."""
+    header, display, predicts = record.header, record.display, predicts or record.predicts
     lacks = ""
     try:
-        more, streams = _run_again(record, floor)
+        more, streams = _run_again(record, floor, predicts)
     except ValueError as error:
         lacks = printable(str(error))
-        more, streams = _as_recorded(record)
+        more, streams = _as_recorded(record, predicts)
     title = _title(header)
     about = {
         "title": title,
@@ -277,8 +315,8 @@ def _differences(values: Any, scale: float) -> bytes:  # noqa: ANN401
     return signed_varints(np.diff(whole, axis=0, prepend=0).T)
 
 
-def _run_again(record: EpisodeRecord, floor: str | Floor | None) -> tuple[dict[str, Any], Streams]:
-    sampler = ReplaySampler(float(record.display.times[-1]))
+def _run_again(record: EpisodeRecord, floor: str | Floor | None, predicts: bool) -> tuple[dict[str, Any], Streams]:
+    sampler = ReplaySampler(float(record.display.times[-1]), predicts)
     env = drive_again(record, floor, [sampler])
     if not is_same(record, env):
         raise ValueError(f"the episode does not run as it was recorded: {first_difference(record, env)}")
@@ -302,7 +340,16 @@ def _run_again(record: EpisodeRecord, floor: str | Floor | None) -> tuple[dict[s
     if samples.believed:
         believed = np.unwrap(np.stack(samples.believed), axis=0)
         streams["believed"] = _differences(believed.reshape(len(believed), -1), _MILLI)
-    return more, streams
+    return _with_prediction(more, streams, sampler.prediction)
+
+
+def _with_prediction(
+    more: dict[str, Any], streams: Streams, prediction: _PredictionTrack | None
+) -> tuple[dict[str, Any], Streams]:
+    """Return header and streams with those of the prediction, if there is one."""
+    if prediction is None:
+        return {**more, "prediction": None}, streams
+    return {**more, "prediction": prediction.header}, {**streams, "prediction": bytes(prediction.squares.changes)}
 
 
 def _grid_header(env: ExplorationEnv, sampler: ReplaySampler) -> dict[str, Any]:
@@ -318,13 +365,16 @@ def _scans(ranges: NDArray[np.float32]) -> bytes:
     return signed_varints(np.diff(whole, axis=-1, prepend=0))
 
 
-def _as_recorded(record: EpisodeRecord) -> tuple[dict[str, Any], Streams]:
+def _as_recorded(record: EpisodeRecord, predicts: bool) -> tuple[dict[str, Any], Streams]:
     display = record.display
     grid = grid_around(display.map_at(math.inf) != UNKNOWN, display.resolution)
     team = Layer.blank(grid)
+    prediction = _PredictionTrack(grid, grid.block * display.resolution) if predicts else None
     for time_s in display.changes.times:
         levels = display.map_at(float(time_s))[grid.window]
         team.add(coarse(levels == OCCUPIED, levels == FREE, grid.block))
+        if prediction is not None:
+            prediction.add(team.levels, float(time_s), is_last=time_s == display.changes.times[-1])
     more = {
         "grid": grid.header(display.origin, display.resolution),
         "layers": ["team"],
@@ -334,4 +384,4 @@ def _as_recorded(record: EpisodeRecord) -> tuple[dict[str, Any], Streams]:
         "has_beliefs": False,
     }
     times = varints([]) if not len(display.changes.times) else _differences(display.changes.times, _MILLI)
-    return more, {"map_times": times, "map_team": bytes(team.changes)}
+    return _with_prediction(more, {"map_times": times, "map_team": bytes(team.changes)}, prediction)

@@ -1,11 +1,10 @@
 """The robots' maps, overlaid on the lattice of the scorer's masks."""
 
-import math
-
 import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.envs.faces.parallel import ExplorationEnv
+from lidarium.envs.simulation.maps_on_floor import laid, map_on_floor
 
 
 def maps_on_floor(env: ExplorationEnv) -> NDArray[np.int8]:
@@ -27,44 +26,7 @@ def map_within(env: ExplorationEnv, row: int, rows: slice, columns: slice) -> ND
 
     As in `maps_on_floor`; the window has a start and a stop within the lattice.
     """
-    log_odds = env.beliefs.log_odds[row]
-    if env.settings.known_starts:
-        return _on_floor(env, row, log_odds)[rows, columns]
-    tables, resolution = env.world.floors[0], env.settings.occupancy.resolution
-    assert tables is not None
-    y, x = ((np.arange(side.start, side.stop) + 0.5) * resolution for side in (rows, columns))
-    start_x, start_y, theta = env.world.starts[row]
-    east, north = x + tables.laser.origin[0] - start_x, (y + tables.laser.origin[1] - start_y)[:, None]
-    own_x = math.cos(theta) * east + math.sin(theta) * north - env.beliefs.origins[row, 0]
-    own_y = math.cos(theta) * north - math.sin(theta) * east - env.beliefs.origins[row, 1]
-    own_columns, own_rows = (np.floor(own / resolution).astype(np.int64) for own in (own_x, own_y))
-    is_inside = (
-        (own_rows >= 0) & (own_rows < log_odds.shape[0]) & (own_columns >= 0) & (own_columns < log_odds.shape[1])
-    )
-    placed = np.zeros(own_x.shape, np.int8)
-    placed[is_inside] = log_odds[own_rows[is_inside], own_columns[is_inside]]
-    return placed
-
-
-def cells_beyond(env: ExplorationEnv, row: int) -> tuple[int, int]:
-    """Return the rows and columns by which a robot's map begins before the masks.
-
-    The robot knows its start; the lattice is that of the scorer's masks.
-    """
-    tables, resolution = env.world.floors[0], env.settings.occupancy.resolution
-    assert tables is not None
-    x, y = (corner - own for corner, own in zip(tables.laser.origin, env.beliefs.origins[row], strict=True))
-    return round(float(y) / resolution), round(float(x) / resolution)
-
-
-def _on_floor(env: ExplorationEnv, row: int, log_odds: NDArray[np.int8]) -> NDArray[np.int8]:
-    """Return a robot's map on the lattice of the scorer's masks, (rows, columns).
-
-    The part that lies on it is taken; the robot knows its start.
-    """
-    first_row, first_column = cells_beyond(env, row)
-    rows, words = env.score.counted_masks[0].shape
-    return log_odds[first_row : first_row + rows, first_column : first_column + words * 64]
+    return map_on_floor(env.simulation, env.settings, row, rows, columns)
 
 
 def team_log_odds(env: ExplorationEnv) -> tuple[NDArray[np.int16], tuple[float, float]]:
@@ -93,7 +55,11 @@ def held_maps(env: ExplorationEnv) -> list[NDArray[np.int8]]:
     The radio is not ideal: the sum is of its own map and those that reached it.
     """
     held = [env.perception.shared_map(row) for row in range(env.settings.robots)]
-    return [_on_floor(env, row, navigation.log_odds) for row, navigation in enumerate(held) if navigation is not None]
+    return [
+        laid(env.simulation, row, 0, navigation.log_odds)
+        for row, navigation in enumerate(held)
+        if navigation is not None
+    ]
 
 
 def free_as_held(env: ExplorationEnv, maps: NDArray[np.int8]) -> NDArray[np.bool_]:

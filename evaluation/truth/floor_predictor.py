@@ -33,10 +33,12 @@ class FloorPredictor:
 
     def _laid_on(self, partial: PartialMap) -> NDArray[np.float32]:
         """Return the floor's free squares on the lattice of a robot's map."""
-        engine, episode, row = self._team._engine, self._team._episode, self._team.row(partial.agent)
-        laser, beliefs = engine.world.floors[episode].laser, engine.simulation.beliefs
+        belief = self._team.belief(partial.agent)  # that of the team itself, also within a supervisor
+        perception, row = belief._perception, belief._row
+        episode, beliefs = perception.episode_of(row), perception.beliefs
+        laser = perception.world.floors[episode].laser
         counted = np.unpackbits(
-            engine.score.counted_masks[episode].astype("<u8").view(np.uint8), axis=1, bitorder="little"
+            perception.simulation.score.counted_masks[episode].astype("<u8").view(np.uint8), axis=1, bitorder="little"
         ).astype(np.bool_)
         resolution = beliefs.occupancy.resolution
         multiple = round(resolution / laser.resolution)

@@ -26,9 +26,13 @@ class Layer(Enum):
     TRAILS = "Paths driven"
     PLANS = "Plans and goals"
     FRONTIERS = "Frontiers"
+    PREDICTION = "Prediction"
     CLOUDS = "Depth images"
     BOXES = "Sparse maps"
 
+
+OF_MAPS = frozenset({Layer.JOINED, Layer.OWN, Layer.PREDICTION})
+"""Layers that the picture of the ground shows."""
 
 OF_CAMERAS = (Layer.CLOUDS, Layer.BOXES)
 """Layers that are there only if robots have cameras."""
@@ -55,6 +59,8 @@ class Controls:
         Greatest height at which walls can be cut, and the one to begin with [m].
     speed : str
         The speed to begin with.
+    predicts : bool
+        Whether the prediction is shown at first.
     more : callable, optional
         Adds controls of its own, above the layers.
     """
@@ -66,6 +72,7 @@ class Controls:
         has_cameras: bool,
         heights: tuple[float, float],
         speed: str = FIRST_SPEED,
+        predicts: bool = False,
         more: Callable[[], None] = lambda: None,
     ) -> None:
         gui = server.gui
@@ -81,7 +88,9 @@ class Controls:
         more()
         with gui.add_folder("Layers"):
             self._layers: dict[Layer, GuiInputHandle[bool]] = {
-                layer: gui.add_checkbox(layer.value, True) for layer in Layer if has_cameras or layer not in OF_CAMERAS
+                layer: gui.add_checkbox(layer.value, predicts or layer is not Layer.PREDICTION)
+                for layer in Layer
+                if has_cameras or layer not in OF_CAMERAS
             }
             greatest, first = heights
             self._height = gui.add_slider("Walls cut [m]", 0.05, max(greatest, 0.1), 0.05, min(first, greatest))

@@ -17,7 +17,7 @@ from lidarium.envs.onboard.radio.messages import Orders
 from lidarium.evaluation.episodes.events import joined_groups
 from lidarium.evaluation.episodes.watching import WatchedExploration, Watcher
 from lidarium.evaluation.processes import is_end_asked
-from lidarium.evaluation.viewing.controls import FIRST_SPEED, Controls, Layer, follow
+from lidarium.evaluation.viewing.controls import FIRST_SPEED, OF_MAPS, Controls, Layer, follow
 from lidarium.evaluation.viewing.moment import Moment, moment_of
 from lidarium.evaluation.viewing.scene import TeamMaps, TeamScene
 from lidarium.mapping.files.guarded_reading import printable
@@ -199,6 +199,7 @@ class LiveView(Watcher):
             has_cameras,
             (ceiling, CUT_M if has_cameras else LOW_WALLS_M),
             self.first_speed,
+            env.perception.predicts,
             self._add_controls,
         )
         self._maps = TeamMaps(env)
@@ -233,7 +234,7 @@ class LiveView(Watcher):
         layers = self._controls.layers
         self._scene.cut_walls(self._controls.wall_height)
         self._scene.show(layers)
-        if layers & {Layer.JOINED, Layer.OWN} != self._drawn_layers:
+        if layers & OF_MAPS != self._drawn_layers:
             self._draw_maps()
         self._follow()
         return not is_end_asked()
@@ -260,10 +261,11 @@ class LiveView(Watcher):
     def _draw_maps(self) -> None:
         """Draw maps, frontiers and words; then not for so long that it takes a small share of the time."""
         began, env, report = self._clock(), self._env, self._policy.report()
-        self._drawn_layers = self._controls.layers & {Layer.JOINED, Layer.OWN}
+        self._drawn_layers = self._controls.layers & OF_MAPS
         groups = self._shown_groups(joined_groups(report, env.possible_agents)[0])
         levels = self._maps.levels(env, groups)
-        self._scene.draw_ground(self._maps.picture(groups, levels), self._maps.frontiers(levels))
+        free = self._maps.free_beyond(env, groups) if Layer.PREDICTION in self._drawn_layers else None
+        self._scene.draw_ground(self._maps.picture(groups, levels, free), self._maps.frontiers(levels))
         status = status_text(env, self._name, report, self._decisions, self._status())
         self._controls.write(status, events_text(env, report), env.scorer.coverage)
         if env.simulation.camera is not None:

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from lidarium.envs.drawing.frame_parts import DOOR, EXPLORED, PERSON, UNEXPLORED, Colour, Frame, team_colours
+from lidarium.envs.drawing.frame_parts import DOOR, EXPLORED, PERSON, UNEXPLORED, Colour, Frame, team_colours, thinned
+from lidarium.envs.drawing.prediction_layer import STRENGTH, PredictionLayer, tinted
 from lidarium.envs.drawing.shading import owner_colours
 from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.floors.faces import GROUND, section_of
@@ -166,12 +167,26 @@ class TeamMaps:
         x, y = tables.laser.origin
         self.corner = (x + grid.column * resolution, y + grid.row * resolution)
         self.size = (grid.columns * self.cell_m, grid.rows * self.cell_m)
+        self._prediction = PredictionLayer()
 
     def levels(self, env: ExplorationEnv, groups: Sequence[set[int]]) -> list[Levels]:
         """Return the map of each group of robots, (rows, columns): above 0 occupied, below 0 free."""
-        maps = [map_within(env, row, *self._grid.window) for row in range(env.settings.robots)]
-        together = [np.sum([maps[robot] for robot in sorted(group)], axis=0, dtype=np.int16) for group in groups]
-        return [self._coarse(np.asarray(log_odds)) for log_odds in together]
+        return [self._coarse(self._sum(env, group)) for group in groups]
+
+    def free_beyond(self, env: ExplorationEnv, groups: Sequence[set[int]]) -> NDArray[np.float32]:
+        """Return the probability that cells that no group knows are free, by the maps of all, (rows, columns)."""
+        log_odds = self._sum(env, set().union(*groups))
+        grid, free = self._grid, self._prediction.cells(log_odds, env.settings.occupancy.resolution)
+        return thinned(free, grid.block)[: grid.rows, : grid.columns]
+
+    def _sum(self, env: ExplorationEnv, group: set[int]) -> NDArray[np.int16]:
+        """Return the sum of the maps of some robots, in cells of the lattice."""
+        window = self._grid.window
+        sides = [side.stop - side.start for side in window]
+        together = np.zeros(sides, np.int16)
+        for robot in sorted(group):
+            together += map_within(env, robot, *window)
+        return together
 
     def _coarse(self, log_odds: NDArray[np.signedinteger[Any]]) -> Levels:
         classes = coarse(np.asarray(log_odds > 0), np.asarray(log_odds < 0), self._grid.block)
@@ -179,12 +194,17 @@ class TeamMaps:
         signs[[UNKNOWN, FREE, OCCUPIED]] = 0, -1, 1
         return signs[classes]
 
-    def picture(self, groups: Sequence[set[int]], maps: Sequence[Levels]) -> Frame:
+    def picture(
+        self, groups: Sequence[set[int]], maps: Sequence[Levels], free: NDArray[np.float32] | None = None
+    ) -> Frame:
         """Return a picture of the ground with the maps of groups over it, upright.
 
-        Maps of single robots are in their colours, joined maps in white and dark.
+        Maps of single robots are in their colours, joined maps in white and dark; beyond them it is the bluer the more
+        probably it is free, if that is given.
         """
         blank = np.full((self._grid.rows, self._grid.columns, 3), UNEXPLORED, np.uint8)
+        if free is not None:
+            blank = tinted(blank, STRENGTH * free)
         picture = overlaid(blank, maps, [shades_of(group, self._colours) for group in groups])
         return np.ascontiguousarray(picture[::-1])
 

@@ -46,6 +46,8 @@ class _Replay(FilmFiles, Command):
 
     Works for records of other versions too, with less to be seen
     """
+    prediction: bool = False
+    """show what a network predicts beyond the map, in all of these, also if robots did not predict"""
     mcap: Path | None = None
     """run the record again and write the sensor data as a bag of ROS 2 (extra bags)"""
     demonstrations: Path | None = None
@@ -82,12 +84,12 @@ def _drawn(command: _Replay, record: "EpisodeRecord") -> Answer:
 
     files = []
     if command.picture is not None:
-        save_track_picture(command.picture, record)
+        save_track_picture(command.picture, record, command.prediction)
         files.append(str(command.picture))
     floor = _floor_of_camera(command, record) if command.films else None
     for path in command.films:
         notify(f"filming {record.display.times[-1]:.0f} s")
-        save_track_film(path, record, command.film_settings, floor)
+        save_track_film(path, record, command.film_settings, floor, command.prediction)
         files.append(str(path))
     if command.html is not None:
         _write_page(command.html, command, record)
@@ -123,7 +125,7 @@ def _write_page(path: Path, command: _Replay, record: "EpisodeRecord") -> None:
     from lidarium.evaluation.report.page import write_replay_page
     from lidarium.evaluation.report.replay_page import replay_of
 
-    replay = replay_of(record, command.floor)
+    replay = replay_of(record, command.floor, command.prediction)
     if replay.lacks:
         notify(f"the page is without scans, true walls and the robots' own maps: {replay.lacks}")
     write_replay_page(path, replay)

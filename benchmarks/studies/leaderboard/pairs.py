@@ -27,10 +27,14 @@ HEADER = f"| world | policy | over | floors | {_ROBOTS} | all |\n|---|---|---|--
 Episode = Mapping[str, Any]
 
 
-def pairs_table(episodes: Mapping[str, Sequence[Episode]], names: Mapping[str, str]) -> str:
+def pairs_table(
+    episodes: Mapping[str, Sequence[Episode]],
+    names: Mapping[str, str],
+    pairs: Sequence[tuple[str, str, str]] = PAIRS,
+) -> str:
     """Return the table of pairs of all teams."""
     rows = [HEADER]
-    for world, ours, theirs in PAIRS:
+    for world, ours, theirs in pairs:
         first, second = (_times(episodes.get(world, ()), policy) for policy in (ours, theirs))
         both = sorted(set(first) & set(second))
         if not both:

@@ -30,3 +30,38 @@ def test_ones_own_network_explores_under_a_supervisor(weights):
 def test_weights_that_are_not_there_are_named():
     with pytest.raises(FileNotFoundError, match=r"nowhere\.safetensors"):
         make_policy("supervised_learned", weights="nowhere.safetensors")
+
+
+def led(policy, **settings):
+    options = {"robots": 2, "resolution": 0.05, "stop_coverage": 0.99, "horizon_s": 600.0, **settings}
+    env = ExplorationEnv("apartment:7", make_settings(**options))
+    run_episode(policy, env, 0)
+    return env, policy
+
+
+def test_robots_that_predict_join_their_maps_and_explore_all_from_unknown_starts():
+    first, second = (
+        led(make_policy("supervised_predicted"), known_starts=False, localization="slam") for _ in range(2)
+    )
+    env, policy = first
+    assert env.scorer.coverage >= 0.99
+    assert [join.is_used for join in policy.joins if {join.a, join.b} == {"robot_0", "robot_1"}][-1]
+    assert env.perception.received.has_merged_map(0) or env.perception.received.has_merged_map(1)
+    assert policy.decided_by["predicted"] > 0
+    np.testing.assert_array_equal(env.world.poses, second[0].world.poses)
+    assert policy.decisions == second[1].decisions
+
+
+def test_without_a_prediction_they_explore_as_supervised_tours_to_the_bit():
+    (classic, _), (other, _) = (
+        led(make_policy(name, **settings), known_starts=False)
+        for name, settings in (("supervised_tours", {}), ("supervised_predicted", {"predictor": "nothing"}))
+    )
+    assert classic.scorer.time == other.scorer.time
+    np.testing.assert_array_equal(classic.world.poses, other.world.poses)
+
+
+def test_the_truth_bounds_a_team_under_a_supervisor_that_knows_its_starts():
+    env, policy = led(make_policy("supervised_predicted", predictor="truth"))
+    assert env.scorer.coverage >= 0.99
+    assert policy.decided_by["predicted"] > 0

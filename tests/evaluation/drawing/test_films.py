@@ -14,7 +14,15 @@ import lidarium
 from lidarium.envs.drawing.frame_parts import EXPLORED, team_colours
 from lidarium.envs.settings.making import make_settings
 from lidarium.evaluation.drawing import films
-from lidarium.evaluation.drawing.films import FORMATS, Film, FilmSettings, ScanFrames, film_writer, format_of
+from lidarium.evaluation.drawing.films import (
+    FORMATS,
+    Film,
+    FilmSettings,
+    PredictionFrames,
+    ScanFrames,
+    film_writer,
+    format_of,
+)
 from lidarium.evaluation.drawing.films import filmed as opened
 from lidarium.evaluation.drawing.map_film import JOINED, MapFrames
 from lidarium.evaluation.episodes.runner import run_episode
@@ -317,3 +325,42 @@ def test_an_older_film_stays_where_a_new_one_fails(tmp_path):
     with pytest.raises(OSError, match="not whole"), film_writer(tmp_path / "film.gif"):
         pass
     assert (tmp_path / "film.gif").read_text() == "older"
+
+
+def blue_of(frames, reference):
+    """Return how many pixels are bluer than in another film of the same run, frame by frame."""
+    change = frames.astype(int) - reference.astype(int)
+    return ((change[..., 0] < -20) & (change[..., 2] > change[..., 0] + 20)).mean(axis=(1, 2))
+
+
+def test_films_show_predictions_if_the_policy_predicts_or_one_asks(tmp_path):
+    settings = FilmSettings(speed=10.0, width=360)
+
+    def film(name, frames, policy, **options):
+        return filmed(tmp_path / f"{name}.webp", lambda made: frames(made, 360), settings, policy, **options)[1].frames
+
+    plain = film("plain", ScanFrames, "tour_frontier")
+    asked = film("asked", PredictionFrames, "tour_frontier")
+    assert blue_of(asked, plain)[0] > 0.05
+    assert blue_of(asked, plain)[-1] < blue_of(asked, plain)[0]
+    # At the start both policies see the same.
+    assert blue_of(film("own", ScanFrames, "predicted_tours"), plain)[0] > 0.05
+
+
+def test_the_film_of_maps_shows_what_each_robot_predicts(tmp_path):
+    settings, first = FilmSettings(speed=10.0, width=480), []
+    for policy in ("supervised_tours", "supervised_predicted"):
+        _, found = filmed(
+            tmp_path / f"{policy}.webp",
+            lambda made: MapFrames(made, 480),
+            settings,
+            policy,
+            known_starts=False,
+            horizon_s=1.0,
+            resolution=0.1,
+        )
+        first.append(found.frames[0])
+    plain, tinted = first
+    half = len(plain) // 3
+    assert blue_of(tinted[None, :half], plain[None, :half])[0] > 0.02
+    assert blue_of(tinted[None, half:], plain[None, half:])[0] > 0.05

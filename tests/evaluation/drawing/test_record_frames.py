@@ -61,3 +61,29 @@ def test_a_picture_shows_the_end(foreign, tmp_path):
     assert picture.shape[1] > 1000
     assert 0.3 < share_of(picture, (255, 255, 255)) < 0.95
     assert all(share_of(picture, colour) > 3e-4 for colour in team_colours(3))
+
+
+def test_what_is_unknown_is_tinted_if_robots_predicted_or_one_asks(foreign, tmp_path):
+    predicting = replace(foreign, header={**foreign.header, "predicts": True})
+    plain, tinted = TrackFrames(foreign, 320).draw(2.0), TrackFrames(predicting, 320).draw(2.0)
+    differs = (plain != tinted).any(axis=2)
+    assert differs.mean() > 0.05
+    assert (tinted[differs][:, 2] >= plain[differs][:, 2]).mean() > 0.99
+    assert (tinted[differs][:, 0] < plain[differs][:, 0]).all()
+    assert not (plain[differs] == EXPLORED).all(axis=1).any()
+    assert (TrackFrames(foreign, 320, predicts=True).draw(2.0) == tinted).all()
+    changes = foreign.display.changes
+    early = replace(changes, counts=changes.counts * (changes.times <= 2.0))
+    short = replace(foreign, display=replace(foreign.display, changes=early))
+    pictures = []
+    for name, predicts in (("plain", False), ("tinted", True)):
+        save_track_picture(tmp_path / f"{name}.png", short, predicts)
+        pictures.append(cv2.imread(str(tmp_path / f"{name}.png"))[..., ::-1])
+    blue = [(each[..., 2].astype(int) - each[..., 0] > 60).mean() for each in pictures]
+    assert blue[1] > blue[0] + 0.03
+
+
+def test_frames_with_predictions_are_the_same_whatever_was_drawn_before(foreign):
+    frames = TrackFrames(foreign, 320, predicts=True)
+    for time_s in (3.0, 30.0, 0.0):
+        assert (frames.draw(time_s) == TrackFrames(foreign, 320, predicts=True).draw(time_s)).all()

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from browsing import Browser, chromium
 
-from lidarium.envs.drawing.frame_parts import DOOR, PERSON
+from lidarium.envs.drawing.frame_parts import DOOR, PERSON, UNEXPLORED
+from lidarium.envs.drawing.prediction_layer import STRENGTH, tinted
 from lidarium.evaluation.record import write_record
 from lidarium.evaluation.report import write_report
 from lidarium.evaluation.report.page import write_replay_page
@@ -295,6 +296,30 @@ def test_people_and_doors_are_a_layer_of_episodes_that_have_them(driver, recorde
     page.open(report)
     ready(page)
     assert "People, doors" not in [each.text for each in page.find_all("#replay .layers label")]
+
+
+def test_the_prediction_is_a_layer_of_episodes_that_have_one(driver, recorded, report, tmp_path):
+    record, _ = recorded("predicted_tours", resolution=0.05, horizon_s=10.0)
+    write_replay_page(tmp_path / "predicted.html", replay_of(record))
+    page = Browser(driver)
+    page.open(tmp_path / "predicted.html")
+    ready(page)
+    page.labelled("True walls", "#replay").click()
+    bluest = tinted(np.array(UNEXPLORED, np.uint8), np.array(STRENGTH))[::-1]
+
+    def surely_free():
+        return int((np.abs(canvas_of(page) - bluest) <= 1).all(axis=2).sum())
+
+    first = surely_free()
+    scrub(page, 1.0)
+    last = surely_free()
+    assert first > last > 20
+    page.labelled("Prediction", "#replay").click()
+    assert surely_free() == 0
+    assert page.complaints() == []
+    page.open(report)
+    ready(page)
+    assert "Prediction" not in [each.text for each in page.find_all("#replay .layers label")]
 
 
 @pytest.mark.parametrize("theme", ["light", "dark"])

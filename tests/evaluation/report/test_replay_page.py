@@ -10,13 +10,21 @@ from hypothesis import strategies as st
 from page_reader import columns, maps_of, plain_numbers, signed_numbers, unpacked
 
 import lidarium
+from lidarium.envs.drawing.prediction_layer import PredictionLayer
 from lidarium.envs.settings.lidar import Lidar
 from lidarium.envs.settings.making import make_settings
 from lidarium.evaluation.episodes.runner import run_episode
 from lidarium.evaluation.episodes.watching import WatchedExploration
+from lidarium.evaluation.record import read_record, write_record
 from lidarium.evaluation.record.replay import drive_again, rerun
 from lidarium.evaluation.report.map_layers import changed_runs, coarse, packed, signed_varints, varints
-from lidarium.evaluation.report.replay_page import MOST_BEAMS, SCAN_UNIT_M, ReplaySampler, replay_of
+from lidarium.evaluation.report.replay_page import (
+    MOST_BEAMS,
+    PROBABILITIES,
+    SCAN_UNIT_M,
+    ReplaySampler,
+    replay_of,
+)
 from lidarium.evaluation.truth.beliefs import maps_on_floor
 from lidarium.evaluation.truth.true_map import occupied_in_truth
 
@@ -225,3 +233,41 @@ def test_events_are_plain_text_and_numbers(apart):
     changed = replace(record, display=replace(record.display, events=odd))
     (event,) = unpacked(replay_of(changed).text)[0]["events"]
     assert event == {"time_s": 1.0, "kind": "</script>", "agent": None, "what": "['a']", "x": "nan"}
+
+
+def test_a_replay_predicts_beyond_the_maps_if_robots_did_or_one_asks(recorded):
+    plain, _ = recorded(resolution=0.05, horizon_s=6.0)
+    predicting, _ = recorded("predicted_tours", resolution=0.05, horizon_s=6.0)
+    older = replace(predicting, header={**predicting.header, "version": "9.9.9"})
+    assert (plain.predicts, predicting.predicts) == (False, True)
+    assert unpacked(replay_of(plain).text)[0]["prediction"] is None
+    for record, is_asked in ((plain, True), (predicting, False), (older, False)):
+        header, streams = unpacked(replay_of(record, predicts=is_asked).text)
+        grid, about = header["grid"], header["prediction"]
+        assert about["cells"] * grid["cell"] == pytest.approx(0.2)
+        assert about["steps"] == PROBABILITIES
+        squares = maps_of(streams["prediction"], about["rows"], about["columns"])
+        maps = maps_of(streams["map_team"], grid["rows"], grid["columns"])
+        assert len(squares) == len(maps) == len(columns(streams["map_times"], 1))
+        cells = np.repeat(np.repeat(squares[-1], about["cells"], 0), about["cells"], 1)[
+            : grid["rows"], : grid["columns"]
+        ]
+        assert cells.max() == PROBABILITIES
+        assert np.isin(np.arange(1, PROBABILITIES), cells[maps[-1] == 0]).any()
+        # The page has what the network says of its last map, but for changes that are too small to be shown.
+        known = (maps[-1] == 2).astype(np.int8) - (maps[-1] == 1)
+        found = PredictionLayer().squares(known, grid["cell"])[0]
+        assert np.abs(PROBABILITIES * found - squares[-1]).max() <= 0.76
+
+
+def test_a_record_says_whether_robots_predicted(recorded, tmp_path):
+    record, _ = recorded("predicted_tours", resolution=0.05, horizon_s=1.0)
+    write_record(tmp_path / "episode.npz", record)
+    assert read_record(tmp_path / "episode.npz").predicts
+    older = replace(record, header={key: value for key, value in record.header.items() if key != "predicts"})
+    write_record(tmp_path / "older.npz", older)
+    assert not read_record(tmp_path / "older.npz").predicts
+    odd = replace(record, header={**record.header, "predicts": "yes"})
+    write_record(tmp_path / "odd.npz", odd)
+    with pytest.raises(ValueError, match="predicts 'yes'; want true or false"):
+        read_record(tmp_path / "odd.npz")

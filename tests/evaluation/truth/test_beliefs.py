@@ -6,9 +6,9 @@ from seen_truth import NEAR, begun
 
 from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.settings.making import make_settings
+from lidarium.envs.simulation.maps_on_floor import cells_beyond
 from lidarium.evaluation.truth.beliefs import (
     believed_on_floor,
-    cells_beyond,
     free_as_held,
     map_within,
     maps_on_floor,
@@ -42,7 +42,7 @@ def test_a_window_of_a_map_is_that_part_of_the_whole(known_starts):
 
 def test_a_map_that_knows_its_start_is_moved_by_whole_cells():
     env = begun()
-    row, column = cells_beyond(env, 0)
+    row, column = cells_beyond(env.simulation, 0, 0)
     marked = env.beliefs.log_odds[0]
     marked[row + 3, column + 7] = 99
     assert np.argwhere(maps_on_floor(env)[0] == 99).tolist() == [[3, 7]]

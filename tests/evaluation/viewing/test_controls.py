@@ -22,9 +22,9 @@ from lidarium.evaluation.viewing.controls import (
 AGENTS = ["robot_0", "robot_1"]
 
 
-def made(has_cameras=False, heights=(2.5, 1.2), **choices):
+def made(has_cameras=False, heights=(2.5, 1.2), predicts=False, **choices):
     server = RecordedServer(**choices)
-    return Controls(server, AGENTS, has_cameras, heights), server.gui.controls
+    return Controls(server, AGENTS, has_cameras, heights, predicts=predicts), server.gui.controls
 
 
 def test_a_run_waits_from_a_click_to_the_next():
@@ -52,10 +52,10 @@ def test_a_robot_is_followed_by_its_number():
 
 def test_layers_are_those_that_are_ticked_and_of_cameras_only_where_there_are_any():
     controls, boxes = made()
-    assert controls.layers == frozenset(Layer) - set(OF_CAMERAS)
+    assert controls.layers == frozenset(Layer) - {*OF_CAMERAS, Layer.PREDICTION}
     boxes[Layer.SCANS.value].value = False
     assert Layer.SCANS not in controls.layers
-    assert made(has_cameras=True)[0].layers == frozenset(Layer)
+    assert made(has_cameras=True, predicts=True)[0].layers == frozenset(Layer)
 
 
 def test_walls_are_cut_where_the_slider_stands_and_no_higher_than_they_are():

@@ -12,6 +12,8 @@ from recorded_scene import RecordedServer
 
 import lidarium
 from lidarium.agents.policy import settings_for
+from lidarium.envs.drawing.frame_parts import UNEXPLORED
+from lidarium.envs.drawing.prediction_layer import PREDICTED
 from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.floors.catalogue.names import load_floor
 from lidarium.envs.settings.making import make_settings
@@ -80,6 +82,7 @@ def seen(settings, policy_name="nearest_frontier", floor="apartment", watchers=(
     [
         (SETTINGS, "nearest_frontier", "apartment"),
         (SETTINGS, "tour_frontier", "apartment"),
+        (SETTINGS, "predicted_tours", "apartment"),
         (APART, "supervised", "apartment"),
         (SETTINGS, "random_walk", "apartment"),
         (WITH_CAMERA, "sparse_frontier", "open_apartment"),
@@ -355,3 +358,28 @@ def test_what_a_station_did_is_listed_last_things_first():
     times = [float(part.split(" s<")[0].rsplit(">", 1)[1]) for part in text.split("<tr>")[1:]]
     assert 1 <= len(times) <= 6
     assert times == sorted(times, reverse=True)
+
+
+def test_the_prediction_is_a_layer_that_is_shown_at_first_if_robots_predict():
+    for policy, is_shown in (("nearest_frontier", False), ("predicted_tours", True)):
+        run = seen(SETTINGS, policy)
+        box = run.server.gui.controls["Prediction"]
+        assert box.value == is_shown
+        first = run.nodes["/ground"].image
+        box.value = not is_shown
+        run.view._answer_controls()
+        pictures = (run.nodes["/ground"].image, first) if is_shown else (first, run.nodes["/ground"].image)
+        without, tinted = (picture.reshape(-1, 3) for picture in pictures)
+        differs = (without != tinted).any(axis=1)
+        assert differs.any()
+        assert (without[differs] == UNEXPLORED).all()
+        assert (tinted[differs, 0] < UNEXPLORED[0]).all()
+        assert tinted[:, 0].min() >= PREDICTED[0]
+
+
+def test_without_maps_nothing_is_predicted():
+    run = seen(SETTINGS, "predicted_tours")
+    for label in ("Joined map", "Own maps"):
+        run.server.gui.controls[label].value = False
+    run.view._answer_controls()
+    assert (run.nodes["/ground"].image == UNEXPLORED).all()

@@ -22,7 +22,7 @@ from lidarium.envs.simulation.people.crowd import Crowd
 from lidarium.evaluation.episodes.runner import run_episode
 from lidarium.evaluation.episodes.watching import WatchedExploration
 from lidarium.evaluation.truth.true_map import truth_of
-from lidarium.evaluation.viewing.controls import Layer
+from lidarium.evaluation.viewing.controls import OF_MAPS, Layer
 from lidarium.evaluation.viewing.moment import NO_BOXES, NO_CLOUD, NO_POINTS, RobotMoment, moment_of
 from lidarium.evaluation.viewing.scene import (
     FIELD_OF_VIEW,
@@ -378,4 +378,4 @@ def test_what_is_drawn_belongs_to_layers():
     assert of_layers[Layer.PLANS] is nodes["/plans/robot_0"]
     assert of_layers[Layer.BOXES] is nodes["/boxes/robot_0"]
     # Of those of a floor and its maps there is one for all robots.
-    assert set(Layer) - set(of_layers) == {Layer.FLOOR, Layer.JOINED, Layer.OWN, Layer.FRONTIERS}
+    assert set(Layer) - set(of_layers) == OF_MAPS | {Layer.FLOOR, Layer.FRONTIERS}

@@ -170,6 +170,18 @@ def test_a_page_is_written_with_the_episode_in_it(record, tmp_path, capsys):
     assert streams["scans"]
 
 
+def test_predictions_are_shown_if_they_are_asked_for(record, tmp_path):
+    headers, pictures = [], []
+    for name, more in (("plain", []), ("predicted", ["--prediction"])):
+        files = [str(tmp_path / f"{name}.{ending}") for ending in ("html", "png")]
+        assert main(["replay", str(record), "--html", files[0], "--picture", files[1], *more]) == 0
+        headers.append(replay_of_page(tmp_path / f"{name}.html")[0])
+        pictures.append((tmp_path / f"{name}.png").read_bytes())
+    assert headers[0]["prediction"] is None
+    assert headers[1]["prediction"]["steps"] > 1
+    assert pictures[0] != pictures[1]
+
+
 def test_a_page_of_a_record_whose_floor_is_gone_says_what_it_lacks(record, tmp_path, capsys):
     shutil.rmtree(tmp_path / "in")
     assert main(["replay", str(record), "--html", "episode.html"]) == 0

@@ -3,7 +3,7 @@ import { type Episode, FREE, OCCUPIED, UNKNOWN } from "./episode";
 import { colour, isDark, mixed, onGround, rgb } from "../theme";
 
 export type Layers = Record<
-  "truth" | "frontiers" | "scans" | "paths" | "targets" | "events" | "believed" | "crowd", boolean>;
+  "truth" | "frontiers" | "scans" | "paths" | "targets" | "events" | "believed" | "crowd" | "prediction", boolean>;
 export type Look = { time: number; map: string; layers: Layers; follow: number | null };
 
 /** Map of the page that shows who is joined with whom. */
@@ -14,7 +14,10 @@ const EVENT_S = 4;
 /** Part of the floor around a robot that is followed [m]. */
 const FOLLOWED_M = 9;
 
-type Palette = { unknown: string; free: string; wall: string; truth: string; frontier: string };
+/** Share of the colour of the prediction where unknown space is surely free. */
+const STRENGTH = 0.6;
+
+type Palette = { unknown: string; free: string; wall: string; truth: string; frontier: string; predicted: string };
 
 /** Draws one episode on a canvas. */
 export class Picture {
@@ -66,14 +69,16 @@ export class Picture {
     const { episode } = this;
     const sample = episode.sampleAt(look.time);
     const groups = look.map === JOINED ? episode.groupsAt(look.time) : [];
-    const { truth, frontiers } = look.layers;
-    const as = [sample, look.map, groups.join(), truth, frontiers, isDark()].join("|");
+    const { truth, frontiers, prediction } = look.layers;
+    const as = [sample, look.map, groups.join(), truth, frontiers, prediction, isDark()].join("|");
     if (as === this.drawnAs) return;
     this.drawnAs = as;
     const pixels = new Uint32Array(this.image.data.buffer);
     const levels = look.map === JOINED
       ? this.paintJoined(pixels, sample, groups, palette) : this.paintLevels(pixels, episode.map(look.map, sample), palette);
     const { columns } = episode.header.grid;
+    // The prediction is that of the map of all robots.
+    if (prediction && (look.map === JOINED || look.map === "team")) this.paintPrediction(pixels, levels, sample, palette);
     if (truth && episode.truth !== null) {
       const wall = packedColour(palette.truth);
       for (let k = 0; k < pixels.length; k++) {
@@ -88,6 +93,21 @@ export class Picture {
       }
     }
     this.cells.getContext("2d")?.putImageData(this.image, 0, 0);
+  }
+
+  /** Tints what is unknown: the more probably it is free, the more. */
+  private paintPrediction(pixels: Uint32Array, levels: Uint8Array, sample: number, palette: Palette): void {
+    const { grid, prediction } = this.episode.header;
+    const squares = this.episode.predictionAt(sample);
+    if (prediction === null || squares === null) return;
+    const tints = Uint32Array.from({ length: prediction.steps + 1 },
+      (_, step) => packedColour(mixed(palette.unknown, palette.predicted, (STRENGTH * step) / prediction.steps)));
+    for (let row = 0, k = 0; row < grid.rows; row++) {
+      const first = Math.floor(row / prediction.cells) * prediction.columns;
+      for (let column = 0; column < grid.columns; column++, k++) {
+        if (levels[k] === UNKNOWN) pixels[k] = tints[squares[first + Math.floor(column / prediction.cells)]!]!;
+      }
+    }
   }
 
   private paintLevels(pixels: Uint32Array, levels: Uint8Array, palette: Palette): Uint8Array {
@@ -267,7 +287,7 @@ function disc(context: CanvasRenderingContext2D, x: number, y: number, radius: n
 function paletteNow(): Palette {
   return {
     unknown: colour("map-unknown"), free: colour("map-free"), wall: colour("map-wall"),
-    truth: colour("map-truth"), frontier: colour("map-frontier"),
+    truth: colour("map-truth"), frontier: colour("map-frontier"), predicted: colour("map-predicted"),
   };
 }
 

@@ -16,6 +16,8 @@ export type Header = {
   interrupted: boolean; lacks: string; duration_s: number; radius_m: number; known_starts: boolean;
   colours: string[]; events: Happening[]; grid: Grid; layers: string[]; has_truth: boolean;
   beam_angles: number[]; scan_unit_m: number; has_beliefs: boolean; people_radius_m: number[];
+  /** Squares of so many cells of the grid along a side, and steps of a probability; null where nothing is predicted. */
+  prediction: { rows: number; columns: number; cells: number; steps: number } | null;
   /** Ends x, y, x, y of the openings; leaves slide away to the first. */
   doors: [number, number, number, number][];
 };
@@ -72,6 +74,7 @@ class Layer {
 export class Episode {
   private readonly layers = new Map<string, Layer>();
   readonly truth: Uint8Array | null;
+  private readonly prediction: Layer | null;
   readonly agents: string[];
 
   private constructor(
@@ -92,6 +95,8 @@ export class Episode {
     const cells = header.grid.rows * header.grid.columns;
     for (const name of header.layers) this.layers.set(name, new Layer(stream(streams, `map_${name}`), cells));
     this.truth = header.has_truth ? new Layer(stream(streams, "truth"), cells).at(0) : null;
+    this.prediction = header.prediction === null ? null
+      : new Layer(stream(streams, "prediction"), header.prediction.rows * header.prediction.columns);
     this.agents = header.colours.map((_, robot) => `robot_${robot}`);
   }
 
@@ -120,6 +125,11 @@ export class Episode {
     const layer = this.layers.get(name) ?? this.layers.get("team");
     if (layer === undefined) throw new Error("a replay of the page has no map; make the page again");
     return layer.at(sample);
+  }
+
+  /** Returns the squares of the prediction as of a sample of the maps, null without any; valid until the next call. */
+  predictionAt(sample: number): Uint8Array | null {
+    return this.prediction === null ? null : this.prediction.at(sample);
   }
 
   get hasOwnMaps(): boolean {

@@ -11,7 +11,7 @@ const STEP_S = 1;
 const LAYERS: readonly [keyof Layers, string][] = [
   ["truth", "True walls"], ["frontiers", "Frontiers"], ["scans", "Scans"], ["paths", "Paths"],
   ["targets", "Targets"], ["events", "Merges, orders"], ["believed", "Believed poses"],
-  ["crowd", "People, doors"],
+  ["crowd", "People, doors"], ["prediction", "Prediction"],
 ];
 
 export class Player {
@@ -140,6 +140,7 @@ export class Player {
       truth: episodes.some(({ header }) => header.has_truth),
       scans: episodes.some(({ header }) => header.beam_angles.length > 0),
       believed: episodes.some(({ header }) => header.has_beliefs),
+      prediction: episodes.some(({ header }) => header.prediction !== null),
       crowd: episodes.some(({ header }) => header.people_radius_m.length + header.doors.length > 0),
     };
     LAYERS.forEach(([name], k) => { this.ticks[k]!.hidden = has[name] === false; });
