@@ -241,7 +241,7 @@ class TourRequest:
 
 def memory_of(navigation: NavigationMap, settings: TourSettings) -> TourMemory:
     """Return the memory of a map on which no tours have been planned yet."""
-    return TourMemory(navigation.log_odds.shape, _factor_of(navigation.resolution), settings.most)
+    return TourMemory(navigation.log_odds.shape, _factor_of(navigation.resolution))
 
 
 def _factor_of(resolution: float) -> int:
@@ -314,7 +314,7 @@ def _table_of(request: TourRequest) -> NDArray[np.int64]:
     navigation, clusters = request.navigation, request.clusters
     return table_of(
         [
-            *request.memory.arrays(len(request.robots)),
+            *request.memory.arrays,
             navigation.log_odds,
             navigation.clearance.closeness,
             clusters.cells,

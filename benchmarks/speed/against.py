@@ -2,10 +2,12 @@
 
 Both are driven alternately; the comparison shows what a change of the kernels gained.
 
-    python benchmarks/speed/against.py OTHER_PYTHON [--threads 1] [--rounds 3] [--blocks 40]
+    python benchmarks/speed/against.py OTHER_PYTHON [--threads 1] [--rounds 3] [--blocks 40] [--tours]
 
 OTHER_PYTHON is the interpreter of a virtual environment in which the other checkout is installed. Each runs
 in a process of its own, and they take turns block by block, so that both meet the same noise of the machine.
+With ``--tours`` they plan tours instead: a block is an episode of ``tour_frontier`` on a validation floor; times are
+those of the processor.
 """
 
 import argparse
@@ -28,9 +30,38 @@ KINDS = (
     "frontier decisions",
     "frontier decisions of three",
 )
+TOUR_KINDS = ("plans of tours of two robots",)
 FLOOR = "building:3"
 STEPS = 20
 """Steps of a block."""
+
+
+def serve_tours() -> None:
+    """Explore a floor for each line of standard input, which ends with its number; print the mean time of a plan [us].
+
+    It is the processor's time of a plan of two robots.
+    """
+    options: dict[str, Any] = {"robots": 2, "resolution": 0.05, "stop_coverage": 0.99, "horizon_s": 1800.0}
+    floors = lidarium.floor_set("set:validation:8")
+    for line in sys.stdin:
+        seed, seconds = int(line.rpartition(" ")[2]), list[float]()
+        env = lidarium.parallel_env(floors[seed % len(floors)], **options)
+        lidarium.run_episode(_timed(lidarium.policy("tour_frontier"), seconds), env, seed=seed)
+        print(1e6 * float(np.mean(seconds)), flush=True)
+
+
+def _timed(policy: Any, seconds: list[float]) -> Any:  # noqa: ANN401
+    """Return a policy that notes the time of the processor of each of its plans."""
+    choose = policy.choose
+
+    def noted(*given: Any) -> Any:  # noqa: ANN401
+        began = time.process_time()
+        chosen = choose(*given)
+        seconds.append(time.process_time() - began)
+        return chosen
+
+    policy.choose = noted
+    return policy
 
 
 def serve(threads: int) -> None:
@@ -84,19 +115,22 @@ def serve(threads: int) -> None:
         print((time.perf_counter() - began) / steps / len(agents) * 1e6, flush=True)
 
 
-def times(pythons: list[str], threads: int, rounds: int, blocks: int) -> dict[str, np.ndarray]:
+def times(pythons: list[str], kinds: tuple[str, ...], threads: int, rounds: int, blocks: int) -> dict[str, np.ndarray]:
     """Return the times per agent step of each kind [us]. The shape is (pythons, rounds * blocks)."""
-    command = [str(Path(__file__).resolve()), "--serve", "--threads", str(threads)]
+    tours = kinds == TOUR_KINDS
+    command = [str(Path(__file__).resolve()), "--serve", "--threads", str(threads), *["--tours"] * tours]
     processes = [
         subprocess.Popen([python, *command], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
         for python in pythons
     ]
-    found: dict[str, np.ndarray] = {kind: np.zeros((len(pythons), rounds * blocks)) for kind in KINDS}
+    found: dict[str, np.ndarray] = {kind: np.zeros((len(pythons), rounds * blocks)) for kind in kinds}
     try:
+        for process in processes if tours else ():
+            _answer(process, f"{kinds[0]} from 0\n")  # kernels are compiled, floors are read
         for block in range(rounds * blocks):
             # Blocks of a round go on where the one before ended; a round begins with blank maps.
-            place = f" from {block // blocks}" if block % blocks == 0 else ""
-            for kind in KINDS:
+            place = f" from {block}" if tours else f" from {block // blocks}" if block % blocks == 0 else ""
+            for kind in kinds:
                 for k, process in enumerate(processes):
                     answer = _answer(process, f"{kind}{place}\n")
                     if not answer:
@@ -126,18 +160,27 @@ def main() -> None:
     parser.add_argument("--threads", type=int, default=1)
     parser.add_argument("--rounds", type=int, default=3, help="each begins with blank maps")
     parser.add_argument("--blocks", type=int, default=40, help=f"blocks of {STEPS} steps in a round")
+    parser.add_argument("--tours", action="store_true", help="plans of tours alone")
     parser.add_argument("--serve", action="store_true", help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.serve:
-        serve(options.threads)
+        if options.tours:
+            serve_tours()
+        else:
+            serve(options.threads)
         return
     if options.other is None or min(options.threads, options.rounds, options.blocks) < 1:
         parser.error("want the other checkout's interpreter, and threads, rounds and blocks of at least 1")
     for kind, (ours, other) in times(
-        [sys.executable, options.other], options.threads, options.rounds, options.blocks
+        [sys.executable, options.other],
+        TOUR_KINDS if options.tours else KINDS,
+        options.threads,
+        options.rounds,
+        options.blocks,
     ).items():
         low, middle, high = np.quantile(ours / other, [0.25, 0.5, 0.75])
-        rates = f"{np.median(ours):.2f} us an agent step, the other {np.median(other):.2f}"
+        unit = "us" if options.tours else "us an agent step"
+        rates = f"{np.median(ours):.2f} {unit}, the other {np.median(other):.2f}"
         print(f"{kind}: {rates}; {middle:.3f} of its time (quartiles {low:.3f} to {high:.3f})")
 
 

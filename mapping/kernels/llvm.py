@@ -86,6 +86,9 @@ def generic_llvm_overload(function: Callable[..., Any], typer: Callable[..., Any
 stack_slot: Any = _utils.alloca_once_value
 """Return a place on the stack that holds a value at first."""
 
+for_range: Any = _utils.for_range
+"""Return the context of text that runs a number of times; its ``index`` counts from 0."""
+
 
 def vector(element: Value, count: int) -> Value:
     """Return the type of vectors of a number of elements."""

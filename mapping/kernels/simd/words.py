@@ -15,12 +15,16 @@ from lidarium.mapping.kernels.llvm import (
     LONG,
     Builder,
     Value,
+    bits_of_lanes,
     call,
     constant,
     has_feature,
     llvm_overload,
+    load_at,
+    splat,
     vector,
 )
+from lidarium.mapping.kernels.views import vector_at
 
 CAN_MULTIPLY_WITHOUT_CARRY = has_feature("pclmul")
 """Whether the processor multiplies without carrying."""
@@ -44,6 +48,30 @@ def first_bit(word: np.uint64) -> int:
 @llvm_overload(first_bit, types.int64, types.uint64)
 def _(builder: Builder, word: Value) -> Value:
     return builder.cttz(word, ir.Constant(ir.IntType(1), 1))
+
+
+def free_cells(levels: int) -> np.uint64:
+    """Return which of the 64 int8 at an address are below 0, bit 0 the first."""
+    return bits_of(np.array(vector_at(levels, 64, np.int8)) < 0)
+
+
+@llvm_overload(free_cells, types.uint64, types.int64)
+def _(builder: Builder, levels: Value) -> Value:
+    kind = vector(ir.IntType(8), 64)
+    return bits_of_lanes(builder, builder.icmp_signed("<", load_at(builder, levels, kind), constant(kind, 0)))
+
+
+def near_cells(closeness: int, limit: int) -> np.uint64:
+    """Return which of the 64 uint16 at an address are at most a limit, bit 0 the first; none if it is negative."""
+    return bits_of(np.array(vector_at(closeness, 64, np.uint16)) <= limit)
+
+
+@llvm_overload(near_cells, types.uint64, types.int64, types.int64)
+def _(builder: Builder, closeness: Value, limit: Value) -> Value:
+    kind, zero = vector(ir.IntType(16), 64), ir.Constant(LONG, 0)
+    least = splat(builder, limit, kind)
+    bits = bits_of_lanes(builder, builder.icmp_unsigned("<=", load_at(builder, closeness, kind), least))
+    return builder.select(builder.icmp_signed("<", limit, zero), zero, bits)
 
 
 @kernel(forceinline=True)

@@ -12,9 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.mapping.kernels.compilation import Array, kernel
-
-RAYS = 32
-"""Number of rays by which a view is measured."""
+from lidarium.mapping.kernels.simd.sight import RAYS, unknown_in_view
 
 
 class ViewRules(NamedTuple):
@@ -58,6 +56,8 @@ class ViewFrame(NamedTuple):
         Directions: rows and columns along a cell.
     steps : (RAYS, K, 2) int64
         Rows and columns from a cell to those along each ray.
+    ahead : (K, 2, RAYS) int32
+        The same, step after step.
     """
 
     around: int
@@ -69,6 +69,7 @@ class ViewFrame(NamedTuple):
     kept_share: float
     rays: NDArray[np.float64]
     steps: NDArray[np.int64]
+    ahead: NDArray[np.int32]
 
 
 @lru_cache(maxsize=64)
@@ -76,6 +77,7 @@ def frame_of(rules: ViewRules, resolution: float, side: float) -> ViewFrame:
     """Return view rules in cells of the map and coarse cells, by their sides [m]."""
     reach, stride, rays = round(rules.reach / resolution), max(round(0.05 / resolution), 1), _rays()
     along = np.arange(stride, reach + 1, stride)
+    steps = np.floor(0.5 + along[None, :, None] * rays[:, None, :]).astype(np.int64)
     return ViewFrame(
         math.ceil(rules.around / side),
         max(round(rules.spacing / side), 1),
@@ -85,7 +87,8 @@ def frame_of(rules: ViewRules, resolution: float, side: float) -> ViewFrame:
         resolution * resolution,
         rules.kept_share,
         rays,
-        np.floor(0.5 + along[None, :, None] * rays[:, None, :]).astype(np.int64),
+        steps,
+        np.ascontiguousarray(steps.transpose(1, 2, 0), np.int32),
     )
 
 
@@ -110,12 +113,27 @@ def _rays() -> NDArray[np.float64]:
     return np.stack([np.sin(angles), np.cos(angles)], axis=1)
 
 
+@kernel
+def offsets_of(frame: ViewFrame, columns: int) -> NDArray[np.int32]:
+    """Return the offsets from a cell to those along each ray, (K, RAYS), on a map of this many columns (kernel)."""
+    offsets = np.empty((len(frame.ahead), RAYS), np.int32)
+    for step in range(len(offsets)):
+        for ray in range(RAYS):
+            offsets[step, ray] = frame.ahead[step, 0, ray] * columns + frame.ahead[step, 1, ray]
+    return offsets
+
+
 @kernel(nrt=False)
-def view_gain(log_odds: Array, row: int, column: int, frame: ViewFrame) -> float:
-    """Return the unknown area in view of a cell [m2] (kernel)."""
-    area = 0
-    for ray in range(len(frame.rays)):
-        area += _seen_along(log_odds, row, column, frame, ray)
+def view_gain(log_odds: Array, row: int, column: int, frame: ViewFrame, offsets: Array) -> float:
+    """Return the unknown area in view of a cell [m2]; ``offsets`` are those of ``offsets_of`` (kernel)."""
+    (rows, columns), margin, area = log_odds.shape, frame.reach + 1, 0
+    if margin <= row < rows - margin and margin <= column < columns - margin:
+        most, cell = max(-(-frame.depth // frame.stride), 1), log_odds.ctypes.data + row * columns + column
+        seen = unknown_in_view(cell, offsets.ctypes.data, len(offsets), most)
+        area = seen * frame.stride * frame.stride
+    else:
+        for ray in range(len(frame.rays)):
+            area += _seen_along(log_odds, row, column, frame, ray)
     return area * (2.0 * math.pi / len(frame.rays)) * frame.area
 
 

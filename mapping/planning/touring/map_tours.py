@@ -1,8 +1,8 @@
 """Tours past the frontiers of many maps, planned again and again as the maps grow, by one kernel on all threads.
 
-Of each map is kept what its last plan found: the gains of views, until the map changes within their reach, and the
-lengths of paths from views, brought up to date where cells have opened or closed. A plan from what is kept equals one
-from nothing to the bit.
+Of each map the gains of views are kept until the map changes within their reach. Lengths of paths are found anew, from
+all robots at once and then from all views: that takes less than to bring those of the last plan up to date. A plan from
+what is kept equals one from nothing to the bit.
 """
 
 import math
@@ -14,17 +14,11 @@ from numpy.typing import NDArray
 
 from lidarium.mapping.grids.grid_lines import line_is_open
 from lidarium.mapping.kernels.compilation import Array, kernel
+from lidarium.mapping.kernels.simd.lengths import FAR, FEW_LANES, LANES, STRAIGHT
 from lidarium.mapping.kernels.views import arrays_at
 from lidarium.mapping.kernels.work_queue import Work, share_of, take_next
-from lidarium.mapping.planning.frontiers.views import ViewFrame, view_gain
-from lidarium.mapping.planning.touring.coarse_distances import STRAIGHT, UNREACHED
-from lidarium.mapping.planning.touring.kept_lengths import (
-    BUCKETS,
-    CLOSED,
-    begin_field,
-    change_field,
-    extend_field,
-)
+from lidarium.mapping.planning.frontiers.views import ViewFrame, offsets_of, view_gain
+from lidarium.mapping.planning.touring.many_lengths import Cells, lengths_from_few, lengths_from_many, number_cells
 from lidarium.mapping.planning.touring.open_cells import Standing, open_cells
 from lidarium.mapping.planning.touring.tours import TourWeights, team_tours
 
@@ -49,26 +43,18 @@ class _Kept(NamedTuple):
 
     Attributes
     ----------
-    is_open, opening : (rows + 2, columns + 2) uint8
-        Open coarse cells of the last plan, and of this one.
+    is_open : (rows + 2, columns + 2) uint8
+        Scratch: open coarse cells; zeros between plans.
+    cell_numbers : (rows + 2, columns + 2) int32
+        Numbers of the open coarse cells of the last plan, see ``Cells``.
     levels : (map rows, map columns) int8
         Signs of the log-odds at the last plan.
     gains : (rows, columns) float64
         Gain of a view from each coarse cell [m2], nan if it is not known.
-    fields : (slots, size) int32
-        Lengths from views, see ``kept_lengths``.
-    slots : (slots, 2) int64
-        Start of each field, -1 for none, and its horizon.
-    from_robots : (robots, size) int32
-        Lengths from robots.
-    queues : (BUCKETS, size) int32
-        Scratch.
-    changes : (2, size) int64
-        Scratch: cells that have closed and opened.
     tried : (rows, columns) int64
         Scratch: the last frontier that was looked at from each coarse cell, counted over all plans.
     bounds : (5,) int64
-        Rows and columns of the grid with its border that have ever been open, the last exclusive, and the number of
+        First and last rows and columns of coarse cells of the last plan, the last exclusive, and the number of
         frontiers that were looked at.
     log_odds, closeness : (map rows, map columns) int8, uint16
         The map and its clearance.
@@ -77,14 +63,9 @@ class _Kept(NamedTuple):
     """
 
     is_open: Annotated[Array, np.uint8, 2]
-    opening: Annotated[Array, np.uint8, 2]
+    cell_numbers: Annotated[Array, np.int32, 2]
     levels: Annotated[Array, np.int8, 2]
     gains: Annotated[Array, np.float64, 2]
-    fields: Annotated[Array, np.int32, 2]
-    slots: Annotated[Array, np.int64, 2]
-    from_robots: Annotated[Array, np.int32, 2]
-    queues: Annotated[Array, np.int32, 2]
-    changes: Annotated[Array, np.int64, 2]
     tried: Annotated[Array, np.int64, 2]
     bounds: Annotated[Array, np.int64, 1]
     log_odds: Annotated[Array, np.int8, 2]
@@ -194,35 +175,24 @@ class TourMemory:
         Shape of the map.
     factor : int
         Side of a coarse cell [cells].
-    most : int
-        Maximum number of views on tours.
+
+    Attributes
+    ----------
+    arrays : list
+        What is kept, as the first of ``_Kept``.
     """
 
-    def __init__(self, shape: tuple[int, int], factor: int, most: int) -> None:
-        self._made_of = shape, factor, most
+    def __init__(self, shape: tuple[int, int], factor: int) -> None:
+        self._made_of = shape, factor
         rows, columns = -(-shape[0] // factor), -(-shape[1] // factor)
-        size = (rows + 2) * (columns + 2)
-        bordered = np.zeros((2, rows + 2, columns + 2), np.uint8)
-        # Memory of zeros is taken when it is first written to: most fields never are.
-        self._arrays: list[NDArray[Any]] = [
-            bordered[0],
-            bordered[1],
+        self.arrays: list[NDArray[Any]] = [
+            np.zeros((rows + 2, columns + 2), np.uint8),
+            np.zeros((rows + 2, columns + 2), np.int32),
             np.zeros(shape, np.int8),
             np.full((rows, columns), np.nan),
-            np.zeros((most, size), np.int32),
-            np.full((most, 2), -1, np.int64),
-            np.zeros((1, size), np.int32),
-            np.zeros((BUCKETS, size), np.int32),
-            np.zeros((2, size), np.int64),
             np.zeros((rows, columns), np.int64),
-            np.array([rows + 2, 0, columns + 2, 0, 0], np.int64),
+            np.zeros(5, np.int64),
         ]
-
-    def arrays(self, robots: int) -> list[NDArray[Any]]:
-        """Return the arrays that are kept, as the first of ``_Kept``."""
-        if len(self._arrays[6]) < robots:
-            self._arrays[6] = np.zeros((robots, self._arrays[6].shape[1]), np.int32)
-        return self._arrays
 
     def __reduce__(self) -> Any:  # noqa: ANN401
         return TourMemory, self._made_of
@@ -262,19 +232,21 @@ def _plan_one(kept: _Kept, robots: Robots, rules: PlanRules, sight: ViewFrame, p
         robots.windows[number],
         starts,
         Standing(rules.factor, rules.max_closeness, rules.near_start),
-        kept.opening,
+        kept.is_open,
     )
-    _renew_fields(kept, frame)
+    last = kept.bounds
+    kept.cell_numbers[last[0] + 1 : last[1] + 1, last[2] + 1 : last[3] + 1] = 0
+    last[:4] = frame
+    cells = number_cells(kept.is_open, frame, kept.cell_numbers)
     at = np.empty(count, np.int64)
     for k in range(count):
         row = min(max(starts[k, 0] // rules.factor, frame[0]), frame[1] - 1)
         column = min(max(starts[k, 1] // rules.factor, frame[2]), frame[3] - 1)
         starts[k, 0], starts[k, 1] = row, column
         at[k] = (row + 1) * columns + column + 1
-        begin_field(kept.from_robots[k], kept.is_open, kept.bounds, at[k])
-        extend_field(kept.from_robots[k], columns, kept.bounds, 1, np.full(1, -1), kept.queues)
-    views, gains = _view_all(kept, count, frame, rules.factor, sight)
-    chosen = _nearest(kept, count, views, gains, plans.numbers.shape[1], rules.least_gain)
+    from_robots = lengths_from_few(cells, at)
+    views, gains = _view_all(kept, cells, at, from_robots, frame, rules.factor, sight)
+    chosen = _nearest(cells, at, from_robots, views, gains, plans.numbers.shape[1], rules.least_gain)
     if len(chosen) == 0:
         return
     n = plans.counts[number] = len(chosen)
@@ -284,17 +256,28 @@ def _plan_one(kept: _Kept, robots: Robots, rules: PlanRules, sight: ViewFrame, p
         row, column = places[i] // columns - 1, places[i] % columns - 1
         plans.places[number, i, 0], plans.places[number, i, 1] = row - frame[0], column - frame[2]
         _roomiest(kept, row, column, rules.factor, plans.cells[number, i])
-    slots = _lengths_between(kept, places, at, rules.side, plans.between[number])
+    towards = np.empty((count, n), np.int64)
+    for begin in range(0, n, LANES):
+        group = places[begin : begin + LANES]
+        lanes = lengths_from_many(cells, group, from_robots[0], at[:FEW_LANES])
+        for i in range(len(group)):
+            plans.between[number, begin + i, begin + i] = 0.0
+            for j in range(begin + i + 1, n):
+                length = 0 if places[j] == group[i] else lanes[cells.numbers.reshape(-1)[places[j]], i]
+                metres = _metres(length, rules.side)
+                plans.between[number, begin + i, j] = plans.between[number, j, begin + i] = metres
+        for k in range(count):
+            _find_ahead(cells, lanes, group, starts[k], frame, rules, towards[k, begin : begin + len(group)])
     first = plans.first[number]
     for k in range(count):
         pose, goal = robots.poses[number, k], robots.kept_cells[number, k]
         for i in range(n):
-            length = _metres(kept.from_robots[k, places[i]], rules.side)
-            turn = _turn(kept.fields[slots[i]], columns, pose, starts[k], frame, rules)
+            metres = _metres(_from_robot(cells, from_robots, at, k, places[i]), rules.side)
+            turn = _turn(towards[k, i], columns, pose, rules)
             is_kept = goal[0] >= 0 and _is_near(kept, chosen[i], goal, SAME / rules.resolution)
-            plans.lengths[number, k, i], plans.turns[number, k, i] = length, turn
+            plans.lengths[number, k, i], plans.turns[number, k, i] = metres, turn
             plans.is_kept[number, k, i] = is_kept
-            first[k, i] = length + rules.turn_length * turn - robots.kept[number, k] * is_kept
+            first[k, i] = metres + rules.turn_length * turn - robots.kept[number, k] * is_kept
     plans.sequences[number, : n + count - 1] = team_tours(
         first[:count, :n].copy(),
         plans.between[number, :n, :n].copy(),
@@ -344,40 +327,8 @@ def _note_changes(kept: _Kept, row: int, column: int) -> bool:
 
 
 @kernel
-def _renew_fields(kept: _Kept, frame: Array) -> None:
-    """Take over the open cells of this plan, and bring the kept lengths up to date."""
-    bounds, is_open, opening = kept.bounds, kept.is_open, kept.opening
-    bounds[0], bounds[1] = min(bounds[0], frame[0] + 1), max(bounds[1], frame[1] + 1)
-    bounds[2], bounds[3] = min(bounds[2], frame[2] + 1), max(bounds[3], frame[3] + 1)
-    columns, closed_count, opened_count = is_open.shape[1], 0, 0
-    closed, opened = kept.changes[0], kept.changes[1]
-    for row in range(bounds[0], bounds[1]):
-        for column in range(bounds[2], bounds[3]):
-            if is_open[row, column] != opening[row, column]:
-                if opening[row, column]:
-                    opened[opened_count] = row * columns + column
-                    opened_count += 1
-                else:
-                    closed[closed_count] = row * columns + column
-                    closed_count += 1
-            is_open[row, column] = opening[row, column]
-            opening[row, column] = 0
-    for k in range(len(kept.slots)):
-        if kept.slots[k, 0] >= 0:
-            change_field(
-                kept.fields[k],
-                columns,
-                kept.slots[k, 1],
-                kept.slots[k, 0],
-                closed[:closed_count],
-                opened[:opened_count],
-                kept.queues,
-            )
-
-
-@kernel
 def _view_all(
-    kept: _Kept, robots: int, frame: Array, factor: int, sight: ViewFrame
+    kept: _Kept, cells: Cells, at: Array, from_robots: Array, frame: Array, factor: int, sight: ViewFrame
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """Return the view of each frontier as a cell of the grid with its border, -1 for none, and its gain [m2].
 
@@ -386,11 +337,12 @@ def _view_all(
     count, columns = len(kept.starts) - 1, kept.is_open.shape[1]
     views, gains = np.full(count, -1, np.int64), np.zeros(count)
     places, shown, lengths = np.empty(_MOST_PLACES, np.int64), np.empty(_MOST_PLACES), np.empty(_MOST_PLACES, np.int64)
+    offsets = offsets_of(sight, kept.log_odds.shape[1])
     for k in range(count):
-        number = _look(kept, robots, k, frame, factor, sight, (places, shown, lengths))
+        number = _look(kept, cells, at, from_robots, k, frame, factor, sight, offsets, (places, shown, lengths))
         if number == 0:
             continue
-        wanted, least = sight.kept_share * shown[:number].max(), np.int64(UNREACHED)
+        wanted, least = sight.kept_share * shown[:number].max(), np.int64(FAR)
         for i in range(number):
             if shown[i] >= wanted and lengths[i] < least:
                 row, column = places[i] // columns, places[i] % columns
@@ -401,11 +353,14 @@ def _view_all(
 @kernel(nrt=False)
 def _look(
     kept: _Kept,
-    robots: int,
+    open_cells: Cells,
+    starts: Array,
+    from_robots: Array,
     number: int,
     frame: Array,
     factor: int,
     sight: ViewFrame,
+    offsets: Array,
     found: tuple[Array, Array, Array],
 ) -> int:
     """Write the coarse cells that see a frontier, their gains [m2] and the paths there; return how many there are."""
@@ -420,19 +375,17 @@ def _look(
         row, column = cells[i, 0], cells[i, 1]
         middle_row = (row - frame[0] * factor) // factor
         middle_column = (column - frame[2] * factor) // factor
-        for at in range(max(middle_row - sight.around, 0), min(middle_row + sight.around + 1, rows)):
-            if at % sight.spacing != 0:
-                continue
-            for across in range(max(middle_column - sight.around, 0), min(middle_column + sight.around + 1, width)):
+        low = -(-max(middle_row - sight.around, 0) // sight.spacing) * sight.spacing
+        left = -(-max(middle_column - sight.around, 0) // sight.spacing) * sight.spacing
+        for at in range(low, min(middle_row + sight.around + 1, rows), sight.spacing):
+            for across in range(left, min(middle_column + sight.around + 1, width), sight.spacing):
                 at_row, at_column = frame[0] + at, frame[2] + across
-                if across % sight.spacing != 0 or kept.tried[at_row, at_column] == turn or count == len(places):
+                if kept.tried[at_row, at_column] == turn or count == len(places):
                     continue
-                length = UNREACHED
-                for k in range(robots):
-                    reached = kept.from_robots[k, (at_row + 1) * columns + at_column + 1]
-                    if reached != CLOSED:
-                        length = min(length, reached)
-                if length == UNREACHED:
+                length, cell = np.int64(FAR), (at_row + 1) * columns + at_column + 1
+                for k in range(len(starts)):
+                    length = min(length, _from_robot(open_cells, from_robots, starts, k, cell))
+                if length == FAR:
                     continue
                 place_row, place_column = at_row * factor + factor // 2, at_column * factor + factor // 2
                 if not line_is_open(kept.log_odds, place_row, place_column, row, column):
@@ -440,97 +393,76 @@ def _look(
                 kept.tried[at_row, at_column] = turn
                 gain = kept.gains[at_row, at_column]
                 if math.isnan(gain):
-                    gain = view_gain(kept.log_odds, place_row, place_column, sight)
+                    gain = view_gain(kept.log_odds, place_row, place_column, sight, offsets)
                     kept.gains[at_row, at_column] = gain
                 places[count], shown[count], lengths[count] = at_row * columns + at_column, gain, length
                 count += 1
     return count
 
 
+@kernel(nrt=False)
+def _from_robot(cells: Cells, from_robots: Array, starts: Array, robot: int, cell: int) -> int:
+    """Return the length of the path from a robot to a cell, ``FAR`` if there is none; it may stand in a closed one."""
+    if starts[robot] == cell:
+        return 0
+    return int(from_robots[robot // FEW_LANES, cells.numbers.reshape(-1)[cell], robot % FEW_LANES])
+
+
 @kernel
-def _nearest(kept: _Kept, robots: int, views: Array, gains: Array, most: int, least_gain: float) -> NDArray[np.int64]:
+def _nearest(
+    cells: Cells, starts: Array, from_robots: Array, views: Array, gains: Array, most: int, least_gain: float
+) -> NDArray[np.int64]:
     """Return the numbers of the frontiers to visit, the nearest to any robot first.
 
     Each robot in turn takes its nearest: a team that is spread out has something to visit everywhere.
     """
-    count = len(views)
-    lengths, turns = np.full((robots, count), UNREACHED, np.int64), np.full(count, UNREACHED, np.int64)
-    nearest = np.full(count, UNREACHED, np.int64)
+    robots, count = len(starts), len(views)
+    lengths, turns = np.full((robots, count), FAR, np.int64), np.full(count, 1 << 30, np.int64)
+    nearest = np.full(count, FAR, np.int64)
     for k in range(robots):
         for i in range(count):
-            if views[i] >= 0 and kept.from_robots[k, views[i]] != CLOSED and gains[i] >= least_gain:
-                lengths[k, i] = kept.from_robots[k, views[i]]
+            if views[i] >= 0 and gains[i] >= least_gain:
+                lengths[k, i] = _from_robot(cells, from_robots, starts, k, views[i])
                 nearest[i] = min(nearest[i], lengths[k, i])
         order = np.argsort(lengths[k], kind="mergesort")
         for rank in range(count):
-            if lengths[k, order[rank]] != UNREACHED:
+            if lengths[k, order[rank]] != FAR:
                 turns[order[rank]] = min(turns[order[rank]], rank * robots + k)
     order = np.argsort(turns, kind="mergesort")[:most]
-    chosen = np.sort(order[turns[order] < UNREACHED])
+    chosen = np.sort(order[turns[order] < 1 << 30])
     return chosen[np.argsort(nearest[chosen], kind="mergesort")]
-
-
-@kernel
-def _lengths_between(kept: _Kept, places: Array, starts: Array, side: float, between: Array) -> NDArray[np.int64]:
-    """Write the lengths of paths between places (n, n) [m]; return the number of the field of each place.
-
-    Fields reach all robots' starts and the places that follow: paths have the same length in both directions.
-    """
-    count, columns = len(places), kept.is_open.shape[1]
-    slots, is_used = np.full(count, -1, np.int64), np.zeros(len(kept.slots), np.bool_)
-    for i in range(count):
-        for slot in range(len(kept.slots)):
-            if kept.slots[slot, 0] == places[i] and not is_used[slot]:
-                slots[i], is_used[slot] = slot, True
-                break
-    targets = np.empty(len(starts) + count, np.int64)
-    targets[: len(starts)] = starts
-    free = 0
-    for i in range(count):
-        if slots[i] < 0:
-            while is_used[free]:
-                free += 1
-            slots[i], is_used[free] = free, True
-            kept.slots[free, 0], kept.slots[free, 1] = places[i], 1
-            begin_field(kept.fields[free], kept.is_open, kept.bounds, places[i])
-        field = kept.fields[slots[i]]
-        number = len(starts)
-        for j in range(i + 1, count):
-            targets[number] = places[j]
-            number += 1
-        kept.slots[slots[i], 1] = extend_field(
-            field, columns, kept.bounds, kept.slots[slots[i], 1], targets[:number], kept.queues
-        )
-        between[i, i] = 0.0
-        for j in range(i + 1, count):
-            between[i, j] = between[j, i] = _metres(field[places[j]], side)
-    for slot in range(len(kept.slots)):
-        if not is_used[slot]:
-            kept.slots[slot, 0] = -1
-    return slots
 
 
 @kernel(nrt=False)
 def _metres(length: int, side: float) -> float:
-    """Return a length of a field in metres."""
-    metres: float = NO_PATH if length in (CLOSED, UNREACHED) else (length - 1) * (side / STRAIGHT)
+    """Return a length in metres."""
+    metres: float = NO_PATH if length == FAR else length * (side / STRAIGHT)
     return metres
 
 
-@kernel(nrt=False)
-def _turn(field: Array, columns: int, pose: Array, start: Array, frame: Array, rules: PlanRules) -> float:
-    """Return by how much a robot turns to set out to the start of a field [rad]."""
-    reach = max(round(AHEAD / rules.side), 1)
+@kernel
+def _find_ahead(
+    cells: Cells, lanes: Array, places: Array, start: Array, frame: Array, rules: PlanRules, towards: Array
+) -> None:
+    """Write the cell near a robot from which the path to each place is shortest, the first of equal ones."""
+    reach, columns = max(round(AHEAD / rules.side), 1), cells.numbers.shape[1]
     low_row, low_column = max(start[0] - reach, frame[0]), max(start[1] - reach, frame[2])
-    least, at_row, at_column = np.int64(UNREACHED), low_row, low_column
+    least = np.full(len(places), FAR, np.int64)
+    towards[:] = (low_row + 1) * columns + low_column + 1
     for row in range(low_row, min(start[0] + reach + 1, frame[1])):
         for column in range(low_column, min(start[1] + reach + 1, frame[3])):
-            length = field[(row + 1) * columns + column + 1]
-            if length != CLOSED and length < least:
-                least, at_row, at_column = np.int64(length), row, column
-    factor = rules.factor
-    x = (at_column + 0.5) * factor * rules.resolution - pose[0]
-    y = (at_row + 0.5) * factor * rules.resolution - pose[1]
+            cell, number = (row + 1) * columns + column + 1, cells.numbers[row + 1, column + 1]
+            for i in range(len(places)):
+                length = 0 if cell == places[i] else np.int64(lanes[number, i])
+                if length < least[i]:
+                    least[i], towards[i] = length, cell
+
+
+@kernel(nrt=False)
+def _turn(towards: int, columns: int, pose: Array, rules: PlanRules) -> float:
+    """Return by how much a robot turns to set out to a cell [rad]."""
+    x = (towards % columns - 0.5) * rules.factor * rules.resolution - pose[0]
+    y = (towards // columns - 0.5) * rules.factor * rules.resolution - pose[1]
     if math.hypot(x, y) <= rules.side:
         return 0.0
     turn: float = abs((math.atan2(y, x) - pose[2] + math.pi) % (2.0 * math.pi) - math.pi)

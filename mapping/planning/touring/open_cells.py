@@ -11,6 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.mapping.kernels.compilation import Array, kernel
+from lidarium.mapping.kernels.simd.words import first_bit, free_cells, last_bit, near_cells
+
+WORD = 64
+"""Cells of a word."""
 
 
 class Standing(NamedTuple):
@@ -83,57 +87,63 @@ def _runs_of(
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], tuple[int, int, int, int]]:
     """Return the first and last columns of the runs of cells that fit, where each row begins, and the free window."""
     rows = max(window[1] - window[0], 0)
+    rows, width, columns = max(window[1] - window[0], 0), max(window[3] - window[2], 0), log_odds.shape[1]
     runs, count = np.empty((1024, 2), np.int64), 0
-    starts_of_rows = np.zeros(rows + 1, np.int64)
-    row_low, row_high, column_low, column_high = log_odds.shape[0], 0, log_odds.shape[1], 0
-    width = max(window[3] - window[2], 0)
-    fits, edges = np.zeros(width + 1, np.uint8), np.zeros(width + 1, np.uint8)
-    limit, has_room = np.uint16(max(standing.max_closeness, 0)), np.uint8(standing.max_closeness >= 0)
+    starts_of_rows, words = np.zeros(rows + 1, np.int64), (width + WORD - 1) // WORD
+    row_low, row_high, free_columns = log_odds.shape[0], 0, np.zeros(words, np.uint64)
     for row in range(window[0], window[1]):
-        level, near = log_odds[row, window[2] : window[3]], closeness[row, window[2] : window[3]]
-        free = np.uint8(0)
-        for i in range(width):
-            is_free = np.uint8(level[i] < 0)
-            free |= is_free
-            fits[i] = is_free & has_room & np.uint8(near[i] <= limit)
-        if free:
+        first, carry, has_free = np.int64(-1), np.uint64(0), False
+        for word in range(words):
+            at, number = row * columns + window[2] + WORD * word, min(width - WORD * word, WORD)
+            levels, near = log_odds.ctypes.data + at, closeness.ctypes.data + 2 * at
+            if number == WORD:
+                free, fits = free_cells(levels), near_cells(near, standing.max_closeness)
+            else:
+                free, fits = np.uint64(0), np.uint64(0)
+                for k in range(number):
+                    column, bit = window[2] + WORD * word + k, np.uint64(1) << np.uint64(k)
+                    if log_odds[row, column] < 0:
+                        free |= bit
+                    if closeness[row, column] <= standing.max_closeness:
+                        fits |= bit
+            fits &= free
+            free_columns[word] |= free
+            has_free |= free != 0
+            edges = fits ^ (fits << np.uint64(1) | carry)
+            carry = fits >> np.uint64(WORD - 1)
+            while edges != 0:
+                column = window[2] + WORD * word + first_bit(edges)
+                edges &= edges - np.uint64(1)
+                if first < 0:
+                    first = column
+                    continue
+                runs = _with_room(runs, count)
+                runs[count, 0], runs[count, 1] = first, column - 1
+                count, first = count + 1, np.int64(-1)
+        if first >= 0:
+            runs = _with_room(runs, count)
+            runs[count, 0], runs[count, 1] = first, window[3] - 1
+            count += 1
+        if has_free:
             row_low, row_high = min(row_low, row), row + 1
-            for i in range(min(column_low - window[2], width)):
-                if level[i] < 0:
-                    column_low = window[2] + i
-                    break
-            for i in range(width - 1, max(column_high - window[2], 0) - 1, -1):
-                if level[i] < 0:
-                    column_high = window[2] + i + 1
-                    break
-            edges[0] = fits[0]
-            for i in range(width):
-                edges[i + 1] = fits[i] ^ fits[i + 1]
-            i, first = 0, -1
-            while i <= width:
-                # Most blocks have no edge.
-                if i + 16 <= width:
-                    some = np.uint8(0)
-                    for k in range(16):
-                        some |= edges[i + k]
-                    if not some:
-                        i += 16
-                        continue
-                for k in range(i, min(i + 16, width + 1)):
-                    if not edges[k]:
-                        continue
-                    if first < 0:
-                        first = k
-                        continue
-                    if count == len(runs):
-                        longer = np.empty((2 * count, 2), np.int64)
-                        longer[:count] = runs
-                        runs = longer
-                    runs[count, 0], runs[count, 1] = window[2] + first, window[2] + k - 1
-                    count, first = count + 1, -1
-                i += 16
         starts_of_rows[row - window[0] + 1] = count
+    column_low, column_high = columns, 0
+    for word in range(words):
+        if free_columns[word] != 0:
+            begin = window[2] + WORD * word
+            column_low = min(column_low, begin + first_bit(free_columns[word]))
+            column_high = begin + last_bit(free_columns[word]) + 1
     return runs[:count], starts_of_rows, (row_low, row_high, column_low, column_high)
+
+
+@kernel
+def _with_room(runs: Array, count: int) -> NDArray[np.int64]:
+    """Return the runs with room for one more."""
+    if count < len(runs):
+        return runs
+    longer = np.empty((2 * count, 2), np.int64)
+    longer[:count] = runs
+    return longer
 
 
 @kernel(nrt=False)

@@ -196,6 +196,63 @@ def _visit_all(state: _State, sequence: Array, first: int, last: int, costs: _Co
     return state
 
 
+_REST, _WORTH, _WAITING, _LATER_LONGEST, _LATER_TOTAL, _LATER_WAITING = range(6)
+"""Columns of what follows each number of a sequence: the length of the rest of its tour, from its place on; the worth
+of the places of that rest, and their worth times the path to each; the longest of the later tours, their sum and
+their waiting."""
+
+_DOUBT = 1e-7
+"""Estimates sum up in another order than costs: they are off by less than this share."""
+
+
+@kernel(nrt=False)
+def _look_ahead(sequence: Array, size: int, costs: _Costs, after: Array) -> None:
+    """Write what follows each of the first ``size`` numbers of a sequence of all robots' tours."""
+    robots, count = costs.first.shape
+    robot = robots - 1
+    for column in range(after.shape[1]):
+        after[size, column] = 0.0
+    for k in range(size - 1, -1, -1):
+        here, behind, place = after[k], after[k + 1], sequence[k]
+        goes_on = k + 1 < size and sequence[k + 1] < count
+        for column in range(_REST, _LATER_LONGEST):
+            here[column] = 0.0
+        for column in range(_LATER_LONGEST, _LATER_WAITING + 1):
+            here[column] = behind[column]
+        if place < count:
+            here[_WORTH] = costs.worth[place]
+            if goes_on:
+                leg = costs.between[place, sequence[k + 1]]
+                here[_REST] = leg + behind[_REST]
+                here[_WORTH] += behind[_WORTH]
+                here[_WAITING] = behind[_WAITING] + leg * behind[_WORTH]
+            continue
+        if goes_on:
+            leg = costs.first[robot, sequence[k + 1]]
+            here[_LATER_LONGEST] = max(here[_LATER_LONGEST], leg + behind[_REST])
+            here[_LATER_TOTAL] += leg + behind[_REST]
+            here[_LATER_WAITING] += behind[_WAITING] + leg * behind[_WORTH]
+        robot -= 1
+
+
+@kernel(forceinline=True, nrt=False)
+def _is_hopeless(
+    state: _State, sequence: Array, first: int, size: int, costs: _Costs, after: Array, limit: float
+) -> bool:
+    """Whether tours that begin thus and go on with a sequence surely cost a limit or more, by an estimate."""
+    here, length, waiting = after[first], state.length, state.waiting
+    if first < size and sequence[first] < costs.first.shape[1]:
+        place = sequence[first]
+        length += costs.first[state.robot, place] if state.last < 0 else costs.between[state.last, place]
+        waiting += here[_WAITING] + length * here[_WORTH]
+        length += here[_REST]
+    longest, weights = max(state.longest, length, here[_LATER_LONGEST]), costs.weights
+    total = state.total + length + here[_LATER_TOTAL]
+    waiting += here[_LATER_WAITING]
+    cost = weights.longest * longest + weights.total * total + weights.waiting * waiting
+    return bool(cost >= limit + _DOUBT * (1.0 + abs(cost)))
+
+
 @kernel
 def team_tours(
     first: NDArray[np.float64],
@@ -227,12 +284,13 @@ def team_tours(
     for robot in range(robots - 1):
         sequence[robot] = count + robot
     costs = _Costs(first, between, worth, weights, count == 0 or first.min() >= 0.0)
-    _insert_all(sequence, np.ones(count, np.bool_), costs)
+    after = np.empty((len(sequence) + 1, 6))
+    _insert_all(sequence, np.ones(count, np.bool_), costs, after)
     rest, piece = np.empty_like(sequence), np.empty(_LONGEST_PIECE, np.int64)
     cost = _cost(sequence, len(sequence), first, between, worth, weights)
     while True:
-        better = _turn_pieces(sequence, costs, cost)
-        better = _move_pieces(sequence, rest, piece, costs, better)
+        better = _turn_pieces(sequence, costs, cost, after)
+        better = _move_pieces(sequence, rest, piece, costs, better, after)
         if better >= cost - _LESS:
             return sequence
         cost = better
@@ -310,22 +368,23 @@ def _cost(sequence: Array, size: int, first: Array, between: Array, worth: Array
 
 
 @kernel(nrt=False)
-def _insert_all(sequence: Array, is_left: Array, costs: _Costs) -> None:
+def _insert_all(sequence: Array, is_left: Array, costs: _Costs, after: Array) -> None:
     """Insert all places into empty tours, each time the one with the lowest cost."""
     robots, count = costs.first.shape
     size = robots - 1
     for _ in range(count):
         minimum, chosen, at = np.inf, -1, 0
+        _look_ahead(sequence, size, costs, after)
         for place in range(count):
             if not is_left[place]:
                 continue
             before = _begin()
             for position in range(size + 1):
-                limit = minimum - _LESS
-                state = _visit_all(_visit(before, place, costs), sequence, position, size, costs, limit)
-                cost = _total(state, costs.weights)
-                if cost < limit:
-                    minimum, chosen, at = cost, place, position
+                limit, state = minimum - _LESS, _visit(before, place, costs)
+                if not _is_hopeless(state, sequence, position, size, costs, after, limit):
+                    cost = _total(_visit_all(state, sequence, position, size, costs, limit), costs.weights)
+                    if cost < limit:
+                        minimum, chosen, at = cost, place, position
                 if position < size:
                     before = _visit(before, sequence[position], costs)
         for k in range(size, at, -1):
@@ -335,10 +394,11 @@ def _insert_all(sequence: Array, is_left: Array, costs: _Costs) -> None:
 
 
 @kernel(nrt=False)
-def _turn_pieces(sequence: Array, costs: _Costs, cost: float) -> float:
+def _turn_pieces(sequence: Array, costs: _Costs, cost: float, after: Array) -> float:
     """Reverse every piece that makes the tours better; return their cost."""
     size = sequence.shape[0]
     before = _begin()
+    _look_ahead(sequence, size, costs, after)
     for start in range(size):
         for end in range(start + 2, size + 1):
             state, limit = before, cost - _LESS
@@ -346,20 +406,21 @@ def _turn_pieces(sequence: Array, costs: _Costs, cost: float) -> float:
                 state = _visit(state, sequence[k], costs)
                 if _is_over(state, costs, limit):
                     break
-            if not _is_over(state, costs, limit):
-                state = _visit_all(state, sequence, end, size, costs, limit)
-            better = _total(state, costs.weights)
+            if _is_over(state, costs, limit) or _is_hopeless(state, sequence, end, size, costs, after, limit):
+                continue
+            better = _total(_visit_all(state, sequence, end, size, costs, limit), costs.weights)
             if better < limit:
                 for k in range((end - start) // 2):
                     other = end - 1 - k
                     sequence[start + k], sequence[other] = sequence[other], sequence[start + k]
                 cost = better
+                _look_ahead(sequence, size, costs, after)
         before = _visit(before, sequence[start], costs)
     return cost
 
 
 @kernel(nrt=False)
-def _move_pieces(sequence: Array, rest: Array, piece: Array, costs: _Costs, cost: float) -> float:
+def _move_pieces(sequence: Array, rest: Array, piece: Array, costs: _Costs, cost: float, after: Array) -> float:
     """Move short pieces to positions that make the tours better; return their cost."""
     size = sequence.shape[0]
     for length in range(1, min(_LONGEST_PIECE, size - 1) + 1):
@@ -368,19 +429,20 @@ def _move_pieces(sequence: Array, rest: Array, piece: Array, costs: _Costs, cost
             _copy(sequence, start, length, piece, 0)
             _copy(sequence, 0, start, rest, 0)
             _copy(sequence, start + length, left - start, rest, start)
+            _look_ahead(rest, left, costs, after)
             before = _begin()
             for position in range(left + 1):
                 limit = cost - _LESS
                 state = _visit_all(before, piece, 0, length, costs, limit)
-                if not _is_over(state, costs, limit):
-                    state = _visit_all(state, rest, position, left, costs, limit)
-                better = _total(state, costs.weights)
-                if better < limit:
-                    _copy(rest, 0, position, sequence, 0)
-                    _copy(piece, 0, length, sequence, position)
-                    _copy(rest, position, left - position, sequence, position + length)
-                    cost = better
-                    break
+                is_over = _is_over(state, costs, limit)
+                if not is_over and not _is_hopeless(state, rest, position, left, costs, after, limit):
+                    better = _total(_visit_all(state, rest, position, left, costs, limit), costs.weights)
+                    if better < limit:
+                        _copy(rest, 0, position, sequence, 0)
+                        _copy(piece, 0, length, sequence, position)
+                        _copy(rest, position, left - position, sequence, position + length)
+                        cost = better
+                        break
                 if position < left:
                     before = _visit(before, rest[position], costs)
     return cost

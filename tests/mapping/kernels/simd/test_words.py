@@ -9,7 +9,15 @@ from numba import types
 
 from lidarium.mapping.kernels.llvm import llvm_overload
 from lidarium.mapping.kernels.simd import words
-from lidarium.mapping.kernels.simd.words import bits_of, cells_of, first_bit, last_bit, running_xor
+from lidarium.mapping.kernels.simd.words import (
+    bits_of,
+    cells_of,
+    first_bit,
+    free_cells,
+    last_bit,
+    near_cells,
+    running_xor,
+)
 
 
 def test_words_have_a_bit_for_each_cell_the_first_lowest():
@@ -24,6 +32,15 @@ def test_words_have_a_bit_for_each_cell_the_first_lowest():
 def test_the_first_and_the_last_bit_are_found(word):
     assert assert_forms_agree(first_bit, np.uint64(word))[0] == (word & -word).bit_length() - 1
     assert last_bit(np.uint64(word)) == word.bit_length() - 1
+
+
+def test_free_and_near_cells_have_a_bit_each():
+    generator = np.random.default_rng(0)
+    levels = generator.integers(-20, 21, 64).astype(np.int8)
+    closeness = generator.integers(0, 2**16, 64).astype(np.uint16)
+    assert assert_forms_agree(free_cells, levels)[0] == bits_of(levels < 0)
+    for limit in (-1, 0, int(closeness[3]), 2**16 - 1):
+        assert assert_forms_agree(near_cells, closeness, limit)[0] == bits_of(closeness <= limit)
 
 
 @given(st.integers(0, 2**64 - 1))

@@ -5,15 +5,12 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from lidarium.mapping.planning.clearance import ClearanceField, limit_of
 from lidarium.mapping.planning.footprint import Footprint
 from lidarium.mapping.planning.grid_planning import search
 from lidarium.mapping.planning.search.path_search import SearchSpace
 from lidarium.mapping.planning.touring.coarse_distances import UNREACHED, CoarseGrid, distances_from
-from lidarium.mapping.planning.touring.kept_lengths import begin_field, change_field, extend_field
 from lidarium.mapping.planning.touring.open_cells import Standing, open_cells
 
 
@@ -110,37 +107,6 @@ def test_a_map_without_anything_known_has_one_closed_cell():
     grid = coarse_grid(log_odds, ClearanceField(log_odds.shape, 0.05, 0.6), 0.18)
     assert not grid.is_open.any()
     assert math.isclose(grid.side, 0.1)
-
-
-@settings(deadline=None)
-@given(st.integers(0, 10**6))
-def test_kept_lengths_equal_those_from_nothing_however_the_grid_changes(seed):
-    """Cells open and close, the start among them; lengths are exact up to the horizon, unknown beyond it."""
-    generator = np.random.default_rng(seed)
-    rows, columns = (int(side) for side in generator.integers(4, 30, 2))
-    is_open = np.zeros((rows + 2, columns + 2), np.uint8)
-    is_open[1:-1, 1:-1] = generator.random((rows, columns)) < 0.7
-    start = tuple(int(generator.integers(1, side + 1)) for side in (rows, columns))
-    field, queues = np.zeros(is_open.size, np.int32), np.zeros((8, is_open.size), np.int32)
-    bounds, horizon = np.array([1, rows + 1, 1, columns + 1]), 1
-    at = start[0] * (columns + 2) + start[1]
-    begin_field(field, is_open, bounds, at)
-    for _ in range(6):
-        targets = generator.choice(np.flatnonzero(is_open.ravel()), 3)
-        horizon = extend_field(field, columns + 2, bounds, horizon, targets, queues)
-        wanted = lengths_by_heap(is_open, start).ravel()
-        reached = (wanted + 1 <= horizon) & ((is_open.ravel() > 0) | (wanted == 0))
-        np.testing.assert_array_equal(field[reached], wanted[reached] + 1)
-        assert (field[~reached & (is_open.ravel() > 0)] == UNREACHED).all()
-        assert (field[~reached & (is_open.ravel() == 0)] == 0).all()
-        assert reached[targets].all() or (field[targets] == UNREACHED).any()
-        changed = np.flatnonzero(generator.random(is_open.size) < generator.choice([0.01, 0.1]))
-        changed = changed[np.isin(changed, np.flatnonzero(np.pad(np.ones((rows, columns)), 1)))]
-        opened, closed = changed[is_open.ravel()[changed] == 0], changed[is_open.ravel()[changed] == 1]
-        is_open.ravel()[changed] ^= 1
-        if not is_open.any():
-            break
-        change_field(field, columns + 2, horizon, at, closed, opened, queues)
 
 
 def test_what_the_fine_cells_do_not_join_is_left_out():
