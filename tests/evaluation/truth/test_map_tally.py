@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from seen_truth import NEAR, begun, scribbled
 
+from lidarium.envs.simulation import maps_on_floor as placed
 from lidarium.envs.simulation.coverage import pack_bits
 from lidarium.envs.simulation.kernels.arrays import world_at
 from lidarium.evaluation.metrics import cells
@@ -172,4 +173,4 @@ def test_of_what_maps_dispute_the_sum_decides():
 @pytest.mark.parametrize("row", [0, 1])
 def test_maps_begin_as_many_cells_before_the_masks_as_their_corners_say(row):
     env = begun()
-    assert cells_beyond(world_at(env.simulation.table), row, 0) == beliefs.cells_beyond(env, row)
+    assert cells_beyond(world_at(env.simulation.table), row, 0) == placed.cells_beyond(env.simulation, row, 0)
