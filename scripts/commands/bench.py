@@ -86,7 +86,7 @@ def _guard(command: _Bench, other: Path) -> Answer:
     import numpy as np
 
     from lidarium.benchmarks.results_page import about
-    from lidarium.benchmarks.speed.against import times
+    from lidarium.benchmarks.speed.against import KINDS, times
     from lidarium.mapping.files.output import check_writable, write_json
 
     if command.only:
@@ -99,7 +99,7 @@ def _guard(command: _Bench, other: Path) -> Answer:
         check_writable(command.out)
     notify(f"stepping beside {other}")
     try:
-        found = times([sys.executable, str(other)], 1, *BLOCKS[command.effort])
+        found = times([sys.executable, str(other)], KINDS, 1, *BLOCKS[command.effort])
     except (RuntimeError, OSError) as error:
         raise ValueError(f"--guard cannot be used: {error}") from error
     lines, rows = [], []

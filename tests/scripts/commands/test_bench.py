@@ -122,7 +122,7 @@ def in_turn(monkeypatch):
     """A comparison in which frontier decisions take a tenth more time than in the other version."""
     found = {"waypoint decisions": np.array([[9.0, 9.0], [10.0, 10.0]]), "frontier decisions": np.ones((2, 2))}
     found["frontier decisions"][0] = 1.1
-    monkeypatch.setattr(against, "times", lambda pythons, threads, rounds, blocks: found)
+    monkeypatch.setattr(against, "times", lambda pythons, kinds, threads, rounds, blocks: found)
 
 
 def test_a_guard_names_what_is_slower_than_another_version(in_turn, tmp_path, capsys):
@@ -136,7 +136,7 @@ def test_a_guard_names_what_is_slower_than_another_version(in_turn, tmp_path, ca
 
 
 def test_a_guard_that_cannot_run_is_refused(monkeypatch, tmp_path, capsys):
-    def ended(pythons, threads, rounds, blocks):
+    def ended(pythons, kinds, threads, rounds, blocks):
         raise RuntimeError(f"{pythons[1]} has ended")
 
     monkeypatch.setattr(against, "times", ended)
