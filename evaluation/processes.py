@@ -317,10 +317,18 @@ def _in_pool(
         pool = ProcessPoolExecutor(workers, mp_context=context, initializer=_begin_worker)
         inner: Any = pool
         is_whole, watch = False, _Watch()
+
+        def hand_over(maximum: int) -> None:
+            for task in islice(tasks, maximum):
+                try:
+                    with interrupts_held():
+                        running[pool.submit(_done, work, task)] = task
+                except BrokenProcessPool:
+                    lost.append(task)
+                    return
+
         try:
-            for task in islice(tasks, WAITING_PER_WORKER * workers):
-                with interrupts_held():
-                    running[pool.submit(_done, work, task)] = task
+            hand_over(WAITING_PER_WORKER * workers)
             while running:
                 ready = wait(running, POLL_S, FIRST_COMPLETED).done
                 if interrupt.is_asked:
@@ -330,6 +338,8 @@ def _in_pool(
                     task = running.pop(future)
                     error = future.exception()
                     if isinstance(error, BrokenProcessPool):
+                        # The pool is broken as soon as a process closes its end, before its exit status is there.
+                        inner._executor_manager_thread.join(END_GRACE_S)
                         if UNGUARDED in (process.exitcode for process in inner._processes.values()):
                             raise RuntimeError(
                                 "workers load the program that starts them, and would start workers of their own; "
@@ -340,14 +350,8 @@ def _in_pool(
                     if error is not None and not isinstance(error, Exception):
                         raise error
                     yield task, future.result() if error is None else error
-                    if lost:
-                        continue
-                    for following in islice(tasks, 1):
-                        try:
-                            with interrupts_held():
-                                running[pool.submit(_done, work, following)] = following
-                        except BrokenProcessPool:
-                            lost.append(following)
+                    if not lost:
+                        hand_over(1)
             is_whole = True
         finally:
             end_pool(pool, are_ending=is_whole)
