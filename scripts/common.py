@@ -156,6 +156,17 @@ def notify(message: str) -> None:
         print(message, file=sys.stderr, flush=True)
 
 
+KERNELS_OF_RUN = Path(__file__).parent / "data" / "kernels_of_run.json"
+"""The kernels of ``lidarium run`` that take long; ``scripts/dev/list_kernels.py run`` writes it."""
+
+
+def compile_first() -> None:
+    """Compile the kernels of a run in several processes, if most are not compiled yet."""
+    from lidarium.mapping.kernels.first_start import compile_listed
+
+    compile_listed(KERNELS_OF_RUN, "the first start")
+
+
 def announce_compiling() -> None:
     """Tell, at the first start, why nothing happens for a while."""
     from lidarium.mapping.kernels.compilation import is_cache_empty

@@ -120,7 +120,7 @@ def _run_episode(run: Run, episode: int, drives: Drives, following: Following, r
             break
 
 
-@kernel(apart=True)
+@kernel
 def run_serial(run: Run, drives: Drives, following: Following, rules: Rules, observed: Arrays, work: Work) -> None:
     """Run the episodes by their modes, in the order of the work's items.
 

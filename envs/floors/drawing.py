@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.mapping.kernels.compilation import kernel
+from lidarium.mapping.kernels.ordering import stable_order
 
 Rings = list[NDArray[np.float64]]
 
@@ -179,7 +180,7 @@ def _fill(cells: NDArray[np.uint8], edges: NDArray[np.float64], ends: NDArray[np
 def _sort(values: NDArray[np.float64]) -> None:
     """Sort in place; rows of most shapes have two values."""
     if len(values) > _FEW:
-        values[:] = np.sort(values)
+        values[:] = values[stable_order(values)]
         return
     for k in range(1, len(values)):
         value, place = values[k], k

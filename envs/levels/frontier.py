@@ -40,7 +40,7 @@ REASONS = ("", "unseen", "blocked", "no_progress")
 """Reasons for giving up a chosen frontier, by number; 0 if it is not given up."""
 
 
-_renew_teams_serial = kernel(apart=True)(renew_teams)
+_renew_teams_serial = kernel(renew_teams)
 
 
 @kernel(parallel=True)

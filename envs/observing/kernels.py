@@ -102,7 +102,7 @@ def _write_maps(row: int, world: WorldArrays, given: _Sources, maps: Array, egoc
         crop_turned(pools, x, y, believed[row, 2], given.scales, egocentric_maps[row])
 
 
-@kernel(apart=True, nrt=False)
+@kernel(nrt=False)
 def write_row(row: int, sources: Array, observed: Arrays) -> None:
     """Write a row of the arrays of ``KEYS``.
 

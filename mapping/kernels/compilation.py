@@ -112,13 +112,8 @@ def kernel(
     forceinline: bool = False,
     inline: str = "never",
     nrt: bool = True,
-    apart: bool = False,
 ) -> Any:  # noqa: ANN401
-    """Compile a function with ``numba.njit``: with exact floating point, without the GIL, and cached.
-
-    Kernels that call one that is compiled ``apart`` find its code at run time. Otherwise numba links it into each of
-    them, and optimizes it there again.
-    """
+    """Compile a function with ``numba.njit``: with exact floating point, without the GIL, and cached."""
     if IS_INTERPRETED:
         return _interpreted if function is None else _interpreted(function)
 
@@ -146,8 +141,7 @@ def kernel(
             compiled = numba.njit(**options)(target)
             if _CAN_CACHE:
                 _keep(compiled)
-            if apart:
-                _set_apart(compiled)
+            _choose_linking(compiled)
             return compiled
         finally:
             _numba_config.CACHE_DIR = previous
@@ -155,48 +149,73 @@ def kernel(
     return decorate if function is None else decorate(function)
 
 
-# -- Kernels apart -----------------------------------------------------------------------------------------
+# -- Kernels that call others ------------------------------------------------------------------------------
 
-_apart: dict[tuple[str, str], Any] = {}
+# numba links a kernel's code into each of its callers and optimizes it there again, so that code deep in a tree of
+# calls is optimized at each level. Here only short kernels are linked. Long ones are called by the names of their
+# machine code, which are published before a caller is compiled, or loaded from the cache.
+
+LONGEST_LINKED = 16_384
+"""Bitcode of a kernel up to which its callers link it [bytes]."""
+
+_by_origin: dict[tuple[str, str, bool], Any] = {}
 
 
-class _Elsewhere:
-    """What numba links in place of a kernel that is compiled apart: nothing.
+class _Callee:
+    """A compiled kernel as numba links it into a caller: with its code or, if that is long, without."""
 
-    ``reach`` is kept with the code of each caller, and called before that is loaded from the cache.
-    """
-
-    def __init__(self, reach: Callable[[], None]) -> None:
-        self._reload_init = {reach}
+    def __init__(self, compiled: Any, form: Any) -> None:  # noqa: ANN401
+        self._form, self._module = form, form.library._get_module_for_linking
+        self._kinds = tuple(form.signature.args)
+        self._origin = _origin_of(compiled)
 
     def _ensure_finalized(self) -> None:
         pass
 
+    @functools.cached_property
+    def _is_long(self) -> bool:
+        return self._origin in _by_origin and len(self._module().as_bitcode()) > LONGEST_LINKED
+
+    @property
+    def _reload_init(self) -> set[Callable[[], None]]:
+        """What a caller that is loaded from the cache has to do first."""
+        if not self._is_long:
+            return set(self._form.library._reload_init)
+        return {functools.partial(_reach, self._origin, self._kinds, self._form.fndesc.llvm_func_name)}
+
     def _get_module_for_linking(self) -> Any:  # noqa: ANN401
+        if not self._is_long:
+            return self._module()
+        _publish(self._form, self._form.fndesc.llvm_func_name)
         return _llvm.parse_assembly("")
 
 
-def _set_apart(compiled: Any) -> None:  # noqa: ANN401
-    """Let kernels call the compiled forms of a function by the names of their machine code."""
-    origin = compiled.py_func.__module__, compiled.py_func.__qualname__
-    _apart[origin] = compiled
+def _origin_of(compiled: Any) -> tuple[str, str, bool]:  # noqa: ANN401
+    """Return where a function is defined, and which form of it is compiled."""
+    function = compiled.py_func
+    return function.__module__, function.__qualname__, bool(compiled.targetoptions["parallel"])
+
+
+def _choose_linking(compiled: Any) -> None:  # noqa: ANN401
+    """Have callers of a kernel link it or, if it is long, call it by name."""
+    is_inline = compiled.targetoptions.get("forceinline", False)
+    if not is_inline and "<locals>" not in compiled.py_func.__qualname__:  # others are not found again
+        _by_origin[_origin_of(compiled)] = compiled
     add_overload = compiled.add_overload
 
     def add(form: Any) -> None:  # noqa: ANN401
         add_overload(form)
-        symbol, context = form.fndesc.llvm_func_name, compiled.targetctx
-        _publish(form, symbol)
-        reach = functools.partial(_reach, *origin, tuple(form.signature.args), symbol)
+        context = compiled.targetctx
         context.remove_user_function(form.entry_point)
-        context.insert_user_function(form.entry_point, form.fndesc, [_Elsewhere(reach)])
+        context.insert_user_function(form.entry_point, form.fndesc, [_Callee(compiled, form)])
 
     compiled.add_overload = add
 
 
-def _reach(module: str, name: str, kinds: tuple[Any, ...], symbol: str) -> None:
-    """Have a kernel apart compiled or loaded, and known by the name under which a cached caller calls it."""
-    importlib.import_module(module)
-    compiled = _apart[module, name]
+def _reach(origin: tuple[str, str, bool], kinds: tuple[Any, ...], symbol: str) -> None:
+    """Have a kernel compiled or loaded, and known by the name under which a cached caller calls it."""
+    importlib.import_module(origin[0])
+    compiled = _by_origin[origin]
     compiled.compile(kinds)
     _publish(compiled.overloads[kinds], symbol)
 
@@ -237,7 +256,10 @@ class _KernelCache(_caching):
     def load_overload(self, sig: Any, target_context: Any) -> Any:  # noqa: ANN401
         """Return the compiled form for types of arguments, or None if there is none or it is damaged."""
         try:
-            return super().load_overload(sig, target_context)
+            found = super().load_overload(sig, target_context)
+            if found is not None:  # numba leaves out what callers of a loaded kernel have to do when they are loaded
+                found.library._reload_init.update(found.reload_init or ())
+            return found
         except Exception:  # unpickling damaged bytes can raise anything
             self._forget()
             return None

@@ -7,19 +7,105 @@ compiles: it reads one kernel per line, and answers each with a line.
 import contextlib
 import importlib
 import json
+import multiprocessing
 import os
 import subprocess
 import sys
 import threading
-from collections.abc import Iterator, Sequence
+import time
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
 from queue import SimpleQueue
 from typing import Any
+
+from lidarium.mapping.kernels.compilation import IS_INTERPRETED, kernel_cache
+
+try:
+    import fcntl
+except ImportError:  # Windows
+    fcntl = None  # type: ignore[assignment]
+
+MOST_PROCESSES = 4
+"""More would gain little, as kernels wait for those that they call, and cost memory."""
+
+LOCK = "first_start.lock"
+"""File in the cache that is locked by the process that fills it."""
+
+LINE_PERIOD_S = 5.0
+"""Wall time between lines of progress if there is no terminal [s]."""
 
 SWITCH = "LIDARIUM_FIRST_START"
 """Environment variable: ``off`` compiles each kernel at its first call."""
 
 Entry = dict[str, Any]
 """A kernel: ``name`` as ``module:name``, and ``signature``, a list of encoded types."""
+
+
+# -- First start -------------------------------------------------------------------------------------------
+
+
+def compile_listed(path: Path, what: str) -> None:
+    """Compile the kernels of a list in several processes if most of them are not in the cache.
+
+    ``what`` names the start in the message. Nothing is done in child processes, on one core, while another process
+    does it, and if ``LIDARIUM_FIRST_START`` is ``off``: then each kernel is compiled at its first call.
+    """
+    processes = min(_cores(), MOST_PROCESSES)
+    if IS_INTERPRETED or processes < 2 or os.environ.get(SWITCH) == "off" or not sys.executable:
+        return
+    folder = kernel_cache()
+    if folder is None or multiprocessing.parent_process() is not None:
+        return
+    entries: list[Entry] = json.loads(path.read_text())
+    # A compiled function is in "module.function-line.version.nbi".
+    cached = {file.name.rpartition("-")[0] for file in folder.rglob("*.nbi")}
+    if 2 * sum(each["name"].rpartition(".")[2].replace(":", ".") in cached for each in entries) > len(entries):
+        return
+    with _locked(folder) as is_alone:
+        if is_alone:
+            _tell(f"{what} compiles kernels in {processes} processes; later ones find them")
+            for _ in _shown(compile_in_processes(entries, processes), len(entries)):
+                pass
+
+
+def _cores() -> int:
+    """Return how many cores this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else int(os.cpu_count() or 1)
+
+
+@contextlib.contextmanager
+def _locked(folder: Path) -> Iterator[bool]:
+    """Hold the lock of a cache; yield whether this process got it. The system gives it back at the process's end."""
+    with contextlib.ExitStack() as stack:
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            file = stack.enter_context((folder / LOCK).open("a"))
+            if fcntl is not None:
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            is_alone = True
+        except OSError:  # another process holds it, or nothing can be written here
+            is_alone = False
+        yield is_alone
+
+
+def _shown(names: Iterable[str], total: int) -> Iterator[str]:
+    """Pass names on, and show their number on standard error: a bar on a terminal, otherwise lines."""
+    if sys.stderr.isatty():
+        from tqdm import tqdm
+
+        yield from tqdm(names, total=total, unit="kernel", leave=False)
+        return
+    last = time.monotonic()
+    for count, name in enumerate(names, 1):
+        yield name
+        if time.monotonic() - last >= LINE_PERIOD_S:
+            last = time.monotonic()
+            _tell(f"{count} of {total} kernels compiled")
+
+
+def _tell(message: str) -> None:
+    with contextlib.suppress(OSError, ValueError):  # nobody reads it
+        print(f"lidarium: {message}", file=sys.stderr, flush=True)
 
 
 # -- Kernels of lists --------------------------------------------------------------------------------------

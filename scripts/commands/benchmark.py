@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from tyro.conf import Positional
 
-from lidarium.scripts import first_start
 from lidarium.scripts.commands.evaluate import shard_of
-from lidarium.scripts.common import DEFECT, DONE, INTERRUPTED, Answer, Command, counted, notify, table
+from lidarium.scripts.common import DEFECT, DONE, INTERRUPTED, Answer, Command, compile_first, counted, notify, table
 from lidarium.scripts.options import options_by_policy
 
 if TYPE_CHECKING:
@@ -70,7 +69,7 @@ def execute(command: _Benchmark) -> Answer:
     shard_of(command.shard)
     size: Size = "easy" if command.quick else "full"
     if command.policies or command.reference:
-        first_start.compile_first(command.json)
+        compile_first()
     failures: dict[tuple[str, str], str] = {}
     is_interrupted = False
     for task in tasks:

@@ -11,8 +11,18 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from tyro.conf import Positional
 
 from lidarium.mapping.geometry.bounds import shown
-from lidarium.scripts import first_start
-from lidarium.scripts.common import DEFECT, DONE, DOUBTFUL, INTERRUPTED, Answer, TeamCommand, counted, notify, table
+from lidarium.scripts.common import (
+    DEFECT,
+    DONE,
+    DOUBTFUL,
+    INTERRUPTED,
+    Answer,
+    TeamCommand,
+    compile_first,
+    counted,
+    notify,
+    table,
+)
 from lidarium.scripts.options import check_supervised, is_supervised, options_by_policy, supervisor_options
 
 if TYPE_CHECKING:
@@ -96,7 +106,7 @@ def execute(command: _Evaluate) -> Answer:
         list(suite.trials())[part],
         cluster=command.ray,
     )
-    first_start.compile_first(command.json)
+    compile_first()
     is_interrupted = False
     runs = campaign.run()
     try:

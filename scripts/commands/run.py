@@ -6,9 +6,18 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from lidarium.scripts import first_start
 from lidarium.scripts.commands.floors import verdict_of_reach
-from lidarium.scripts.common import DONE, DOUBTFUL, INTERRUPTED, Answer, Progress, TeamCommand, file_name, notify
+from lidarium.scripts.common import (
+    DONE,
+    DOUBTFUL,
+    INTERRUPTED,
+    Answer,
+    Progress,
+    TeamCommand,
+    compile_first,
+    file_name,
+    notify,
+)
 from lidarium.scripts.options import (
     FilmOptions,
     ViewOptions,
@@ -136,7 +145,7 @@ def answer(command: Run, policy: "Policy", options: dict[str, Any], views: "Sequ
     env.watchers += views
     options_of_reset = reset_options(command)
     films = RunFilms(env, policy, command.films, command.film_shows, command.film_settings)
-    first_start.compile_first(command.json)
+    compile_first()
     episode = _explore(command, policy, env, films, options_of_reset)
     assert env.floor is not None
     folder = _folder(command, env.floor.name)

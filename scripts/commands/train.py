@@ -14,8 +14,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from tyro.conf import Positional
 
 from lidarium.extras import check_installed
-from lidarium.scripts import first_start
-from lidarium.scripts.common import INTERRUPTED, LINE_PERIOD_S, Answer, Command, notify, table
+from lidarium.scripts.common import INTERRUPTED, LINE_PERIOD_S, Answer, Command, compile_first, notify, table
 
 if TYPE_CHECKING:
     from lidarium.training.loggers import Logger
@@ -89,7 +88,7 @@ def execute(command: _Train) -> Answer:
     check_writable(folder)
     for name in command.log:
         check_logger(name)
-    first_start.compile_first(command.json)
+    compile_first()
     training = _training_of(settings, folder, command.workers or len(os.sched_getaffinity(0)), command.device)
     steps, show, is_interrupted, is_whole = training.run(), _Shown(command.json), False, False
     loggers: list[Logger] = []

@@ -1,92 +1,114 @@
-"""List the kernels that ``lidarium run`` calls, for the first start to compile side by side.
+"""List the kernels that a first start compiles and that take long, each with those that it calls.
 
-Usage: python scripts/dev/list_kernels.py [--check]
+Usage: python scripts/dev/list_kernels.py run|reset [--check]
 
-It runs ``lidarium run`` with empty caches, which takes minutes, then again: kernels that the second run loads from
-the cache are those that Python calls. With ``--check`` it runs with the existing caches, and only compares.
+It does the default ``lidarium run``, or a reset, with an empty cache, which takes minutes. With ``--check`` it only
+compares the kernels' names with those of the list.
 """
 
+import contextlib
 import json
 import os
 import subprocess
 import sys
 import tempfile
-from collections.abc import Mapping
-from pathlib import Path
-from types import ModuleType
 from typing import Any
 
-from lidarium.mapping.kernels.first_start import encode_type
-from lidarium.scripts.first_start import LIST, count_compiled
+from lidarium.envs.engine import first_reset
+from lidarium.mapping.kernels.first_start import SWITCH, encode_type
+from lidarium.scripts.common import KERNELS_OF_RUN
 
+LISTS = {"run": KERNELS_OF_RUN, "reset": first_reset.LIST}
 CHILD = "--child"
+LEAST_SHARE = 0.003
+"""Share of all compiling, with what it calls, that makes a kernel worth a place in the list."""
 
 
-def called_kernels(modules: Mapping[str, ModuleType]) -> list[dict[str, Any]]:
-    """Return the kernels of modules that this process has called from Python, largest machine code first."""
+def _compiled_in(start: str) -> list[dict[str, Any]]:
+    """Do a start; return the kernels that took long, the longest first, with their callees."""
+    from time import process_time
+
+    from numba.core import event
     from numba.core.dispatcher import Dispatcher
 
-    found = [
-        (_code_size(value), {"name": f"{name}:{key}", "signature": [encode_type(each) for each in signature]})
-        for name, module in sorted(modules.items())
-        if name.startswith("lidarium.")
-        for key, value in vars(module).items()
-        if isinstance(value, Dispatcher) and value.__module__ == name
-        for signature in value.signatures
-    ]
-    return [entry for _, entry in sorted(found, key=lambda each: -each[0])]
+    events: Any = event
 
+    found: list[tuple[float, Any, Any]] = []
 
-def _code_size(kernel: Any) -> int:  # noqa: ANN401
-    """Return the bytes of a kernel's machine code with all that it calls: how long compiling takes."""
-    folder = kernel.stats.cache_path
-    if folder is None:  # it cannot be cached
-        return 0
-    stem = f"{kernel.__module__.rpartition('.')[2]}.{kernel.py_func.__qualname__}-"
-    return max((path.stat().st_size for path in Path(folder).glob(f"{stem}*.nbc")), default=0)
+    class Clock(event.Listener):
+        began: list[float] = []  # noqa: RUF012
+        seconds = 0.0
 
+        def on_start(self, _event: Any) -> None:  # noqa: ANN401
+            self.began.append(process_time())
 
-def _run_and_list(caches: Path | None) -> list[dict[str, Any]]:
-    """Run ``lidarium run`` in a process of its own and return the kernels that it called."""
+        def on_end(self, event: Any) -> None:  # noqa: ANN401
+            seconds = process_time() - self.began.pop()
+            self.seconds += 0.0 if self.began else seconds
+            found.append((seconds, event.data["dispatcher"], event.data["args"]))
+
+    clock = Clock()
+    events.register("numba:compile", clock)
     with tempfile.TemporaryDirectory() as folder:
-        # A floor that is not in the user's cache: some kernels draw floors.
-        environment = {**os.environ, "XDG_CACHE_HOME": f"{folder}/floors"}
-        if caches is not None:
-            environment["NUMBA_CACHE_DIR"] = str(caches)
-        command = [sys.executable, __file__, CHILD, folder]
-        output = subprocess.run(command, env=environment, check=True, stdout=subprocess.PIPE, text=True)
-    return list(json.loads(output.stdout.splitlines()[-1]))
+        _begin(start, folder)
+
+    def callees(kernel: Any) -> set[Any]:  # noqa: ANN401
+        names, values = kernel.py_func.__code__.co_names, kernel.py_func.__globals__
+        own = {values[name] for name in names if isinstance(values.get(name), Dispatcher)}
+        return own.union(*map(callees, own))
+
+    chosen: dict[tuple[str, str], tuple[Any, Any]] = {}
+    for seconds, kernel, arguments in sorted(found, key=lambda each: -each[0]):
+        if seconds < LEAST_SHARE * clock.seconds or not kernel.py_func.__module__.startswith("lidarium."):
+            continue
+        try:
+            place, signature = _place_of(kernel), [encode_type(each) for each in arguments]
+        except (LookupError, ValueError):  # made by a function, or called with defaults
+            continue
+        chosen.setdefault((place, json.dumps(signature)), (kernel, signature))
+    return [
+        {
+            "name": place,
+            "signature": signature,
+            "needs": [k for k, (other, _) in enumerate(chosen.values()) if other in callees(kernel)],
+        }
+        for (place, _), (kernel, signature) in chosen.items()
+    ]
 
 
-def _child(folder: str) -> None:
-    from lidarium.scripts import first_start
+def _begin(start: str, folder: str) -> None:
+    import lidarium
     from lidarium.scripts.main import main
 
-    first_start.compile_first = lambda is_quiet: None
-    assert main(["run", "--out", f"{folder}/run"]) == 0
-    print(json.dumps(called_kernels(sys.modules)))
+    if start == "reset":
+        lidarium.parallel_env().reset(seed=0)
+    else:
+        with contextlib.redirect_stdout(sys.stderr):
+            assert main(["run", "--out", f"{folder}/run"]) == 0
 
 
-def _write() -> None:
+def _place_of(kernel: Any) -> str:  # noqa: ANN401
+    """Return ``module:name`` of a kernel; its function may have another name."""
+    module = kernel.py_func.__module__
+    names = [key for key, value in vars(sys.modules[module]).items() if value is kernel]
+    return f"{module}:{names[0]}"
+
+
+def _main(start: str, option: str = "") -> None:
+    if option == CHILD:
+        print(json.dumps(_compiled_in(start)))
+        return
     with tempfile.TemporaryDirectory() as caches:
-        _run_and_list(Path(caches))
-        compiled = count_compiled(Path(caches))
-        kernels = _run_and_list(Path(caches))
-    lines = ",\n".join(json.dumps(each) for each in kernels)
-    LIST.write_text(f'{{"compiled": {compiled}, "kernels": [\n{lines}\n]}}\n')
-
-
-def _is_current() -> bool:
-    def by_name(kernels: list[dict[str, Any]]) -> list[str]:
-        return sorted(json.dumps(each) for each in kernels)
-
-    return by_name(json.loads(LIST.read_text())["kernels"]) == by_name(_run_and_list(None))
+        environment = {**os.environ, "NUMBA_CACHE_DIR": caches, "XDG_CACHE_HOME": caches, SWITCH: "off"}
+        command = [sys.executable, __file__, start, CHILD]
+        output = subprocess.run(command, env=environment, check=True, stdout=subprocess.PIPE, text=True)
+    found = json.loads(output.stdout.splitlines()[-1])
+    if option == "--check":
+        listed = json.loads(LISTS[start].read_text())
+        gone = sorted({each["name"] for each in listed} - {each["name"] for each in found})
+        sys.exit(f"the start no longer compiles {', '.join(gone)}; write the list again" if gone else None)
+    LISTS[start].write_text("[\n" + ",\n".join(json.dumps(each) for each in found) + "\n]\n")
 
 
 if __name__ == "__main__":
-    if CHILD in sys.argv:
-        _child(sys.argv[-1])
-    elif "--check" in sys.argv:
-        sys.exit(None if _is_current() else f"{LIST} is stale; run python scripts/dev/list_kernels.py")
-    else:
-        _write()
+    _main(*sys.argv[1:])

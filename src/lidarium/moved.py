@@ -310,7 +310,7 @@ MOVED: dict[str, str] = {
     "scripts.output.run_summary": "scripts.run_output",
     "scripts.output.team_files": "scripts.run_output",
     "scripts.output.transforms": "scripts.transforms",
-    "scripts.process.first_start": "scripts.first_start",
+    "scripts.process.first_start": "mapping.kernels.first_start",
     "scripts.process.signals": "evaluation.processes",
     "scripts.process.streams": "scripts.main",
     "scripts.replay": "scripts.commands.replay",

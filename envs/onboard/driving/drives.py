@@ -195,7 +195,7 @@ def any_newly_done(drives: Drives, first: int, last: int, live: Array, waiting: 
     return newly_done > 0
 
 
-@kernel(apart=True, nrt=False)
+@kernel(nrt=False)
 def follow_team(
     drives: Drives,
     following: Following,

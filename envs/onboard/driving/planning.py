@@ -296,7 +296,7 @@ def _standing(planning: Planning, drives: Drives, row: int) -> tuple[Array, Arra
     return avoided, ended
 
 
-@kernel(apart=True)
+@kernel
 def prepare_teams_serial(planning: Planning, drives: Drives, maps: TeamMaps, work: Work, is_blocked: Array) -> None:
     """Prepare the live robots of some teams, in their order, on fresh maps.
 

@@ -116,7 +116,7 @@ def _encode(world: WorldArrays, episode: int, robots: int, velocities: Array) ->
         )
 
 
-@kernel(apart=True)
+@kernel
 def _move_people(table: Array, episode: int, robots: int) -> None:
     """Move the doors and the people of an episode, who see the robots where they are."""
     world = world_at(table)
@@ -126,7 +126,7 @@ def _move_people(table: Array, episode: int, robots: int) -> None:
         walk_people(world, episode, robots)
 
 
-@kernel(apart=True)
+@kernel
 def _note_people(table: Array, episode: int, robots: int) -> None:
     """Note how near robots are to people, after both have moved."""
     note_people(world_at(table), episode, robots)
@@ -198,7 +198,7 @@ def _share(world: WorldArrays, episode: int, robots: int) -> None:
     )
 
 
-@kernel(apart=True)
+@kernel
 def _sense_rows(table: Array, rows: tuple[int, int], robots: int, perceives: bool) -> None:
     """Let the robots of the rows from the first up to the last sense, score and (if ``perceives``) map."""
     world = world_at(table)
@@ -208,7 +208,7 @@ def _sense_rows(table: Array, rows: tuple[int, int], robots: int, perceives: boo
             sense_and_perceive(world, row, row // robots * robots, robots, perceives, scratch)
 
 
-@kernel(apart=True, nrt=False)
+@kernel(nrt=False)
 def step_episode(table: Array, episode: int, robots: int, commands: Array, moves_bodies: bool, perceives: bool) -> None:
     """Run a step of one episode: move, and if robots scan in it, sense, score and (if ``perceives``) map."""
     world = world_at(table)
@@ -238,7 +238,7 @@ def _step_row(table: Array, row: int, robots: int, perceives: bool) -> None:
         _sense_rows(table, (row, row + 1), robots, perceives)
 
 
-@kernel(apart=True)
+@kernel
 def _perceive_row(table: Array, row: int, robots: int, runs: Array) -> None:
     world, episode = world_at(table), row // robots
     # The step is counted.

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from lidarium.mapping.grids.grid_lines import line_is_open
 from lidarium.mapping.kernels.compilation import Array, kernel
+from lidarium.mapping.kernels.ordering import stable_order
 from lidarium.mapping.kernels.simd.lengths import FAR, FEW_LANES, LANES, STRAIGHT
 from lidarium.mapping.kernels.views import arrays_at
 from lidarium.mapping.kernels.work_queue import Work, share_of, take_next
@@ -198,7 +199,7 @@ class TourMemory:
         return TourMemory, self._made_of
 
 
-@kernel(apart=True)
+@kernel
 def plan_serial(tables: Array, robots: Robots, rules: PlanRules, sight: ViewFrame, plans: Plans, work: Work) -> None:
     """Plan the tours of the maps that are left: tables (M, fields of ``_Kept``, 3)."""
     item = take_next(work.taken)
@@ -424,13 +425,14 @@ def _nearest(
             if views[i] >= 0 and gains[i] >= least_gain:
                 lengths[k, i] = _from_robot(cells, from_robots, starts, k, views[i])
                 nearest[i] = min(nearest[i], lengths[k, i])
-        order = np.argsort(lengths[k], kind="mergesort")
+        order = stable_order(lengths[k])
         for rank in range(count):
             if lengths[k, order[rank]] != FAR:
                 turns[order[rank]] = min(turns[order[rank]], rank * robots + k)
-    order = np.argsort(turns, kind="mergesort")[:most]
-    chosen = np.sort(order[turns[order] < 1 << 30])
-    return chosen[np.argsort(nearest[chosen], kind="mergesort")]
+    order = stable_order(turns)[:most]
+    chosen = order[turns[order] < 1 << 30]
+    chosen = chosen[stable_order(chosen)]
+    return chosen[stable_order(nearest[chosen])]
 
 
 @kernel(nrt=False)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.mapping.kernels.compilation import Array, kernel
+from lidarium.mapping.kernels.ordering import stable_order
 
 _BEGINNINGS = 4
 """Number of tours that are improved, each from another of the nearest places."""
@@ -37,7 +38,7 @@ def shortest_tour(first: NDArray[np.float64], between: NDArray[np.float64]) -> N
     """
     count = first.shape[0]
     best, best_length = np.arange(count), np.inf
-    nearest = np.argsort(first, kind="mergesort")
+    nearest = stable_order(first)
     tour, trial = np.empty(count, np.int64), np.empty(count, np.int64)
     for beginning in range(min(_BEGINNINGS, count)):
         _go_to_nearest(nearest[beginning], between, tour)

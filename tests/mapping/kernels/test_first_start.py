@@ -1,5 +1,6 @@
 """Kernels of lists are compiled by several processes, each after those that it calls."""
 
+import fcntl
 import io
 import json
 import os
@@ -9,15 +10,20 @@ import sys
 import pytest
 from numba.core import types
 
+from lidarium.envs.engine import first_reset
 from lidarium.mapping.grids.scan_integration import SeenScan
 from lidarium.mapping.kernels import first_start
 from lidarium.mapping.kernels.first_start import (
+    LOCK,
+    SWITCH,
     _Plan,
     compile_in_processes,
     compile_kernel,
     decode_type,
     encode_type,
 )
+from lidarium.mapping.planning.search.search_state import _grown
+from lidarium.scripts.common import KERNELS_OF_RUN
 
 ARRAY = types.Array(types.int8, 2, "C")
 CASES = [
@@ -144,3 +150,63 @@ def test_each_kernel_is_answered_and_one_that_fails_is_left_out(monkeypatch, cap
         "left out: JSONDecodeError",
         "compiled",
     ]
+
+
+def test_a_kernel_is_compiled_for_what_it_is_called_with():
+    compile_kernel({"name": f"{_grown.__module__}:_grown", "signature": ["int32:2C", "int64"]})
+    assert (types.Array(types.int32, 2, "C"), types.int64) in _grown.signatures
+
+
+@pytest.mark.parametrize("path", [KERNELS_OF_RUN, first_reset.LIST], ids=["run", "reset"])
+def test_every_listed_kernel_can_be_compiled_for_its_types_after_what_it_calls(path):
+    entries = json.loads(path.read_text())
+    assert len(entries) > 20
+    for number, entry in enumerate(entries):
+        module, name = entry["name"].split(":")
+        kernel = getattr(__import__(module, fromlist=[name]), name)
+        arguments = [decode_type(each) for each in entry["signature"]]
+        assert len(arguments) == kernel.py_func.__code__.co_argcount, entry["name"]
+        assert number not in entry["needs"]
+        assert all(set(entries[other]["needs"]) <= set(entry["needs"]) for other in entry["needs"])
+
+
+START = """
+import sys
+from pathlib import Path
+from lidarium.mapping.kernels import first_start
+first_start._cores = lambda: 2
+first_start.compile_listed(Path(sys.argv[1]), "the first start")
+"""
+
+
+@pytest.fixture
+def start(tmp_path):
+    """Run a first start in a process of its own; return what it says."""
+    (tmp_path / "list.json").write_text(json.dumps([TAKE]))
+
+    def run(**environment):
+        return subprocess.run(
+            [sys.executable, "-c", START, str(tmp_path / "list.json")],
+            env={**os.environ, SWITCH: "", "NUMBA_CACHE_DIR": str(tmp_path / "caches"), **environment},
+            check=True,
+            capture_output=True,
+            text=True,
+        ).stderr
+
+    return run
+
+
+def test_an_empty_cache_is_filled_once_and_the_wait_explained(start, tmp_path):
+    assert start() == "lidarium: the first start compiles kernels in 2 processes; later ones find them\n"
+    assert any("take_next" in path.name for path in (tmp_path / "caches").rglob("*.nbc"))
+    assert start() == ""
+
+
+def test_who_wants_no_processes_gets_none_and_two_starts_share_them(start, tmp_path):
+    (tmp_path / "caches").mkdir()
+    assert start(**{SWITCH: "off"}) == ""
+    with (tmp_path / "caches" / LOCK).open("w") as file:
+        fcntl.flock(file, fcntl.LOCK_EX)
+        assert start() == "", "another process compiles already"
+    assert not any((tmp_path / "caches").rglob("*.nbc"))
+    assert start() != ""

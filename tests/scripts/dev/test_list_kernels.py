@@ -1,20 +1,12 @@
-"""Kernels that Python has called are listed, so that a first start compiles them."""
+"""Kernels of a first start are listed by a name that can be imported."""
 
-import numpy as np
+from importlib import import_module
 
-from lidarium.evaluation.record import recorder
-from lidarium.evaluation.truth import map_tally
 from lidarium.mapping.grids import map_deltas
-from lidarium.scripts.dev.list_kernels import called_kernels
+from lidarium.scripts.dev.list_kernels import _place_of
 
 
-def test_a_kernel_that_was_called_is_listed_where_it_stands():
-    windows = np.zeros((1, 4), np.int64)
-    map_tally.note_changes(windows, windows.copy())
-    listed = called_kernels({module.__name__: module for module in (map_tally, recorder, map_deltas)})
-    signatures = {entry["name"]: entry["signature"] for entry in listed}
-    names = list(signatures)
-    assert len(signatures["lidarium.evaluation.truth.map_tally:note_changes"]) == 2
-    # A kernel is listed by the module that holds it, not by those that import it.
-    assert recorder.note_changes is map_deltas.note_changes
-    assert not [name for name in names if name.startswith("lidarium.evaluation.record.recorder:")]
+def test_the_place_of_a_kernel_leads_back_to_it():
+    for kernel in (map_deltas.note_word, map_deltas.seen_spans, map_deltas.note_changes):
+        module, _, name = _place_of(kernel).partition(":")
+        assert getattr(import_module(module), name) is kernel

@@ -1,4 +1,4 @@
-"""Kernels that are compiled apart are called by name, also by callers that come from the cache."""
+"""Kernels call each other: in parallel loops, and where the caller or what it calls comes from the cache."""
 
 import os
 import subprocess
@@ -13,7 +13,7 @@ from lidarium.mapping.kernels.compilation import IS_INTERPRETED, Array, kernel
 from lidarium.mapping.kernels.work_queue import Work, new_work, share_of, take_next
 
 
-@kernel(apart=True)
+@kernel
 def _square(values: Array, out: Array, work: Work) -> None:
     """Square the items of the work, and note the thread that did."""
     for thread in range(work.first, work.first + work.threads):
@@ -46,7 +46,7 @@ def test_a_parallel_loop_works_off_all_items_whatever_the_types_of_arguments(is_
 SOURCE = """
     from lidarium.mapping.kernels.compilation import kernel
 
-    @kernel(apart=True)
+    @kernel
     def inner(value): return 2.0 * value
 
     @kernel
@@ -58,28 +58,52 @@ SOURCE = """
 
 PROGRAM = """
     import sys
+    from lidarium.mapping.kernels import compilation
+
+    compilation.LONGEST_LINKED = int(sys.argv[2])
     import sources
-    print(sources.outer(20.0), len(sources.outer.stats.cache_hits))
+
+    called = getattr(sources, sys.argv[1])
+    print(called(20.0), len(called.stats.cache_hits))
 """
 
 
-@pytest.mark.skipif(IS_INTERPRETED, reason="Python runs the kernels")
-def test_a_cached_caller_finds_a_kernel_whose_own_code_was_lost(tmp_path):
+@pytest.fixture
+def run(tmp_path):
+    """Call one of the kernels in a process of its own; return its result and whether its code was in the cache."""
     (tmp_path / "sources.py").write_text(textwrap.dedent(SOURCE))
     (tmp_path / "program.py").write_text(textwrap.dedent(PROGRAM))
-    cache = tmp_path / "cache"
 
-    def run():
-        environment = {**os.environ, "NUMBA_CACHE_DIR": str(cache)}
+    def call(name, longest_linked):
         done = subprocess.run(
-            [sys.executable, str(tmp_path / "program.py")], env=environment, capture_output=True, text=True, check=True
+            [sys.executable, str(tmp_path / "program.py"), name, str(longest_linked)],
+            env={**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache")},
+            capture_output=True,
+            text=True,
+            check=True,
         )
-        return done.stdout.split()
+        result, hits = done.stdout.split()
+        return float(result), bool(int(hits))
 
-    assert run() == ["42.0", "0"]
-    assert run() == ["42.0", "1"]
-    lost = [path for path in cache.rglob("*") if path.is_file() and "inner" in path.name]
+    return call
+
+
+@pytest.mark.skipif(IS_INTERPRETED, reason="Python runs the kernels")
+@pytest.mark.parametrize("longest_linked", [0, 10**9])
+def test_a_cached_caller_finds_a_kernel_whose_own_code_was_lost(run, tmp_path, longest_linked):
+    assert run("outer", longest_linked) == (42.0, False)
+    assert run("outer", longest_linked) == (42.0, True)
+    lost = [path for path in (tmp_path / "cache").rglob("*") if path.is_file() and "inner" in path.name]
     assert lost
     for path in lost:
         path.unlink()
-    assert run() == ["42.0", "1"]
+    assert run("outer", longest_linked) == (42.0, True)
+
+
+@pytest.mark.skipif(IS_INTERPRETED, reason="Python runs the kernels")
+@pytest.mark.parametrize("of_middle", [0, 10**9])
+@pytest.mark.parametrize("of_outer", [0, 10**9])
+def test_a_cached_caller_finds_what_a_kernel_calls_that_was_in_the_cache_before(run, of_middle, of_outer):
+    assert run("middle", of_middle) == (41.0, False)
+    assert run("outer", of_outer) == (42.0, False)
+    assert run("outer", of_outer) == (42.0, True)
