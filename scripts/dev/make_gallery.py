@@ -1,13 +1,16 @@
-"""Makes the pages of environments and the gallery: `python scripts/dev/make_gallery.py [--only NAME...]`.
+"""Makes the pages of environments, the gallery and the site: `python scripts/dev/make_gallery.py [--site FOLDER]`.
 
 Each id and each task of lidarium-1 has a page with a film, its spaces, rewards, endings, settings and versions, and how
 the reference policies do. Pages go to docs/environments, pictures to docs/images/gallery. Films that exist are
-made again only with ``--films``; they take minutes.
+made again only with ``--films``; they take minutes. With ``--site`` the documentation is built there, for which all
+notebooks are run.
 """
 
 import argparse
 import json
 import math
+import subprocess
+import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cache
@@ -309,6 +312,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--only", nargs="*", default=[], help="names of environments; all by default")
     parser.add_argument("--films", action="store_true", help="make films and pictures again that exist")
+    parser.add_argument("--site", type=Path, help="build the documentation in this folder, and run its notebooks")
     given = parser.parse_args()
     PICTURES.mkdir(parents=True, exist_ok=True)
     found = benchmark("lidarium-1")
@@ -326,6 +330,9 @@ def main() -> None:
         if given.films or not path.exists():
             save_floor_picture(path, lidarium.load_floor(name), 0.3)
     write_text(PAGES / "index.md", index(listed))
+    if given.site:
+        build = [sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", "-b", "html", DOCS, given.site]
+        subprocess.run(build, check=True)
 
 
 if __name__ == "__main__":

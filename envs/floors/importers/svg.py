@@ -348,6 +348,7 @@ class _Drawing:
         self._named = {name: each for each in root.iter() if (name := each.get("id"))}
         self._sheet = StyleSheet("".join("".join(each.itertext()) for each in root.iter() if _kind(each) == "style"))
         self._pictures = self._drawn = 0
+        self._painted: tuple[Style | None, tuple[bool | None, bool | None]] = None, (None, None)
 
     def remarks(self) -> Iterator[str]:
         """Yield the parts of the drawing that are left out."""
@@ -391,8 +392,8 @@ class _Drawing:
             (a, b), (c, d) = matrix[:2, :2].tolist()
             scale = math.sqrt(abs(a * d - b * c))
             width = _length(style["stroke-width"], 1.0, math.hypot(*view) / math.sqrt(2.0)) * scale
-            inside = None if kind == "line" else self._is_dark(style, "fill")
-            shape = _Shape(placed, inside, self._is_dark(style, "stroke"), width)
+            inside, line = self._paints(style)
+            shape = _Shape(placed, None if kind == "line" else inside, line, width)
             if math.isfinite(width + sum(outline.sum() for outline in placed)):
                 yield shape
             elif shape.is_solid_inside or shape.is_solid_line:
@@ -419,6 +420,12 @@ class _Drawing:
         opacity = share_of(own.pop("opacity", "1"), 1.0) * float(inherited["opacity"])
         own = {name: inherited[name] if value.strip() == "inherit" else value for name, value in own.items()}
         return {**inherited, **own, "opacity": str(opacity)}
+
+    def _paints(self, style: Style) -> tuple[bool | None, bool | None]:
+        """Return whether the inside and the line of shapes are dark; most shapes share the style of the last one."""
+        if self._painted[0] is not style:
+            self._painted = style, (self._is_dark(style, "fill"), self._is_dark(style, "stroke"))
+        return self._painted[1]
 
     def _is_dark(self, style: Style, what: str) -> bool | None:
         """Return whether a paint makes dark what it covers, whatever was there; None if that depends on it.
