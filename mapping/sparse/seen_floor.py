@@ -237,7 +237,8 @@ class FloorPoints:
         steps = np.full((rows, columns), UNSEEN, np.uint8)
         if own.any():
             nearest = ndimage.distance_transform_edt(~own, return_distances=False, return_indices=True)
-            heights = (sums / np.maximum(counts, 1.0))[nearest[0], nearest[1]]
+            np.divide(sums, np.maximum(counts, 1.0, out=counts), out=sums)  # in place: maps may be large
+            heights = sums[nearest[0], nearest[1]]
             heights = heights.reshape(rows, _FINE, columns, _FINE).mean(axis=(1, 3)).astype(np.float32)
             is_plain = is_seen & ~beside
             kernel = np.ones((3, 3), np.uint8)
