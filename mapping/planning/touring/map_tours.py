@@ -432,7 +432,8 @@ def _nearest(
     order = stable_order(turns)[:most]
     chosen = order[turns[order] < 1 << 30]
     chosen = chosen[stable_order(chosen)]
-    return chosen[stable_order(nearest[chosen])]
+    nearest_first: NDArray[np.int64] = chosen[stable_order(nearest[chosen])]
+    return nearest_first
 
 
 @kernel(nrt=False)
