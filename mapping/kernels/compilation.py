@@ -178,7 +178,7 @@ class _Callee:
 
     @property
     def _reload_init(self) -> set[Callable[[], None]]:
-        """What a caller that is loaded from the cache has to do first."""
+        """Functions that a caller runs when it is loaded from the cache."""
         if not self._is_long:
             return set(self._form.library._reload_init)
         return {functools.partial(_reach, self._origin, self._kinds, self._form.fndesc.llvm_func_name)}

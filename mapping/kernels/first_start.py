@@ -32,7 +32,7 @@ LOCK = "first_start.lock"
 """File in the cache that is locked by the process that fills it."""
 
 LINE_PERIOD_S = 5.0
-"""Wall time between lines of progress if there is no terminal [s]."""
+"""Interval between progress lines when standard error is no terminal [s]."""
 
 SWITCH = "LIDARIUM_FIRST_START"
 """Environment variable: ``off`` compiles each kernel at its first call."""
@@ -44,10 +44,10 @@ Entry = dict[str, Any]
 # -- First start -------------------------------------------------------------------------------------------
 
 
-def compile_listed(path: Path, what: str) -> None:
+def compile_listed(path: Path, start: str) -> None:
     """Compile the kernels of a list in several processes if most of them are not in the cache.
 
-    ``what`` names the start in the message. Nothing is done in child processes, on one core, while another process
+    ``start`` names it in the message. Nothing is done in child processes, on one core, while another process
     does it, and if ``LIDARIUM_FIRST_START`` is ``off``: then each kernel is compiled at its first call.
     """
     processes = min(_cores(), MOST_PROCESSES)
@@ -63,7 +63,7 @@ def compile_listed(path: Path, what: str) -> None:
         return
     with _locked(folder) as is_alone:
         if is_alone:
-            _tell(f"{what} compiles kernels in {processes} processes; later ones find them")
+            _tell(f"{start} compiles kernels in {processes} processes; later ones find them")
             for _ in _shown(compile_in_processes(entries, processes), len(entries)):
                 pass
 
@@ -104,7 +104,7 @@ def _shown(names: Iterable[str], total: int) -> Iterator[str]:
 
 
 def _tell(message: str) -> None:
-    with contextlib.suppress(OSError, ValueError):  # nobody reads it
+    with contextlib.suppress(OSError, ValueError):  # standard error is closed
         print(f"lidarium: {message}", file=sys.stderr, flush=True)
 
 

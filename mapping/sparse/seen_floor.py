@@ -238,8 +238,11 @@ class FloorPoints:
         if own.any():
             nearest = ndimage.distance_transform_edt(~own, return_distances=False, return_indices=True)
             np.divide(sums, np.maximum(counts, 1.0, out=counts), out=sums)  # in place: maps may be large
-            heights = sums[nearest[0], nearest[1]]
-            heights = heights.reshape(rows, _FINE, columns, _FINE).mean(axis=(1, 3)).astype(np.float32)
+            heights = np.empty((rows, columns), np.float32)
+            for row in range(rows):  # one at a time: numpy makes indices four times as large as heights
+                fine = slice(row * _FINE, (row + 1) * _FINE)
+                own_heights = sums[nearest[0, fine], nearest[1, fine]].reshape(1, _FINE, columns, _FINE)
+                heights[row] = own_heights.mean(axis=(1, 3))[0]
             is_plain = is_seen & ~beside
             kernel = np.ones((3, 3), np.uint8)
             highest = cv2.dilate(np.where(is_plain, heights, np.float32(-_NO_HEIGHT)), kernel)

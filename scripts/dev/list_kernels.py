@@ -21,7 +21,7 @@ from lidarium.scripts.common import KERNELS_OF_RUN
 LISTS = {"run": KERNELS_OF_RUN, "reset": first_reset.LIST}
 CHILD = "--child"
 LEAST_SHARE = 0.003
-"""Share of all compiling, with what it calls, that makes a kernel worth a place in the list."""
+"""Kernels are listed if they and their callees take at least this share of the compile time."""
 
 
 def _compiled_in(start: str) -> list[dict[str, Any]]:

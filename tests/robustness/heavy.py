@@ -72,6 +72,11 @@ def _outline(corners: int, size: float) -> bytes:
     return json.dumps({"id": "h", "verts": points.tolist()}).encode()
 
 
+def _points(count: int, length: float, width: float) -> bytes:
+    points = _draws.random((count, 3)) * (length, width, 0.02)
+    return "".join(f"{x:.2f} {y:.2f} {z:.2f}\n" for x, y, z in points).encode()
+
+
 def _segments(line: str, count: int, size: int) -> bytes:
     ends = _draws.integers(0, size, (count, 4))
     return "".join(line.format(*row) for row in ends).encode()[:MOST_BYTES]
@@ -242,6 +247,13 @@ CASES: dict[str, tuple[str, Callable[[], bytes]]] = {
     "a bag of ROS 1": ("bag_bz2.bag", lambda: _bag(13_000, 8, "bag_bz2.bag")),
     "a packed bag": ("bag.db3.zstd", lambda: _bag(13_000, 8, "bag.db3.zstd")),
     "a bag in sqlite": ("bag.db3", lambda: _bag(500, 8, "bag.db3")),
+    "a cloud": ("cloud_lines.xyz", lambda: _points(40_000, 9.0, 9.0)),
+    "a wide cloud": ("cloud_lines.xyz", lambda: _points(40_000, 900.0, 900.0)),
+    "a long thin cloud": ("cloud_lines.xyz", lambda: _points(190, 770.0, 3.0)),
+    "a far cloud": ("cloud_lines.xyz", lambda: _points(10, 1e6, 1e6)),
+    "a cloud of one place": ("cloud_lines.xyz", lambda: _repeated("1 1 0\n")),
+    "a pose": ("pose.txt", lambda: _repeated("0 0 1 0.5\n")),
+    "boxes of a sparse map": ("sparse_text.txt", lambda: _repeated("box 0 0 0 1 1 1\n")),
     "curves": ("splines.json", lambda: _repeated('{"knots":[0,1],"points":[[0,0]]},', '{"curves":[', "{}]}")),
 }
 """By name: what the file is called, and how it is made."""

@@ -1,4 +1,4 @@
-"""Kernels call each other: in parallel loops, and where the caller or what it calls comes from the cache."""
+"""Calls between kernels: in parallel loops, and with the caller or the callee loaded from the cache."""
 
 import os
 import subprocess
@@ -70,7 +70,7 @@ PROGRAM = """
 
 @pytest.fixture
 def run(tmp_path):
-    """Call one of the kernels in a process of its own; return its result and whether its code was in the cache."""
+    """Call a kernel in a new process; return its result, and whether it was loaded from the cache."""
     (tmp_path / "sources.py").write_text(textwrap.dedent(SOURCE))
     (tmp_path / "program.py").write_text(textwrap.dedent(PROGRAM))
 

@@ -181,7 +181,7 @@ first_start.compile_listed(Path(sys.argv[1]), "the first start")
 
 @pytest.fixture
 def start(tmp_path):
-    """Run a first start in a process of its own; return what it says."""
+    """Run a first start in a new process; return its messages."""
     (tmp_path / "list.json").write_text(json.dumps([TAKE]))
 
     def run(**environment):
