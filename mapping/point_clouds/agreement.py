@@ -9,8 +9,8 @@ distance of what agrees, which is smaller if all points are stretched as the rig
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from lidarium.mapping.geometry.rigid_motions import inverse_of
 
@@ -126,6 +126,6 @@ def _view_of(points: NDArray[np.float64], pose: NDArray[np.float64]) -> _View:
     near_image, far_image = nearest.reshape(ROWS, COLUMNS), farthest.reshape(ROWS, COLUMNS)
     is_seen = np.isfinite(near_image)
     # Directions beside an edge, or beside none, do not tell.
-    inner = ndimage.minimum_filter(is_seen, 3, mode="constant")
-    low, high = ndimage.minimum_filter(near_image, 3), ndimage.maximum_filter(far_image, 3)
+    inner = scipy.ndimage.minimum_filter(is_seen, 3, mode="constant")
+    low, high = scipy.ndimage.minimum_filter(near_image, 3), scipy.ndimage.maximum_filter(far_image, 3)
     return _View(np.where(inner, low, np.inf), np.where(inner, high, 0.0), inverse_of(pose))

@@ -3,7 +3,7 @@
 import itertools
 import re
 import struct
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -48,35 +48,39 @@ def _parse_obj(content: bytes) -> Content:
             f"{np.count_nonzero(lengths < 3):,} of its {len(lengths):,} vertices have less than three columns: damaged?"
         )
     points = text_columns(b"\n".join(b" ".join(words[:3]) for words in vertices), (0, 1, 2))
-    groups: dict[int, list[list[int]]] = {}
-    before: NDArray[np.int64] | None = None
-    for face in _FACES.finditer(content):
-        corners = [int(word.partition(b"/")[0]) for word in face[1].split(b"#")[0].split()]
-        if min(corners, default=1) < 0:
-            if before is None:
-                before = np.array([vertex.start() for vertex in _VERTICES.finditer(content)])
-            # The last point before the face is -1.
-            count = int(np.searchsorted(before, face.start()))
-            corners = [corner + count + 1 if corner < 0 else corner for corner in corners]
-        groups.setdefault(len(corners), []).append(corners)
-    polygons = [np.array(group, np.int64).reshape(len(group), -1) - 1 for group in groups.values()]
-    return Content(points, triangles=triangles_of(polygons, len(points)), remarks=_doubts_of(content, lengths, groups))
+    polygons, counts = _faces_of(content)
+    return Content(points, triangles=triangles_of(polygons, len(points)), remarks=_doubts_of(content, lengths, counts))
 
 
-def _doubts_of(
-    content: bytes, lengths: NDArray[np.int64], faces: Mapping[int, Sequence[Sequence[int]]]
-) -> tuple[str, ...]:
+def _faces_of(content: bytes) -> tuple[list[NDArray[np.int64]], NDArray[np.int64]]:
+    """Return the corners of an OBJ file's faces, grouped by their number, (m, corners) each, and all these numbers."""
+    lines = [line.split(b"#", 1)[0] for line in _FACES.findall(content)]
+    counts = np.array([len(line.split()) for line in lines], np.int64)
+    # A corner is a vertex, and perhaps a texture and a normal after slashes.
+    words = re.sub(rb"/\S*", b"", b" ".join(lines)).split()
+    if len(words) != counts.sum():
+        raise ValueError("corners of its faces name no vertex: damaged?")
+    corners = np.array(list(map(int, words)), np.int64)
+    if corners.min(initial=0) < 0:  # the last vertex before the face is -1
+        vertices, faces = (np.array([each.start() for each in form.finditer(content)]) for form in (_VERTICES, _FACES))
+        before = np.repeat(np.searchsorted(vertices, faces), counts)
+        corners = np.where(corners < 0, corners + before + 1, corners)
+    firsts = np.cumsum(counts) - counts
+    groups = [firsts[counts == count][:, None] + np.arange(count) for count in np.unique(counts)]
+    return [corners[group] - 1 for group in groups], counts
+
+
+def _doubts_of(content: bytes, lengths: NDArray[np.int64], corners: NDArray[np.int64]) -> tuple[str, ...]:
     """Say which lines of an OBJ file are none, and how many vertices and faces are of other lengths."""
     remarks = []
-    lines = [line.split(b"#")[0].split() for line in content.splitlines()]
+    lines = [line.split(b"#", 1)[0].split(None, 1) for line in content.splitlines()]
     strange = [number for number, words in enumerate(lines, 1) if words and words[0] not in _OBJ_WORDS]
     if strange:
         remarks.append(f"{len(strange):,} lines are no OBJ and passed over, the first is line {strange[0]:,}: damaged?")
     usual = int(np.bincount(lengths).argmax())
     if others := int(np.count_nonzero(lengths != usual)):
         remarks.append(f"{others:,} of {len(lengths):,} vertices have not {usual} numbers as most: damaged?")
-    short = sum(len(group) for corners, group in faces.items() if corners < 3)
-    if short:
+    if short := int(np.count_nonzero(corners < 3)):
         remarks.append(f"{short:,} faces have fewer than three corners and are passed over: damaged?")
     return tuple(remarks)
 

@@ -1,9 +1,12 @@
 """Faces of meshes: polygons as triangles, and points on them."""
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
+
+from lidarium.mapping.kernels.compilation import Array, kernel
 
 SPACING_M = 0.02
 """Largest distance between neighbouring points on a face [m]."""
@@ -50,16 +53,7 @@ def sampled(points: NDArray[np.float64], triangles: Triangles) -> tuple[NDArray[
     spacing = SPACING_M
     while _number(base, height, spacing) > MAX_SAMPLES:
         spacing *= 1.25
-    # Rows of points parallel to the base, shorter and shorter.
-    rows = np.ceil(height / spacing).astype(np.int64) + 1
-    of_row = np.repeat(np.arange(len(rows)), rows)
-    up = _count_up(rows) / np.maximum(rows - 1, 1)[of_row]
-    across = np.ceil(base[of_row] * (1.0 - up) / spacing).astype(np.int64) + 1
-    of_point = np.repeat(np.arange(len(across)), across)
-    along = (_count_up(across) / np.maximum(across - 1, 1)[of_point])[:, None]
-    left = start[of_row] + up[:, None] * (top - start)[of_row]
-    right = end[of_row] + up[:, None] * (top - end)[of_row]
-    return left[of_point] + along * (right - left)[of_point], spacing
+    return _rows_of_points(start, end, top, base, height, spacing), spacing
 
 
 def _number(base: NDArray[np.float64], height: NDArray[np.float64], spacing: float) -> float:
@@ -67,7 +61,27 @@ def _number(base: NDArray[np.float64], height: NDArray[np.float64], spacing: flo
     return float(((0.5 * base / spacing + 1.5) * (height / spacing + 1.5)).sum())
 
 
-def _count_up(counts: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return 0, 1, ... up to each count, one after the other."""
-    ends = np.cumsum(counts)
-    return np.arange(ends[-1] if len(ends) else 0) - np.repeat(ends - counts, counts)
+@kernel
+def _rows_of_points(
+    start: Array, end: Array, top: Array, base: Array, height: Array, spacing: float
+) -> NDArray[np.float64]:
+    """Return points in rows parallel to the bases of triangles, shorter and shorter up to the top."""
+    count = 0
+    for k in range(len(base)):
+        rows = math.ceil(height[k] / spacing) + 1
+        for row in range(rows):
+            count += math.ceil(base[k] * (1.0 - row / max(rows - 1, 1)) / spacing) + 1
+    found, place = np.empty((count, 3)), 0
+    for k in range(len(base)):
+        rows = math.ceil(height[k] / spacing) + 1
+        for row in range(rows):
+            up = row / max(rows - 1, 1)
+            across = math.ceil(base[k] * (1.0 - up) / spacing) + 1
+            for column in range(across):
+                along = column / max(across - 1, 1)
+                for axis in range(3):
+                    left = start[k, axis] + up * (top[k, axis] - start[k, axis])
+                    right = end[k, axis] + up * (top[k, axis] - end[k, axis])
+                    found[place, axis] = left + along * (right - left)
+                place += 1
+    return found

@@ -77,6 +77,12 @@ def _points(count: int, length: float, width: float) -> bytes:
     return "".join(f"{x:.2f} {y:.2f} {z:.2f}\n" for x, y, z in points).encode()
 
 
+def _mesh(faces: int, size: float) -> bytes:
+    corners = _draws.random((1000, 3)) * (size, size, 3.0)
+    vertices = "".join(f"v {x:.2f} {y:.2f} {z:.2f}\n" for x, y, z in corners)
+    return (vertices + "".join(f"f {i} {j} {k}\n" for i, j, k in _draws.integers(1, 1001, (faces, 3)))).encode()
+
+
 def _segments(line: str, count: int, size: int) -> bytes:
     ends = _draws.integers(0, size, (count, 4))
     return "".join(line.format(*row) for row in ends).encode()[:MOST_BYTES]
@@ -252,6 +258,8 @@ CASES: dict[str, tuple[str, Callable[[], bytes]]] = {
     "a long thin cloud": ("cloud_lines.xyz", lambda: _points(190, 770.0, 3.0)),
     "a far cloud": ("cloud_lines.xyz", lambda: _points(10, 1e6, 1e6)),
     "a cloud of one place": ("cloud_lines.xyz", lambda: _repeated("1 1 0\n")),
+    "a mesh": ("cloud_mesh.obj", lambda: _repeated("f 1 2 3\n", "v 0 0 0\nv 9 0 0\nv 0 9 0\nv 0 0 9\n", "f 1 2 4\n")),
+    "a wide mesh": ("cloud_mesh.obj", lambda: _mesh(30_000, 900.0)),
     "a pose": ("pose.txt", lambda: _repeated("0 0 1 0.5\n")),
     "boxes of a sparse map": ("sparse_text.txt", lambda: _repeated("box 0 0 0 1 1 1\n")),
     "curves": ("splines.json", lambda: _repeated('{"knots":[0,1],"points":[[0,0]]},', '{"curves":[', "{}]}")),

@@ -19,8 +19,8 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.point_clouds.point_cloud import numbered
@@ -70,12 +70,13 @@ def usable_points(points: NDArray[np.floating], range_m: float | None = None) ->
     (M, 3) float64
         Points, in their order [m].
     """
-    cloud = np.asarray(points, np.float64)
+    cloud = np.array(points, np.float64)
     if cloud.ndim != 2 or cloud.shape[1] != 3:
         raise ValueError(f"points have shape {cloud.shape}; want (N, 3)")
     if len(cloud) == 0:
         raise ValueError("the cloud has no points; want some")
-    finite = cloud[np.isfinite(cloud).all(axis=1)]
+    is_finite = np.isfinite(cloud)
+    finite = cloud if is_finite.all() else cloud[is_finite.all(axis=1)]
     if len(finite) == 0:
         raise ValueError(f"none of the {len(cloud):,} points of the cloud is finite; want numbers")
     if range_m is not None:
@@ -107,13 +108,34 @@ def voxels_of(points: NDArray[np.float64], side: float) -> _Voxels:
     """
     if side <= 0.0 or len(points) == 0:
         return _Voxels(points, np.ones(len(points)), np.arange(len(points)))
-    cells = np.floor((points - points.min(axis=0)) / side).astype(np.int64)
-    cells = np.minimum(cells, (1 << _CELL_BITS) - 1)
-    keys = (cells[:, 2] << 2 * _CELL_BITS) | (cells[:, 1] << _CELL_BITS) | cells[:, 0]
-    labels, count = numbered(keys)
-    weights = np.bincount(labels, minlength=count).astype(np.float64)
-    sums = np.stack([np.bincount(labels, points[:, axis]) for axis in range(3)], axis=1)
-    return _Voxels(sums / weights[:, None], weights, labels)
+    labels, count = numbered(_voxel_keys(points, points.min(axis=0), side))
+    means, weights = _voxel_means(points, labels, count)
+    return _Voxels(means, weights, labels)
+
+
+@kernel
+def _voxel_keys(points: Array, low: Array, side: float) -> NDArray[np.int64]:
+    """Return the number of each point's voxel, counted from the lowest corner."""
+    keys = np.zeros(len(points), np.int64)
+    for k in range(len(points)):
+        for axis in (2, 1, 0):
+            cell = min(math.floor((points[k, axis] - low[axis]) / side), (1 << _CELL_BITS) - 1)
+            keys[k] = (keys[k] << _CELL_BITS) | cell
+    return keys
+
+
+@kernel
+def _voxel_means(points: Array, labels: Array, count: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the mean of each voxel's points, and their number."""
+    means, weights = np.zeros((count, 3)), np.zeros(count)
+    for k in range(len(points)):
+        weights[labels[k]] += 1.0
+        for axis in range(3):
+            means[labels[k], axis] += points[k, axis]
+    for voxel in range(count):
+        for axis in range(3):
+            means[voxel, axis] /= weights[voxel]
+    return means, weights
 
 
 _NEIGHBOURS = 16
@@ -137,7 +159,7 @@ def _hangs_over(points: NDArray[np.float64], floor: FloorPlane, settings: Mapper
     if len(low) == 0:
         return np.ones(len(points), np.bool_)
     # A ramp rises from the floor no steeper than its slope allows.
-    gaps = cKDTree(low).query(aside)[0]
+    gaps = scipy.spatial.cKDTree(low).query(aside)[0]
     return np.asarray(reach > gaps * math.tan(settings.most_slope))
 
 
@@ -146,7 +168,7 @@ def _surface_normals(points: NDArray[np.float64]) -> NDArray[np.float64]:
     count = min(_NEIGHBOURS, len(points))
     if count < 3:
         return np.zeros(points.shape)
-    near = points[np.reshape(cKDTree(points).query(points, count)[1], (len(points), count))]
+    near = points[np.reshape(scipy.spatial.cKDTree(points).query(points, count)[1], (len(points), count))]
     near = near - near.mean(axis=1, keepdims=True)
     return np.asarray(np.linalg.eigh(np.einsum("nki,nkj->nij", near, near))[1][:, :, 0])
 
