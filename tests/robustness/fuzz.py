@@ -109,13 +109,18 @@ def _run_worker(kind: str, samples: Path, seed: int, first: int, last: int, tall
                 return (first if current is None else current) + 1
             if line is None:
                 break
-            word, number, *rest = line.split(" ", 2)
+            word, *rest = line.split(" ", 2)
             if word == "begin":
                 # The first case imports and loads what the others find.
-                current, patience = int(number), STARTS_S if int(number) == first else HANGS_S
+                current = int(rest[0])
+                patience = STARTS_S if current == first else HANGS_S
                 (began_s, _), waited = _cpu_s(worker.pid), 0
+            elif word == "compiling":
+                patience = STARTS_S
+            elif word == "compiled":  # the case begins anew
+                patience, (began_s, _), waited = HANGS_S, _cpu_s(worker.pid), 0
             elif word == "end":
-                tally.add(int(number), json.loads(rest[0]))
+                tally.add(int(rest[0]), json.loads(rest[1]))
                 current = None
         if worker.wait() == 0:
             return last

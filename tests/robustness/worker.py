@@ -1,7 +1,8 @@
 """Runs cases one after the other in a process of its own, and tells of each on standard output.
 
 A line ``begin N`` precedes case N, a line ``end N OUTCOME`` follows it; who reads the lines sees which case
-a process died of, or never came back from.
+a process died of, or never came back from. While kernels are compiled, which counts to no case, lines
+``compiling`` and ``compiled`` tell of it.
 """
 
 import json
@@ -16,6 +17,8 @@ import traceback
 import warnings
 from collections.abc import Callable
 from pathlib import Path
+
+from numba.core.event import Listener, register
 
 MOST_MESSAGE = 500
 AGAIN_S = 0.5
@@ -85,6 +88,22 @@ def read_all(samples: list[Path], folder: Path) -> None:
             use(folder / sample.name)
 
 
+class _Compiling(Listener):
+    """Tells when a kernel and those that it calls begin to be compiled, and when they are."""
+
+    depth = 0
+
+    def on_start(self, event: object) -> None:
+        if self.depth == 0:
+            print("compiling", flush=True)
+        self.depth += 1
+
+    def on_end(self, event: object) -> None:
+        self.depth -= 1
+        if self.depth == 0:
+            print("compiled", flush=True)
+
+
 def setting_case(seed: int, number: int) -> Callable[[], object]:
     """Return what makes and steps an environment of extreme settings."""
     from robustness.extremes import try_settings
@@ -97,6 +116,7 @@ def main(kind: str, samples_folder: str, seed: int, first: int, last: int) -> No
     warnings.simplefilter("ignore")
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    register("numba:compile", _Compiling())
     samples = sorted(path for path in Path(samples_folder).iterdir() if path.is_file())
     with tempfile.TemporaryDirectory() as folder:
         print(f"begin {first}", flush=True)
