@@ -4,8 +4,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from lidarium.envs.settings.faults import NO_FAULTS, FaultSettings
 from lidarium.envs.settings.lidar import Lidar, by_robot
@@ -165,7 +165,7 @@ class KinematicWorld:
         if self._faults.capacity == 0:
             return np.zeros((self.robots, 0))
         x, y = floor.laser.origin
-        room = np.asarray(ndimage.distance_transform_edt(free)) * floor.laser.resolution
+        room = np.asarray(scipy.ndimage.distance_transform_edt(free)) * floor.laser.resolution
         rows, columns = np.nonzero(room > self.bodies[:, RADIUS].max() + floor.laser.resolution)
         places = (np.stack([columns, rows], axis=1) + 0.5) * floor.laser.resolution + (x, y)
         somewhere = np.asarray(places if len(places) else starts[:, :2], np.float64)

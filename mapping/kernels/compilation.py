@@ -28,7 +28,8 @@ import llvmlite.binding
 import numba
 import numpy as np
 from numba.core import config, event
-from numba.core.caching import FunctionCache
+from numba.core.caching import CompileResultCacheImpl, FunctionCache
+from numba.core.codegen import JITCodeLibrary
 from numpy.typing import NDArray
 
 from lidarium.mapping.kernels.cache_folders import cache_folder
@@ -46,6 +47,8 @@ Array = NDArray[Any]
 
 _numba_config: Any = config
 _caching: Any = FunctionCache
+_rebuilding: Any = CompileResultCacheImpl
+_libraries: Any = JITCodeLibrary
 _events: Any = event
 _llvm: Any = llvmlite.binding
 
@@ -174,7 +177,9 @@ class _Callee:
 
     @functools.cached_property
     def _is_long(self) -> bool:
-        return self._origin in _by_origin and len(self._module().as_bitcode()) > LONGEST_LINKED
+        if self._origin not in _by_origin:
+            return False
+        return len(getattr(self._form.library, "bitcode", None) or self._module().as_bitcode()) > LONGEST_LINKED
 
     @property
     def _reload_init(self) -> set[Callable[[], None]]:
@@ -250,8 +255,47 @@ _events.register("numba:compile", _WithoutCollection())
 # -- Cache -------------------------------------------------------------------------------------------------
 
 
+class _LoadedLibrary(_libraries):
+    """A kernel's machine code from the cache. Numba parses its bitcode at once; here a caller that links it does."""
+
+    def __init__(self, codegen: Any, state: tuple[str, str, tuple[bytes, bytes]]) -> None:  # noqa: ANN401
+        name, _, (self._code, self.bitcode) = state
+        super().__init__(codegen, name)
+        self.enable_object_caching()
+        self._set_compiled_object(self._code)
+        self._finalize_final_module()
+
+    @functools.cached_property
+    def _module(self) -> Any:  # noqa: ANN401
+        return _llvm.parse_bitcode(self.bitcode)
+
+    def _get_module_for_linking(self) -> Any:  # noqa: ANN401
+        return self._module
+
+    def get_pointer_to_function(self, name: str) -> int:
+        """Return the address of a function, 0 if the code has none of that name."""
+        self._ensure_finalized()
+        return int(self._codegen._engine.get_function_address(name)) if name.encode() in self._code else 0
+
+
+class _Rebuilding(_rebuilding):
+    """How numba makes a kernel of what the cache holds."""
+
+    def rebuild(self, target_context: Any, payload: Any) -> Any:  # noqa: ANN401
+        """Return the compiled form."""
+        codegen = target_context.codegen()
+        before = codegen.unserialize_library  # a kernel loads those that it calls
+        codegen.unserialize_library = functools.partial(_LoadedLibrary, codegen)
+        try:
+            return super().rebuild(target_context, payload)
+        finally:
+            codegen.unserialize_library = before
+
+
 class _KernelCache(_caching):
     """Numba's cache of a function that survives full disks, closed folders and damaged files."""
+
+    _impl_class = _Rebuilding
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:  # noqa: ANN401
         """Return the compiled form for types of arguments, or None if there is none or it is damaged."""

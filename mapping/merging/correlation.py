@@ -13,7 +13,7 @@ from typing import Annotated
 
 import cv2
 import numpy as np
-import scipy.fft
+import scipy
 from numpy.typing import NDArray
 
 from lidarium.mapping.geometry.bounds import FromZero, Length, check_settings, within

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
-import scipy.fft
+import scipy
 from numpy.typing import NDArray
 
 from lidarium.mapping.geometry.bounds import Count, Length, check_settings, share, within

@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from lidarium.mapping.geometry.bounds import above, check_settings, within
 from lidarium.mapping.kernels.compilation import Array, kernel
@@ -267,7 +267,7 @@ def _nodes_with_room(
     found, own = np.concatenate([nodes[stands], moved]), int(stands.sum())
     if merge_radius <= 0.0 or len(moved) == 0:
         return found
-    pairs = cKDTree(found).query_pairs(merge_radius, output_type="ndarray")
+    pairs = scipy.spatial.cKDTree(found).query_pairs(merge_radius, output_type="ndarray")
     pairs = pairs[np.argsort(pairs[:, 1], kind="stable")]
     return np.asarray(found[_are_kept(len(found), own, pairs)])
 
@@ -492,7 +492,7 @@ def _nodes_beside(
         outward = np.array([2.0 * x - 1.0, 2.0 * y - 1.0])
         found += [corners + outward * away * share for share in ((1.0, 0.0), (0.0, 1.0), (math.sqrt(0.5),) * 2)]
     places = np.concatenate(found)
-    nodes = np.column_stack([places, free[cKDTree(free[:, :2]).query(places)[1], 2]])
+    nodes = np.column_stack([places, free[scipy.spatial.cKDTree(free[:, :2]).query(places)[1], 2]])
     nodes = reduced_nodes(nodes[standing_nodes(nodes, index, body)], RIM_MERGE_M)
     return nodes[standing_nodes(nodes, index, body)]
 

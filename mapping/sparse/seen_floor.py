@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from lidarium.mapping.sparse.floor_plane import FloorPlane
 
@@ -236,7 +236,7 @@ class FloorPoints:
         )
         steps = np.full((rows, columns), UNSEEN, np.uint8)
         if own.any():
-            nearest = ndimage.distance_transform_edt(~own, return_distances=False, return_indices=True)
+            nearest = scipy.ndimage.distance_transform_edt(~own, return_distances=False, return_indices=True)
             np.divide(sums, np.maximum(counts, 1.0, out=counts), out=sums)  # in place: maps may be large
             heights = np.empty((rows, columns), np.float32)
             for row in range(rows):  # one at a time: numpy makes indices four times as large as heights

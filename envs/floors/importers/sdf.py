@@ -18,8 +18,8 @@ from xml.parsers import expat
 
 import cv2
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from lidarium.envs.floors.drawing import fill_shapes
 from lidarium.envs.floors.floor import CEILING, Floor, Solid, check_extent
@@ -312,14 +312,14 @@ def _pose(path: Path, element: Element) -> Pose:
     if found is not None and found.get("rotation_format") == "quat_xyzw":
         x, y, z, *quaternion = _numbers(path, text or "0 0 0 0 0 0 1", 7, "pose")
         pose = np.eye(4)
-        pose[:3, :3] = Rotation.from_quat(quaternion).as_matrix()
+        pose[:3, :3] = scipy.spatial.transform.Rotation.from_quat(quaternion).as_matrix()
         pose[:3, 3] = x, y, z
         return pose
     x, y, z, roll, pitch, yaw = _numbers(path, text if text.strip() else "0 0 0 0 0 0", 6, "pose")
     if found is not None and found.get("degrees") in ("true", "1"):
         roll, pitch, yaw = (math.radians(angle) for angle in (roll, pitch, yaw))
     pose = np.eye(4)
-    pose[:3, :3] = Rotation.from_euler("xyz", [roll, pitch, yaw]).as_matrix()
+    pose[:3, :3] = scipy.spatial.transform.Rotation.from_euler("xyz", [roll, pitch, yaw]).as_matrix()
     pose[:3, 3] = x, y, z
     return pose
 

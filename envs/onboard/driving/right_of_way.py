@@ -4,8 +4,8 @@ import itertools
 import math
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from lidarium.envs.onboard.driving.drives import Drives, drop_path
 from lidarium.envs.onboard.driving.path_following import ARRIVED, BLOCKED, DRIVING, IDLE
@@ -69,7 +69,7 @@ def find_refuge(
     (row, column) or None
         The cell with the lowest path cost; None if no cell is suitable.
     """
-    tree = cKDTree(_sampled(path))
+    tree = scipy.spatial.cKDTree(_sampled(path))
     for farthest in FARTHEST_REFUGE:
         found = search(
             navigation.space,

@@ -6,8 +6,8 @@ A 32-bit hash of the counter picks one entry from each of two tables; the sum of
 """
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.special import ndtri
 
 from lidarium.mapping.kernels.compilation import Array, kernel
 
@@ -16,7 +16,7 @@ TABLE_SIZE = 4096
 
 def _half_variance_table() -> NDArray[np.float32]:
     """Quantiles of a Gaussian of variance 1/2, scaled to have that variance exactly."""
-    quantiles = ndtri((np.arange(TABLE_SIZE) + 0.5) / TABLE_SIZE)
+    quantiles = scipy.special.ndtri((np.arange(TABLE_SIZE) + 0.5) / TABLE_SIZE)
     return np.asarray(quantiles * np.sqrt(0.5 / np.mean(quantiles**2)), np.float32)
 
 

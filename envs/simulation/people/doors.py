@@ -4,8 +4,8 @@ from functools import lru_cache
 
 import cv2
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from lidarium.envs.floors.drawing import draw_segments
 from lidarium.envs.floors.floor import Floor
@@ -61,7 +61,7 @@ def openings_of(walls: Raster) -> NDArray[np.float64]:
     and more room before and behind.
     """
     resolution, (rows, columns) = walls.resolution, walls.solid.shape
-    far, nearest = ndimage.distance_transform_edt(walls.solid == 0, return_indices=True)
+    far, nearest = scipy.ndimage.distance_transform_edt(walls.solid == 0, return_indices=True)
     far = far * resolution
     i, j = np.nonzero((far >= 0.5 * NARROWEST_M) & (far <= 0.5 * WIDEST_M + resolution))
     wall = nearest[:, i, j]

@@ -10,8 +10,8 @@ from dataclasses import dataclass, field
 
 import cv2
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from lidarium.envs.floors.raster import Raster
 from lidarium.envs.simulation.kernels.contact import distance_bound
@@ -94,7 +94,7 @@ def walkways_of(raster: Raster) -> Walkways:
     solid = np.ascontiguousarray(raster.solid, np.uint8)
     cell = max(round(LATTICE_M / raster.resolution), 1)
     rows, columns = solid.shape[0] // cell, solid.shape[1] // cell
-    far = ndimage.distance_transform_edt(solid == 0)[cell // 2 :: cell, cell // 2 :: cell][:rows, :columns]
+    far = scipy.ndimage.distance_transform_edt(solid == 0)[cell // 2 :: cell, cell // 2 :: cell][:rows, :columns]
     clearance = np.ascontiguousarray(np.maximum((far - 0.5) * raster.resolution, 0.0), np.float32)
     _, labels, sizes, _ = cv2.connectedComponentsWithStats((clearance >= ROOM_M).view(np.uint8), connectivity=4)
     is_any = len(sizes) > 1

@@ -5,8 +5,8 @@ free space. Boxes are compared with all points that were seen, and divided where
 """
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from lidarium.mapping.sparse.mapper.frame_coding import split_points
 from lidarium.mapping.sparse.mapper.merging import are_covered
@@ -63,7 +63,7 @@ class SeenPoints:
         return (cells - (1 << (_BITS - 1)) + 0.5) * CELL_M
 
 
-def empty_shares(boxes: NDArray[np.float64], points: cKDTree, near: float) -> NDArray[np.float64]:
+def empty_shares(boxes: NDArray[np.float64], points: "scipy.spatial.cKDTree", near: float) -> NDArray[np.float64]:
     """Return the share of each box (M, 2, 3) that is farther than a distance [m] from all points, (M,)."""
     sizes = boxes[:, 1] - boxes[:, 0]
     counts = np.maximum(np.ceil(sizes / _SAMPLE_M).astype(np.int64), 1)
@@ -88,7 +88,7 @@ def empty_shares(boxes: NDArray[np.float64], points: cKDTree, near: float) -> ND
     return found
 
 
-def near_distance(points: cKDTree) -> float:
+def near_distance(points: "scipy.spatial.cKDTree") -> float:
     """Return how far from all points a place is empty [m]."""
     some = points.data[:: max(points.n // _SOME_POINTS, 1)]
     if points.n < 2:
@@ -109,7 +109,7 @@ def fitted_codes(codes: OccupiedCodes, points: NDArray[np.float64], frame: int =
     """
     if len(points) == 0:
         return codes
-    tree = cKDTree(points)
+    tree = scipy.spatial.cKDTree(points)
     near = near_distance(tree)
     is_empty = empty_shares(codes.boxes, tree, near) > MOST_EMPTY
     kept = codes.taken(~is_empty)
@@ -132,7 +132,7 @@ def unlike_points(sparse_map: SparseMap, points: NDArray[np.float64]) -> dict[st
     is_inner = split_points(obstacles - CELL_M * sparse_map.floor.normal, sparse_map.floor, sparse_map.settings)[0]
     wide = sparse_map.boxes + np.array([[-CELL_M], [CELL_M]])
     missed = ~are_covered(is_inner + CELL_M * sparse_map.floor.normal, wide)
-    tree = cKDTree(obstacles)
+    tree = scipy.spatial.cKDTree(obstacles)
     shares = empty_shares(sparse_map.boxes, tree, near_distance(tree))
     return {"points": int(np.count_nonzero(missed)), "boxes": int(np.count_nonzero(shares > MOST_EMPTY + 0.05))}
 
@@ -146,7 +146,7 @@ def _groups(points: NDArray[np.float64]) -> list[NDArray[np.float64]]:
     return np.split(points[order], np.flatnonzero(np.diff(labels[order])) + 1)
 
 
-def _divided(points: NDArray[np.float64], tree: cKDTree, near: float) -> NDArray[np.float64]:
+def _divided(points: NDArray[np.float64], tree: "scipy.spatial.cKDTree", near: float) -> NDArray[np.float64]:
     """Return the boxes around cells (N, 3), divided until none is mostly empty, (M, 2, 3)."""
     waiting, found = [points] if len(points) else [], []
     while waiting:

@@ -3,8 +3,8 @@
 import math
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.sparse.settings import MapperSettings
@@ -198,7 +198,7 @@ def are_near(points: NDArray[np.float64], nodes: NDArray[np.float64], distance: 
     """Return which points (N, 3) are near [m] to one of nodes (M, 3), (N,) bool."""
     if len(nodes) == 0 or len(points) == 0:
         return np.zeros(len(points), np.bool_)
-    gaps = cKDTree(nodes).query(points, distance_upper_bound=distance)[0]
+    gaps = scipy.spatial.cKDTree(nodes).query(points, distance_upper_bound=distance)[0]
     return np.asarray(gaps <= distance)
 
 

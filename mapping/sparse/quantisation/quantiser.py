@@ -7,8 +7,8 @@ from functools import cache, partial
 from typing import Annotated, Any
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy.spatial import cKDTree
 
 from lidarium.mapping.geometry.bounds import Counted, above, check_settings
 from lidarium.mapping.kernels.compilation import Array, kernel
@@ -216,7 +216,7 @@ def _merging_costs(
         Numbers of the neighbours.
     """
     count = min(neighbours + 1, len(codes))
-    found: Any = cKDTree(codes).query(codes, count)
+    found: Any = scipy.spatial.cKDTree(codes).query(codes, count)
     distances, near = found
     own, other = masses[:, None], masses[near]
     ward = distances**2 * own * other / np.maximum(own + other, np.finfo(np.float64).tiny)
