@@ -17,7 +17,6 @@ import gc
 import hashlib
 import importlib
 import os
-import re
 import sys
 import warnings
 from collections.abc import Callable
@@ -62,19 +61,21 @@ NUMBA_SETTINGS = ("BOUNDSCHECK", "DEBUGINFO_DEFAULT", "OPT", "LOOP_VECTORIZE", "
 """Settings of numba that change compiled code and that its own cache ignores."""
 
 _ROOT = Path(__file__).resolve().parents[2]
-_IMPORTS = re.compile(rb"^from lidarium\.([\w.]+) import", re.MULTILINE)
 
 
 def key_sources(root: Path = _ROOT) -> list[Path]:
     """Return the sources of compiled kernels: files with kernels, this package, and their imports."""
-    found: set[Path] = set()
+    found, imported = set[Path](), set[bytes]()
     for folder in PACKAGE_FOLDERS:
-        for path in (root / folder).rglob("*.py"):
-            source = path.read_bytes()
-            if b"@kernel" in source or "kernels" in path.parts:
-                modules = (root / f"{name.decode().replace('.', '/')}.py" for name in _IMPORTS.findall(source))
-                found.update((path, *filter(Path.is_file, modules)))
-    return sorted(found)
+        for place, folders, names in os.walk(root / folder):
+            folders[:] = [name for name in folders if name != "__pycache__"]  # which may hold all compiled kernels
+            for path in (Path(place, name) for name in names if name.endswith(".py")):
+                source = path.read_bytes()
+                if b"@kernel" in source or "kernels" in path.parts:
+                    found.add(path)
+                    imported.update(line.partition(b" ")[0] for line in (b"\n" + source).split(b"\nfrom lidarium.")[1:])
+    modules = (root / f"{name.decode().replace('.', '/')}.py" for name in imported)
+    return sorted(found.union(filter(Path.is_file, modules)))
 
 
 def _sources_hash(root: Path = _ROOT) -> str:

@@ -5,8 +5,9 @@ It does not depend on the order of threads or rows.
 A 32-bit hash of the counter picks one entry from each of two tables; the sum of the two entries is Gaussian.
 """
 
+from statistics import NormalDist
+
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 
 from lidarium.mapping.kernels.compilation import Array, kernel
@@ -16,7 +17,7 @@ TABLE_SIZE = 4096
 
 def _half_variance_table() -> NDArray[np.float32]:
     """Quantiles of a Gaussian of variance 1/2, scaled to have that variance exactly."""
-    quantiles = scipy.special.ndtri((np.arange(TABLE_SIZE) + 0.5) / TABLE_SIZE)
+    quantiles = np.array([NormalDist().inv_cdf((k + 0.5) / TABLE_SIZE) for k in range(TABLE_SIZE)])
     return np.asarray(quantiles * np.sqrt(0.5 / np.mean(quantiles**2)), np.float32)
 
 
