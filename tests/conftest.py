@@ -43,13 +43,15 @@ def shared_cases() -> Path:
 
 _FIRST = (
     "test_golden_episodes.py",
+    "test_slam.py",
+    "test_conformance.py",
+    "test_sparse_page.py",
+    "test_gallery.py",
+    "test_plain_loop.py",
     "test_heavy.py",
     "test_kills.py",
     "test_fuzz.py",
-    "test_slam.py",
     "test_failing_disk.py",
-    "test_conformance.py",
-    "test_plain_loop.py",
     "test_determinism.py",
     "test_equality.py",
     "test_frontier.py",
@@ -58,9 +60,10 @@ _FIRST = (
     "test_policy.py",
     "test_signals.py",
     "test_wrappers.py",
+    "test_notebooks.py",
     "test_learning_run.py",
     "test_results.py",
-    "test_sparse_page.py",
+    "test_calls.py",
 )
 """Long files. While the first compiles the kernels of environments, other processes run those that need few."""
 

@@ -107,6 +107,6 @@ def test_what_a_teammate_goes_for_is_left_to_it_and_frontiers_near_by_cost_more(
     assert _first_on_tour(hall([(3.4, 4.2), (8.0, 9.0)]), there, LIMITS, 0.8, Intent(), both) is None
 
 
-@pytest.mark.parametrize("memory", [hall([]), hall([(3.0, 3.5)]), RegionMemory([])])
-def test_there_is_no_tour_without_frontiers_of_that_length(memory):
-    assert _first_on_tour(memory, senses_at(5.0, 2.0), LIMITS, 0.8, Intent(), ()) is None
+@pytest.mark.parametrize("remembered", [lambda: hall([]), lambda: hall([(3.0, 3.5)]), lambda: RegionMemory([])])
+def test_there_is_no_tour_without_frontiers_of_that_length(remembered):
+    assert _first_on_tour(remembered(), senses_at(5.0, 2.0), LIMITS, 0.8, Intent(), ()) is None

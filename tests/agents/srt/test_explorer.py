@@ -1,5 +1,6 @@
 """One robot of the tree: it looks around, goes where it is open, and home when it is done."""
 
+import functools
 import math
 from itertools import pairwise
 
@@ -146,7 +147,11 @@ def test_a_robot_that_is_held_backs_out():
 
 
 TREE_GROWTH_LIDAR = Lidar(beams=360, field_of_view=2.0 * math.pi, range_max=6.0)
-MEMORY = hall([])
+
+
+@functools.cache
+def memory_of_hall():
+    return hall([])
 
 
 def at(x, y, ranges=2.0):
@@ -156,7 +161,7 @@ def at(x, y, ranges=2.0):
 
 def planted(tree=None, agent="robot_0", **settings):
     growth = _TreeGrowth(agent, tree or Tree(), SrtSettings(**settings), TREE_GROWTH_LIDAR, RADIUS)
-    growth.plant(at(4.0, 3.0), MEMORY)
+    growth.plant(at(4.0, 3.0), memory_of_hall())
     return growth
 
 
@@ -170,9 +175,9 @@ def test_the_first_node_is_the_root_where_the_robot_is():
 
 def test_a_robot_makes_a_node_only_apart_from_its_last_one():
     growth = planted()
-    growth.add_if_apart(at(4.0 + 0.9 * NEW_NODE, 3.0), MEMORY)
+    growth.add_if_apart(at(4.0 + 0.9 * NEW_NODE, 3.0), memory_of_hall())
     assert growth.count == 1
-    growth.add_if_apart(at(5.0, 3.0), MEMORY)
+    growth.add_if_apart(at(5.0, 3.0), memory_of_hall())
     assert (growth.count, growth.number, growth.node.parent) == (2, 1, 0)
     assert 0 in growth.node.neighbours
 
@@ -191,7 +196,7 @@ def test_another_scan_at_a_place_shows_what_the_first_did_not():
     growth = _TreeGrowth("robot_0", Tree(), SrtSettings(), TREE_GROWTH_LIDAR, RADIUS)
     blind = at(4.0, 3.0)
     blind.scan[TREE_GROWTH_LIDAR.beams // 4 : 3 * TREE_GROWTH_LIDAR.beams // 4] = np.nan  # nothing is known ahead
-    growth.plant(blind, MEMORY)
+    growth.plant(blind, memory_of_hall())
     ahead, behind = np.array([5.0, 3.0]), np.array([3.0, 3.0])
     assert not growth.node.safe.contains(ahead)
     assert growth.node.safe.contains(behind)

@@ -1,5 +1,6 @@
 """A memory that relies on the robot's map."""
 
+import functools
 from itertools import pairwise
 
 import numpy as np
@@ -22,25 +23,29 @@ def test_ways_between_frontiers_are_no_longer_than_past_the_robot():
 
 
 # Places are counted from the map's first cell: the hall's lower left corner is at (1, 1) m.
-MEMORY = hall([(3.0, 4.0)])
+
+
+@functools.cache
+def memory_of_hall():
+    return hall([(3.0, 4.0)])
 
 
 def test_space_is_seen_where_it_is_known_beside_walls_and_beyond_the_map():
     points = np.array([[5.0, 3.0], [4.5, 5.5], [4.1, 5.03], [-1.0, 3.0], [12.0, 5.5]])
-    assert MEMORY.is_seen(points, None).tolist() == [True, False, True, True, False]
+    assert memory_of_hall().is_seen(points, None).tolist() == [True, False, True, True, False]
 
 
 def test_a_straight_way_is_clear_over_free_cells_with_room_for_the_body():
     here = np.array([2.0, 3.0])
-    assert MEMORY.is_clear(here, np.array([9.0, 3.0]))
-    assert not MEMORY.is_clear(here, np.array([9.0, 1.15]))
-    assert not MEMORY.is_clear(here, np.array([4.5, 5.5]))
+    assert memory_of_hall().is_clear(here, np.array([9.0, 3.0]))
+    assert not memory_of_hall().is_clear(here, np.array([9.0, 1.15]))
+    assert not memory_of_hall().is_clear(here, np.array([4.5, 5.5]))
     # A robot may begin nearer to a wall than it would go.
-    assert MEMORY.is_clear(np.array([2.0, 1.15]), np.array([2.0, 3.0]))
+    assert memory_of_hall().is_clear(np.array([2.0, 1.15]), np.array([2.0, 3.0]))
 
 
 def test_a_way_goes_round_what_is_in_between_in_clear_legs():
-    log_odds = MEMORY._map.log_odds.copy()
+    log_odds = memory_of_hall()._map.log_odds.copy()
     log_odds[20:80, 120:130] = 40
     navigation = NavigationMap(log_odds, RESOLUTION)
     navigation.changed((0, 120, 0, 320))
@@ -55,15 +60,17 @@ def test_a_way_goes_round_what_is_in_between_in_clear_legs():
 
 def test_there_is_no_way_to_what_is_not_free():
     for end in ((4.5, 5.5), (4.0, 1.0), (50.0, 3.0)):
-        assert MEMORY.way(np.array([2.0, 3.0]), np.array(end)) is None
+        assert memory_of_hall().way(np.array([2.0, 3.0]), np.array(end)) is None
 
 
 def test_a_frontier_is_found_with_the_way_to_it_if_it_is_long_enough():
-    found = MEMORY.frontiers(np.array([2.0, 3.0]), 0.5, 5)
+    found = memory_of_hall().frontiers(np.array([2.0, 3.0]), 0.5, 5)
     assert len(found.sizes) == 1
     assert 4.0 <= found.focuses[0, 0] <= 5.0
-    assert MEMORY.frontiers(np.array([2.0, 3.0]), 2.0, 5) is None
-    np.testing.assert_allclose(found.legs(0)[-1], MEMORY.frontiers(found.legs(0)[-1], 0.5, 5).ahead[0], atol=0.1)
+    assert memory_of_hall().frontiers(np.array([2.0, 3.0]), 2.0, 5) is None
+    np.testing.assert_allclose(
+        found.legs(0)[-1], memory_of_hall().frontiers(found.legs(0)[-1], 0.5, 5).ahead[0], atol=0.1
+    )
 
 
 FIRST, SECOND = node(0, (0.0, 0.0), box_view()), node(1, (1.5, 0.0), box_view())

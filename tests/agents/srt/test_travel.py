@@ -1,5 +1,6 @@
 """How a robot travels along the legs of a way."""
 
+import functools
 import math
 from dataclasses import replace
 from types import SimpleNamespace
@@ -15,7 +16,11 @@ from lidarium.envs.settings.lidar import Lidar
 from lidarium.envs.settings.robots import Robot
 
 LIDAR = Lidar(beams=3)
-MEMORY = hall([])
+
+
+@functools.cache
+def memory_of_hall():
+    return hall([])
 
 
 def travel(**settings):
@@ -46,18 +51,18 @@ def test_the_target_is_what_the_last_leg_leads_to():
 def test_corners_are_cut_where_the_map_has_room():
     one, there = travel(memory="map"), senses_at(2.0, 2.0)
     one.set_out([leg(4.0, 0.5), leg(5.0, 3.0), leg(9.0, 2.0)], there)
-    one.begin_leg(there, MEMORY)
+    one.begin_leg(there, memory_of_hall())
     assert [each.candidate for each in one.legs] == ["at 9"]
     kept = travel(memory="regions")
     kept.set_out([leg(4.0, 0.5), leg(9.0, 2.0)], there)
-    kept.begin_leg(there, MEMORY)
+    kept.begin_leg(there, memory_of_hall())
     assert len(kept.legs) == 2
 
 
 def test_a_leg_ends_where_the_robot_is_at_its_end():
     one, there = travel(), senses_at(2.0, 2.0)
     one.set_out([leg(4.0, 2.0)], there)
-    one.begin_leg(there, MEMORY)
+    one.begin_leg(there, memory_of_hall())
     speed, turn_rate = one.drive(there)
     assert speed >= 0.0
     assert abs(turn_rate) < 0.1

@@ -51,15 +51,15 @@ def test_the_overlap_does_not_depend_on_where_both_curves_are(x, y, theta):
 @pytest.mark.parametrize(
     "seen",
     [
-        along(1.0, 3.0, 0.15),
-        along(3.9, 6.0),
-        along(4.5, 6.0),
-        fit_bspline([(3, 0), (2, 0), (1.5, 0), (1, 0)]).spline,
-        fit_bspline([(1, 0), (1.1, 0.1), (1.2, 0.2), (1.3, 0.3)]).spline,
+        lambda: along(1.0, 3.0, 0.15),
+        lambda: along(3.9, 6.0),
+        lambda: along(4.5, 6.0),
+        lambda: fit_bspline([(3, 0), (2, 0), (1.5, 0), (1, 0)]).spline,
+        lambda: fit_bspline([(1, 0), (1.1, 0.1), (1.2, 0.2), (1.3, 0.3)]).spline,
     ],
 )
 def test_curves_apart_short_of_overlap_opposite_or_across_are_not_of_one_wall(seen):
-    assert overlap_of(seen, along(0.0, 4.0)) is None
+    assert overlap_of(seen(), along(0.0, 4.0)) is None
 
 
 def test_the_rough_step_looks_at_control_points():

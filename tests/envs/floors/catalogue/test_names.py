@@ -34,16 +34,17 @@ def with_holes_and_goal():
 
 
 @pytest.mark.parametrize(
-    "floor",
+    "make",
     [
-        generate_building(3),
-        load_floor("apartment"),
-        with_holes_and_goal(),
-        Floor("empty", (0.0, 0.0, 1.0, 1.0)),
+        lambda: generate_building(3),
+        lambda: load_floor("apartment"),
+        with_holes_and_goal,
+        lambda: Floor("empty", (0.0, 0.0, 1.0, 1.0)),
     ],
-    ids=lambda floor: floor.name,
+    ids=["generated", "apartment", "holes", "empty"],
 )
-def test_a_floor_comes_back_to_the_bit(floor):
+def test_a_floor_comes_back_to_the_bit(make):
+    floor = make()
     back = _unpacked_floor(_packed_floor(floor))
     assert (back.name, back.bounds, back.goal) == (floor.name, floor.bounds, floor.goal)
     assert np.array_equal(back.starts, floor.starts)

@@ -87,9 +87,12 @@ def refuse(*_):
 
 
 @pytest.mark.parametrize(
-    "floor", [load_floor("apartment"), generate_building(5), box(4.0)], ids=lambda floor: floor.name
+    "make",
+    [lambda: load_floor("apartment"), lambda: generate_building(5), lambda: box(4.0)],
+    ids=["apartment", "generated", "box"],
 )
-def test_tables_are_the_same_to_the_bit_from_cache_store_and_made_anew(floor, own_store, monkeypatch):
+def test_tables_are_the_same_to_the_bit_from_cache_store_and_made_anew(make, own_store, monkeypatch):
+    floor = make()
     fresh = FloorTables.of_floor(floor, *HEIGHTS)
     made = floor_tables(floor, *HEIGHTS)
     monkeypatch.setattr(FloorTables, "of_floor", refuse)
