@@ -4,7 +4,7 @@ import time
 import zlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -59,17 +59,6 @@ class Family:
         """The time that a fifth of the runs of the first policy miss [s]."""
         return float(self.times.ppf(1.0 - CENSORED))
 
-    def cut_scale(self) -> float:
-        """Return the mean of exponential cuts that come before a fifth of the times [s]."""
-
-        def excess(logarithm: float) -> float:
-            rate = np.exp(-logarithm)
-            return float(integrate.quad(lambda rank: np.exp(-rate * self.times.ppf(rank)), 0.0, 1.0)[0]) - (
-                1.0 - CENSORED
-            )
-
-        return float(np.exp(optimize.brentq(excess, 3.0, 9.0)))
-
     def restricted(self, horizon: float, scale: float = 1.0) -> float:
         """Return the true restricted mean of the times, stretched by a scale [s]."""
         return float(scale * integrate.quad(self.times.sf, 0.0, horizon / scale)[0])
@@ -82,6 +71,17 @@ FAMILIES = (
     Family("lognormal, sigma 1", stats.lognorm(1.0, scale=100.0), is_asked_for=False),
 )
 ASKED_FOR = tuple(family for family in FAMILIES if family.is_asked_for)
+
+
+@cache
+def _cut_scale(times: Any) -> float:  # noqa: ANN401
+    """Return the mean of exponential cuts that come before a fifth of the times [s]."""
+
+    def excess(logarithm: float) -> float:
+        rate = np.exp(-logarithm)
+        return float(integrate.quad(lambda rank: np.exp(-rate * times.ppf(rank)), 0.0, 1.0)[0]) - (1.0 - CENSORED)
+
+    return float(np.exp(optimize.brentq(excess, 3.0, 9.0)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -180,7 +180,7 @@ def _restricted(
     # Where runs are cut at random, hardly any is watched for very long: the horizon lies where a quarter is
     # still on its way.
     horizon = float(family.times.ppf(0.75)) if is_random else family.horizon
-    scale = family.cut_scale() if is_random else np.inf
+    scale = _cut_scale(family.times) if is_random else np.inf
 
     def censored(generator: np.random.Generator, times: Values) -> tuple[Values, NDArray[np.bool_]]:
         cuts = generator.exponential(scale, len(times)) if is_random else np.full(len(times), horizon)
