@@ -68,7 +68,7 @@ def key_sources(root: Path = _ROOT) -> list[Path]:
     found, imported = set[Path](), set[bytes]()
     for folder in PACKAGE_FOLDERS:
         for place, folders, names in os.walk(root / folder):
-            folders[:] = [name for name in folders if name != "__pycache__"]  # which may hold all compiled kernels
+            folders[:] = [name for name in folders if name != "__pycache__"]  # it may hold all compiled kernels
             for path in (Path(place, name) for name in names if name.endswith(".py")):
                 source = path.read_bytes()
                 if b"@kernel" in source or "kernels" in path.parts:
@@ -268,7 +268,12 @@ class _LoadedLibrary(_libraries):
 
     @functools.cached_property
     def _module(self) -> Any:  # noqa: ANN401
-        return _llvm.parse_bitcode(self.bitcode)
+        try:
+            return _llvm.parse_bitcode(self.bitcode)
+        except RuntimeError as error:
+            raise RuntimeError(
+                f"the compiled kernel {self.name} in {kernel_cache()} is damaged: {str(error)[:200]}; delete the folder"
+            ) from error
 
     def _get_module_for_linking(self) -> Any:  # noqa: ANN401
         return self._module
@@ -280,7 +285,7 @@ class _LoadedLibrary(_libraries):
 
 
 class _Rebuilding(_rebuilding):
-    """How numba makes a kernel of what the cache holds."""
+    """Loads cached kernels as numba does, but into libraries that do not parse bitcode at once."""
 
     def rebuild(self, target_context: Any, payload: Any) -> Any:  # noqa: ANN401
         """Return the compiled form."""

@@ -32,7 +32,7 @@ LOCK = "first_start.lock"
 """File in the cache that is locked by the process that fills it."""
 
 LINE_PERIOD_S = 5.0
-"""Interval between progress lines when standard error is no terminal [s]."""
+"""Interval between progress lines when standard error is not a terminal [s]."""
 
 SWITCH = "LIDARIUM_FIRST_START"
 """Environment variable: ``off`` compiles each kernel at its first call."""

@@ -117,7 +117,7 @@ def _run_worker(kind: str, samples: Path, seed: int, first: int, last: int, tall
                 (began_s, _), waited = _cpu_s(worker.pid), 0
             elif word == "compiling":
                 patience = STARTS_S
-            elif word == "compiled":  # the case begins anew
+            elif word == "compiled":  # compiling is not part of the case
                 patience, (began_s, _), waited = HANGS_S, _cpu_s(worker.pid), 0
             elif word == "end":
                 tally.add(int(rest[0]), json.loads(rest[1]))

@@ -1,8 +1,8 @@
 """Runs cases one after the other in a process of its own, and tells of each on standard output.
 
 A line ``begin N`` precedes case N, a line ``end N OUTCOME`` follows it; who reads the lines sees which case
-a process died of, or never came back from. While kernels are compiled, which counts to no case, lines
-``compiling`` and ``compiled`` tell of it.
+a process died of, or never came back from. The lines ``compiling`` and ``compiled`` enclose the time in which
+kernels are compiled, which is not part of any case.
 """
 
 import json
@@ -89,7 +89,7 @@ def read_all(samples: list[Path], folder: Path) -> None:
 
 
 class _Compiling(Listener):
-    """Tells when a kernel and those that it calls begin to be compiled, and when they are."""
+    """Prints when the compilation of a kernel, with the kernels that it calls, starts and ends."""
 
     depth = 0
 

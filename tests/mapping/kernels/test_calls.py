@@ -107,3 +107,18 @@ def test_a_cached_caller_finds_what_a_kernel_calls_that_was_in_the_cache_before(
     assert run("middle", of_middle) == (41.0, False)
     assert run("outer", of_outer) == (42.0, False)
     assert run("outer", of_outer) == (42.0, True)
+
+
+@pytest.mark.skipif(IS_INTERPRETED, reason="Python runs the kernels")
+def test_damaged_bitcode_of_a_cached_kernel_is_told_to_whoever_links_it(run, tmp_path):
+    assert run("inner", 10**9) == (40.0, False)
+    (code,) = (path for path in (tmp_path / "cache").rglob("*.nbc") if "inner" in path.name)
+    magic = b"BC\xc0\xde"  # LLVM, "LLVM Bitcode File Format": the first four bytes
+    assert magic in code.read_bytes()
+    code.write_bytes(code.read_bytes().replace(magic, bytes(4)))
+    assert run("inner", 10**9) == (40.0, True)
+    with pytest.raises(subprocess.CalledProcessError) as ended:
+        run("middle", 10**9)
+    assert "is damaged" in ended.value.stderr
+    assert f"{tmp_path / 'cache'}" in ended.value.stderr
+    assert "delete the folder" in ended.value.stderr

@@ -91,7 +91,7 @@ def refuse(*_):
     [lambda: load_floor("apartment"), lambda: generate_building(5), lambda: box(4.0)],
     ids=["apartment", "generated", "box"],
 )
-def test_tables_are_the_same_to_the_bit_from_cache_store_and_made_anew(make, own_store, monkeypatch):
+def test_tables_from_the_cache_and_the_store_equal_new_ones_bit_for_bit(make, own_store, monkeypatch):
     floor = make()
     fresh = FloorTables.of_floor(floor, *HEIGHTS)
     made = floor_tables(floor, *HEIGHTS)
