@@ -67,6 +67,13 @@ def test_two_robots_are_joined_rightly_redirected_and_stopped_when_the_floor_is_
     assert log.count("\n") == len(policy.decisions) + len(policy.events)
 
 
+def test_no_join_of_robots_that_know_their_starts_is_wrong_by_the_truth():
+    env = lidarium.parallel_env("apartment", robots=2, horizon_s=60.0, stop_coverage=None)
+    figures = result_of(run_episode(lidarium.policy("supervised"), env, seed=0), "supervised")["merges"]
+    assert (figures["accepted"], figures["wrong"]) == (1, 0)
+    assert figures["worst_here_m"] == pytest.approx(0.0, abs=1e-9)
+
+
 def test_a_team_is_faster_than_robots_alone_and_about_as_fast_as_one_that_is_told_its_starts():
     alone, together = finished("independent"), finished("supervised")
     told = finished("oracle_starts", reveals_starts=True)
