@@ -154,7 +154,7 @@ MAX_COORDINATE_M = 1e8
 
 _LOG = logging.getLogger(__name__)
 _ALPHA_OF_MODES: dict[str, _Alpha] = {"trinary": "averaged", "scale": "unknown", "raw": "ignored"}
-"""What map_server does with opacity in each mode."""
+"""How map_server treats opacity in each mode."""
 
 _REQUIRED = ("image", "resolution", "origin", "negate", "occupied_thresh", "free_thresh")
 _PGM_LEVELS = {OCCUPIED: 0, UNKNOWN: 205, FREE: 254}

@@ -34,7 +34,7 @@ NEAR_M, NEAR_SHARE = 0.05, 0.03
 
 
 FAR_M = 0.3
-"""What is farther off than this belongs to something else, and is no part of the mean distance [m]."""
+"""Maximum distance of points that count towards the mean [m]; those farther off belong to something else."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)

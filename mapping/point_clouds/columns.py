@@ -1,4 +1,4 @@
-"""What files of clouds hold: columns of points, normals and weights, and faces."""
+"""Contents of files of clouds: columns of points, normals and weights, and faces."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field

@@ -40,7 +40,7 @@ _MOST_PLACES = 512
 
 
 class _Kept(NamedTuple):
-    """What is kept of a map, and the inputs of its next plan. Coarse grids are absolute; most have a border of a cell.
+    """State kept of a map, and the inputs of its next plan. Coarse grids are absolute; most have a border of a cell.
 
     Attributes
     ----------
@@ -168,7 +168,7 @@ class Plans(NamedTuple):
 
 
 class TourMemory:
-    """What is kept of a map between plans; copies begin with nothing.
+    """State kept of a map between plans; copies begin with none.
 
     Parameters
     ----------
