@@ -1,7 +1,7 @@
 """The environment of a team of lidar robots (PettingZoo parallel API)."""
 
 import copy
-from collections.abc import Collection
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -282,8 +282,8 @@ class ExplorationEnv(ParallelEnv[str, Any, Any]):
         return observations, rewards, terminations, truncations, infos
 
     def _observations(self, agents: Collection[str]) -> dict[str, Any]:
-        whole, index = self._rows.observations, self._index
-        return {agent: _of_row(whole, index[agent]) for agent in agents}
+        index, rows = self._index, _split(self._rows.observations)
+        return {agent: rows[index[agent]] for agent in agents}
 
     def _infos(self, agents: Collection[str]) -> dict[str, dict[str, Any]]:
         """Return the infos of agents, from those of all rows."""
@@ -291,24 +291,29 @@ class ExplorationEnv(ParallelEnv[str, Any, Any]):
         if self.conventions.ended_agents == "zeros" and form != "none":
             active = self._rows.active
             whole = {**whole, ACTIVE: active.astype(np.float64) if form == "flat" else active}
-        found: dict[str, dict[str, Any]] = {agent: {} for agent in agents}
-        pairs = [(info, self._index[agent]) for agent, info in found.items()]
-        everyone = self.engine.everyone
+        everyone, columns, masks = self.engine.everyone, {}, []
         for name, values in whole.items():
-            if name[0] == "_":
-                continue
-            if name in self._named:  # states and orders are the same object until one changes
-                kept, listed = self._named[name]
-                if kept is not values:
-                    listed = values.tolist()
-                    self._named[name] = values, listed
-            else:
-                listed = _listed(values) if name != "camera" or form != "full" else self._calibrations()
-            mask = whole.get("_" + name, everyone)
-            for info, row in pairs:
-                if mask is everyone or mask[row]:
-                    info[name] = listed[row]
-        return found
+            if name[0] != "_":
+                columns[name] = self._listed_info(name, values)
+            elif values is not everyone:
+                masks.append((name[1:], values))
+        if not columns:
+            return {agent: {} for agent in agents}
+        infos = _by_row(columns)
+        for name, mask in masks:
+            for row in np.flatnonzero(~mask):
+                del infos[row][name]
+        return {agent: infos[self._index[agent]] for agent in agents}
+
+    def _listed_info(self, name: str, values: Any) -> list[Any]:  # noqa: ANN401
+        """Return an info of all rows as a list over rows."""
+        if name in self._named:  # states and orders are the same object until one changes
+            kept, listed = self._named[name]
+            if kept is not values:
+                listed = values.tolist()
+                self._named[name] = values, listed
+            return listed
+        return _listed(values) if name != "camera" or self.conventions.infos != "full" else self._calibrations()
 
     def _calibrations(self) -> list[dict[str, Any]]:
         camera = self.simulation.camera
@@ -472,16 +477,21 @@ class ExplorationEnv(ParallelEnv[str, Any, Any]):
         return {**self.__dict__, "_window": None}
 
 
-def _of_row(values: Any, row: int) -> Any:  # noqa: ANN401
-    if type(values) is not dict:
-        return values[row]
-    return {name: each[row] if type(each) is not dict else _of_row(each, row) for name, each in values.items()}
+def _by_row(columns: Mapping[str, Iterable[Any]]) -> list[dict[str, Any]]:
+    """Return a dict for each row from the values of all rows by name."""
+    return [dict(zip(columns, row)) for row in zip(*columns.values())]  # noqa: B905 (hot)
+
+
+def _split(observations: Any) -> Sequence[Any]:  # noqa: ANN401
+    """Return the observation of each row."""
+    if type(observations) is not dict:
+        return observations
+    return _by_row({name: _split(each) if type(each) is dict else each for name, each in observations.items()})
 
 
 def _listed(values: Any) -> list[Any]:  # noqa: ANN401
-    """Return an info of all rows as a list over rows: of values by name, a dict for each row."""
+    """Return an info of all rows as a list over rows; values by name become a dict for each row."""
     if type(values) is dict:
-        columns = [_listed(each) for each in values.values()]
-        return [dict(zip(values, row)) for row in zip(*columns)]  # noqa: B905 (hot)
+        return _by_row({name: _listed(each) for name, each in values.items()})
     listed: list[Any] = values.tolist() if values.ndim == 1 else list(values)
     return listed

@@ -82,7 +82,8 @@ class TeamRows:
         self.engine = engine
         self.conventions = conventions
         self.rows, self.episodes, self.robots = engine.rows, engine.episodes, engine.robots
-        self._robot_of = {agent: robot for robot, agent in enumerate(engine.settings.agents)}
+        self._names = engine.settings.agents
+        self._robot_of = {agent: robot for robot, agent in enumerate(self._names)}
         self._keeps = conventions.ended_agents == "zeros"
         self._merged = None if merging is None else MergedRows(engine, merging, can_talk)
         self._router = SparseRouter(engine, shares_map) if plans_sparsely else None
@@ -151,7 +152,7 @@ class TeamRows:
         after_step: AfterStep | None = None,
     ) -> None:
         """Run all live episodes by actions of rows, and begin others; see `by_row`."""
-        engine, names = self.engine, self.engine.settings.agents
+        engine, names = self.engine, self._names
         told = {row: action for row, action in actions.items() if type(action) is Stop or type(action) is Order}
         if told:
             actions = {row: action for row, action in actions.items() if row not in told}
