@@ -16,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from threadpoolctl import ThreadpoolController
 
 from lidarium.mapping.files.weight_files import WeightFiles, Weights
 from lidarium.mapping.prediction.levels import FREE, OCCUPIED
@@ -60,6 +61,11 @@ FILES = WeightFiles(shapes(), "lidarium.mapping.prediction", "prediction.safeten
 
 
 @lru_cache(maxsize=1)
+def _blas() -> ThreadpoolController:
+    return ThreadpoolController()
+
+
+@lru_cache(maxsize=1)
 def _shipped() -> Weights:
     return FILES.load()
 
@@ -88,6 +94,11 @@ class MapNetwork:
 
     def logits(self, levels: NDArray[np.int8]) -> NDArray[np.float32]:
         """Return the logarithms of the odds that squares are free, (WINDOW, WINDOW) float32."""
+        # Threads of BLAS wait for each other in loops: beside other work they took five times the time of one.
+        with _blas().limit(limits=1, user_api="blas"):
+            return self._logits(levels)
+
+    def _logits(self, levels: NDArray[np.int8]) -> NDArray[np.float32]:
         seen = np.stack([levels == OCCUPIED, levels == FREE]).astype(np.float32)
         x = np.maximum(self._layer("enter", _to_channels(seen)), 0.0)
         kept: list[NDArray[np.float32]] = []

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from threadpoolctl import ThreadpoolController
 
 from lidarium.mapping.prediction.levels import FREE, OCCUPIED, UNKNOWN, free_squares, levels_of, shares_unknown
 from lidarium.mapping.prediction.network import FILES, WINDOW, MapNetwork, shapes
@@ -46,6 +47,23 @@ def test_the_network_is_that_of_pytorch(weights):
         wanted = trained(torch.from_numpy(levels)[None])[0].sigmoid().numpy()
     np.testing.assert_allclose(MapNetwork(weights)(levels), wanted, atol=1e-4)
     assert wanted.std() > 0.05
+
+
+def test_it_predicts_on_one_thread_and_leaves_the_number_of_blas_as_it_was(weights, monkeypatch):
+    pools = ThreadpoolController().select(user_api="blas")
+    if not pools.lib_controllers:
+        pytest.skip("numpy's BLAS is not one whose threads can be counted")
+    counted, layer = set(), MapNetwork._layer
+
+    def counting(*arguments, **options):
+        counted.update(pool["num_threads"] for pool in pools.info())
+        return layer(*arguments, **options)
+
+    monkeypatch.setattr(MapNetwork, "_layer", counting)
+    with pools.limit(limits=2):
+        MapNetwork(weights)(np.zeros((WINDOW, WINDOW), np.int8))
+        assert {pool["num_threads"] for pool in pools.info()} == {2}
+    assert counted == {1}
 
 
 def test_it_has_at_most_a_million_parameters():
