@@ -106,7 +106,9 @@ def by_stage(tried: figures.Tried) -> str:
 
             cells.append(str(figures.recall(tried, of)))
         lines.append(f"| {name} | {' | '.join(cells)} |")
-    return "Recall of the default mode; early is the first of the three maps of a drive.\n\n" + "\n".join(lines)
+    return "Recall of the default mode; early is the first of the three maps of a drive.\n\n" + in_file(
+        "\n".join(lines)
+    )
 
 
 def beside_thesis(tried: dict[str, figures.Tried]) -> str:
@@ -161,15 +163,13 @@ def detectors(rows: list[dict[str, Any]]) -> str:
 
 
 def _stabilities(rows: list[dict[str, Any]]) -> str:
-    """Return how many points detectors find in all runs, if that was measured."""
+    """Return the least share of points that a detector finds in all runs, if that was measured."""
     if not all("stable" in row for row in rows):
         return ""
-    names = list(rows[0]["stable"])
-    least = {name: min(row["stable"][name] for row in rows) for name in names}
+    least = min(share for row in rows for share in row["stable"].values())
     return (
-        f"Least share of points that all of {REPEATS} runs find: "
-        + ", ".join(f"{name} {100 * share:.0f} %" for name, share in least.items())
-        + ". The thesis: 100 % of all."
+        f"The least share of points that a detector finds in all of {REPEATS} runs is {100 * least:.0f} % (the thesis: "
+        "100 %)."
     )
 
 

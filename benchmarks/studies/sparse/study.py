@@ -97,7 +97,8 @@ sizes.
 
 ## Memory
 
-Kilobytes on disk, *deflated* by zlib. Sparse maps are deflated in themselves, without their graphs.
+Kilobytes on disk, *deflated* by zlib, and ratios, beside the thesis's printed sizes. Sparse maps are deflated in
+themselves, without their graphs.
 
 {memory}
 
@@ -154,7 +155,7 @@ def page(folder: Path) -> str:
         printed_failures=printed_failures(),
         thesis_failures=in_file(thesis_failure_table(lines)),
         nodes=in_file(node_table(lines)),
-        memory=memory_table(lines),
+        memory=in_file(memory_table(lines)),
         clouds=len(clouds),
         gpu=gpu_text(clouds),
         errors=in_file(error_table(clouds)),

@@ -85,7 +85,7 @@ def page(folder: Path) -> str:
         TUNED_ON,
         "The default mode over the thesis's mode on the same seeds: ratios of sums, and least and greatest of single "
         "runs.",
-        tables.against_thesis_mode(runs),
+        in_file(tables.against_thesis_mode(runs)),
         "![Covered area over time](srt_coverage.png)",
         "## Variants of the thesis's rules",
         'The thesis\'s mode drives by MOVE_TO with the list of controls (`drive="controls"`), on stars as safe regions '
