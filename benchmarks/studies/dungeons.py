@@ -63,14 +63,12 @@ PLANNERS = {
 
 PAGE = """# Dungeons
 
-Ways of one robot on public dungeon maps, the test maps of
-[DARE](https://github.com/marmotlab/DARE) (MIT), beside those of four planners of that project on the first
-{printed} maps of its listing.
+Ways of one robot on the test maps of [DARE](https://github.com/marmotlab/DARE) (MIT), beside those of four planners
+of that project on the first {printed} maps of its listing.
 
-The sensor sees 20 m all around, cells have 0.4 m, starts are the maps' marks: as in the project. A robot of
-1 cm drives freely at 2 m/s and sees while it drives. The project's moves between the nodes of a graph, 4 m
-apart, sees at these, and ends where no node shows anything new; so its planners are beside ours, not in a
-race with them.
+As in the project, the sensor sees 20 m all around, cells have 0.4 m, and starts are the maps' marks. A robot of 1 cm
+drives freely at 2 m/s and sees while it drives. The project's robot moves between nodes 4 m apart, sees at these only,
+and ends when no node shows anything new, so this is no race with its planners.
 
 ## The same maps
 
@@ -92,9 +90,9 @@ Policies on all {count} maps: ways to 99 %, and over that of `nearest_frontier`.
 ## By ARiADNE's sensor and stop rule
 
 [ARiADNE](https://github.com/marmotlab/ARiADNE) sees 80 pixels around and ends when 250 free ones are left
-unseen; so does the preset [`ariadne`](../reference/presets.md#ariadne), with pixels of 0.1 m. Four of its
-maps are at hand, and {sisters} of the same kind from two projects beside it. Its paper prints means over a
-hundred maps, which are not at hand, nor is that table: nothing of ours stands beside it here.
+unseen; so does the preset [`ariadne`](../reference/presets.md), with pixels of 0.1 m. Four of its maps are at hand,
+and {sisters} of the same kind from two projects beside it. Its paper's table is not at hand, so nothing stands beside
+ours here.
 
 | policy | ended so | way [m] | over `nearest_frontier` | way on ARiADNE's four [m] |
 |---|---:|---:|---:|---:|

@@ -12,6 +12,7 @@ from scipy.sparse.csgraph import connected_components
 from lidarium.agents.catalogue import make_policy
 from lidarium.agents.meetings.policy import Meetings
 from lidarium.agents.policy import Policy
+from lidarium.benchmarks.results_page import in_file
 from lidarium.benchmarks.studies.shared.study import Progress, Study, Task, do_missing, kept_lines
 from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.settings.faults import Fault, FaultSettings
@@ -51,8 +52,8 @@ PAGE = """# Meetings
 
 Teams of 4 whose radio breaks (`signal` unless said otherwise), maps of 0.1 m, `realism="ideal"`, until every robot
 that lives knows {share:.0f} % of the floor, or {horizon:.0f} s, which then count. Ratios are geometric means over
-pairs on the same floor, with 95 % intervals. Starts are those of the floor. Floors are a part of 60: {offices} offices
-and {buildings} smaller buildings.
+pairs on the same floor, with 95 % intervals. Floors are a part of 60: {offices} offices and {buildings} smaller
+buildings.
 
 | figure | to reach | measured | floors | reached |
 |---|---:|---:|---:|---|
@@ -67,24 +68,21 @@ and {buildings} smaller buildings.
 ## What can be won
 
 If all robots of `oblivious` had known at once what the team knew together, they would have needed {together} of the
-time. With the ideal radio `tour_frontier` needs {ideal} of the time of `oblivious`. Meetings can win no more than
-that, less the ways to them.
+time. With the ideal radio `tour_frontier` needs {ideal} of the time of `oblivious`. Meetings cannot win more.
 
 ## By radio and team
 
 *All know*: mean time until every robot knows 99 %; *reached*: runs in which they do. *Team*: until they know it
-together. *Station*: what a listener at the first start holds when all know. *Station [s]*: mean time until it knows
-99 %, and in how many runs; teams go on until their policy ends. *Apart*: share of the time in which the team was not
-one cluster. Agreements and news cost *told* beside the maps. Bytes and *apart* are until all know.
+together. *Station*: share that a listener at the first start holds when all know. *Station [s]*: mean time until it
+knows 99 %, and in how many runs. *Apart*: share of the time in which the team was not one cluster. *Told*: cost of
+agreements and news, beside the maps that are *sent*; these and *apart* are until all know.
 
-{columns}
-|---|---:|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|
 {teams}
 
 ## The rule
 
-Of the rules for a robot that has nothing left to explore, on offices of the set `validation`: the ratio is that of the
-time of `meeting_tours` over that of `oblivious`.
+Rules for a robot that has nothing left to explore, on offices of the set `validation`: time of `meeting_tours` over
+that of `oblivious`.
 
 | rule | floors | ratio |
 |---|---:|---:|
@@ -297,6 +295,10 @@ def _station_knows(lines: Sequence[Line]) -> str:
     return f"{np.mean(times):.0f} ({len(times)})" if times else "- (0)"
 
 
+def _header(columns: Sequence[str]) -> tuple[str, str]:
+    return f"| {' | '.join(columns)} |", f"|{'---|' * len(columns)}"
+
+
 def page(folder: Path) -> str:
     """Return the results as markdown."""
     lines, rules = kept_lines(folder / RUNS_FILE), kept_lines(folder / RULES_FILE)
@@ -316,8 +318,7 @@ def page(folder: Path) -> str:
         together=_together(_chosen(lines, "oblivious")),
         ideal=_ratio(_chosen(lines, "tour_frontier", "all"), _chosen(lines, "oblivious")) or "-",
         kinds="\n".join(_kind_row(lines, other) for other in POLICIES if other != OURS),
-        columns=f"| {' | '.join(COLUMNS)} |",
-        teams="\n".join(_team_row(teams[key]) for key in sorted(teams)),
+        teams=in_file("\n".join([*_header(COLUMNS), *(_team_row(teams[key]) for key in sorted(teams))])),
         rules="\n".join(
             f"| `{rule}` | {len(_pairs(found, by_chance)[0])} | {_ratio(found, by_chance)} |"
             for rule, found in by_rule.items()

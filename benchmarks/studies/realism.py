@@ -233,20 +233,17 @@ REPEATED = 3
 RATES_FILE, EPISODES_FILE, LONGEST_FILE = "rates.jsonl", "episodes.jsonl", "longest.jsonl"
 
 ABOUT = """\
-World of `realism="lab"`: datasheet noise, typical odometry (5 % bias), SLAM; `nearest_frontier`, cells of
-0.05 m. Medians over robots and seeds, in parentheses the worst. ATE is the root of the mean square over the
-whole episode, of poses as they were believed at the time, after the best rigid motion (Umeyama without
-scale), as `evo` and others give it. *In the frame of the start* is that without the motion: starts are
-known, so the first error of a heading counts with all of its lever. IoU is of the team's map, as
-[metrics](../reference/metrics.md) defines it, *aligned* after the best motion of all believed poses onto
-the true ones, and *true poses* that of the map of robots that know where they are, with the same noise, in
-an episode of the first seed: no localizer does better.
+World of `realism="lab"`: datasheet noise, typical odometry (5 % bias), SLAM; `nearest_frontier`, cells of 0.05 m.
+Medians over robots and seeds, in parentheses the worst. ATE is the root mean square of the online pose errors over
+the whole episode, after the best rigid motion (Umeyama without scale), as in `evo`; *in the frame of the start* is
+without that motion. IoU is of the team's map, as [metrics](../reference/metrics.md) defines it, *aligned* after the
+best motion of all believed poses onto the true ones. *True poses* is the IoU of robots that know their poses, with
+the same noise, in an episode of the first seed.
 
-Wanted are an ATE of at most 0.05 m in an apartment of 65 m2 and 0.15 m in an office of 2,000 m2, IoU of at
-least 0.85, at most 4 ms for a matched scan and 50 ms for a closure, and 600 agent steps a second. In the
-large office robots start in a hall of which a laser of 5.6 m sees little, and drive along bare corridors:
-the first degrees of heading that are lost there turn all that follows, and a map that is turned by one
-degree lies two cells off after 6 m."""
+Targets: ATE of at most 0.05 m in an apartment of 65 m2 and 0.15 m in an office of 2,000 m2, IoU of at least 0.85, at
+most 4 ms for a matched scan and 50 ms for a closure, and 600 agent steps a second. In the large office robots start in
+a hall of which a laser of 5.6 m sees little, and drive along bare corridors. A map that is turned by one degree is two
+cells off after 6 m."""
 
 HEADER = (
     "floor",

@@ -38,22 +38,17 @@ BEGIN, END = "<!-- leaderboard -->", "<!-- end of the leaderboard -->"
 
 PAGE = """# Leaderboard
 
-To sort and filter it, save
-[leaderboard.html](leaderboard.html) and open it in a browser.
+To sort and filter it, save [leaderboard.html](leaderboard.html) and open it in a browser.
 
-Simulated time; Kobuki, the URG laser (240 deg, 5.6 m), maps of 5 cm, cut at {horizon:.0f} s. Starts are drawn
-by the seed, the same for every policy.
+Simulated time; Kobuki, the URG laser (240 deg, 5.6 m), maps of 5 cm, cut at {horizon:.0f} s. Starts are drawn by the
+seed, the same for every policy. The world *ideal* has perfect poses, no noise and known starts; *lab* has SLAM on
+noisy scans and odometry; with *unknown starts* robots find out by their maps where the others are. *By camera* a floor
+counts as seen if depth cameras saw the ground.
 
-- The world *ideal* has perfect poses, no noise and known starts. *Lab* has SLAM on noisy scans and odometry.
-- Robots with *unknown starts* localize by SLAM, too, and find out by their maps where the others are.
-- *By camera* a floor counts as seen where depth cameras saw the ground.
-
-An entry of time is the median with its 95 % interval; runs that did not get there count as never. Multiples
-are of the time that a team needs that [knows the floor](../reference/bounds.md), medians over the floors that
-have a bound. The difference is that of the restricted means to the baseline of the world
-(`nearest_frontier`, or `independent` where starts are unknown), pair by pair, with its 95 % interval; of fewer
-than six pairs there is none. It is bold where both Wilcoxon's signed rank test (5 %, Holm) and its interval say
-that it is beyond chance.
+Times are medians with 95 % intervals; runs that did not get there count as never. Multiples are of the time of a team
+that [knows the floor](../reference/bounds.md), medians over floors that have a bound. Differences are of restricted
+means to the baseline of the world (`nearest_frontier`, or `independent` if starts are unknown), pair by pair, for six
+pairs or more; they are bold if both Wilcoxon's signed rank test (5 %, Holm) and the 95 % interval exclude chance.
 {notes}
 ## Pairs
 

@@ -156,14 +156,13 @@ def plan_tables(rows: Rows) -> str:
         spent = f"{np.median(times):.0f} / {np.quantile(times, 0.95):.0f}"
         lines.append(f"| `{building}` | {len(own)} | {shown} | {wrong} | {spent} |")
     return (
-        "A drawn plan and a map of a robot, `--scale auto`: nobody knows the plan's metres a pixel. Scales "
-        f"from {settings.least:g} to {settings.most:g} are tried. A pair is right within 1 m at the median "
-        "correspondence and 8 degrees, with the plan's pixels taken as 2 cm. Strangers are the plans with "
-        "all maps of other buildings, and every third pair of maps of different buildings. The bound of "
+        f"Robots' maps on drawn plans of unknown scale (`--scale auto`, {settings.least:g} to {settings.most:g}). A "
+        "pair is right within 1 m and 8 degrees at the median correspondence, with plan pixels of 2 cm. Strangers are "
+        "plans with all maps of other buildings, and every third pair of maps of different buildings. The bound of "
         f"{settings.confidence:g} was set when all plans and 50 strangers had been seen.\n\n"
         + "\n".join(lines)
         + "\n\nThe same by the confidence from which maps are joined:\n\n"
-        + _curve(rows)
+        + in_file(_curve(rows))
         + "\n\nEach pair of one building:\n\n"
         + in_file(_each(rows))
     )

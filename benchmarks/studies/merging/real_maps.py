@@ -274,12 +274,12 @@ def real_maps(rows: Rows) -> str:
         chosen = [row for row in rows if _group(row) == group]
         lines.append(f"| {_name(group)} | {'yes' if group[1] else 'no'} | {_figures(chosen, group[0])} |")
     return (
-        "Maps that others made of real buildings. A pair of Halmstad is right within 1 m at the median "
-        "correspondence and 8 degrees, as these maps are bent by up to 0.5 m; of the others within 0.5 m and "
-        "3 degrees. Strangers are all pairs of maps of different buildings. The model was fitted to E5, the "
-        "easy halves of logs, every other pair of strangers, and the bank's half for tuning.\n\n"
+        "Maps that others made of real buildings. A pair of Halmstad is right within 1 m and 8 degrees at the median "
+        "correspondence, as these maps are bent by up to 0.5 m; others are within 0.5 m and 3 degrees. Strangers are "
+        "all pairs of different buildings. The model was fitted to E5, the easy halves of logs, every other pair of "
+        "strangers, and the bank's half for tuning.\n\n"
         + in_file("\n".join(lines))
-        + "\n\nThe same by the confidence from which maps are joined that agree only once they are bent "
+        + "\n\nThe same by the confidence that is required of maps that agree only once they are bent "
         f"(`normal` is {TOLERANCES['normal']}, `drift` {TOLERANCES['drift']}):\n\n"
         + in_file(_curve(rows))
         + "\n\nEach pair of one building that is not joined, or wrong:\n\n"
@@ -302,9 +302,8 @@ def _held(rows: Rows) -> str:
             share, half = Share(sum(each <= 2.0 for each in found), len(found)), np.median(found)
             lines.append(f"| {pairs} | {'yes' if is_calibrated else 'no'} | {share} | {half:.2f} |")
     return (
-        "The covariance of pairs that are joined right, as the distance from the truth in the plane, at the middle of "
-        "what agrees, in standard deviations. A normal distribution in the plane has 86 % within two of them, and a "
-        "median of 1.18.\n\n"
+        "Covariances of right joins: distance from the truth in the plane, at the middle of the agreement, in standard "
+        "deviations. A normal distribution has 86 % within two, and a median of 1.18.\n\n"
         "| pairs | fitted to | within two standard deviations | median |\n|---|---|---|---:|\n" + "\n".join(lines)
     )
 

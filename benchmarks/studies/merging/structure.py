@@ -283,15 +283,15 @@ def structure_text(rows: Rows, bank: dict[str, Tried]) -> str:
         for row in rows
     ]
     return (
-        "What proposes transforms before all rotations and translations are tried: corners (the default from "
-        "Python and in teams), regions of free space and the doors between them, or both (`lidarium merge`). "
-        "Halls have slanted walls and pillars, corridors rooms on both sides; both are drawn from seeds, and "
-        "two robots see about two thirds of each from nine places. Strangers are each floor and the next. "
-        "Times of the bank and of real maps include the description of both maps.\n\n"
+        "Transforms are proposed by corners (the default from Python and in teams), by regions of free space and the "
+        "doors between them, or by both (`all`, the default of `lidarium merge`); then all rotations and translations "
+        "are tried. Halls have slanted walls and pillars, corridors rooms on both sides; both are drawn from seeds, "
+        "and two robots see about two thirds of each from nine places. Strangers are each floor and the next. Times of "
+        "the bank and of real maps include the description of both maps.\n\n"
         + "\n".join(lines)
-        + "\n\nDrawn corridors are much alike: a door every few metres, nothing else. Bent by up to 0.6 m, "
-        "some strangers among them fit, whatever proposes; `--tolerance strict` joins none that has to be "
-        "bent. What regions propose and is refused is therefore not bent."
+        + "\n\nDrawn corridors are much alike: a door every few metres, nothing else. Bent by up to 0.6 m, some "
+        "strangers among them fit; `--tolerance strict` joins no maps that have to be bent. Refused proposals of "
+        "regions are therefore not bent."
         "\n\n![Regions and doors of a drawn corridor and of what a robot has seen of it](merging_regions.png)"
     )
 

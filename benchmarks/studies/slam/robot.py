@@ -112,9 +112,8 @@ def robot_lines(robot: Robot, floor: str) -> list[str]:
 
     return [
         f"A Kobuki with URG-04LX (727 beams, 5.6 m, noise of the data sheet) explores `{floor}` over "
-        f"{robot.path_m:.0f} m; its odometry stretches motions by 5 % and pulls aside by 1 degree a metre. Positions "
-        f"told at each time are off by {robot.error_m:.3f} m (root mean square, unaligned), those of odometry by "
-        f"{robot.odometry_m:.2f} m.",
+        f"{robot.path_m:.0f} m; its odometry is 5 % too long and pulls aside by 1 degree a metre. Online positions are "
+        f"off by {robot.error_m:.3f} m (root mean square, unaligned), those of odometry by {robot.odometry_m:.2f} m.",
         "",
         "| ms of CPU time | scans | median | p95 | most | to reach |",
         "|---|---|---|---|---|---|",

@@ -13,13 +13,14 @@ from lidarium.benchmarks.studies.sparse.figures import figure_table
 from lidarium.benchmarks.studies.sparse.pictures import draw_errors, draw_paths
 from lidarium.benchmarks.studies.sparse.places import CELL_M, CLEAR_M, REQUESTS, SPACING_M
 from lidarium.benchmarks.studies.sparse.tables import (
-    MEASURES,
     error_table,
     failure_table,
     gpu_text,
+    mean_table,
     measure_table,
     memory_table,
     node_table,
+    printed_failures,
     thesis_error_table,
     thesis_failure_table,
 )
@@ -30,53 +31,53 @@ ERRORS_PICTURE, PATHS_PICTURE = "sparse_errors.png", "sparse_paths.png"
 PAGE = """# Sparse maps
 
 Four furnished places: two laboratories, an arena and a flat, each with furniture on legs. A robot of
-0.30 m and 1.2 m stops every {spacing} m and takes {turns} frames of 320 x 240 round about, with its
+0.30 m and 1.2 m stops every {spacing} m and takes {turns} frames of 320 x 240 all around, with its
 camera 1 m above the floor, looking down by 26 degrees, and exact poses. *Incremental*: at most 256 codes
 a frame. *Full*: 2,048 codes of a sixteenth of all pixels. *Thesis's form*: codes as points, 32 a frame
-and as many frames as the thesis has, edges as cylinders, no shortcuts, its parameters of each place.
-*Grid*: an OctoMap of 5 cm made by the octomap library of the same frames, projected and inflated by 0.30
+and as many frames as in the thesis, edges as cylinders, no shortcuts, and its parameters of each place.
+*Grid*: an OctoMap of 5 cm by the octomap library of the same frames, projected and inflated by 0.30
 m, with A* that keeps off obstacles. *Laser*: the grid of a planar laser at 0.30 m that knows every cell
 of its plane.
 
-{requests} requests a place, both ends {clear:.0f} cm clear of what they could touch. A path collides
-where the robot's circle reaches more than one cell of a raster of {cell:.0f} cm into what stands there.
-The optimum is the shortest path of a circle among the solids themselves, by a graph of corners.
+{requests} requests a place, both ends {clear:.0f} cm clear of obstacles. A path collides if the robot's circle
+reaches more than one cell of a raster of {cell:.0f} cm into an obstacle. The optimum is the shortest path of a
+circle among the solids, by a graph of corners.
 
 ## Figures
 
 {figures}
 
-What limits the miss: unanswered requests in full maps end beside boxes that are a few centimetres
-too wide; cutting such boxes and moving nodes into passages left these. Maps became small by two changes:
-free codes merge within 25 cm, not 20, and files keep places in strips of ground, each of their columns
-deflated with codes of its own. Wider merging lengthens paths. Robots that map while they drive keep 20 cm,
-where .bt has 11.3 times the bytes in the worst place (1.80 deflated).
+Requests that full maps leave unanswered end beside boxes that are a few centimetres too wide. Robots that map
+while they drive merge free codes within 20 cm, not 25 cm, for shorter paths; then .bt has 11.3 times the bytes
+in the worst place (1.80 deflated).
 
 With the noise of an Xtion in its frames, of {requests} requests each, incremental maps of
 
 - all points up to 4 m: {noisy_all};
 - points up to {precise:.1f} m, where depths deviate by 1 cm: {noisy_precise}.
 
-Boxes hold all of their points. Noise and rounding of 3 cm at 4 m widen boxes to both sides, so narrow places
-close and starts and goals lie in boxes. Every place is seen from nearer as well, so far points are left out.
-Boxes of the maps: {boxes_all} of all points, {boxes_precise} of precise ones.
+Noise and rounding of 3 cm at 4 m widen boxes, so narrow places close and starts and goals lie in boxes; far
+points are therefore left out. Boxes of the maps: {boxes_all} of all points, {boxes_precise} of precise ones.
 
-Table tops and seats: of places that only they take up, and no laser's plane shows, the inflated grid of the
+Table tops and seats: of the area that only they take up, outside the laser's plane, the inflated grid of the
 laser lets a robot stand at {laser}.
 
 ## Holes, stairs and pallets
 
-{areas} holes, as many stairwells and pallets of {pallet:.0f} cm are put on the floor of each place, of
-{low} to {high} m a side. {requests} requests a place have a path by the truth, both ends {clear:.0f} cm clear. A path
-leads over an area if the robot's circle reaches more than a cell of the raster into it.
+{areas} holes, {areas} stairwells and {areas} pallets of {pallet:.0f} cm are put on the floor of each place,
+with sides of {low} to {high} m. {requests} requests a place have a true path, both ends {clear:.0f} cm clear.
+A path leads over an area if the robot's circle reaches more than a cell of the raster into it.
 
 {drops}
 
 ## Paths
 
-Means and standard deviations over the requests that both the grid and the sparse map answer. Turning and
-dispersion are taken at points of 5 cm along the path; in the thesis's form at its own points, as the thesis
-does. The printed figures are of other places: their relations can be compared, their sizes cannot.
+Means on incremental maps, over the requests that both the grid and the sparse map answer; the file has standard
+deviations and full maps, too. Turning and dispersion are taken at points of 5 cm along the path; in the
+thesis's form at its own points, as in the thesis. The printed figures are of other places: compare ratios, not
+sizes.
+
+{means}
 
 {measures}
 
@@ -86,6 +87,8 @@ does. The printed figures are of other places: their relations can be compared, 
 
 {failures}
 
+{printed_failures}
+
 {thesis_failures}
 
 ## Codes and graphs
@@ -94,7 +97,8 @@ does. The printed figures are of other places: their relations can be compared, 
 
 ## Memory
 
-Kilobytes on disk, *deflated* by zlib. Sparse maps are deflated in themselves, without their graphs.
+Kilobytes on disk, *deflated* by zlib, and ratios, beside the thesis's printed sizes. Sparse maps are deflated in
+themselves, without their graphs.
 
 {memory}
 
@@ -107,8 +111,8 @@ simulated frames of the apartment.
 
 {errors}
 
-What the thesis prints in tables 5.3 and 5.4, with other clouds and another unit of depth, so that only ratios
-compare; K-means++ there labels on a GPU. {gpu}
+Tables 5.3 and 5.4 of the thesis, with other clouds and another unit of depth, so that only ratios compare;
+K-means++ there labels on a GPU. {gpu}
 
 {thesis_errors}
 
@@ -127,10 +131,6 @@ def page(folder: Path) -> str:
     """Return the results as markdown."""
     lines = kept_lines(folder / paths.PATHS_FILE)
     clouds = kept_lines(folder / quantisation.QUANTISATION_FILE)
-    measures = (
-        f"### {title}\n\n{measure_table(lines, name, column, digits, unit)}"
-        for name, title, column, digits, unit in MEASURES
-    )
     return PAGE.format(
         spacing=SPACING_M,
         turns=lines[0]["turns"],
@@ -149,11 +149,13 @@ def page(folder: Path) -> str:
         low=drops.SIDES_M[0],
         high=drops.SIDES_M[1],
         drops=drops.drops_table(kept_lines(folder / drops.DROPS_FILE)),
-        measures="\n\n".join(measures),
+        means=mean_table(lines),
+        measures=in_file(measure_table(lines)),
         failures=failure_table(lines),
-        thesis_failures=thesis_failure_table(lines),
-        nodes=node_table(lines),
-        memory=memory_table(lines),
+        printed_failures=printed_failures(),
+        thesis_failures=in_file(thesis_failure_table(lines)),
+        nodes=in_file(node_table(lines)),
+        memory=in_file(memory_table(lines)),
         clouds=len(clouds),
         gpu=gpu_text(clouds),
         errors=in_file(error_table(clouds)),

@@ -1,7 +1,7 @@
 """Tables of the study, in the form of the thesis's."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -23,11 +23,11 @@ from lidarium.evaluation.report.tables import markdown_table
 Line = Mapping[str, Any]
 
 MEASURES = (
-    ("length", "Length [m], table 5.7", LENGTH, 3, 1.0),
-    ("points", "Points, table 5.8", POINTS, 1, 1.0),
-    ("seconds", "Time [ms], table 5.9", SECONDS, 3, 1e3),
-    ("dispersion", "Dispersion [m], table 5.10", DISPERSION, 3, 1.0),
-    ("turning", "Turning [rad], table 5.11", TURNING, 2, 1.0),
+    ("length", "length [m], table 5.7", LENGTH, 3, 1.0),
+    ("points", "points, table 5.8", POINTS, 1, 1.0),
+    ("seconds", "time [ms], table 5.9", SECONDS, 3, 1e3),
+    ("dispersion", "dispersion [m], table 5.10", DISPERSION, 3, 1.0),
+    ("turning", "turning [rad], table 5.11", TURNING, 2, 1.0),
 )
 RAW = {"dispersion": RAW_DISPERSION, "turning": RAW_TURNING}
 PLANNERS = ("grid", "laser", "incremental", "full", "thesis incremental", "thesis full")
@@ -44,24 +44,53 @@ def answered(line: Line, planner: str) -> NDArray[np.bool_]:
     return ~np.isnan(answers_of(line, planner)[:, LENGTH])
 
 
-def measure_table(lines: Sequence[Line], name: str, column: int, digits: int, unit: float) -> str:
-    """Return means and standard deviations over the requests that the grid and the sparse map answer."""
-    header = ("place", "usage", "grid", "sparse", "by the thesis", "printed: navigation stack", "sparse")
-    rows = []
-    for line in lines:
-        for usage in thesis.USAGES:
-            both = answered(line, "grid") & answered(line, usage)
-            cells = [_spread(answers_of(line, "grid")[both, column] * unit, digits)]
-            cells.append(_spread(answers_of(line, usage)[both, column] * unit, digits))
-            printed_form = f"thesis {usage}"
-            own = answered(line, "grid") & answered(line, printed_form)
-            # The thesis measures at the points as they are.
-            raw = RAW.get(name, column)
-            cells.append(_spread(answers_of(line, printed_form)[own, raw] * unit, digits))
-            place = list(thesis.PLACES).index(line["place"])
-            printed = [f"{value * unit:.{digits}f}" for value in thesis.MEANS[name][usage][place]]
-            rows.append([line["place"], usage, *cells, *printed])
-    return markdown_table(header, rows)
+PATH_HEADER = ("grid", "sparse", "by the thesis", "printed: navigation stack", "sparse")
+
+
+def measure_table(lines: Sequence[Line]) -> str:
+    """Return means and standard deviations of all measures and usages."""
+    rows = [
+        [title, line["place"], usage, *_path_cells(line, usage, name, column, digits, unit, _spread)]
+        for name, title, column, digits, unit in MEASURES
+        for line in lines
+        for usage in thesis.USAGES
+    ]
+    return markdown_table(("measure", "place", "usage", *PATH_HEADER), rows)
+
+
+def mean_table(lines: Sequence[Line]) -> str:
+    """Return means of all measures on incremental maps."""
+    rows = [
+        [title, line["place"], *_path_cells(line, "incremental", name, column, digits, unit, _mean)]
+        for name, title, column, digits, unit in MEASURES
+        for line in lines
+    ]
+    return markdown_table(("measure", "place", *PATH_HEADER), rows)
+
+
+def _path_cells(
+    line: Line,
+    usage: str,
+    name: str,
+    column: int,
+    digits: int,
+    unit: float,
+    shown: Callable[[NDArray[np.float64], int], str],
+) -> list[str]:
+    """Return a measure over the requests that the grid and the sparse map answer, beside the printed figures."""
+    both = answered(line, "grid") & answered(line, usage)
+    cells = [shown(answers_of(line, planner)[both, column] * unit, digits) for planner in ("grid", usage)]
+    printed_form = f"thesis {usage}"
+    own = answered(line, "grid") & answered(line, printed_form)
+    # The thesis measures at the points as they are.
+    raw = RAW.get(name, column)
+    place = list(thesis.PLACES).index(line["place"])
+    printed = [f"{value * unit:.{digits}f}" for value in thesis.MEANS[name][usage][place]]
+    return [*cells, shown(answers_of(line, printed_form)[own, raw] * unit, digits), *printed]
+
+
+def _mean(values: NDArray[np.float64], digits: int) -> str:
+    return f"{values.mean():.{digits}f}" if len(values) else "-"
 
 
 def _spread(values: NDArray[np.float64], digits: int) -> str:
@@ -96,6 +125,16 @@ def thesis_failure_table(lines: Sequence[Line]) -> str:
             counts = [str(int(value)) for value in ((~grid).sum(), (~own).sum(), (grid & own).sum())]
             rows.append([line["place"], usage, *counts, printed])
     return markdown_table(header, rows)
+
+
+def printed_failures() -> str:
+    """Say how many requests have no path in the thesis."""
+    found = [counts for by_place in thesis.FAILURES.values() for counts in by_place]
+    grid, sparse = ([counts[k] for counts in found] for k in (0, 1))
+    return (
+        f"The thesis prints {min(grid)} to {max(grid)} requests of 1,000 without a path on grids, and {min(sparse)} to "
+        f"{max(sparse)} on sparse maps."
+    )
 
 
 def node_table(lines: Sequence[Line]) -> str:

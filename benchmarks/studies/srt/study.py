@@ -37,10 +37,10 @@ GOALS_FILE, TREES_FILE, ABLATIONS_FILE = "goals.jsonl", "trees.jsonl", "ablation
 PICTURE_SEED = SEEDS[0]
 
 TUNED_ON = (
-    f"Seeds are {SEEDS[0]} and on; choices were made on others of the same worlds: what the thesis never printed (free "
-    "rays of 0.9 m, step, least distance) among about twenty settings with seeds 0 to 19, for goals that are reached, "
-    "slower and with more nodes than others that were tried, which flatters the ratios to it; the default mode with "
-    "seeds 0 to 5, and its localization with seeds 0 to 3, with a look at 100 to 102."
+    f"Seeds are {SEEDS[0]} and on; choices were made on others of the same worlds. Parameters that the thesis does not "
+    "print (free rays of 0.9 m, step, least distance) were chosen among about twenty settings with seeds 0 to 19, for "
+    "goals that are reached, though slower and with more nodes, which flatters the ratios. The default mode was tuned "
+    "with seeds 0 to 5, its localization with seeds 0 to 3, with a look at 100 to 102."
 )
 """What the runs towards goals owe to choices that were made on the same worlds."""
 
@@ -73,49 +73,42 @@ def page(folder: Path) -> str:
     episodes = read_episodes(folder / EXPLORATION / "episodes.jsonl")
     parts = [
         "# Sensor-based random tree",
-        "What the tree does is told in [the reference](../reference/srt.md).",
+        "[The reference](../reference/srt.md) describes the tree.",
         "## Towards goals",
-        "A Pioneer P3-DX with the URG-04LX (noise of its data sheet) looks for the goal of each world; "
-        "wheels tell 5 % too much or too "
-        'little of ways and turns, drift and slip (`odometry="typical"`); '
-        "it localizes on the map of curves that it makes "
-        '(`localization="splines"`). A goal is reached within 0.2 m. The world\'s raster is 1 cm. '
-        "Entries are medians, least and "
-        "greatest; the area covered is the least, the distance from the start the greatest. *Printed* is "
-        "what the thesis tells of its own "
-        "worlds, of which only descriptions are left: ours are drawn after these, so its figures are no "
-        "target. In `srt_cluttered` the "
-        "goal is enclosed: `unreachable`, all covered and back at the start is right.",
+        "A Pioneer P3-DX with the URG-04LX (noise of its data sheet) looks for the goal of each world, with "
+        '`odometry="typical"` (5 % bias of ways and turns, drift, slip) and `localization="splines"`, on the map that '
+        "it makes. A goal is reached within 0.2 m. Entries are medians, least and greatest; the area covered is the "
+        "least, the distance from the start the greatest. *Printed* are the thesis's figures of its own worlds, of "
+        "which only descriptions exist: ours are drawn after these, so its figures are no target. In `srt_cluttered` "
+        "the goal is enclosed: `unreachable`, with all covered and the robot back at the start, is right.",
         tables.goals(runs),
         TUNED_ON,
-        "The default mode over the thesis's mode on the same seeds: of the sums, and least and greatest of "
-        "single runs.",
-        tables.against_thesis_mode(runs),
+        "The default mode over the thesis's mode on the same seeds: ratios of sums, and least and greatest of single "
+        "runs.",
+        in_file(tables.against_thesis_mode(runs)),
         "![Covered area over time](srt_coverage.png)",
         "## Variants of the thesis's rules",
-        'The rows called thesis drive by MOVE_TO with the list of controls (`drive="controls"`), have stars as safe '
-        'regions and the spline map by the thesis\'s rules (`spline_settings("thesis")`). Here one rule at a time is '
-        "another that the thesis names: the controller of turn and advance, balls, one radius for each ray, the base "
-        "algorithm, and the farthest point of an opening. In `apartment` there is no goal: the robot knows where it "
-        "is, and explores until 99 % are covered or 1,200 s are over. What slopes and lines about the robot do to the "
-        "map is in [parts](#what-parts-are-worth).",
-        tables.trees(trees),
+        'The thesis\'s mode drives by MOVE_TO with the list of controls (`drive="controls"`), on stars as safe regions '
+        'and spline maps by the thesis\'s rules (`spline_settings("thesis")`). Each variant replaces one rule by '
+        "another of the thesis: the controller of turn and advance, balls, one radius for each ray, the base "
+        "algorithm, and the farthest point of an opening. In `apartment` there is no goal: with known poses, the robot "
+        "explores until 99 % are covered or 1,200 s are over.",
+        in_file(tables.trees(trees)),
         "## Poses and maps",
-        "Means, in brackets the worst of the runs. *Walls found* counts walls within 5 cm of which true beams end, "
-        "*curves right* the curves' length within 5 cm of a wall. Bytes are those of the compact form; end points are "
-        "those of the scans that went into the map, as two float32 each; a grid has one byte a cell of 5 cm over the "
-        "floor's bounds.",
+        "Means, in brackets the worst of the runs. *Walls found* are walls within 5 cm of which true beams end, "
+        "*curves right* the share of the curves' length within 5 cm of a wall. Bytes are those of the compact form, "
+        "beside those of the scans' end points (two float32 each) and of a grid of 5 cm (one byte a cell).",
         in_file(tables.maps(runs)),
         "\n".join(
             f"![{world}: tree, safe regions, curves and truth](srt_world_{world.removeprefix('srt_')}.png)"
             for world in WORLDS
         ),
         "## Full exploration",
-        "One robot with perfect poses explores until 99 % is covered, maps of 2.5 cm, starts drawn by the seed, the "
-        "same for every policy. The six scenes had a part in the choices, with other starts; the generated floors, "
-        "ten of the validation set, had none, but that two faults showed on them and were mended: robots that stood "
-        "still beside a wall (`office:2000006`), and one that turned between two targets for ever (`office:2000009`). "
-        "Means over the starts; the last columns are our mean over that of the better of the others.",
+        "One robot with true poses explores until 99 % is covered, on maps of 2.5 cm; starts are drawn by the seed, "
+        "the same for every policy. The six scenes had a part in the choices, with other starts; the ten generated "
+        "floors of the validation set had none, except that two faults which they showed were mended "
+        "(`office:2000006`, `office:2000009`). Means over the starts; the last columns are our mean over that of the "
+        "better of the others.",
         in_file(tables.exploration(episodes, POLICIES)),
         "## What parts are worth",
         f"{len(followed)} ways of the default mode, followed by the particle filter with one part changed. Means, in "

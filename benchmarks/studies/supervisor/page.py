@@ -8,8 +8,16 @@ from typing import Any
 from lidarium.agents.supervisor.settings import SupervisorSettings
 from lidarium.benchmarks.results_page import in_file
 from lidarium.benchmarks.studies.supervisor import tables
-from lidarium.benchmarks.studies.supervisor.figures import Row, chosen, floor_of, has_wrong_merge, median, time_shares
-from lidarium.benchmarks.studies.supervisor.goals import BUMPER, SUPERVISED, goals_of, is_covered
+from lidarium.benchmarks.studies.supervisor.figures import (
+    Row,
+    chosen,
+    floor_of,
+    has_wrong_merge,
+    median,
+    time_ratios,
+    time_shares,
+)
+from lidarium.benchmarks.studies.supervisor.goals import BUMPER, SUPERVISED, TOLD, goals_of, is_covered
 from lidarium.benchmarks.studies.supervisor.runs import FAILING, LOGS_FILE, asked_runs, read_json
 from lidarium.benchmarks.studies.supervisor.suites import (
     BUMPED,
@@ -30,25 +38,29 @@ from lidarium.benchmarks.studies.supervisor.tables import (
 from lidarium.evaluation.suites.episodes_file import KEY
 
 LINES_SHOWN = 12
-"""Lines of a log on the page."""
+"""Lines of a log that are published."""
 
 
 def logs_section(logs: Mapping[str, Any]) -> list[str]:
-    """Return the logs of typical runs where something was missed."""
+    """Return the logs of typical runs if something was missed."""
     if not logs:
         return []
-    parts = [
-        "### Typical runs\n\nWhere a figure was missed, what the station noted and ordered: for a size of "
-        "teams in the run whose share "
-        "of one robot's time is the median, where runs are counted in the middle one of those that missed it."
-    ]
+    rows = ["| missed | run | station and orders |", "|---|---|---|"]
     for name, log in logs.items():
         lines = [line for entry in log["lines"] if (line := _line_of(json.loads(entry)))]
         left_out = len(lines) - LINES_SHOWN
         if left_out > 0:
             lines = [*lines[: LINES_SHOWN // 2], f"... {left_out} more", *lines[-LINES_SHOWN // 2 :]]
-        parts.append(f"{name}, `{_short(log[KEY])}`:\n\n```\n" + "\n".join(lines) + "\n```")
-    return parts
+        rows += [f"| {name} | {_cell(_short(log[KEY]))} | {_cell(line.strip())} |" for line in lines]
+    words = (
+        "Log lines of the station and its orders, if a figure was missed: of the run with the median share of one "
+        "robot's time for a size of teams, and of the middle one of the runs that missed a count."
+    )
+    return ["### Typical runs\n\n" + words + "\n\n" + in_file("\n".join(rows))]
+
+
+def _cell(text: str) -> str:
+    return text.replace("|", "\\|")
 
 
 def _line_of(entry: Mapping[str, Any]) -> str:
@@ -92,11 +104,11 @@ def page(folder: Path) -> str:
         "## Beside the thesis\n\n" + _beside_thesis(rows["teams"], alone),
         "## Test 1: each robot alone\n\n" + tables.alone_table(rows["alone"]),
         *(
-            f"## Test 2: pairs, {floor}\n\nJade with Luna (starts A and B), and with Mars (A and C).\n\n"
-            + tables.team_table([row for row in rows["pairs"] if floor_of(row) == floor], rows["alone"])
+            f"## Test 2: pairs, {floor}\n\nJade with Luna (starts A and B), and with Mars (A and C). "
+            + _team_section([row for row in rows["pairs"] if floor_of(row) == floor], rows["alone"])
             for floor in dict.fromkeys(floor_of(row) for row in rows["pairs"])
         ),
-        "## Test 3: three robots, apartment\n\n" + tables.team_table(rows["three"], rows["alone"]),
+        "## Test 3: three robots, apartment\n\n" + _team_section(rows["three"], rows["alone"]),
         "## One robot on each floor\n\n" + in_file(tables.one_table(alone)),
     ]
     generated = [row for row in rows["teams"] if _is_generated(row)]
@@ -109,7 +121,10 @@ def page(folder: Path) -> str:
         if some:
             parts.append(f"## {title}\n\n" + in_file(tables.team_table(some, alone)))
     parts += [
-        "## Five robots\n\n" + tables.five_table(rows["five"], alone),
+        "## Five robots\n\n"
+        + _times_text(rows["five"], alone)
+        + ".\n\n"
+        + in_file(tables.five_table(rows["five"], alone)),
         "## A robot fails\n\n" + _about_failing() + "\n\n" + failing_table(failing),
         *_left_section(failing),
         *_bumper_section(rows[BUMPER]),
@@ -117,6 +132,17 @@ def page(folder: Path) -> str:
         *(in_file(extension_table(rows[name])) for name in EXTENSION_SUITES if rows[name]),
     ]
     return "\n\n".join(parts) + "\n"
+
+
+def _team_section(rows: Sequence[Row], alone: Sequence[Row]) -> str:
+    """Return the times of supervised teams in a sentence, and the table of all policies."""
+    ratio = tables.shown(median(time_ratios(chosen(rows, SUPERVISED), chosen(rows, TOLD))))
+    return f"{_times_text(rows, alone)} and {ratio} of that of `{TOLD}`.\n\n{in_file(tables.team_table(rows, alone))}"
+
+
+def _times_text(rows: Sequence[Row], alone: Sequence[Row]) -> str:
+    share = tables.shown(median(time_shares(chosen(rows, SUPERVISED), alone)))
+    return f"Supervised teams take {share} of one robot's time"
 
 
 def _beside_thesis(teams: Sequence[Row], alone: Sequence[Row]) -> str:
@@ -128,13 +154,13 @@ def _beside_thesis(teams: Sequence[Row], alone: Sequence[Row]) -> str:
     )
     settings = SupervisorSettings()
     return (
-        "The introduction of the thesis says that two robots and more need close to a third less time than one, "
-        "though some are stopped; no times that this comes from are in its text. Here supervised teams need "
-        f"{ours or 'too few runs to say'} (medians over all floors). Its claim names energy beside time; ours is in "
-        "tests 1 to 3, until 99 % is seen and by a battery that only counts. Its station merges maps every second, "
-        f"ours every {settings.merge_period_s:g} s; both look at the decision tree every {settings.period_s:g} s. "
-        "`map_kno` in decisions is the share that a robot's own map knows of what the merged map knows or has around "
-        "its frontiers. The thesis says that 1 is a complete map, but not of which area it is a share."
+        "The thesis says that two and more robots need close to a third less time than one, and prints no times for "
+        f"it. Here supervised teams need {ours or 'too few runs to say'} (medians over all floors). The thesis also "
+        "claims less energy; ours is in tests 1 to 3, until 99 % is seen, by a battery that only counts. Its station "
+        f"merges maps every second, ours every {settings.merge_period_s:g} s; both look at the decision tree every "
+        f"{settings.period_s:g} s. `map_kno` is the share that a robot's own map knows of the area that the merged map "
+        "knows or has around its frontiers. The thesis says that 1 is a complete map, but not of which area it is a "
+        "share."
     )
 
 
@@ -144,8 +170,8 @@ def _wrong_section(rows: Sequence[Row]) -> list[str]:
     if not wrong:
         return []
     words = (
-        "Runs with a merge that is wrong: how far off it is where the maps meet, how far by what the starts say, and "
-        "the error of each robot's own trajectory."
+        "Runs with a wrong merge: its error where the maps meet and by the starts, and the error of each robot's "
+        "trajectory."
     )
     return ["### Wrong merges\n\n" + words + "\n\n" + wrong_table(wrong)]
 
@@ -153,10 +179,9 @@ def _wrong_section(rows: Sequence[Row]) -> list[str]:
 def _bumper_section(rows: Sequence[Row]) -> list[str]:
     """Return the thesis's experiment with the bumper (4.2.3), if it was run."""
     words = (
-        f"Robots of kind `{BUMPED['robot']}`, taller than what their lasers see, pause where they touch "
-        "something, or something stands in their way for a second. By the thesis's rule a paused robot gets "
-        "no order, since what it met would be drawn into its map and trap it (`supervised`). `resumes` "
-        "orders it to go on where the cause is known, after it has backed out. Counts are of all runs."
+        f"Robots of kind `{BUMPED['robot']}`, taller than their lasers see, pause if they touch something or are "
+        "blocked for a second. By the thesis's rule a paused robot gets no order (`supervised`); `resumes` orders it "
+        "to go on after it has backed out, if the cause is known. Counts are of all runs."
     )
     return ["## Bumpers\n\n" + words + "\n\n" + in_file(bumper_table(rows))] if rows else []
 
@@ -167,7 +192,7 @@ def _left_section(failing: Sequence[Row]) -> list[str]:
     They did not cover what the robot leaves; the other policies' runs stand besides them.
     """
     words = (
-        "Runs in which a supervised team covered less than 99 % of that, and what the others covered of it "
+        "Runs in which a supervised team covered less than 99 % of that, and the share that the other policies covered "
         "at the same death."
     )
     is_left = not all(is_covered(row) for row in chosen(failing, SUPERVISED))
@@ -186,41 +211,37 @@ def _about(alone: Sequence[Row]) -> str:
         "" if is_real else " No folder of real floors was given: generated offices and corridors stand in for them."
     )
     return (
-        "Kobuki robots with the URG-04LX laser, noise as of its data sheet, typical wheel odometry, SLAM, starts that "
-        f"nobody knows, maps of 5 cm, cut at {SETTINGS['horizon_s']:.0f} s. Scenario 1 is `apartment`, scenario 2 "
-        f"`clinic`; Jade, Luna and Mars start at A, B and C. The others are {len(floors)} floors, {len(large)} of them "
-        "over 300 m2; starts are drawn by the seed, the same for every policy, and that of one robot is that of a "
-        f"team's first.{stand_ins} `independent` merges nothing, `oracle_starts` is told how the robots stand to each "
-        "other ([supervisor](../reference/supervisor.md)). Entries are medians over runs, ratios and differences "
-        "those of paired runs, with intervals of 95 %; what was not done by the horizon counts as never, and as done "
-        "then where others are divided by it. Where a team starts at starts that robots tried alone, as in the "
-        "scenarios, one robot's figure is the mean of theirs."
+        "Kobuki robots with the URG-04LX laser (noise of its data sheet), typical odometry, SLAM, unknown starts, maps "
+        f"of 5 cm, cut at {SETTINGS['horizon_s']:.0f} s. Scenario 1 is `apartment`, scenario 2 `clinic`; Jade, Luna "
+        f"and Mars start at A, B and C. The others are {len(floors)} floors, {len(large)} of them over 300 m2, with "
+        f"starts drawn by the seed, the same for every policy; one robot starts as the first of a team.{stand_ins} "
+        "`independent` merges nothing, `oracle_starts` knows the starts ([supervisor](../reference/supervisor.md)). "
+        "Entries are medians over runs, ratios and differences those of paired runs, with 95 % intervals. Runs that "
+        "miss 99 % count as never, and as done at the horizon if they are the denominator of a ratio. In the "
+        "scenarios, one robot's figure is the mean over the starts of the team."
     )
 
 
 def _notes() -> str:
     return (
-        "A merge is wrong where the transform that was found is off by more than 0.3 m or 3 degrees at the centroid "
-        "of what both maps know, from how the maps truly lie to each other there: a robot's map lies as its pose did "
-        "when it was nearest to there. Maps that SLAM draws drift, and no merger can know by how much. Where a third "
-        "robot's map lies between two, its drift and the lever of small angles come to what is between them, and the "
-        "merges that join them are judged themselves. So what the starts say of all joined robots is counted beside "
-        "it, within the same bounds and within those of `result.json`, 2 cells and 0.01 rad. A tick is a look at the "
-        "tree every 10 s, with its merge and what robots are told, on one core of a machine that others share."
+        "A merge is wrong if its transform is off by more than 0.3 m or 3 degrees at the centroid of the area that "
+        "both maps know, from the true relation of the maps there; drift of SLAM elsewhere does not count. Errors by "
+        "the starts of all joined robots, drift included, are counted beside it, within the same bounds and within "
+        "those of `result.json`, 2 cells and 0.01 rad. A tick is a look at the tree every 10 s, with its merge and "
+        "orders, on one core of a shared machine."
     )
 
 
 def _about_failing() -> str:
     return (
         "`robot_0` dies at half the time in which the whole supervised team of that floor and seed saw 99 %. Its body "
-        "stands where it is. Its map is used no more, so the others cover its part, too: counted is what they have "
-        "seen themselves, of what the body leaves in reach."
+        "stays, and its map is not used any more: counted is the area that the others have seen, of what the body "
+        "leaves in reach."
     )
 
 
 def _about_extensions() -> str:
     return (
-        f"Three robots, {FEWEST_SEEDS} seeds on each of two floors; runs are not ended at 99 %, since what robots do "
-        f"then counts, too. `energy budget` turns back at {MARGIN:g} times what the way home costs. `all together` is "
-        "every one at once, with `utility`."
+        f"Three robots, {FEWEST_SEEDS} seeds on each of two floors; runs do not end at 99 %. `energy budget` turns "
+        f"back at {MARGIN:g} times the energy of the way home. `all together` combines all of them, with `utility`."
     )
