@@ -28,9 +28,9 @@ REQUESTS = 500
 TO_REACH = 1000.0
 
 NOTES = (
-    f"*Path server* is `lidarium serve` with the furnished apartment and {CODES:,} free codes; one client asks for "
-    f"{REQUESTS} paths in turn and waits for each, by the Python client, on the same core. CPU time is that of server "
-    "and client together, so that other programs do not count. *Plan alone* is the same requests without server.",
+    f"*Path server*: `lidarium serve` with the furnished apartment and {CODES:,} free codes; one Python client on the "
+    f"same core asks for {REQUESTS} paths in turn. CPU time is that of server and client. *Plan alone*: the same "
+    "requests without server.",
 )
 
 _PROGRAM = "import sys; from lidarium.scripts.main import main; sys.exit(main())"
