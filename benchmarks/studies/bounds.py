@@ -62,7 +62,7 @@ the lower bound of a linear program, to which cuts are added for at most {relax:
 
 {tight}
 
-## Explorers beside it
+## Explorers
 
 Kobuki, URG-04LX, perfect poses, maps of 5 cm, {floor_count} floors of the set `validation`, drawn starts. Medians
 over floors: the time of the plan, then each policy's time to 99 % as a multiple of it; runs that miss 99 % count

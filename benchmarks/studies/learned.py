@@ -226,12 +226,12 @@ All comparisons, with medians, runs that reached 99 % and the ratio of the longe
 {missing}
 ## What sends the robots
 
-How often robots of `learned` leave for a target, and chosen by what: the tours; the network, elsewhere; or the
-nearest frontier, if too little is left for a stop of a tour.
+How often robots of `learned` leave for a target in a run, and whether tours chose it, the network, or the nearest
+frontier (if too little is left for a stop of a tour).
 
 {senders}
 
-## Beside bounds
+## Comparison with bounds
 
 Medians of multiples of the time of a team that has the [floor plan](../reference/bounds.md), on {bounded} floors of
 the set `test`. *Saved*: share of the time between `tour_frontier` and the bound.

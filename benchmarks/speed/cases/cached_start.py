@@ -26,7 +26,7 @@ ALLOWED_S = 1.5
 NOTES = (
     "*Cached start*: `import lidarium`, `lidarium.parallel_env()` and its first reset in a fresh process, after one "
     "that has compiled the kernels. *Kernels compiled*: those of the reset and three steps that were not in the "
-    "cache. *Read-only*: kernels are kept in the temporary folder.",
+    "cache.",
 )
 
 

@@ -23,8 +23,8 @@ _HOLD, _DRAWS = 20, 50
 CORES = 1
 
 NOTES = (
-    "*Whole step*: `ExplorationEnv.step` of 3 robots with observations (a 256 x 256 crop of the map each), rewards "
-    "and infos, over `KinematicWorld.step` in the same state; 720 noisy beams, maps at 2.5 cm.",
+    "*Whole step*: `ExplorationEnv.step` of 3 robots with observations (a 256 x 256 crop each), rewards and infos, "
+    "over `KinematicWorld.step` in the same state; 720 noisy beams, maps at 2.5 cm.",
 )
 
 

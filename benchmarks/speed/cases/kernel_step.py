@@ -130,7 +130,7 @@ CORES = 1
 
 NOTES = (
     "*Kernel step*: one call of `KinematicWorld.step` for 16 robots: motion, contact, 720 noisy beams over 240 deg to "
-    "5.6 m, scorer and 16 maps, on a floor of 512 x 512 cells of 2.5 cm with rooms, doors and boxes.",
+    "5.6 m, scorer and 16 maps, on a floor of 512 x 512 cells of 2.5 cm.",
     "*VMAS*: its lidar with 720 rays on the same boxes (a turn does not change its time), 3 agents in an environment, "
     "the best batch size of a short trial; no map.",
     "*IR-SIM*: its lidar2d with 720 noisy beams for one robot on the same floor, at the fastest of six poses; no map "

@@ -20,9 +20,9 @@ WANTED = 15.0
 
 NOTES = (
     f"*Learning preset*: `lidarium.vector_env` with {EPISODES} episodes of {ROBOTS} robots, `lidar_360_6m` (180 beams "
-    f"all around to 6 m, no noise), maps at 5 cm, observations as in the *batch*. VMAS has as many agents, {PEER_RAYS} "
-    "rays all around to 6 m, no map, and the best of the batch sizes 32 to 2048. *Without egocentric maps* the "
-    "observations are those of VMAS; maps and rewards are still computed.",
+    f"to 6 m, no noise), maps at 5 cm, observations as in the *batch*. VMAS has as many agents, {PEER_RAYS} rays to 6 "
+    "m, no map, and the best of the batch sizes 32 to 2048. *Without egocentric maps* the observations are those of "
+    "VMAS; maps and rewards are still computed.",
 )
 
 

@@ -34,9 +34,8 @@ LIMITS_S = {("apartment", 320): 0.12e-3, ("apartment", 640): 0.35e-3, ("large", 
 
 NOTES = (
     "*Depth images*: the Xtion (58 deg, 0.4 to 4 m) at 64 free places of an apartment with 80 solids and of about "
-    "2,000 m2 of offices (*large*). *getCameraImage* is PyBullet's; EGL draws in software without a GPU. *With "
-    f"depth*: a batch of {EPISODES} episodes x {ROBOTS_EACH} robots that observes 64 x 48 depths, over the same batch "
-    "without depth.",
+    f"2,000 m2 of offices (*large*). *getCameraImage* is PyBullet's. *With depth*: a batch of {EPISODES} episodes x "
+    f"{ROBOTS_EACH} robots that observes 64 x 48 depths, over the same batch without depth.",
 )
 
 

@@ -85,10 +85,10 @@ LEAST_RATIOS = {"scikit-learn": 30.0, "faiss": 3.0}
 MOST_PHI = {"phi2": 0.94, "phi1": 0.975}
 
 NOTES = (
-    f"*Quantisation*: the whole call with {STEPS} of Lloyd's steps on points of depth images of 640 x 480 in the "
-    "furnished apartment, with 5 mm of noise. Peers start from the same codes and make as many steps on one thread. "
-    f"*Error over theirs*: of mean squared distances. *Budget*: the error after {BUDGET_S} s over that of K-means++, "
-    f"the mean over {FRAMES} real (7-Scenes kitchen in LIDARIUM_DATA; judged) and {FRAMES} simulated depth images.",
+    f"*Quantisation*: the whole call with {STEPS} of Lloyd's steps on points of depth images of the furnished "
+    "apartment. Peers start from the same codes and make as many steps on one thread. *Error over theirs*: of mean "
+    f"squared distances. *Budget*: the error after {BUDGET_S} s over that of K-means++, the mean over {FRAMES} real "
+    f"(7-Scenes kitchen in LIDARIUM_DATA; judged) and {FRAMES} simulated depth images.",
 )
 
 

@@ -23,9 +23,8 @@ SETTINGS = GraphSettings(merge_radius=0.0)
 LIMITS_MS = {"graph": 10.0, "repair": 0.5, "plan": 0.1, "plan, 95 %": 0.4}
 
 NOTES = (
-    f"*Sparse planning*: the furnished apartment with {CODES:,} free codes of the floor, at all of which a body of "
-    "0.30 m and 1.2 m can stand. *Repaired and replanned*: an obstacle of 0.4 m appears on the path. *Plan*: median "
-    f"and 95th percentile of {REQUESTS} requests.",
+    f"*Sparse planning*: the furnished apartment with {CODES:,} free codes of the floor. *Repaired and replanned*: an "
+    f"obstacle of 0.4 m appears on the path. *Plan*: median and 95th percentile of {REQUESTS} requests.",
 )
 
 
