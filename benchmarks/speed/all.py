@@ -76,10 +76,7 @@ _MODULES: tuple[ModuleType, ...] = (
 QUESTIONS: dict[str, Any] = {module.__name__.split(".")[-1]: module for module in _MODULES}
 """The questions by name. They are modules with ``CORES``, ``NOTES`` and ``measure(effort)``."""
 
-ABOUT_QUOTES = (
-    "*quoted* marks a rate that was not measured in this run but on an AMD Zen 5 core of about 4.1 GHz; on another "
-    "machine read those ratios with that in mind.",
-)
+ABOUT_QUOTES = ("*quoted*: not measured in this run but on an AMD Zen 5 core of about 4.1 GHz.",)
 
 
 def ask(name: str, effort: Effort) -> list[Line]:

@@ -273,13 +273,10 @@ def profile_page(profiles: Mapping[str, tuple[Mapping[str, float], float, float]
             profile_table(profiles),
             "",
             f"A team of {ROBOTS} on the floor of 512 x 512 cells of 2.5 cm, straight and turned by 17 deg; 720 noisy "
-            "beams over 240 deg to 5.6 m, maps at 2.5 cm. Every part runs by itself on the same poses and scans, so "
-            "what it needs lies in nearer caches than in the whole step, and the rest holds that difference, too. The "
-            "observation (scan, pose, velocity, bumper, egocentric maps) is no part of the kernel's step.",
-            "",
-            *rates(profiles),
-            "",
-            "What the parts are, and what limits them: [profiling](profiling.md).",
+            "beams over 240 deg to 5.6 m, maps at 2.5 cm. Every part runs alone on the same poses and scans, with its "
+            "data in nearer caches than in the whole step; the rest includes that difference. The observation (scan, "
+            "pose, velocity, bumper, egocentric maps) is not part of the kernel's step. The parts and their limits: "
+            "[profiling](profiling.md).",
             "",
         ]
     )

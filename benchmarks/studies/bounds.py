@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from lidarium.agents import make_policy
+from lidarium.benchmarks.results_page import in_file
 from lidarium.benchmarks.studies.shared.study import Progress, Study, Task, do_missing, kept_lines
 from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.floors.catalogue.names import load_floor, set_floors
@@ -39,17 +40,19 @@ FLOORS_EVERY = 20
 
 TIGHT_FILE, FLOORS_FILE = "tight.jsonl", "floors.jsonl"
 
+TIGHT_TABLE = """| floor | places | plan [m] | lower bound [m] | ratio | optimum [m] |
+|---|---:|---:|---:|---:|---:|"""
+
 PAGE = """# Bounds
 
-How soon a team that knows the floor sees 99 % of it. Views that see all are chosen from a lattice of places,
-ordered by OR-Tools and improved by taking stops out and covering again; the tours are driven with the robots'
-limits. The plan is feasible, so its time is an upper bound on the optimum.
+How soon a team that has the floor plan can see 99 % of the floor. Views that see all are chosen from a lattice of
+places, ordered by OR-Tools and improved; the tours are driven with the robots' limits. The plan is feasible, so its
+time is an upper bound on the optimum.
 
 ## How tight
 
 One robot on {tight_count} generated apartments, on a graph of places {side:g} m apart: the plan's length over
-the bound of a linear program with cuts, below which no walk on that graph sees as much. Cuts are added
-for {relax:.0f} s at most, in a part of the study for as large a part of that; the bound holds after any time.
+the lower bound of a linear program, to which cuts are added for at most {relax:.0f} s (less in a part of the study).
 
 | | mean | worst |
 |---|---:|---:|
@@ -57,15 +60,13 @@ for {relax:.0f} s at most, in a part of the study for as large a part of that; t
 
 {exact}
 
-| floor | places | plan [m] | lower bound [m] | ratio | optimum [m] |
-|---|---:|---:|---:|---:|---:|
 {tight}
 
-## Explorers beside it
+## Explorers
 
-Kobuki, URG-04LX, perfect poses, maps of 5 cm, {floor_count} floors of the set `validation`, starts drawn by
-the seed. Medians over floors: the time of the plan, then each policy's time to 99 % as a multiple of it; runs
-that did not get there within {horizon:.0f} s count as that.
+Kobuki, URG-04LX, perfect poses, maps of 5 cm, {floor_count} floors of the set `validation`, drawn starts. Medians
+over floors: the time of the plan, then each policy's time to 99 % as a multiple of it; runs that miss 99 % count
+with {horizon:.0f} s.
 
 | robots | known floor [s] | {titles} |
 |---:|---:|{rule}
@@ -180,7 +181,7 @@ def page(folder: Path) -> str:
         worst=max(ratios),
         relax=RELAX_S,
         exact=exact,
-        tight=rows,
+        tight=in_file(f"{TIGHT_TABLE}\n{rows}"),
         floor_count=len({line["floor"] for line in teams}),
         horizon=HORIZON_S,
         titles=" | ".join(f"`{name}`" for name in POLICIES),

@@ -35,8 +35,8 @@ same starts, to 99 % of the floor or {horizon:.0f} s.
 
 ## Times
 
-Time to 99 % in the fast world over that in the full one, floor by floor; an episode that misses 99 % counts with
-{horizon:.0f} s. The 95 % intervals are of floors drawn again.
+Time to 99 % in the fast world over that in the full one, floor by floor; a miss of 99 % counts with
+{horizon:.0f} s. 95 % intervals are over floors.
 
 | robots | policy | floors | full, mean [s] | fast, mean [s] | fast over full | reached 99 %: full, fast |
 |---:|---|---:|---:|---:|---:|---:|
@@ -44,8 +44,8 @@ Time to 99 % in the fast world over that in the full one, floor by floor; an epi
 
 ## Choice of a policy
 
-A policy that is chosen in the fast world should be the better one in the full world. Times of a policy over those of
-another, in either world:
+A policy that is chosen in the fast world should be the better one in the full world. Times over those of another
+policy, in either world:
 
 | robots | policy | over | in the full world | in the fast world |
 |---:|---|---|---:|---:|

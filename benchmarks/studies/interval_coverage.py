@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import integrate, optimize, stats
 
+from lidarium.benchmarks.results_page import in_file
 from lidarium.benchmarks.studies.shared.study import Progress, Study, Task, do_missing, kept_lines
 from lidarium.evaluation.statistics import (
     FEWEST_FOR_NOMINAL,
@@ -33,6 +34,7 @@ SLOWER = 1.2
 """How much more time the second policy takes."""
 
 CENSORED = 0.2
+BAND = "band of a mean curve"
 _CORRELATION = 0.5
 _TRIALS_OF_A_DRAW = 40
 _SEED = 2026
@@ -245,7 +247,7 @@ def _band(kind: str, is_simultaneous: bool, resamples: int) -> Case:
             low, high = mean - width, mean + width
         return Interval(float(mean.mean()), float(low.max()), float(high.min()), 0.95, size)
 
-    figure = "band of a mean curve" if is_simultaneous else "intervals at each point of a mean curve (for comparison)"
+    figure = BAND if is_simultaneous else "intervals at each point of a mean curve (for comparison)"
     return Case(figure, kind, 0.0, interval, is_simultaneous and kind != "skewed random walks")
 
 
@@ -316,45 +318,79 @@ def page(folder: Path) -> str:
     text = [
         "# How often intervals hold the truth",
         "",
-        f"Share of {trials:,} trials in which the 95 % interval holds the known truth, in %, by the number of runs or "
-        f"pairs; {seconds:.0f} s on one core. Its standard error is {100.0 * np.sqrt(0.95 * 0.05 / trials):.1f} at 95 "
-        f"%. Intervals are made of {resamples:,} resamples here, of 10,000 in reports. Asked for are "
-        f"{100 * WANTED[0]:.0f} to {100 * WANTED[1]:.0f} at {FEWEST_FOR_NOMINAL} and more on normal, skewed and 20 % "
-        "censored data; those of smaller samples are published, not asked for, and reports warn there. Rows marked as "
-        "beyond are harder than what is asked for, or discrete. What each interval is made of: "
+        f"Share of {trials:,} trials in which the 95 % interval holds the known truth, in %, by the number n of runs "
+        f"or pairs; {seconds:.0f} s on one core. The standard error is {100.0 * np.sqrt(0.95 * 0.05 / trials):.1f} at "
+        f"95 %. Intervals are made of {resamples:,} resamples here, of 10,000 in reports. Required are {_wanted()} for "
+        f"n = {FEWEST_FOR_NOMINAL} and more, with normal, skewed and 20 % censored data; for smaller samples reports "
+        "warn. Rows marked as beyond are harder than required, or discrete. How each interval is made: "
         "[statistics](../reference/statistics.md).",
         "",
         "Times of two policies are drawn in pairs whose normal scores have a correlation of 0.5; the second policy "
-        "takes 1.2 times as long. Cut by the horizon: runs end where the first policy has missed a fifth. Cut at "
+        "takes 1.2 times as long. Cut by the horizon: runs end when the first policy has missed a fifth. Cut at "
         "random: exponential cuts come before a fifth of its times, and the horizon is its upper quartile.",
         "",
-        f"**Reached in {asked - len(missed)} of {asked} rows that are asked for.**"
+        f"**Reached in {asked - len(missed)} of {asked} required rows.**"
         + ("" if not missed else " Missed: " + "; ".join(f"{line['figure']}, {line['data']}" for line in missed) + "."),
-        *_tables(lines),
         "",
-        "*refused*: trials in which the longest time was cut before the horizon, so that the mean up to there is "
-        "unknown; the function says so, and the share is of the others.",
+        "## By figure",
+        "",
+        f"Least and greatest share over the kinds of data, for n below {FEWEST_FOR_NOMINAL} and from there on. "
+        "*Refused* is the greatest number of trials in which the longest time was cut before the horizon: the mean up "
+        "to there is unknown, the function raises an error, and shares are of the other trials.",
+        "",
+        *_summary(lines),
+        "",
+        "## All rows",
+        "",
+        in_file("\n".join(_table(lines))),
+        "",
+        "## Bands of a mean curve",
+        "",
+        *_table([line for line in lines if line["figure"] == BAND]),
     ]
     return "\n".join(text) + "\n"
 
 
-def _tables(lines: Sequence[Line]) -> list[str]:
-    """Return a table for each figure, a row for each kind of data."""
-    rows: list[str] = []
-    figure = ""
+def _summary(lines: Sequence[Line]) -> list[str]:
+    """Return a table with a row for each figure."""
+    below = max(size for size in SIZES if size < FEWEST_FOR_NOMINAL)
+    rows = [
+        f"| figure | rows | n = {SIZES[0]} to {below} | n = {FEWEST_FOR_NOMINAL} to {SIZES[-1]} | refused | "
+        f"{_wanted()} from n = {FEWEST_FOR_NOMINAL} |",
+        "|---|---:|---:|---:|---:|---|",
+    ]
+    for figure in dict.fromkeys(line["figure"] for line in lines):
+        members = [line for line in lines if line["figure"] == figure]
+        shares = [(size, *found) for line in members for size, found in zip(SIZES, line["shares"], strict=True)]
+        few = [share for size, share, _ in shares if size < FEWEST_FOR_NOMINAL]
+        many = [share for size, share, _ in shares if size >= FEWEST_FOR_NOMINAL]
+        cells = [figure, len(members), _range(few), _range(many), max(refused for *_, refused in shares)]
+        verdicts = f"{sum(is_reached(line['shares']) for line in members)} of {len(members)}"
+        rows.append(f"| {' | '.join(str(cell) for cell in cells)} | {verdicts} |")
+    return rows
+
+
+def _range(shares: Sequence[float]) -> str:
+    return f"{100.0 * min(shares):.1f} to {100.0 * max(shares):.1f}"
+
+
+def _wanted() -> str:
+    return f"{100 * WANTED[0]:.0f} to {100 * WANTED[1]:.0f}"
+
+
+def _table(lines: Sequence[Line]) -> list[str]:
+    """Return a table with a row for each figure and kind of data."""
+    rows = [
+        f"| figure | data | {' | '.join(f'n = {size}' for size in SIZES)} | "
+        f"{_wanted()} from n = {FEWEST_FOR_NOMINAL} |",
+        "|---|---|" + "---:|" * len(SIZES) + "---|",
+    ]
     for line in lines:
-        if line["figure"] != figure:
-            figure = line["figure"]
-            rows += ["", f"## {figure[0].upper()}{figure[1:]}", ""]
-            rows += [
-                f"| data | {' | '.join(f'n = {size}' for size in SIZES)} | 93 to 97 from n = 50 |",
-                "|---|" + "---|" * (len(SIZES) + 1),
-            ]
         verdict = ("yes" if is_reached(line["shares"]) else "**no**") + ("" if line["is_asked_for"] else " (beyond)")
         cells = [
             f"{100.0 * share:.1f}{f' ({refused} refused)' if refused else ''}" for share, refused in line["shares"]
         ]
-        rows.append(f"| {line['data']} | {' | '.join(cells)} | {verdict} |")
+        rows.append(f"| {line['figure']} | {line['data']} | {' | '.join(cells)} | {verdict} |")
     return rows
 
 

@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from lidarium.benchmarks.results_page import in_file
 from lidarium.benchmarks.studies.shared.study import Progress, Study, Task, do_missing, kept_lines
 from lidarium.evaluation.statistics.samples import MOST_VALUES
 from lidarium.evaluation.suites.campaign import EPISODES_FILE, Campaign
@@ -193,36 +194,34 @@ LONG, PIECES_FILE, AGAIN_FILE, NODES_FILE, KILLS_FILE = (
     "kills.jsonl",
 )
 
+PIECES_TABLE = """| episodes | a piece, each [ms] | memory of the command [MB] | `episodes.jsonl` [MB] |
+|---:|---:|---:|---:|"""
+
 PAGE = """# Many episodes, many machines
 
 ## 10^5 episodes
 
-Short episodes (`random_walk` on the apartment for one simulated second, maps of 10 cm, no records) with
-{workers} workers, in pieces of {piece:,} with settings of their own: what is measured is what stands around
-episodes.
+Overhead of short episodes (`random_walk` on the apartment for one simulated second, maps of 10 cm, no
+records) with {workers} workers, in pieces of {piece:,} with settings of their own.
 
-| episodes | a piece, each [ms] | memory of the command [MB] | `episodes.jsonl` [MB] |
-|---:|---:|---:|---:|
 {pieces}
 
 With all {episodes:,} there, the command opens the file in {opened_s:.1f} s when it is called again.
 `lidarium report --replays 0` takes {report_s:.0f} s and {report_mb:,.0f} MB, and its page has
 {page_mb:.1f} MB.
 
-What breaks first:
+Limits, the nearest first ([how to split a run](../tutorials/run_many_episodes.md)):
 
 1. A report compares at most {group:,} episodes of one policy, with the same settings and number of robots.
-   Its resamples take 20 kB for each, 1.3 GB at that size. Part settings, or take fewer seeds of more floors.
+   Its resamples take 20 kB for each, 1.3 GB at that size.
 2. A line takes {line_bytes:,.0f} bytes. Files above {most:,.1f} GB are refused, so a folder ends at
    {limit:,.0f} episodes.
 3. The report above took {mb_each:.1f} kB an episode, and a browser has to open its page.
 
-[Run many episodes](../tutorials/run_many_episodes.md) says how to part them.
-
 ## Nodes
 
-Two nodes of one core each beside one, on episodes of three robots; connecting and loading kernels are
-included, some six seconds. To reach: 1.8 x.
+Two nodes of one core each over one, on episodes of three robots, with some six seconds to connect and to load
+kernels. To reach: 1.8 x.
 
 | episodes | rounds | two nodes over one, median |
 |---:|---:|---|
@@ -230,8 +229,8 @@ included, some six seconds. To reach: 1.8 x.
 
 ## Killed nodes
 
-While an evaluation ran on a cluster of three nodes, one of them was killed {killed} times (SIGKILL of all
-its processes), each time after 1 to 19 more episodes, and another one joined. Of {killed_episodes:,} episodes
+During an evaluation on a cluster of three nodes, one of them was killed {killed} times (SIGKILL of all its
+processes), each time after 1 to 19 more episodes, and another one joined. Of {killed_episodes:,} episodes
 none was lost, doubled or changed: all lines are those of one machine.
 """
 
@@ -307,7 +306,7 @@ def page(folder: Path) -> str:
     return PAGE.format(
         workers=pieces[-1]["workers"],
         piece=pieces[0]["episodes"],
-        pieces="\n".join(rows),
+        pieces=in_file(f"{PIECES_TABLE}\n" + "\n".join(rows)),
         episodes=again["episodes"],
         opened_s=again["opened_s"],
         report_s=again["report_s"],

@@ -31,24 +31,22 @@ DRIVES_FILE = "drives.jsonl"
 
 PAGE = """# Parity of the worlds
 
-The same commands in the world of PyBullet and in the kinematic world, from the same starts: each of {floors}
-floors, {seeds} seeds, {drive_s:.0f} s, with a new speed and turn rate every {held_s:.0f} s, drawn from -0.3
-to 1 of the greatest speed and from -0.6 to 0.6 of the greatest turn rate. *Free* are drives that touch
-nothing in either world.
+The same commands in the world of PyBullet and in the kinematic world, from the same starts: {floors} floors,
+{seeds} seeds, {drive_s:.0f} s, with a new speed and turn rate every {held_s:.0f} s, drawn from -0.3 to 1 of the
+greatest speed and from -0.6 to 0.6 of the greatest turn rate. *Free* drives touch nothing in either world.
 
 To reach: 95 % of the free drives end within {distance_m} m and {turn_deg:.0f} deg of each other.
 
 {table}
 
-- *Apart*: distance and turn between the poses at the end, median and what 95 % are within. Wheels of PyBullet
-  reach a new speed within milliseconds, the kinematic ones at once; what slips meanwhile adds up.
-- *Steps in contact*: in PyBullet, in the kinematic world, and the share of steps with both worlds' robots at
-  places within 5 cm in which they agree. Round bodies slide along walls in the kinematic world; in PyBullet
-  wheels grip, and a robot that drives against a wall stalls.
-- *Odometry off*: between the pose by dead reckoning and the truth at the end of a drive, 95 %, for wheels
-  that measure exactly; free drives, and those with contact.
-- *Scans*: at the poses of PyBullet's bodies, both worlds' scans, compared to the bit in every step in which
-  the body leans by less than 2 deg.
+- *Apart*: distance and turn between the poses at the end. Wheels of PyBullet reach a new speed within
+  milliseconds, the kinematic ones at once.
+- *Steps in contact*: in PyBullet, in the kinematic world, and the share of steps with robots within 5 cm of each
+  other in which both worlds agree.
+- *Odometry off*: error of dead reckoning at the end of a drive with exact wheel encoders; free drives, and those
+  with contact.
+- *Scans*: at the poses of PyBullet's bodies, equal to the bit, in steps in which the body leans by less than
+  2 deg.
 """
 
 

@@ -76,8 +76,8 @@ RUNS_FILE, SLAM_FILE, STEPS_FILE = "runs.jsonl", "slam.jsonl", "steps.jsonl"
 
 PAGE = """# People and doors
 
-{robots} robots on {floors} generated office floors with {people} people, beside the same floors, starts and seeds
-without. People walk between places by ORCA ([people and doors](../how_to/people_and_doors.md)).
+{robots} robots on {floors} generated office floors, with {people} people and without. People walk between places by
+ORCA ([people and doors](../how_to/people_and_doors.md)).
 
 | figure | to reach | measured | reached |
 |---|---:|---:|---|
@@ -85,9 +85,9 @@ without. People walk between places by ORCA ([people and doors](../how_to/people
 
 ## Policies
 
-Episodes end at 99 % of the floor or {horizon:.0f} s. Times that miss 99 % count with {horizon:.0f} s; ratios are
-geometric means over pairs with 95 % intervals. *Near* is a gap to a person below 0.5 m, *near misses* are such
-approaches in a run, *near* (time) and *lost* (by yielding) are of a robot in a run, *contacts* by robots and by people.
+Times to 99 % of the floor; misses count with {horizon:.0f} s. Ratios are geometric means over pairs with 95 %
+intervals. *Near misses*: approaches below 0.5 m in a run; *near* and *lost* (by yielding): time of a robot in a run;
+*contacts*: by robots, by people.
 
 | policy | runs | pairs | with over without | 99 % | contacts | near misses | near [s] | closest [m] | lost [s] |
 |---|---:|---:|---:|---:|---:|---:|---:|---:|---:|
@@ -99,7 +99,7 @@ With doors in {doors:.0f} % of the openings as well:
 |---|---:|---:|---:|---:|
 {with_doors}
 
-## SLAM
+## SLAM and time of a step
 
 `realism="lab"` with `nearest_frontier`: ATE is the mean over the robots.
 
@@ -107,13 +107,7 @@ With doors in {doors:.0f} % of the openings as well:
 |---|---:|---:|---:|---:|
 {slam}
 
-## Time of a step
-
-A step of a batch of {batch} episodes with {robots} robots each, on one thread, median of {repeats}:
-
-| without people [ms] | with {people} people [ms] | over |
-|---:|---:|---:|
-{steps}
+A step of a batch of {batch} episodes takes {steps} (one thread, median of {repeats}).
 """
 
 
@@ -309,7 +303,7 @@ def page(folder: Path) -> str:
         slam="\n".join(_slam_row(pair) for pair in _pairs(slam)),
         batch=BATCH,
         repeats=REPEATS,
-        steps=" ".join(f"| {line['without_ms']:.2f} | {line['with_ms']:.2f} | {line['over']:.3f} |" for line in steps),
+        steps=", ".join(f"{line['without_ms']:.2f} ms without people, {line['with_ms']:.2f} ms with" for line in steps),
     )
 
 

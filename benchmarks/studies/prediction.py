@@ -47,23 +47,23 @@ COVERAGES = (0.15, 0.3, 0.5, 0.7, 0.85)
 PAGE = """# Predicted maps
 
 How well the shipped [network](../reference/prediction.md) predicts the unknown part of a map, and how much time
-`predicted_tours` saves by it over `tour_frontier`. With the truth in place of the prediction it bounds what any
-predictor can win in this way. No floor here was trained on.
+`predicted_tours` saves by it over `tour_frontier`. The truth in place of the prediction bounds the gain of any
+predictor. No floor here was trained on.
 
 ## Predictions
 
-One robot explores by `tour_frontier`; its map is judged when it has seen {coverages} of the floor. Counted are the
+Maps of one robot with `tour_frontier` that has seen {coverages} of the floor. Counted are the
 unknown squares of 0.2 m within 3 m of known ones. *All free* and *nearest* are guesses without a network: all of them
-are free; each is as the nearest known square. *Saved* is the share of the errors of the better guess that the network
-does not make. *Calibration* is the expected calibration error.
+are free; each is as the nearest known square. *Saved*: share of the errors of the better guess that the network
+avoids. *Calibration*: expected calibration error.
 
 {quality}
 
 ## Times
 
-Simulated time to 99 % of `C_free` over that of `tour_frontier`, pair by pair, from the same starts: geometric means
-with 95 % intervals. Kobuki, URG-04LX, perfect poses, no noise, maps of 5 cm, cut at {horizon:.0f} s; runs that did not
-get there count as that. The truth is that of squares of 0.2 m, as a network would predict it at best.
+Simulated time to 99 % of `C_free` over that of `tour_frontier` from the same starts: geometric means with 95 %
+intervals. Kobuki, URG-04LX, perfect poses, no noise, maps of 5 cm; misses count with {horizon:.0f} s. The truth has
+squares of 0.2 m, as a perfect network would predict.
 
 {times}
 """

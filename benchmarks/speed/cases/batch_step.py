@@ -23,12 +23,9 @@ CORES = 2
 LEAST_GAIN, ALLOWED, LEAST_RATE = 1.8, 1.3, 30_000.0
 
 NOTES = (
-    f"*Batch*: `lidarium.vector_env` with {EPISODES} episodes of {ROBOTS} robots on the straight 512 x 512 floor: 720 "
-    "noisy beams over 240 deg to 5.6 m, maps at 2.5 cm; a whole step has rewards, endings, infos and observations "
-    "(scan, pose, velocity, bumper, and egocentric maps of 64 x 64 cells at the scales 1 and 4). Three such batches "
-    "are in the same state and take the same steps, 20 at a time in turn; every round begins with blank maps at other "
-    "places. *Kernel alone* is the kernel of that step with motion, scans, scorer, maps and rewards, on as many "
-    "threads.",
+    f"*Batch*: `lidarium.vector_env` with {EPISODES} episodes of {ROBOTS} robots, floor, laser and maps as in the "
+    "*kernel step*; observations are scan, pose, velocity, bumper, and egocentric maps of 64 x 64 cells at the scales "
+    "1 and 4. *Kernel alone* is the kernel of that step.",
 )
 
 

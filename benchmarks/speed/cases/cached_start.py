@@ -25,9 +25,8 @@ ALLOWED_S = 1.5
 
 NOTES = (
     "*Cached start*: `import lidarium`, `lidarium.parallel_env()` and its first reset in a fresh process, after one "
-    "that has compiled the kernels. *Kernels compiled* counts those of the reset and three steps that were not loaded "
-    "from the cache. *Read-only* is a start from a copy of the package that cannot be written to, with a home that "
-    "cannot be written to either: the kernels are kept in the temporary folder; a first start there compiles them.",
+    "that has compiled the kernels. *Kernels compiled*: those of the reset and three steps that were not in the "
+    "cache.",
 )
 
 

@@ -19,11 +19,8 @@ from lidarium.envs.settings.lidar import Lidar
 CORES = 1
 
 NOTES = (
-    "*Scan and map update*: `KinematicWorld.step` with one robot, motion and scorer included, at the settings of "
-    "three projects; their rates are quoted (an AMD Zen 5 core, each project's own code and defaults, scan and map "
-    "update only). ARiADNE (commit 8d726ad): 640 x 480 cells, 720 beams all around to 80 cells. Explore-Bench "
-    "(ce3b98a): 250 x 250 cells, all around to 35 cells; ours casts 720 beams. HouseExpo (45e2b25): 258 beams over "
-    "180 deg to 5 m, 4 cm cells, noise of 0.1 m.",
+    "*Scan and map update*: `KinematicWorld.step` with one robot at the settings of ARiADNE (8d726ad), Explore-Bench "
+    "(ce3b98a) and HouseExpo (45e2b25), whose rates are quoted for their own code and defaults.",
 )
 
 

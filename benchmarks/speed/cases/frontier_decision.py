@@ -28,10 +28,9 @@ TO_REACH = {("ideal", 1): 3500.0, ("ideal", 3): 3000.0, ("fast", 1): 8000.0, ("f
 """Rows a CPU second by realism and size of the team."""
 
 NOTES = (
-    f"*Frontier decision*: `lidarium.vector_env` with level `frontier`, {EPISODES} episodes on `{FLOORS}`, "
-    'maps of 5 cm, the default laser and observations, one thread; *fast* has `realism="fast"`. Each robot takes '
-    "any of its offers with equal chance. A row is a decision of one robot, up to 20 steps, new episodes "
-    "included; time is that of the processor, not of the clock.",
+    f"*Frontier decision*: level `frontier`, {EPISODES} episodes on `{FLOORS}`, maps of 5 cm, the default laser and "
+    'observations, one thread; *fast* has `realism="fast"`. Choices are drawn with equal probability. A row is a '
+    "decision of one robot, up to 20 steps, new episodes included, in CPU time.",
 )
 
 

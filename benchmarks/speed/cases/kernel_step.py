@@ -129,14 +129,12 @@ TRIAL_POSES = 6
 CORES = 1
 
 NOTES = (
-    "*Kernel step*: one call of `KinematicWorld.step` for 16 robots: motion with contact, 720 noisy beams over 240 "
-    "deg to 5.6 m, teammates as obstacles of bodies and beams, scorer, and the update of 16 maps at 2.5 cm. The floor "
-    "has 512 x 512 cells of 2.5 cm with rooms, doors and boxes; every block starts with blank maps at other places.",
-    "*VMAS* runs its lidar with 720 rays on the same boxes, 3 agents an environment, at the batch size that was best "
-    "in a short trial; it has no map. It is an outside program and runs in a process of its own. Boxes cost it the "
-    "same whichever way they lie, so its straight floor is the peer of our turned floor too.",
-    "*IR-SIM* runs its lidar2d with 720 beams and noise for one robot, on the same floor as rectangles and as a grid "
-    "map, at that of six poses where it is fastest; it keeps no map here.",
+    "*Kernel step*: one call of `KinematicWorld.step` for 16 robots: motion, contact, 720 noisy beams over 240 deg to "
+    "5.6 m, scorer and 16 maps, on a floor of 512 x 512 cells of 2.5 cm.",
+    "*VMAS*: its lidar with 720 rays on the same boxes (a turn does not change its time), 3 agents in an environment, "
+    "the best batch size of a short trial; no map.",
+    "*IR-SIM*: its lidar2d with 720 noisy beams for one robot on the same floor, at the fastest of six poses; no map "
+    "is built.",
 )
 
 

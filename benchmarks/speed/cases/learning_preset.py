@@ -20,12 +20,9 @@ WANTED = 15.0
 
 NOTES = (
     f"*Learning preset*: `lidarium.vector_env` with {EPISODES} episodes of {ROBOTS} robots, `lidar_360_6m` (180 beams "
-    "all around to 6 m, no noise), maps at 5 cm, and the observations of the *batch*; every third block begins with "
-    f"blank maps at other places. VMAS has as many agents in an environment and {PEER_RAYS} rays all around to 6 m on "
-    "the same boxes, at that of the batch sizes 32 to 2048 that was best in a short trial, with the settings of the C "
-    "library's memory at which it is fastest; it has no map. Two threads each. *Without egocentric maps* is the same "
-    "with scans, poses, velocities and bumpers alone as observations, which is what VMAS gives; maps and rewards are "
-    "still made.",
+    f"to 6 m, no noise), maps at 5 cm, observations as in the *batch*. VMAS has as many agents, {PEER_RAYS} rays to 6 "
+    "m, no map, and the best of the batch sizes 32 to 2048. *Without egocentric maps* the observations are those of "
+    "VMAS; maps and rewards are still computed.",
 )
 
 

@@ -92,10 +92,9 @@ ROBOTS = 16
 CORES = 1
 
 NOTES = (
-    "*Map update*: the same 16 noisy scans of 720 beams into int8 log-odds of 2.5 cm cells on the straight floor. "
-    "Ours is `KinematicWorld.perceive`, one call for 16 maps, hits on teammates taken out; the line *called scan by "
-    "scan* is `OccupancyGrid.integrate`, which checks its arguments each time. *fillPoly and numpy* and *ray "
-    "traversal* (numba) update one map scan by scan.",
+    "*Map update*: the same 16 noisy scans of 720 beams into int8 log-odds of 2.5 cm cells, by one call of "
+    "`KinematicWorld.perceive` for 16 maps, or *called scan by scan* (`OccupancyGrid.integrate`). *fillPoly and "
+    "numpy* and *ray traversal* (numba) update one map scan by scan.",
 )
 
 

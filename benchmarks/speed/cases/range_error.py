@@ -26,9 +26,8 @@ ALLOWED_MM = 0.1
 CORES = 1
 
 NOTES = (
-    "*Range error*: the greatest difference between our ranges (as the sensor returns them, float32) and the nearest "
-    "entry point into any solid cell, computed by intersecting each beam with every such cell in reach; 12 poses of "
-    "720 beams on each of the four floors.",
+    "*Range error*: the greatest difference between the ranges (float32) and the nearest entry point into any solid "
+    "cell, over 12 poses of 720 beams on each of the four floors.",
 )
 
 

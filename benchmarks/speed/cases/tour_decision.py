@@ -24,8 +24,8 @@ MOST_MS, TO_REACH = 1.2, 800.0
 
 NOTES = (
     f"*Plan of tours*: all that `tour_frontier` does to choose goals for {ROBOTS} robots, over whole episodes on "
-    f"`{FLOORS}`, by the time of the processor. *Tour decisions*: `lidarium.vector_env` with level `tour`, {EPISODES} "
-    "episodes, two threads, each robot takes one of its stops with equal chance; robots that only go on do not count.",
+    f"`{FLOORS}`, in CPU time. *Tour decisions*: level `tour`, {EPISODES} episodes, two threads; choices are drawn "
+    "with equal probability, and robots that continue to their stop are not counted.",
 )
 
 

@@ -32,13 +32,10 @@ _TRIALS, _LONGEST, _FREE = 64, 10, 255
 _WITHOUT_WORK = (DriveState.IDLE, DriveState.ARRIVED, DriveState.NO_PATH)
 
 NOTES = (
-    f"*Waypoint decision*: `lidarium.vector_env` with level `waypoint`, {EPISODES} episodes of {ROBOTS} robots, floor, "
-    "laser, maps and observations as in the *batch*, decisions of 2 s (20 steps; less where a robot arrives or finds "
-    f"no way). Each robot gets a cell {NEAREST:g} to {FARTHEST:g} m off that is free in its own map and keeps it until "
-    "it arrives, finds no way, or has tried for 20 s; as an action tells a place from where the robot is now, every "
-    "robot plans anew in every decision. *Bare steps* are calls of `KinematicWorld.step` for robots at the same "
-    "places, as many as each decision took, at the mean speed and turn rate of the decision, on as many threads. "
-    "Times are per robot and step.",
+    f"*Waypoint decision*: level `waypoint`, {EPISODES} episodes of {ROBOTS} robots as in the *batch*, decisions of at "
+    f"most 2 s (20 steps) to free cells {NEAREST:g} to {FARTHEST:g} m off; every robot plans anew in every decision. "
+    "*Bare steps* are as many calls of `KinematicWorld.step` at the same places and mean speeds. Times are per robot "
+    "and step.",
 )
 
 

@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from lidarium.benchmarks.results_page import about, publish
+from lidarium.benchmarks.results_page import about, in_file, publish
 from lidarium.benchmarks.speed.cases.histories import Drives, Histories, drawn_drives
 from lidarium.benchmarks.speed.growth.idle_memory import IdleMemory
 from lidarium.benchmarks.speed.harness.timing import Interval, median_interval, on_cores
@@ -19,6 +19,7 @@ from lidarium.mapping.files.output import check_writable, write_json
 
 ALLOWED_MEMORY = 1.2
 MIB = 2**20
+ON_MAPS = " on the maps of "
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,28 +130,29 @@ def growth_page(result: Mapping[str, Any], growths: Sequence[Growth], memory: Id
     return "\n".join(
         [
             "# Growth",
-            f"One thread. {result['repeats']} repeats in which all sizes run in turn; medians, with the interval of "
-            f"ranks that holds the true median in at least 95 of 100 cases. Caches of a core: {result['caches']}.",
+            f"One thread. {result['repeats']} repeats in which all sizes run in turn; medians with 95 % intervals of "
+            f"ranks. The first of a group has {SIZES[0]} robots, or a side of 13 m. Caches of a core: "
+            f"{result['caches']}.",
             "",
-            growth_table(growths),
+            growth_table([growth for growth in growths if growth.allowed is not None or ON_MAPS in growth.name]),
+            "",
+            "All sizes:",
+            "",
+            in_file(growth_table(growths)),
             "",
             "- *Robots in a batch*: the same 1,024 drives of 1 s (teams of two, 720 noisy beams over 240 deg to 5.6 "
-            "m, the straight floor of 512 x 512 cells of 2.5 cm) are run in batches of 4, of 16 and so on: batch "
-            "after batch is put where its drives begin, on the maps that it has. A step is `KinematicWorld.step` with "
-            "motion, contact, scans, scorer and maps.",
-            "- *On the maps of 4*: the same batch of 1,024 robots, whose maps and masks are those of the first four. "
-            "The arithmetic is the same, cell for cell; only the memory in use is smaller. What the time falls by is "
-            "what memory costs.",
-            "- *Side of the floor*: 256 drives of 5 s on floors of the same kind of rooms, four robots at a "
-            "time, each alone on its floor.",
+            "m, floor of 512 x 512 cells of 2.5 cm) in batches of 4, 16 and so on, one after the other on the same "
+            "maps. A step is `KinematicWorld.step` with motion, contact, scans, scorer and maps.",
+            "- *On the maps of 4*: the same batch of 1,024 robots with the maps and masks of the first four. The "
+            "arithmetic is the same; the difference is the cost of memory.",
+            "- *Side of the floor*: 256 drives of 5 s, four robots at a time, each alone on its floor.",
             "",
             memory_table(memory),
             "",
-            f"- *Idle robot*: {memory.robots:,} robots in teams of two that have stood still for a second at the level "
-            f"of velocities, on the straight floor; the map of one has {memory.map_bytes / MIB:.2f} MiB. *Arrays that "
-            "belong to the robot* are its map, its mask (an eighth of the map) and its rows of all tables; *all "
-            "arrays* adds the team's masks and two sets of observations. *Resident* is what the process has grown by, "
-            "with what the C library keeps between arrays.",
+            f"- *Idle robot*: {memory.robots:,} robots in teams of two after a second without motion at the level of "
+            f"velocities; the map of one has {memory.map_bytes / MIB:.2f} MiB. *Arrays that belong to the robot* are "
+            "its map, its mask (an eighth of the map) and its rows of all tables; *all arrays* adds the team's masks "
+            "and two sets of observations.",
             "",
         ]
     )
@@ -188,7 +190,7 @@ def growth_with_robots(
     The largest is measured once more with all its robots on the maps of the smallest one.
     """
     histories = {f"{size:,} robots": Histories(drives, size, resolution) for size in sizes}
-    shared = f"{sizes[-1]:,} robots on the maps of {sizes[0]}"
+    shared = f"{sizes[-1]:,} robots{ON_MAPS}{sizes[0]}"
     histories[shared] = Histories(drives, sizes[-1], resolution, maps=sizes[0])
     seconds = repeated_in_turn(histories, repeats)
     first = next(iter(seconds.values()))

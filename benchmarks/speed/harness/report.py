@@ -30,9 +30,8 @@ def speed_page(result: Mapping[str, Any], lines: Sequence[Line]) -> str:
     return "\n".join(
         [
             "# Speed",
-            f"Each line is the median of {rounds} rounds in which all its contenders run in turn for "
-            f"{block_s:g} s each; ratios are taken "
-            "round by round, with their least and greatest. One core, and two where a line says two threads.",
+            f"Medians of {rounds} rounds in which all contenders of a line run in turn for {block_s:g} s each; ratios "
+            "are taken round by round, with their least and greatest. One core, or two if a line says two threads.",
             "",
             in_file(table(lines)),
             "",

@@ -18,7 +18,7 @@ def test_a_tiny_share_runs_and_is_not_run_again(tiny, tmp_path):
     assert list(study.work(tmp_path, None, 3, 1)) == []
     page = study.page(tmp_path)
     assert_published("floors", page, tmp_path)
-    assert "| generated floors (building:SEED) | 1 | 1 | 1 | 0.99" in page
+    assert "| generated floors (building:SEED) | 2 | 0 | 0 | " in page
     assert "0 of 2 runs below 0.99" in page
     assert "| building:4000001 | " in page
     assert next(study.work(tmp_path, None, 1, 1)) == ("runs", 3, 4)

@@ -24,8 +24,8 @@ LEAST_GAIN, LEAST_BESIDE = 1.7, 0.95
 _COUNTING = "while True: pass"
 
 NOTES = (
-    f"*Frontier decisions on two threads*: {EPISODES} episodes of one robot on `{FLOORS}`, else as for "
-    "*frontier decision*, by the clock; *beside a busy core* a process counts meanwhile.",
+    f"*Frontier decisions on two threads*: {EPISODES} episodes of one robot on `{FLOORS}`, otherwise as *frontier "
+    "decision*, by the clock; *beside a busy core*: of another process.",
 )
 
 

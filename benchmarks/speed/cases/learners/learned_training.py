@@ -36,9 +36,9 @@ batch = 128
 """
 
 NOTES = (
-    f"*Training by rewards*: the last phase of `lidarium train` on floors of the recipe, {ENVIRONMENTS} environments "
-    f"in processes of their own, {STEPS} decisions of each between updates, from classic tours on. Its *simulator's "
-    "share* is of the time of rollout and update with one environment in the same process.",
+    f"*Training by rewards*: the last phase of `lidarium train`, {ENVIRONMENTS} environments in processes of their "
+    f"own, {STEPS} decisions of each between updates. *Simulator's share*: of the time of rollout and update, with one "
+    "environment in the same process.",
 )
 
 

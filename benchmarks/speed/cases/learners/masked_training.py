@@ -110,9 +110,9 @@ LEARNER = FrontierLearner("MultiInputPolicy", episodes=64, rollout=32, batch=512
 
 NOTES = (
     f"*MaskablePPO*: of sb3-contrib, its `MultiInputPolicy`, {LEARNER.episodes} episodes of one robot on `{FLOORS}` "
-    f"from the store of floors, {LEARNER.rollout} decisions of each between updates of {LEARNER.epochs} epochs, "
-    "PyTorch on one thread and the kernels on two. Steps are decisions, by the clock, floors in the store. *All "
-    f"floors in memory*: `{SIZE_VARIABLE}={ALL_MIB}`; usual are {DEFAULT_MIB:g} MiB.",
+    f"from the store of floors, {LEARNER.rollout} decisions of each between updates of {LEARNER.epochs} epochs. Steps "
+    f"are decisions, by the clock. *All floors in memory*: `{SIZE_VARIABLE}={ALL_MIB}`; the default is {DEFAULT_MIB:g} "
+    "MiB.",
 )
 
 

@@ -24,10 +24,9 @@ LARGE = "1,620 m2, 330 solids"
 TURN_RATE = math.pi / 4.0
 
 NOTES = (
-    "*World of PyBullet*: a step of 0.1 s of 3 Kobukis that turn on the spot, 24 substeps, with 727 beams "
-    "each by our casters, contacts and encoders. *Rig*: the same robots in PyBullet by its own calls, a body "
-    "for each solid, a `stepSimulation` for each substep, with `rayTestBatch` or without scans; on a "
-    "generated floor of 1,620 m2 with 330 solids.",
+    "*World of PyBullet*: a step of 0.1 s of 3 Kobukis, 24 substeps, 727 beams each. *Rig*: the same robots by "
+    "PyBullet's own calls, a body for each solid, with `rayTestBatch` or without scans; on a generated floor of 1,620 "
+    "m2 with 330 solids.",
 )
 
 

@@ -33,11 +33,9 @@ LIMITS_S = {("apartment", 320): 0.12e-3, ("apartment", 640): 0.35e-3, ("large", 
 """Longest that an image may take [s], by floor and columns."""
 
 NOTES = (
-    "*Depth images* are of the Xtion (58 deg, 0.4 to 4 m) on a robot at 64 free places, the whole call included; the "
-    "apartment has 80 solids, the large floor about 2,000 m2 of offices. *getCameraImage* is PyBullet's on the same "
-    f"boxes, depth alone asked for; EGL draws in software where there is no GPU. *With depth* is a batch of {EPISODES} "
-    f"episodes x {ROBOTS_EACH} robots on one thread that observes 64 x 48 depths beside all that is observed by "
-    "default, or beside pose and scan alone; its peer is the same batch without depth.",
+    "*Depth images*: the Xtion (58 deg, 0.4 to 4 m) at 64 free places of an apartment with 80 solids and of about "
+    f"2,000 m2 of offices (*large*). *getCameraImage* is PyBullet's. *With depth*: a batch of {EPISODES} episodes x "
+    f"{ROBOTS_EACH} robots that observes 64 x 48 depths, over the same batch without depth.",
 )
 
 

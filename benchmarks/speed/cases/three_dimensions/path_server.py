@@ -28,9 +28,8 @@ REQUESTS = 500
 TO_REACH = 1000.0
 
 NOTES = (
-    f"*Path server* is `lidarium serve` with the furnished apartment and {CODES:,} free codes; one client asks for "
-    f"{REQUESTS} paths in turn and waits for each, by the Python client, on the same core. CPU time is that of server "
-    "and client together, so that other programs do not count. *Plan alone* is the same requests without server.",
+    f"*Path server*: `lidarium serve` with {CODES:,} free codes of the furnished apartment, and a Python client on the "
+    f"same core that asks for {REQUESTS} paths in turn. CPU time is that of both. *Plan alone*: without server.",
 )
 
 _PROGRAM = "import sys; from lidarium.scripts.main import main; sys.exit(main())"

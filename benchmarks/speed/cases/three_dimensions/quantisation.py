@@ -85,12 +85,10 @@ LEAST_RATIOS = {"scikit-learn": 30.0, "faiss": 3.0}
 MOST_PHI = {"phi2": 0.94, "phi1": 0.975}
 
 NOTES = (
-    f"*Quantisation* is the whole call with {STEPS} of Lloyd's steps: points sorted, labelled, and all that is known "
-    "of each code. The points are of depth images of 640 x 480 in the furnished apartment, without a limit of range "
-    "and with 5 mm of noise. Peers start from the same codes, make as many steps on one thread, and label every point "
-    f"at the end. *Error over theirs* compares the mean squared distances. *Budget* is the error after {BUDGET_S} s of "
-    f"the whole call over that of K-means++, the mean over {FRAMES} depth images: of a kitchen (7-Scenes, in the "
-    "folder that LIDARIUM_DATA names), which are judged, and of the apartment.",
+    f"*Quantisation*: the whole call with {STEPS} of Lloyd's steps on points of depth images of the furnished "
+    "apartment. Peers start from the same codes and make as many steps on one thread. *Error over theirs*: of mean "
+    f"squared distances. *Budget*: the error after {BUDGET_S} s over that of K-means++, the mean over {FRAMES} real "
+    f"(7-Scenes kitchen in LIDARIUM_DATA; judged) and {FRAMES} simulated depth images.",
 )
 
 

@@ -23,10 +23,8 @@ SETTINGS = GraphSettings(merge_radius=0.0)
 LIMITS_MS = {"graph": 10.0, "repair": 0.5, "plan": 0.1, "plan, 95 %": 0.4}
 
 NOTES = (
-    f"*Sparse planning* is in the furnished apartment with {CODES:,} free codes of the floor, all of which "
-    "a body of 0.30 m and 1.2 m can stand at; its boxes are those of the furniture. *Repaired and replanned* "
-    "is an obstacle of 0.4 m that comes upon the path, and a new path around it. *Plan* is the median and "
-    f"what 95 % are within of {REQUESTS} requests, each the least of three.",
+    f"*Sparse planning*: the furnished apartment with {CODES:,} free codes of the floor. *Repaired and replanned*: an "
+    f"obstacle of 0.4 m appears on the path. *Plan*: median and 95th percentile of {REQUESTS} requests.",
 )
 
 

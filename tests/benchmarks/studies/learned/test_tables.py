@@ -23,17 +23,26 @@ def episodes():
 
 
 def test_a_row_compares_pairs(episodes):
-    row = learned._row(episodes, "learned", "tour_frontier", 1)
-    cells = [cell.strip() for cell in row.strip("|").split("|")]
-    assert cells[:4] == ["1", "`learned`", "`tour_frontier`", "8"]
+    cells = learned._cells(episodes, "learned", "tour_frontier", 1)
+    assert cells[:4] == ("1", "`learned`", "`tour_frontier`", "8")
     assert cells[4].startswith("0.835 (")
-    assert cells[6:] == ["100 %", "8, 8", "0.800"]
-    assert learned._row(episodes, "learned", "tour_frontier", 2) == ""
+    assert cells[6:] == ("100 %", "8, 8", "0.800")
+    assert learned._cells(episodes, "learned", "tour_frontier", 2) == ()
+
+
+def test_means_have_a_row_for_each_kind_and_team_that_ran(episodes):
+    (row,) = learned.means_table({"test": episodes, "kth": {}}).splitlines()[2:]
+    cells = [cell.strip() for cell in row.strip("|").split("|")]
+    assert cells[:3] == [learned.KINDS["test"], "1", "8"]
+    assert cells[3].startswith("0.835 (")
+    assert cells[4].startswith("0.667 (")
+    assert cells[4].endswith(", `utility_frontier`")
+    assert learned.times_table({"test": episodes}).count("\n| generated") == 2
 
 
 def test_two_pairs_are_too_few_for_an_interval(episodes):
     few = {policy: dict(list(of_policy.items())[:2]) for policy, of_policy in episodes.items()}
-    cells = [cell.strip() for cell in learned._row(few, "learned", "tour_frontier", 1).strip("|").split("|")]
+    cells = learned._cells(few, "learned", "tour_frontier", 1)
     assert cells[4] == "0.805 (no interval)"
     assert "inf" not in " ".join(cells)
 
