@@ -4,9 +4,10 @@ import itertools
 import json
 import math
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from importlib import resources
+from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import Any
 
@@ -26,22 +27,36 @@ from lidarium.evaluation.episodes.watching import WatchedExploration
 from lidarium.evaluation.statistics import FEWEST_FOR_INTERVAL, Interval, paired_ratio
 from lidarium.mapping.files.output import write_text
 
-TEAMS = ("tours-2", "ppo-2", "mappo-2", "qmix-2", "ppo-4", "signal-2", "supervised-2")
-"""Trainings; the number is the size of the team in training."""
+TEAMS = {
+    "tours-2": 2,
+    "ppo-2": 5,
+    "mappo-2": 5,
+    "vdn-2": 2,
+    "qmix-2": 2,
+    "ppo-4": 5,
+    "mappo-4": 5,
+    "qmix-4": 2,
+    "signal-2": 5,
+    "supervised-2": 5,
+}
+"""Number of trainings by team, whose own number is its size in training; two of those that do not learn."""
+
+AGAIN = ("ppo-2", "0")
+"""Training of a shipped network that is made again, to see what comes out on another day."""
 
 WORLDS: Mapping[str, Mapping[str, Any]] = {"": {}, "signal": {"radio": "signal"}, "supervised": {"known_starts": False}}
 """Settings of the worlds that teams are trained for, by the first word of their name; "" is that of all others."""
 
 WORLD_NAMES = {"signal": "Teams of 2 whose radio breaks", "supervised": "Teams of 2 under a supervisor"}
 
-SEEDS = tuple(range(5))
-
 CLASSICS = ("nearest_frontier", "utility_frontier", "explore_lite", "tour_frontier", "learned", "predicted_tours")
 NEAREST, TOURS, UNTRAINED, SHIPPED = "nearest_frontier", "tour_frontier", "untrained", "shipped"
 BESIDE = (NEAREST, TOURS, "zoo:ppo-2")
 """Policies with which a team is compared in its own world; ppo-2 was trained in the plain one."""
 
-FLOORS = set_floors("set:test:50")
+FLOORS, MORE_FLOORS = set_floors("set:test:50"), set_floors("set:test")[50:]
+"""Floors of all trainings, and those on which shipped teams and classic ones run besides."""
+
 SIZES, LARGE = (2, 4), 8
 """Sizes of teams; networks of these teams drive large ones too."""
 
@@ -60,9 +75,9 @@ PAGE = """# The zoo
 [Teams of the zoo](../reference/learned.md#teams-of-the-zoo) choose among frontiers, `tours-2` among the stops of its
 tours, in the ideal world. The best network of each training by the validation floors runs here. The untrained network
 ranks frontiers as explore_lite does; before its training `tours-2` does as `tour_frontier`. All run on the same
-{floors} floors of the set `test` from the same drawn starts, until 99 % is seen or {horizon:.0f} s are over, which then
-count. Classic policies decide at their own level. Ratios are geometric means of times, floor by floor, with 95 %
-intervals over floors and seeds: runs of a floor are not independent.
+{floors} floors of the set `test` from the same drawn starts, and shipped teams and classic policies on {all_floors},
+until 99 % is seen or {horizon:.0f} s are over, which then count. Classic policies decide at their own level. Ratios
+are geometric means of times over floors, with 95 % intervals; a floor counts by the geometric mean of its trainings.
 
 ## Figures
 
@@ -153,13 +168,21 @@ def _level(team: str) -> str:
     return "tour" if "tours" in team else "frontier"
 
 
+def _card(team: str) -> Traversable:
+    """Return the card of a team that ships, a file that others lack."""
+    return resources.files("lidarium.agents.zoo") / "data" / f"{team}.json"
+
+
+def _first_training(policy: str) -> str:
+    """Return the training of a team of the zoo that runs where not all do."""
+    return SHIPPED if _card(policy.removeprefix("zoo:")).is_file() else "0"
+
+
 def _take_shipped(folder: Path) -> None:
-    """Write the shipped weights and curves of teams without a training in the folder."""
-    there = {team for team, _ in _trainings(folder)}
-    data = resources.files("lidarium.agents.zoo") / "data"
+    """Write the shipped weights and curves."""
     for team in TEAMS:
-        card = data / f"{team}.json"
-        if team in there or not card.is_file():
+        card = _card(team)
+        if not card.is_file():
             continue
         taken = folder / LESSONS / f"{team}-{SHIPPED}"
         taken.mkdir(parents=True, exist_ok=True)
@@ -191,14 +214,18 @@ def measure(run: Run) -> dict[str, Any]:
 def work(folder: Path, _data: Path | None, every: int, workers: int) -> Progress:
     """Train all teams, and compare them with classic ones on every N-th floor.
 
-    A part of the study trains nothing: it uses the trainings in the folder, and shipped weights for other teams.
+    Shipped weights are the trainings of seed 0. A part of the study trains nothing else.
     """
     floors = FLOORS[::every]
+    _take_shipped(folder)
     if every == 1:
-        lessons = [Lesson(team, seed, folder / LESSONS / f"{team}-{seed}") for seed in SEEDS for team in TEAMS]
+        lessons = [
+            Lesson(team, seed, folder / LESSONS / f"{team}-{seed}")
+            for team, number in TEAMS.items()
+            for seed in range(number)
+            if seed or (team, "0") == AGAIN or not _card(team).is_file()
+        ]
         yield from do_missing(folder / LESSONS_FILE, "lessons", lessons, learn, workers)
-    else:
-        _take_shipped(folder)
     untrained = folder / f"{UNTRAINED}.safetensors"
     zeros = {name: np.zeros(shape, np.float32) for name, shape in network_shapes("frontier").items()}
     zoo_files("").save(untrained, {**zeros, "steepness": np.ones(1, np.float32)})
@@ -213,11 +240,19 @@ def work(folder: Path, _data: Path | None, every: int, workers: int) -> Progress
         for name, training, weights in teams
         if not name.startswith("zoo:") or _size(name) == robots
     ]
-    ship = [team for team in teams if team[0] in (NEAREST, TOURS, UNTRAINED) or team[1] in ("0", SHIPPED)]
+    first = [team for team in teams if not team[0].startswith("zoo:") or team[1] == _first_training(team[0])]
     runs += [
         Run(name, training, floor, LARGE, weights)
         for floor in floors[:LARGE_FLOORS]
-        for name, training, weights in ship
+        for name, training, weights in first
+        if name not in CLASSICS or name in (NEAREST, TOURS)
+    ]
+    runs += [
+        Run(name, training, floor, robots, weights)
+        for floor in MORE_FLOORS[::every]
+        for robots in SIZES
+        for name, training, weights in first
+        if not name.startswith("zoo:") or (_size(name) == robots and training == SHIPPED)
     ]
     for own in filter(_world, TEAMS):
         beside: list[tuple[str, str, Path | None]] = [(name, "", None) for name in BESIDE]
@@ -248,14 +283,18 @@ def _seconds(line: Line) -> float:
 
 
 def _ratio(ours: Sequence[Line], others: Sequence[Line]) -> Interval | None:
-    """Return the geometric mean of the ratios of times on the floors that both have."""
+    """Return the geometric mean of the ratios of times on the floors that both have.
+
+    Floors count alike, each by the geometric mean of its runs: some have more trainings than others.
+    """
     known = {line["floor"]: _seconds(line) for line in others}
-    both = [line for line in ours if line["floor"] in known]
-    if len({line["floor"] for line in both}) < 2:
+    logs: dict[str, list[float]] = {}
+    for line in ours:
+        if line["floor"] in known:
+            logs.setdefault(line["floor"], []).append(math.log(_seconds(line)))
+    if len(logs) < 2:
         return None
-    floors = [line["floor"] for line in both]
-    clusters = [sorted(set(floors)).index(floor) for floor in floors]
-    return paired_ratio([_seconds(line) for line in both], [known[floor] for floor in floors], clusters=clusters)
+    return paired_ratio([math.exp(np.mean(each)) for each in logs.values()], [known[floor] for floor in logs])
 
 
 def _mean(lines: Sequence[Line], of: Callable[[Line], float]) -> float:
@@ -353,6 +392,27 @@ def _goals(lines: Sequence[Line]) -> str:
     return "\n".join(rows)
 
 
+def _again(folder: Path, runs: Sequence[Line]) -> Iterator[str]:
+    """Yield a row for the training that was made again: its time over the nearest frontier, and that of the others."""
+    team, seed = AGAIN
+    found, robots = _by_policy(runs, _size(team)), _size(team)
+    ratios: dict[str, float] = {}
+    for training in {line["training"] for line in found.get(f"zoo:{team}", [])}:
+        own = [line for line in found[f"zoo:{team}"] if line["training"] == training]
+        if ratio := _ratio(own, found.get(NEAREST, [])):
+            ratios[training] = ratio.estimate
+    again = ratios.pop(seed, None)
+    if again is None or len(ratios) < 2:
+        return
+    low, high = min(ratios.values()), max(ratios.values())
+    weights = [(folder / LESSONS / f"{team}-{each}" / WEIGHTS).read_bytes() for each in (seed, SHIPPED)]
+    same = ", the same weights to the byte" if weights[0] == weights[1] else ""
+    yield (
+        f"| {robots} robots, `{team}` trained again from the shipped seed | within {low:.2f} to {high:.2f}, as other "
+        f"seeds | {again:.2f}{same} | {_said(low <= again <= high, True)} |"
+    )
+
+
 def _said(is_reached: bool, is_sure: bool) -> str:
     """Return whether a figure was reached; few floors do not tell that it was."""
     if not is_reached:
@@ -409,15 +469,17 @@ def _curve_rows(lessons: Sequence[Line]) -> str:
 
 def page(folder: Path) -> str:
     """Return the results as markdown."""
-    lines, lessons = kept_lines(folder / RUNS_FILE), _lessons(folder)
+    runs, lessons = kept_lines(folder / RUNS_FILE), _lessons(folder)
+    lines = [line for line in runs if (line["policy"].removeprefix("zoo:"), line["training"]) != AGAIN]
     return PAGE.format(
-        floors=len({line["floor"] for line in lines}),
+        floors=len({line["floor"] for line in lines if line["training"] not in ("", SHIPPED)}),
+        all_floors=len({line["floor"] for line in lines}),
         horizon=HORIZON_S,
-        goals=_goals(lines),
+        goals="\n".join((_goals(lines), *_again(folder, runs))),
         tables="\n\n".join(f"## Teams of {robots}\n\n{_table(_by_policy(lines, robots))}" for robots in SIZES),
         large=_table(_by_policy(lines, LARGE)),
         worlds=_worlds(lines),
-        by_seed=_seed_rows(lines, lessons),
+        by_seed=_seed_rows(runs, lessons),
         picture=CURVES_PICTURE,
         curves=_curve_rows(lessons),
     )

@@ -492,6 +492,11 @@ def _split(observations: Any) -> Sequence[Any]:  # noqa: ANN401
 def _listed(values: Any) -> list[Any]:  # noqa: ANN401
     """Return an info of all rows as a list over rows; values by name become a dict for each row."""
     if type(values) is dict:
-        return _by_row({name: _listed(each) for name, each in values.items()})
+        return _by_row(
+            {
+                name: each.tolist() if type(each) is not dict and each.ndim == 1 else _listed(each)
+                for name, each in values.items()
+            }
+        )
     listed: list[Any] = values.tolist() if values.ndim == 1 else list(values)
     return listed

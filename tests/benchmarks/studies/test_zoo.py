@@ -35,12 +35,13 @@ def keep_training(folder, team, seed, coverage):
 
 def test_a_part_runs_the_teams_that_ship(tmp_path, monkeypatch):
     monkeypatch.setattr(zoo, "FLOORS", ("apartment:7",))
+    monkeypatch.setattr(zoo, "MORE_FLOORS", ("apartment:8",))
     monkeypatch.setattr(zoo, "CLASSICS", ("nearest_frontier",))
-    monkeypatch.setattr(zoo, "TEAMS", ("ppo-2",))
+    monkeypatch.setattr(zoo, "TEAMS", {"ppo-2": 1})
     monkeypatch.setattr(zoo, "LARGE", 3)
     monkeypatch.setattr(zoo, "HORIZON_S", 20.0)
     done = [what for what, _, _ in zoo.work(tmp_path, None, 2, 1)]
-    assert done == ["runs"] * 8
+    assert done == ["runs"] * 13
     lines = zoo.kept_lines(tmp_path / zoo.RUNS_FILE)
     assert [(each["policy"], each["robots"]) for each in lines] == [
         ("nearest_frontier", 2),
@@ -51,18 +52,25 @@ def test_a_part_runs_the_teams_that_ship(tmp_path, monkeypatch):
         ("nearest_frontier", 3),
         ("untrained", 3),
         ("zoo:ppo-2", 3),
+        ("nearest_frontier", 2),
+        ("untrained", 2),
+        ("zoo:ppo-2", 2),
+        ("nearest_frontier", 4),
+        ("untrained", 4),
     ]
+    assert [each["floor"] for each in lines] == ["apartment:7"] * 8 + ["apartment:8"] * 5
     assert zoo_files("").load(tmp_path / "untrained.safetensors")["steepness"] == 1.0
     assert "| `nearest_frontier` | 1 |" in zoo.page(tmp_path)
 
 
 def test_a_team_for_another_world_runs_there_beside_others(tmp_path, monkeypatch):
     monkeypatch.setattr(zoo, "FLOORS", ("apartment:7",))
+    monkeypatch.setattr(zoo, "MORE_FLOORS", ("apartment:8",))
     monkeypatch.setattr(zoo, "CLASSICS", ())
     monkeypatch.setattr(zoo, "SIZES", ())
     monkeypatch.setattr(zoo, "LARGE_FLOORS", 0)
     monkeypatch.setattr(zoo, "BESIDE", (NEAREST,))
-    monkeypatch.setattr(zoo, "TEAMS", ("signal-2", "supervised-2"))
+    monkeypatch.setattr(zoo, "TEAMS", {"signal-2": 1, "supervised-2": 1})
     monkeypatch.setattr(zoo, "HORIZON_S", 20.0)
     keep_training(tmp_path, "supervised-2", 0, 0.6)
     list(zoo.work(tmp_path, None, 2, 1))
@@ -102,15 +110,15 @@ def test_the_page_tells_what_is_reached_over_floors_and_seeds(tmp_path):
     lines += [line("tour_frontier", floor, 70.0 + k) for k, floor in enumerate(floors)]
     lines += [line("untrained", floor, None) for floor in floors]
     lines += [
-        line("zoo:ppo-2", floor, (100.0 + k) * (0.78 + 0.01 * seed + 0.01 * (k % 3)), training=str(seed))
+        line("zoo:ppo-2", floor, (100.0 + k) * (0.78 + 0.01 * seed + 0.01 * (k % 3)), training=str(1 + seed))
         for k, floor in enumerate(floors)
         for seed in range(2)
     ]
     lines += [line(policy, floor, 50.0, robots=8) for floor in floors for policy in ("nearest_frontier", "zoo:ppo-2")]
     lines += [line(policy, floor, 60.0, robots=4) for floor in floors for policy in ("nearest_frontier", "zoo:ppo-4")]
-    for seed in (0, 1):
-        keep_training(tmp_path, "ppo-2", seed, 0.6 + seed / 10)
-    lessons = [{"team": "ppo-2", "seed": seed, "processor_s": 90.0} for seed in (0, 1)]
+    for seed in (1, 2):
+        keep_training(tmp_path, "ppo-2", seed, 0.5 + seed / 10)
+    lessons = [{"team": "ppo-2", "seed": seed, "processor_s": 90.0} for seed in (1, 2)]
     lines += [line("zoo:signal-2", floor, 80.0, world="signal") for floor in floors]
     lines += [line(NEAREST, floor, 100.0, world="signal") for floor in floors]
     lines += [
@@ -129,11 +137,34 @@ def test_the_page_tells_what_is_reached_over_floors_and_seeds(tmp_path):
         in page
     )
     assert "| untrained network | 8 | 50.0 % | 1200.0 s |" in page
-    assert "| `ppo-2` | 1 | 10 | 50.0 % | 70.0 % | 0.80" in page
+    assert "| `ppo-2` | 2 | 10 | 50.0 % | 70.0 % | 0.80" in page
     assert "| 1.5 min |" in page
-    assert "| 10 | - | 65.0 % | - | - | - | - | - |" in page
+    assert "| 10 | - | 65.0 % | - | - | - | - | - | - | - | - |" in page
     assert "## Teams of 2 whose radio breaks" in page
     assert "| `zoo:signal-2` | 8 | 75.0 % | 80.0 s | 0.80" in page
     assert "| `zoo:supervised-2` | 8 of 8 | 33.5 s |" in page
     assert "| `nearest_frontier` | 0 of 8 | - |" in page
+    assert "trained again" not in page
     assert "| 4 robots, `zoo:ppo-4` over `nearest_frontier` | at most 0.90, interval below 1 | 1.00" in page
+
+
+def test_a_training_that_was_made_again_is_told_by_itself(tmp_path):
+    floors = [f"building:{k}" for k in range(8)]
+    lines = [line(NEAREST, floor, 100.0) for floor in floors]
+    times = {zoo.SHIPPED: 80.0, "0": 80.0, "1": 70.0, "2": 90.0}
+    lines += [line("zoo:ppo-2", floor, time_s, training=seed) for floor in floors for seed, time_s in times.items()]
+    for seed in times:
+        keep_training(tmp_path, "ppo-2", seed, 0.6)
+    keep(tmp_path / zoo.RUNS_FILE, lines)
+    keep(tmp_path / zoo.LESSONS_FILE, [])
+    page = zoo.page(tmp_path)
+    assert "| within 0.70 to 0.90, as other seeds | 0.80, the same weights to the byte | yes |" in page
+    assert "| `zoo:ppo-2` | 24 |" in page
+    assert f"| {np.exp(np.mean(np.log([0.8, 0.7, 0.9]))):.2f} (" in page
+    assert "| `ppo-2` | 0 | 10 | 50.0 % | 60.0 % | 0.80" in page
+
+
+def test_floors_count_alike_however_many_trainings_ran_there():
+    ours = [line("a", "f", 50.0), line("a", "g", 200.0), line("a", "g", 200.0), line("a", "g", 200.0)]
+    others = [line(NEAREST, "f", 100.0), line(NEAREST, "g", 100.0)]
+    assert zoo._ratio(ours, others).estimate == pytest.approx(1.0)
