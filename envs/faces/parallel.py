@@ -484,9 +484,10 @@ def _by_row(columns: Mapping[str, Iterable[Any]]) -> list[dict[str, Any]]:
 
 def _split(observations: Any) -> Sequence[Any]:  # noqa: ANN401
     """Return the observation of each row."""
-    if type(observations) is not dict:
-        return observations
-    return _by_row({name: _split(each) if type(each) is dict else each for name, each in observations.items()})
+    if type(observations) is dict:
+        return _by_row({name: _split(each) if type(each) is dict else each for name, each in observations.items()})
+    rows: Sequence[Any] = observations
+    return rows
 
 
 def _listed(values: Any) -> list[Any]:  # noqa: ANN401
