@@ -18,6 +18,7 @@ from lidarium.agents.policy import settings_for
 from lidarium.agents.supervisor.policy import Supervised
 from lidarium.agents.zoo.network import network_shapes
 from lidarium.agents.zoo.policy import ZooTeam, zoo_files
+from lidarium.benchmarks.results_page import in_file
 from lidarium.benchmarks.studies.shared.study import Progress, Study, Task, do_missing, kept_lines
 from lidarium.envs.floors.catalogue.names import set_floors
 from lidarium.envs.settings.making import make_settings
@@ -481,7 +482,7 @@ def page(folder: Path) -> str:
         worlds=_worlds(lines),
         by_seed=_seed_rows(runs, lessons),
         picture=CURVES_PICTURE,
-        curves=_curve_rows(lessons),
+        curves=in_file(_curve_rows(lessons)),
     )
 
 

@@ -97,7 +97,7 @@ def page(folder: Path) -> str:
     parts = [
         "# Supervised teams",
         f"{len(every)} runs, {hours:.2f} hours of one core. " + _about(alone),
-        "## What was to be reached\n\n" + in_file(tables.goals_table(goals)),
+        "## What was to be reached\n\n" + tables.goals_table(goals),
         _notes(),
         *_wrong_section(every),
         *logs_section(read_json(folder / LOGS_FILE)),
@@ -124,7 +124,7 @@ def page(folder: Path) -> str:
         "## Five robots\n\n"
         + _times_text(rows["five"], alone)
         + ".\n\n"
-        + in_file(tables.five_table(rows["five"], alone)),
+        + tables.five_table(rows["five"], alone),
         "## A robot fails\n\n" + _about_failing() + "\n\n" + failing_table(failing),
         *_left_section(failing),
         *_bumper_section(rows[BUMPER]),
@@ -137,7 +137,7 @@ def page(folder: Path) -> str:
 def _team_section(rows: Sequence[Row], alone: Sequence[Row]) -> str:
     """Return the times of supervised teams in a sentence, and the table of all policies."""
     ratio = tables.shown(median(time_ratios(chosen(rows, SUPERVISED), chosen(rows, TOLD))))
-    return f"{_times_text(rows, alone)} and {ratio} of that of `{TOLD}`.\n\n{in_file(tables.team_table(rows, alone))}"
+    return f"{_times_text(rows, alone)} and {ratio} of that of `{TOLD}`.\n\n{tables.team_table(rows, alone)}"
 
 
 def _times_text(rows: Sequence[Row], alone: Sequence[Row]) -> str:
