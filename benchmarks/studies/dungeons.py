@@ -68,7 +68,7 @@ of that project on the first {printed} maps of its listing.
 
 As in the project, the sensor sees 20 m all around, cells have 0.4 m, and starts are the maps' marks. A robot of 1 cm
 drives freely at 2 m/s and sees while it drives. The project's robot moves between nodes 4 m apart, sees at these only,
-and ends when no node shows anything new, so this is no race with its planners.
+and ends when no node shows anything new, so its planners cannot be compared directly.
 
 ## The same maps
 
@@ -91,8 +91,8 @@ Policies on all {count} maps: ways to 99 %, and over that of `nearest_frontier`.
 
 [ARiADNE](https://github.com/marmotlab/ARiADNE) sees 80 pixels around and ends when 250 free ones are left
 unseen; so does the preset [`ariadne`](../reference/presets.md), with pixels of 0.1 m. Four of its maps are at hand,
-and {sisters} of the same kind from two projects beside it. Its paper's table is not at hand, so nothing stands beside
-ours here.
+and {sisters} of the same kind from two projects beside it. Its paper's table is not at hand, so only our policies
+are listed.
 
 | policy | ended so | way [m] | over `nearest_frontier` | way on ARiADNE's four [m] |
 |---|---:|---:|---:|---:|

@@ -533,9 +533,8 @@ class Engine:
 
     def _coverage(self) -> NDArray[np.float64]:
         """Return the coverage of a lone episode for each row; its steps are short."""
-        score, coverage = self.score, np.empty(self.rows)
-        coverage.fill(score.team_seen.item(0) / max(score.counted.item(0), 1))
-        return coverage
+        score = self.score
+        return np.full(self.rows, score.team_seen.item(0) / max(score.counted.item(0), 1))
 
     def _calibration_rows(self) -> dict[str, Any] | None:
         """Return the calibration of the robots' cameras in arrays over rows, None without cameras."""

@@ -1,7 +1,7 @@
 """The environment of a team of lidar robots (PettingZoo parallel API)."""
 
 import copy
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -482,22 +482,16 @@ def _by_row(columns: Mapping[str, Iterable[Any]]) -> list[dict[str, Any]]:
     return [dict(zip(columns, row)) for row in zip(*columns.values())]  # noqa: B905 (hot)
 
 
-def _split(observations: Any) -> Sequence[Any]:  # noqa: ANN401
+def _split(observations: Any) -> Any:  # noqa: ANN401
     """Return the observation of each row."""
-    if type(observations) is dict:
-        return _by_row({name: _split(each) if type(each) is dict else each for name, each in observations.items()})
-    rows: Sequence[Any] = observations
-    return rows
+    if type(observations) is not dict:
+        return observations
+    return _by_row({name: _split(each) for name, each in observations.items()})
 
 
 def _listed(values: Any) -> list[Any]:  # noqa: ANN401
     """Return an info of all rows as a list over rows; values by name become a dict for each row."""
     if type(values) is dict:
-        return _by_row(
-            {
-                name: each.tolist() if type(each) is not dict and each.ndim == 1 else _listed(each)
-                for name, each in values.items()
-            }
-        )
+        return _by_row({name: _listed(each) for name, each in values.items()})
     listed: list[Any] = values.tolist() if values.ndim == 1 else list(values)
     return listed

@@ -25,7 +25,7 @@ _COUNTING = "while True: pass"
 
 NOTES = (
     f"*Frontier decisions on two threads*: {EPISODES} episodes of one robot on `{FLOORS}`, otherwise as *frontier "
-    "decision*, by the clock; *beside a busy core*: of another process.",
+    "decision*, by the clock; *beside a busy core*: another process keeps one core busy.",
 )
 
 
