@@ -121,10 +121,7 @@ def page(folder: Path) -> str:
         if some:
             parts.append(f"## {title}\n\n" + in_file(tables.team_table(some, alone)))
     parts += [
-        "## Five robots\n\n"
-        + _times_text(rows["five"], alone)
-        + ".\n\n"
-        + tables.five_table(rows["five"], alone),
+        "## Five robots\n\n" + _times_text(rows["five"], alone) + ".\n\n" + tables.five_table(rows["five"], alone),
         "## A robot fails\n\n" + _about_failing() + "\n\n" + failing_table(failing),
         *_left_section(failing),
         *_bumper_section(rows[BUMPER]),
