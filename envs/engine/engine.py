@@ -381,7 +381,7 @@ class Engine:
         )
         if is_stepped:
             self._run_stepwise(modes, after_step)
-            self._writer.fill(self.observations, seen)
+            self._writer.write(self.observations, seen)
         else:
             self.run_kernel(modes, self._commands, seen)
 
@@ -533,8 +533,9 @@ class Engine:
 
     def _coverage(self) -> NDArray[np.float64]:
         """Return the coverage of a lone episode for each row; its steps are short."""
-        score = self.score
-        return np.full(self.rows, score.team_seen.item(0) / max(score.counted.item(0), 1))
+        score, coverage = self.score, np.empty(self.rows)
+        coverage.fill(score.team_seen.item(0) / max(score.counted.item(0), 1))
+        return coverage
 
     def _calibration_rows(self) -> dict[str, Any] | None:
         """Return the calibration of the robots' cameras in arrays over rows, None without cameras."""

@@ -1,7 +1,7 @@
 """The environment of a team of lidar robots (PettingZoo parallel API)."""
 
 import copy
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -262,18 +262,15 @@ class ExplorationEnv(ParallelEnv[str, Any, Any]):
     def _outcome(self) -> Outcome:
         engine, rows, live = self.engine, self._rows, self.agents
         observations, infos = self._observations(live), self._infos(live)
-        index = self._index
-        earned = rows.rewards.tolist()
-        rewards = {agent: earned[index[agent]] for agent in live}
+        rewards = self._by_agent(live, rows.rewards.tolist())
         if engine.has_endings or not engine.is_whole:
-            ended, cut = rows.terminated.tolist(), rows.truncated.tolist()
-            terminations = {agent: ended[index[agent]] for agent in live}
-            truncations = {agent: cut[index[agent]] for agent in live}
+            terminations = self._by_agent(live, rows.terminated.tolist())
+            truncations = self._by_agent(live, rows.truncated.tolist())
             if engine.has_endings:
                 for row, reason in engine.ended_because.items():
                     self.scorer.ended_because[self.possible_agents[row]] = reason
             stays = self.conventions.ended_agents == "zeros" and bool(engine.live.any())
-            self.agents = [agent for agent in live if stays or engine.live[index[agent]]]
+            self.agents = [agent for agent in live if stays or engine.live[self._index[agent]]]
         else:
             terminations, truncations = dict.fromkeys(live, False), dict.fromkeys(live, False)
         if self.render_mode == "human":
@@ -282,8 +279,13 @@ class ExplorationEnv(ParallelEnv[str, Any, Any]):
         return observations, rewards, terminations, truncations, infos
 
     def _observations(self, agents: Collection[str]) -> dict[str, Any]:
-        index, rows = self._index, _split(self._rows.observations)
-        return {agent: rows[index[agent]] for agent in agents}
+        return self._by_agent(agents, _split(self._rows.observations))
+
+    def _by_agent(self, agents: Collection[str], rows: Sequence[Any]) -> dict[str, Any]:
+        """Return the values of agents, from those of all rows."""
+        if len(agents) == len(rows):
+            return dict(zip(agents, rows))  # noqa: B905 (hot)
+        return {agent: rows[self._index[agent]] for agent in agents}
 
     def _infos(self, agents: Collection[str]) -> dict[str, dict[str, Any]]:
         """Return the infos of agents, from those of all rows."""
@@ -299,11 +301,11 @@ class ExplorationEnv(ParallelEnv[str, Any, Any]):
                 masks.append((name[1:], values))
         if not columns:
             return {agent: {} for agent in agents}
-        infos = _by_row(columns)
+        infos = [dict(zip(columns, row)) for row in zip(*columns.values())]  # noqa: B905 (hot)
         for name, mask in masks:
             for row in np.flatnonzero(~mask):
                 del infos[row][name]
-        return {agent: infos[self._index[agent]] for agent in agents}
+        return self._by_agent(agents, infos)
 
     def _listed_info(self, name: str, values: Any) -> list[Any]:  # noqa: ANN401
         """Return an info of all rows as a list over rows."""
@@ -477,21 +479,20 @@ class ExplorationEnv(ParallelEnv[str, Any, Any]):
         return {**self.__dict__, "_window": None}
 
 
-def _by_row(columns: Mapping[str, Iterable[Any]]) -> list[dict[str, Any]]:
-    """Return a dict for each row from the values of all rows by name."""
-    return [dict(zip(columns, row)) for row in zip(*columns.values())]  # noqa: B905 (hot)
-
-
 def _split(observations: Any) -> Any:  # noqa: ANN401
     """Return the observation of each row."""
     if type(observations) is not dict:
         return observations
-    return _by_row({name: _split(each) for name, each in observations.items()})
+    columns: Collection[Any] = observations.values()
+    if dict in map(type, columns):
+        columns = [_split(each) for each in columns]
+    return [dict(zip(observations, row)) for row in zip(*columns)]  # noqa: B905 (hot)
 
 
 def _listed(values: Any) -> list[Any]:  # noqa: ANN401
     """Return an info of all rows as a list over rows; values by name become a dict for each row."""
     if type(values) is dict:
-        return _by_row({name: _listed(each) for name, each in values.items()})
+        columns = [_listed(each) for each in values.values()]
+        return [dict(zip(values, row)) for row in zip(*columns)]  # noqa: B905 (hot)
     listed: list[Any] = values.tolist() if values.ndim == 1 else list(values)
     return listed

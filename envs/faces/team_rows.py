@@ -30,6 +30,8 @@ from lidarium.registry import unknown
 ACTIVE = "active"
 """Info: whether a robot had not ended before this step."""
 
+_TOLD = {Stop, Order}
+
 
 class TeamRows:
     """Begins and steps the episodes of an engine; results are arrays over rows in the forms of conventions.
@@ -153,8 +155,9 @@ class TeamRows:
     ) -> None:
         """Run all live episodes by actions of rows, and begin others; see `by_row`."""
         engine, names = self.engine, self._names
-        told = {row: action for row, action in actions.items() if type(action) is Stop or type(action) is Order}
-        if told:
+        told: Mapping[int, Any] = {}
+        if not _TOLD.isdisjoint(map(type, actions.values())):
+            told = {row: action for row, action in actions.items() if type(action) in _TOLD}
             actions = {row: action for row, action in actions.items() if row not in told}
         if self._board is not None:
             has_vectors = isinstance(engine.action_space, spaces.Box)
@@ -202,7 +205,8 @@ class TeamRows:
         ValueError
             If these are not actions by agent, an agent is unknown, or one has no action.
         """
-        _check_agents(actions, self._robot_of)
+        if type(actions) is not dict or not actions.keys() <= self._robot_of.keys():
+            _check_agents(actions, self._robot_of)
         engine, first = self.engine, episode * self.robots
         live, operating, takes_none = engine.live, engine.operating, engine.level.takes_none
         given = {}

@@ -4,7 +4,6 @@ The kernel writes the observations of all rows directly into the arrays of the c
 """
 
 from collections.abc import Mapping
-from itertools import starmap
 from operator import itemgetter
 from typing import Any
 
@@ -67,14 +66,13 @@ class ObservationWriter:
             )
         kinds = {name: ((self.rows, *box.shape), box.dtype) for name, box in boxes_of(settings).items()}
         self._kinds = [kinds[name] for name in self.keys]
-        self._sensed = [(place, name) for place, name in enumerate(self.keys) if name not in KEYS]
-        missing = [name for _, name in self._sensed if name not in simulation.sensors]
+        self._sensed = [name for name in self.keys if name not in KEYS]
+        missing = [name for name in self._sensed if name not in simulation.sensors]
         if missing:
             raise ValueError(f"the world has no sensor {missing[0]!r}; it has {', '.join(simulation.sensors)}")
-        # The kernel takes the arrays of all its keys, in order; keys that are not observed come last.
-        absent = [name for name in KEYS if name not in self.keys]
-        self._absent = [np.empty((0,) * len(kinds[name][0]), kinds[name][1]) for name in absent]
-        self._in_order = itemgetter(*((*self.keys, *absent).index(name) for name in KEYS))
+        # The kernel takes the arrays of all keys, in order; those of keys that are not observed are empty.
+        self._absent = {name: np.empty((0,) * len(shape), dtype) for name, (shape, dtype) in kinds.items()}
+        self._in_order = itemgetter(*KEYS)
         # The space's bounds are float32, and so are those to which values are clipped.
         limits = [float(np.float32(limit)) for limit in settings.speed_limits.max(axis=0)]
         self._simulation = simulation
@@ -101,47 +99,27 @@ class ObservationWriter:
         """
         return {name: np.empty(*kind) for name, kind in zip(self.keys, self._kinds, strict=True)}
 
-    def write(
-        self, out: Mapping[str, NDArray[Any]] | None = None, active: NDArray[np.bool_] | None = None
-    ) -> Mapping[str, NDArray[Any]]:
-        """Write one observation a row.
+    def write(self, out: Mapping[str, NDArray[Any]], active: NDArray[np.bool_] | None = None) -> None:
+        """Write one observation a row into arrays that ``buffers`` has made.
 
         Parameters
         ----------
         active : (rows,) bool or None
             Rows to write, the others keep their values; all by default.
         """
-        arrays = list(starmap(np.empty, self._kinds)) if out is None else self.check(out)
-        self._write(arrays, active)
-        return dict(zip(self.keys, arrays, strict=True)) if out is None else out
-
-    def fill(self, out: Mapping[str, NDArray[Any]], active: NDArray[np.bool_] | None = None) -> None:
-        """Write into arrays that ``buffers`` has made, without checks; see `write`."""
-        arrays = [out[name] for name in self.keys]
-        self._write(arrays, active)
-
-    def _write(self, arrays: list[NDArray[Any]], active: NDArray[np.bool_] | None) -> None:
-        sources = self._table() if self._sources is None else self._sources
-        chosen, observed = self._everyone if active is None else active, self._in_order(arrays + self._absent)
+        sources, observed = self.arguments(out)
+        active = self._everyone if active is None else active
         if self._threads > 1 and use_threads(self._threads) > 1:
-            write_parallel(chosen, sources, observed)
+            write_parallel(active, sources, observed)
         else:
-            write_serial(chosen, sources, observed)
+            write_serial(active, sources, observed)
         if self._sensed:
-            self._copy_sensors(arrays, active)
+            self.copy_sensors(out, active)
 
     def copy_sensors(self, out: Mapping[str, NDArray[Any]], active: NDArray[np.bool_]) -> None:
         """Write the observations that the kernel does not: last measurements of sensors, of the active rows."""
-        if self._sensed:
-            self._copy_sensors([out[name] for name in self.keys], active)
-
-    def _copy_sensors(self, arrays: list[NDArray[Any]], active: NDArray[np.bool_] | None) -> None:
-        for place, name in self._sensed:
-            measured = self._simulation.sensors[name].reshape(arrays[place].shape)
-            if active is None:
-                arrays[place][:] = measured
-            else:
-                arrays[place][active] = measured[active]
+        for name in self._sensed:
+            out[name][active] = self._simulation.sensors[name].reshape(out[name].shape)[active]
 
     def arguments(self, out: Mapping[str, NDArray[Any]]) -> tuple[Array, Arrays]:
         """Return the arguments of ``write_row`` except the row.
@@ -149,7 +127,7 @@ class ObservationWriter:
         These are the addresses of the sources, and of the output as ``buffers`` makes it.
         """
         sources = self._table() if self._sources is None else self._sources
-        return sources, self._in_order([out[name] for name in self.keys] + self._absent)
+        return sources, self._in_order({**self._absent, **out})
 
     def _table(self) -> NDArray[np.int64]:
         """Return the addresses of the sources of the observations.
@@ -162,18 +140,3 @@ class ObservationWriter:
     def __getstate__(self) -> dict[str, Any]:
         # A copy's arrays have other addresses, which are known when all of it has been made.
         return {**self.__dict__, "_sources": None}
-
-    def check(self, out: Mapping[str, NDArray[Any]]) -> list[NDArray[Any]]:
-        """Check arrays that a caller gives, and return them in the order of the keys."""
-        arrays = []
-        for name, (shape, dtype) in zip(self.keys, self._kinds, strict=True):
-            array = out.get(name)
-            if array is None:
-                raise ValueError(f"out has no array for {name}; want {', '.join(self.keys)}")
-            if array.shape != shape or array.dtype != dtype or not array.flags.carray:
-                raise ValueError(
-                    f"the array for {name} is {array.dtype} {array.shape}; want {dtype} {shape}, contiguous "
-                    "and writeable"
-                )
-            arrays.append(array)
-        return arrays
