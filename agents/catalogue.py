@@ -223,7 +223,7 @@ def make_policy(name: str, **settings: Any) -> Policy:  # noqa: ANN401
     'waypoint'
     """
     is_own = isinstance(name, str) and ":" in name and name not in POLICIES.summaries
-    maker = maker_at(name) if is_own else POLICIES[name]
+    maker = _maker_at(name) if is_own else POLICIES[name]
     _check_named(name, maker, settings)
     try:
         policy = maker(**settings)
@@ -255,7 +255,7 @@ def _check_named(name: str, maker: Callable[..., Any], settings: Mapping[str, An
 
 def source_of(name: str) -> Path | None:
     """Return the file of a policy that is not of the package, None of one that is."""
-    maker = maker_at(name) if ":" in name and name not in POLICIES.summaries else POLICIES[name]
+    maker = _maker_at(name) if ":" in name and name not in POLICIES.summaries else POLICIES[name]
     module = sys.modules.get(getattr(maker, "__module__", ""))
     file = getattr(module, "__file__", None)
     return None if file is None or str(getattr(module, "__name__", "")).startswith("lidarium.") else Path(file)
@@ -270,7 +270,7 @@ def _unknown_setting(maker: Callable[..., Any], error: TypeError) -> str:
     return unknown("setting", wrong, parameters)
 
 
-def maker_at(name: str) -> Callable[..., Any]:
+def _maker_at(name: str) -> Callable[..., Any]:
     """Return the factory of a user's own policy."""
     module_name, _, attribute = name.partition(":")
     here = os.getcwd()

@@ -159,7 +159,7 @@ _STOPPED = frozenset("Tt")
 
 
 @contextmanager
-def interrupts_held() -> Iterator[None]:
+def _interrupts_held() -> Iterator[None]:
     """Hold Ctrl-C and SIGTERM back while processes are begun: half-begun ones would complain.
 
     Ctrl-C is blocked, which they take over, and so hear nothing of it until they leave it to their parent.
@@ -202,7 +202,7 @@ def end_workers(grace_s: float = END_GRACE_S, *, are_ending: bool = False) -> No
             process.join()
 
 
-def end_pool(pool: ProcessPoolExecutor, *, are_ending: bool = False) -> None:
+def _end_pool(pool: ProcessPoolExecutor, *, are_ending: bool = False) -> None:
     """End a pool and its processes.
 
     Its thread is waited for: Python, on its way out, would write to a pipe that this thread closes just then.
@@ -321,7 +321,7 @@ def _in_pool(
         def hand_over(maximum: int) -> None:
             for task in islice(tasks, maximum):
                 try:
-                    with interrupts_held():
+                    with _interrupts_held():
                         running[pool.submit(_done, work, task)] = task
                 except BrokenProcessPool:
                     lost.append(task)
@@ -354,7 +354,7 @@ def _in_pool(
                         hand_over(1)
             is_whole = True
         finally:
-            end_pool(pool, are_ending=is_whole)
+            _end_pool(pool, are_ending=is_whole)
     return lost
 
 
@@ -410,11 +410,11 @@ def _begin_worker() -> None:
     import cv2
 
     cv2.setNumThreads(1)
-    leave_with_parent()
+    _leave_with_parent()
     import_own()
 
 
-def leave_with_parent() -> None:
+def _leave_with_parent() -> None:
     """Let this process end when its parent is gone, whatever it waits for.
 
     The parent may have been killed, so that the results are not read. On Linux the kernel sends the signal; a thread

@@ -155,6 +155,23 @@ def test_every_public_function_and_class_is_documented():
     assert not missing
 
 
+def test_documented_defaults_are_those_of_the_code():
+    """Entries such as ``spacing : float, default 0.25``; of several names, their common default or one each."""
+    found = 0
+    for module in modules():
+        for owner in vars(module).values():
+            if not inspect.isclass(owner) or owner.__module__ != module.__name__ or not owner.__doc__:
+                continue
+            for names, told in re.findall(r"^(\w[\w, ]*) : .*, default (.+)$", inspect.cleandoc(owner.__doc__), re.M):
+                parameters = inspect.signature(owner).parameters
+                values = [parameters[name].default for name in names.split(", ")]
+                values = values[:1] if len(set(values)) == 1 else values
+                shown = ", ".join(f'"{value}"' if isinstance(value, str) else repr(value) for value in values)
+                assert told == shown, (owner.__name__, names)
+                found += 1
+    assert found > 300
+
+
 def test_every_public_function_outside_of_kernels_has_type_hints():
     bare = []
     for path, source in SOURCES.items():

@@ -74,17 +74,17 @@ class FitSettings:
 
     Attributes
     ----------
-    epochs : int
+    epochs : int, default 30
         How often it sees all samples.
-    batch : int
+    batch : int, default 256
         Samples of an update.
-    learning_rate, weight_decay : float
+    learning_rate, weight_decay : float, default 0.0003, 0.01
         Of AdamW.
-    most_regret : float
+    most_regret : float, default 10.0
         Greater regrets count as this one [m].
-    held_out : float
+    held_out : float, default 0.1
         Share of the floors that are not fitted; the epoch that is best on them is kept.
-    correction_cost : float
+    correction_cost : float, default 0.001
         Cost of the square of a correction [1/m2]: without evidence tours remain as they are.
     """
 
@@ -132,11 +132,11 @@ class PpoSettings(_Budget):
 
     Attributes
     ----------
-    steps : int
+    steps : int, default 512
         Decisions of each environment between two updates.
-    batch, epochs : int
+    batch, epochs : int, default 256, 4
         Decisions of a step of gradients, and how often an update sees all.
-    learning_rate, clip, entropy, discount, trace : float
+    learning_rate, clip, entropy, discount, trace : float, default 0.0001, 0.1, 0.001, 1.0, 0.95
         Rate of Adam, greatest change of a ratio, weight of the entropy, gamma and lambda.
     """
 
@@ -167,17 +167,17 @@ class ValueSettings(_Budget):
 
     Attributes
     ----------
-    batch : int
+    batch : int, default 64
         Decisions of teams in a step of gradients.
-    kept : int
+    kept : int, default 20000
         Decisions of teams that are kept to learn from, the latest; none from before the last checkpoint.
-    learning_rate, discount : float
+    learning_rate, discount : float, default 0.0003, 0.98
         Rate of Adam, and gamma.
-    tracking : float
+    tracking : float, default 0.01
         Share of the way that target networks go towards the learned ones in each step.
-    first_chance, last_chance : float
+    first_chance, last_chance : float, default 0.3, 0.05
         Share of choices that are drawn evenly: at the beginning, and from the middle of the training on.
-    mixing : int
+    mixing : int, default 32
         Width of the network of QMIX that mixes values.
     """
 
@@ -228,9 +228,9 @@ class TeamSettings:
 
     Attributes
     ----------
-    seed : int
+    seed : int, default 0
         Seed of all draws.
-    algorithm : str
+    algorithm : str, default "ppo"
         All robots share a network that attends to frontiers and teammates. ``ppo``: MaskablePPO, whose critic sees
         what the robot sees (independent PPO, IPPO); ``mappo``: the same, its critic sees the true state of the team as
         well; ``qmix``, ``vdn``: the network gives the value of each choice, and that of the team is a mixture that
@@ -238,15 +238,15 @@ class TeamSettings:
     level : str
         ``frontier``, where the network begins with the ranking of explore_lite, or ``tour``, where it begins with what
         `tour_frontier` does.
-    robots : int
+    robots : int, default 2
         Size of the team.
-    floors : str
+    floors : str, default "set:train:1000"
         Floors to learn on, as for ``--floor``.
-    horizon_s : float
+    horizon_s : float, default 120.0
         Episodes end after so long, or when 0.99 of the floor is seen [s].
-    realism : str
+    realism : str, default "fast"
         World of the episodes to learn in; validation is in that of ``lidarium evaluate``.
-    validation : str
+    validation : str, default "set:validation:16"
         Floors on which checkpoints are compared; the best one is kept.
     supervisor : dict, optional
         Settings of a supervisor by name: starts are then unknown, the station merges the maps, and robots follow its
@@ -358,7 +358,7 @@ class TrainingSettings:
 
     Attributes
     ----------
-    seed : int
+    seed : int, default 0
         Seed of all draws.
     settings : dict
         Options of the environment, as in a suite.

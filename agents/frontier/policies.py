@@ -36,9 +36,9 @@ class NearestFrontier(FrontierExplorer):
 
     Parameters
     ----------
-    minimum_size : float
+    minimum_size : float, default 0.5
         Frontiers shorter than this are taken only when no longer one is in reach [m].
-    shares_map : bool
+    shares_map : bool, default True
         Whether robots explore on the team's map.
     """
 
@@ -70,13 +70,13 @@ class ExploreLite(FrontierExplorer):
 
     Parameters
     ----------
-    potential_scale, gain_scale : float
+    potential_scale, gain_scale : float, default 3.0, 1.0
         Weights of the distance to the frontier and of its size [1/m].
-    minimum_size : float
+    minimum_size : float, default 0.75
         Frontiers shorter than this are taken only when no longer one is in reach [m].
-    period_s : float
+    period_s : float, default 3.0
         Time between reconsiderations [s].
-    shares_map : bool
+    shares_map : bool, default True
         Whether robots explore on the team's map.
     """
 
@@ -139,13 +139,13 @@ class UtilityFrontier(FrontierExplorer):
 
     Parameters
     ----------
-    cost_weight : float
+    cost_weight : float, default 0.05
         Utility that a metre of way costs [1/m].
-    sensor_range : float
+    sensor_range : float, default 5.6
         Range within which a target sees other frontiers [m].
-    minimum_size : float
+    minimum_size : float, default 0.5
         Frontiers shorter than this are taken only when no longer one is left for a robot [m].
-    shares_map : bool
+    shares_map : bool, default True
         Whether robots explore on the team's map.
     """
 

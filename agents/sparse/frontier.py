@@ -137,7 +137,7 @@ class SparseFrontier(Policy):
 
     Parameters
     ----------
-    shares_map : bool
+    shares_map : bool, default True
         Whether robots plan on the team's map, if it reaches them at once, or each on its own
         map.
     **settings

@@ -21,13 +21,13 @@ class ViewSettings:
 
     Attributes
     ----------
-    minimum_size : float
+    minimum_size : float, default 0.3
         Shorter borders of unknown ground are no frontiers [m].
-    gain : float
+    gain : float, default 0.3
         Length of path that a square metre of unknown ground in view is worth [m/m2].
-    most_m2 : float
+    most_m2 : float, default 4.0
         Unknown ground in view of which more is worth nothing [m2].
-    near_share : float
+    near_share : float, default 0.6
         Up to which share of the range within which it sees the ground a robot comes near to a frontier.
     """
 

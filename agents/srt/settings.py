@@ -45,64 +45,64 @@ class SrtSettings:
 
     Attributes
     ----------
-    shape : str
+    shape : str, default "radial"
         Shape of the safe regions: ``ball``, ``star`` or ``radial``.
     algorithm : str
         ``integrated`` goes to open parts of the border of the seen region; ``base`` goes in random directions,
         wherever no other safe region lies.
-    candidates : str
+    candidates : str, default "goal"
         The choice of the next goal: ``goal`` (least way, and least distance to the goal if there is one), ``random``
         (an opening by its angular width) or ``farthest`` (the longest ray of an opening).
-    backtrack : str
+    backtrack : str, default "open"
         The choice from a node without openings: ``open`` (the cheapest node that has one, along the tree and
         its bridges) or ``parent``.
-    memory : str
+    memory : str, default "map"
         The record of seen space: ``map`` (the robot's map) or ``regions`` (the nodes' own scans).
     drive : str
         ``turn_advance`` (turn, advance, done) or ``controls`` (the best of a list of controls).
-    places_nodes_at_targets : bool
+    places_nodes_at_targets : bool, default False
         Whether a node is set at the robot's target, as printed in the thesis, and not where it
         takes itself to be.
-    repeats_nodes : bool
+    repeats_nodes : bool, default False
         Whether a node is added again when the robot comes back to it, as printed in the thesis.
-    step_share : float
+    step_share : float, default 0.8
         Share of the safe radius that the robot goes, in (0, 1).
-    random_share : float
+    random_share : float, default 0.0
         Share of random choices among those of least cost. The tree is complete without: frontiers of the map
         are gone to in the end.
-    way_weight : float
+    way_weight : float, default 0.7
         Weight of a metre of way against a metre of distance to the goal.
-    least_step : float
+    least_step : float, default 0.3
         Candidates lie farther than this from their node [m].
-    least_frontier : float
+    least_frontier : float, default 0.8
         With ``candidates`` ``goal`` and ``memory`` ``map``, frontiers of the map of at least this length are
         gone to; shorter ones when nothing else is left [m].
-    tries : int
+    tries : int, default 20
         How many candidates are drawn at a node.
-    nodes : int
+    nodes : int, default 500
         Budget of nodes of each robot.
-    time_s : float
+    time_s : float, default inf
         Budget of simulated time of each robot, without the way home [s].
-    perception : float
+    perception : float, default inf
         Rays count as far as this, and at most as the laser sees [m].
-    margin : float
+    margin : float, default 0.05
         Safe radii end this far before an obstacle, besides the robot's radius [m].
-    turn_room : float
+    turn_room : float, default 0.0
         A laser region with a return nearer than the robot's radius, the margin and this is not safe [m]; 0
         for off.
-    passing_distance : float
+    passing_distance : float, default 1.5
         On its way a robot adds a node after this distance [m].
-    looks_around : bool
+    looks_around : bool, default True
         Whether a robot turns to see the space behind it, at its first node and at nodes that are left without
         openings.
     turning_starts, turning_ends : float
         The robot turns on the spot if its heading is off by more than the first, until it is off by less
         than the second [rad].
-    speed : float
+    speed : float, default inf
         Greatest speed [m/s]; the robot's cruise speed if that is lower.
-    turn_rate : float
+    turn_rate : float, default 1.5
         Greatest turn rate [rad/s].
-    arrived : float
+    arrived : float, default 0.1
         Distance at which a robot has reached its target [m].
     """
 

@@ -20,14 +20,14 @@ class SupervisorSettings:
 
     Attributes
     ----------
-    period_s : float
+    period_s : float, default 10.0
         Simulated time between two decisions by the tree [s].
-    merge_period_s : float
+    merge_period_s : float, default 2.0
         Simulated time between two merges of the maps [s].
-    searches_per_merge : int
+    searches_per_merge : int, default 2
         For how many pairs of maps a merge searches at most; the others wait for their turn. With a decision
         there is no search: it has work of its own.
-    merge_resolution_m : float
+    merge_resolution_m : float, default 0.05
         Maps are compared in cells of this side, or of theirs if that is more [m].
     confirmation_growth_m2 : float
         Two maps are joined only when they were found twice, the second time when they know so much more [m2].
@@ -36,48 +36,48 @@ class SupervisorSettings:
     confirmation_wall_m : float
         When two maps are joined, the walls that agree measure at most so much each in the mean, or the
         overlap is large; 0 for any length [m].
-    same_goal_m : float
+    same_goal_m : float, default 1.0
         Goals that lie nearer to each other than this are one [m].
-    least_frontier_m : float
+    least_frontier_m : float, default 0.5
         Frontiers shorter than this are no goals [m].
-    least_left_m : float
+    least_left_m : float, default 0.5
         The work of a group is done when no frontier of this length is left on its map within reach [m].
-    unbalanced_share : float
+    unbalanced_share : float, default 0.5
         A robot whose share of the map is smaller than this part of its teammates' mean is sent to where there is
         more to map.
-    enclosed_way_m, enclosed_gain_m2_per_m : float
+    enclosed_way_m, enclosed_gain_m2_per_m : float, default 10.0, 0.1
         A robot that has mapped less than this on each metre of its last way of this length is enclosed [m,
         m2/m].
-    cost_weight : float
+    cost_weight : float, default 0.05
         Utility of a goal that a metre of way costs [1/m].
-    sensor_range_m : float
+    sensor_range_m : float, default 5.6
         Range of view of a robot at its goal, and how far around the map there may be more of it [m].
     assignment : str
         Who is given goals: ``pairs`` those robots alone that the rules redirect, one after the other;
         ``hungarian`` all robots of a group at each decision, by the least sum of costs; ``utility`` likewise,
         best pair of robot and goal first.
-    is_stop_final : bool
+    is_stop_final : bool, default False
         Whether a robot that the rules stop while its teammates work has ended; otherwise it stands by and
         goes on when there is a goal.
-    avoids_rendezvous : bool
+    avoids_rendezvous : bool, default False
         Whether robots are separated that are about to meet at goals near each other.
-    rendezvous_m : float
+    rendezvous_m : float, default 3.0
         How near such goals are [m].
-    returns_home : bool
+    returns_home : bool, default False
         Whether the robots drive to their starts when the work is done.
-    battery_margin : float
+    battery_margin : float, default 0.0
         A robot turns back when its battery's charge is less than this many times the cost of the way home; 0
         for never.
-    resumes_paused : bool
+    resumes_paused : bool, default False
         Whether a robot that has paused by itself, and reports a contact or an obstacle, is ordered
         to go on.
-    pauses_idle : bool
+    pauses_idle : bool, default False
         Whether a robot that has no goal of its own while its teammates work is paused by an order, and
         ordered to resume when there is one; else its policy lets it wait.
     merging : str
         Rules by which maps are merged: ``default``, or ``thesis`` for those of the thesis as printed, by which maps
         are joined the first time that they are found.
-    trusts_starts : bool
+    trusts_starts : bool, default False
         Whether robots that know how their frames lie in a common one are joined by that; nothing is searched
         for then.
 

@@ -36,26 +36,26 @@ class TourSettings:
 
     Attributes
     ----------
-    minimum_size : float
+    minimum_size : float, default 0.3
         Shorter frontiers are visited only when no others are left [m].
-    least_gain : float
+    least_gain : float, default 0.4
         So are those that show less than this [m2].
-    most : int
+    most : int, default 30
         Maximum number of frontiers on tours: each robot in turn takes its nearest.
-    kept_share : float
+    kept_share : float, default 0.15
         A robot goes on to a frontier until less than this share of the area that it would show is left.
-    kept : float
+    kept : float, default 1.0
         A robot's goal is left only for tours that are shorter by this [m].
-    turn_length : float
+    turn_length : float, default 0.25
         Length of path that a radian of turning costs at the start [m/rad].
-    total, waiting : float
+    total, waiting : float, default 0.1, 0.05
         Weight of the sum of all tours against the longest one, and of how long a square metre waits to be
         seen [1, 1/m2].
-    around, spacing : float
+    around, spacing : float, default 1.0, 0.3
         Views lie within the first of their frontiers, and the second apart [m].
-    reach, depth : float
+    reach, depth : float, default 3.0, 1.5
         Unknown space counts up to the first from a view, and up to the second behind known space [m].
-    view_share : float
+    view_share : float, default 0.7
         The view with the shortest path is taken among those that show this share of the best.
     """
 

@@ -3,11 +3,12 @@
 import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.envs.engine.first_reset import compile_first_reset
 from lidarium.envs.floors.areas import around
 from lidarium.envs.floors.floor import Floor
 from lidarium.envs.floors.floor_choice import FloorChoice
@@ -18,6 +19,10 @@ from lidarium.envs.simulation.backends import BACKENDS
 from lidarium.envs.simulation.kernels.floor_cache import FloorTables, floor_tables
 from lidarium.envs.simulation.people.doors import NARROWEST_M, WIDEST_M, draw_doors, with_shut_doors
 from lidarium.envs.simulation.simulation import Simulation
+from lidarium.mapping.kernels.first_start import compile_listed
+
+KERNELS_OF_RESET = Path(__file__).parent / "data" / "kernels_of_reset.json"
+"""The kernels of a first reset that take long; ``scripts/dev/list_kernels.py reset`` writes it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -49,7 +54,7 @@ def begin(
     generator: np.random.Generator, choice: FloorChoice, chosen: ResetOptions, settings: ExplorationSettings
 ) -> EpisodeStart:
     """Draw how an episode begins."""
-    compile_first_reset()
+    _compile_kernels()
     choice_here = choice if chosen.floor is None else choice.instead(chosen.floor)
     floor = choice_here.load(generator)
     if isinstance(chosen.starts, np.ndarray):
@@ -80,6 +85,12 @@ def begin(
     if seed is None:
         seed = int(generator.integers(2**63))
     return EpisodeStart(floor, tables, starts, seed, goal)
+
+
+@cache
+def _compile_kernels() -> None:
+    """Compile the kernels of a reset in several processes, if most are not compiled yet; checked once in a process."""
+    compile_listed(KERNELS_OF_RESET, "the first reset")
 
 
 def _check_height(floor: Floor, height: float) -> None:

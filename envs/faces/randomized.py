@@ -187,7 +187,7 @@ class RandomizedTeam(TeamWrapper):
             self._generator = np.random.default_rng()
         made = self._next(self._episode)
         agent = self.possible_agents[0]
-        check_spaces(self.drawn, (made.observation_space(agent), made.action_space(agent)), self._spaces)
+        _check_spaces(self.drawn, (made.observation_space(agent), made.action_space(agent)), self._spaces)
         self.env.close()
         self.env, self.settings, self._has_begun = made, made.settings, True
         own = int(self._generator.integers(2**31)) if seed is None else seed
@@ -305,7 +305,7 @@ class RandomizedRows:
             generator = np.random.default_rng()
         drawn = self._draws.draw(generator)
         part = self._make(self._draws.settings_of(drawn), self._begun)
-        check_spaces(drawn, (part.space, part.action_space), (self.space, self.action_space))
+        _check_spaces(drawn, (part.space, part.action_space), (self.space, self.action_space))
         own = int(generator.integers(2**31)) if seed is None else seed
         part.begin(np.zeros(1, np.int64), [own], None if options is None else {0: options})
         self.parts[episode].engine.simulation.close()
@@ -472,7 +472,7 @@ def _joined_infos(parts: Sequence[Mapping[str, Any]], rows: int) -> dict[str, An
     return found
 
 
-def check_spaces(
+def _check_spaces(
     drawn: Mapping[str, Any],
     made: tuple[spaces.Space[Any], spaces.Space[Any]],
     wanted: tuple[spaces.Space[Any], spaces.Space[Any]],

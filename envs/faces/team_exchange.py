@@ -66,13 +66,13 @@ class MergingSettings:
 
     Attributes
     ----------
-    period_s : float
+    period_s : float, default 1.0
         Simulated time between two exchanges [s].
-    known_starts : bool
+    known_starts : bool, default False
         Whether the robots know how their frames lie, for comparison; nothing is searched for then.
     merge : MergeSettings
         Settings of map merging; by default those of `lidarium merge`.
-    confirms : bool
+    confirms : bool, default True
         Whether two robots are joined only when their maps were found twice to be of one place and convince,
         as a station joins them; otherwise by the first match.
     """

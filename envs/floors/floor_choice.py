@@ -73,7 +73,11 @@ class FloorChoice:
         if self._source is not None or (isinstance(floor, str) and floor.startswith(SET_PREFIX)):
             return False
         if isinstance(floor, str | Path | Floor):
-            return self._load(self._specs[0]).goal is not None
+            first = self._load(self._specs[0])
+            if not self.is_set and isinstance(floor, str) and not is_file_name(floor):
+                # A floor of the catalogue never changes, and is looked up once.
+                self._specs = (first,)
+            return first.goal is not None
         return FloorChoice(self._specs[0], self._resolution_of(self._specs[0])).has_goal
 
     def instead(self, floor: Floors) -> "FloorChoice":
@@ -101,9 +105,11 @@ class FloorChoice:
         return int(generator.choice(count, p=self._weights))
 
     def _load(self, spec: FloorName) -> Floor:
+        if isinstance(spec, Floor):
+            return spec
         # One floor alone is refused with a resolution that it cannot have; of many some are plain images.
         resolution = self._image_resolution
-        if self.is_set and resolution is not None and not isinstance(spec, Floor):
+        if self.is_set and resolution is not None:
             is_plain = is_file_name(spec) and takes_resolution(Path(spec))
             return load_floor(spec, resolution if is_plain else None)
         return load_floor(spec, resolution)

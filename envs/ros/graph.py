@@ -66,7 +66,7 @@ def chosen_domain(domain: int | None) -> int:
     return number
 
 
-def is_local() -> bool:
+def _is_local() -> bool:
     """Whether the environment keeps ROS on this machine, as ``rmw`` reads it."""
     only = os.environ.get("ROS_LOCALHOST_ONLY") == "1"
     return only or os.environ.get("ROS_AUTOMATIC_DISCOVERY_RANGE") == "LOCALHOST"
@@ -104,7 +104,7 @@ class Graph(MessageWriter):
     ) -> None:
         super().__init__()
         self.domain = chosen_domain(domain)
-        local = is_local() if localhost is None else localhost
+        local = _is_local() if localhost is None else localhost
         self.refused: Counter[str] = Counter()
         try:
             self._open = _domain(self.domain, local)

@@ -353,7 +353,7 @@ class RobotLink:
             ranges = resampled(ranges, directions, self._wanted, self.geometry.beams)
         x, y, _ = self._mounting.pose.tolist()
         if math.hypot(x, y) > _CENTRED_M:
-            ranges = recentred(ranges, self.geometry, x, y)
+            ranges = _recentred(ranges, self.geometry, x, y)
         place = max(bisect_right(self._stamps, stamp) - 1, 0)
         ahead = np.array([0.0, 0.0, self._axis])
         moves = self._transforms.moving.get((self.names.map_frame, self.odom_frame))
@@ -427,7 +427,7 @@ def begin_driving(graph: Graph, topics: Mapping[str, str], timeout_s: float = 2.
     return [topic for topic in topics if not graph.subscribers(topic)]
 
 
-def recentred(ranges: NDArray[np.float32], geometry: ScanGeometry, x: float, y: float) -> NDArray[np.float32]:
+def _recentred(ranges: NDArray[np.float32], geometry: ScanGeometry, x: float, y: float) -> NDArray[np.float32]:
     """Return a scan of a laser at (x, y) on the robot [m] as seen from the robot's middle, in the same directions.
 
     Of several returns in a direction the nearest counts; directions without any are invalid. Beams without return

@@ -41,17 +41,17 @@ class SparseMapSettings:
 
     Attributes
     ----------
-    codes : int
+    codes : int, default 256
         Codes of an image, at most, of floor and obstacles together.
-    most_boxes : int
+    most_boxes : int, default 1500
         A map with more boxes merges them with a larger slack.
-    least_motion_m : float
+    least_motion_m : float, default 0.3
         An image is coded if the robot has moved this far since the last one [m].
     least_turn : float
         An image is coded if the robot has turned this far since the last one [rad].
-    cell_m : float
+    cell_m : float, default 0.1
         Side of the cells of seen ground [m].
-    margin_m : float
+    margin_m : float, default 0.05
         Paths on the map keep the body so far from boxes [m].
     mode : str
         What codes are: boxes (``default``), or points without extent (``thesis``).
@@ -77,17 +77,17 @@ class GraphSettings:
 
     Attributes
     ----------
-    spacing : float
+    spacing : float, default 4.0
         Distance of the nodes along each axis [m].
-    neighbours : int
+    neighbours : int, default 2
         An edge leads to nodes up to this many spacings away along each axis, if the line between is known to be free.
-    utility_share : float
+    utility_share : float, default 0.8
         A node counts the frontiers within this share of the laser's range that are visible from it.
-    least_utility : int
+    least_utility : int, default 1
         A node with at most this many frontiers in view counts as having none, from then on.
-    frontier_spacing : float
+    frontier_spacing : float, default 1.6
         Of the frontier cells in a square of this side one is counted [m].
-    offers : int
+    offers : int, default 400
         Maximum number of nodes that are observed, those with the shortest ways.
     """
 
@@ -137,7 +137,7 @@ class ExplorationSettings:
 
     Attributes
     ----------
-    robots : int
+    robots : int, default 3
         Number of robots, 1 to 64.
     robot : Robot
         The body of each; with ``kinds`` a body with room for all of them and the limits of the slowest, by
@@ -158,12 +158,12 @@ class ExplorationSettings:
         Their sparse maps, which robots with cameras make when asked to.
     reward : RewardSettings
         Weights of the reward.
-    known_starts : bool
+    known_starts : bool, default True
         Whether the robots know their start poses; otherwise each believes to start at (0, 0, 0).
     starts : str or None
         Start poses: ``fixed`` uses the starts of the floor as far as it has some; ``drawn`` draws them by the seed.
         None is ``drawn`` for the makers of environments and if each episode draws its floor, else ``fixed``.
-    reveals_starts : bool
+    reveals_starts : bool, default False
         Whether reports include the true starts of robots with unknown starts, as a bound for the results of map
         merging.
     localization : str
@@ -178,58 +178,58 @@ class ExplorationSettings:
         Faults of the robots.
     battery : Battery
         Battery of each robot.
-    people : int
+    people : int, default 0
         Number of people who walk on the floor.
-    doors : float
+    doors : float, default 0.0
         Share of the openings between rooms that have doors: sliding doors that open when somebody comes, stand open
         or stay shut.
-    pauses_when_blocked : bool
+    pauses_when_blocked : bool, default False
         Whether a robot pauses until it is ordered to resume if its bumper touches anything, or its way is blocked.
-    backend : str
+    backend : str, default "kinematic"
         The world: ``kinematic``, ``bullet`` or another that is registered.
-    time_step : float
+    time_step : float, default 0.1
         Simulated time of a step [s].
     scan_period_s : float or None
         Time from scan to scan, a multiple of ``time_step`` and at most the decision period; maps and score follow
         scans [s]. None scans in each step. Longer ones need true poses or odometry, and no camera.
-    horizon_s : float or None
+    horizon_s : float or None, default 600.0
         Simulated time after which the episode is truncated [s]; None for no horizon.
-    stop_coverage : float or None
+    stop_coverage : float or None, default 0.99
         Share of F at which all robots end as ``covered``; None for off.
-    stop_on_contact : bool
+    stop_on_contact : bool, default False
         Whether a robot that touches anything ends as ``collision``.
-    goal_radius : float
+    goal_radius : float, default 0.3
         Distance to the goal, if the floor has one, at which a robot ends as ``reached`` [m].
     observe : tuple of str
         The observations: any of ``OBSERVABLES``, kept in that order, and of the registry
         ``observable``. The makers of environments leave out ``pose`` if it is not named.
-    map_cells : int
+    map_cells : int, default 256
         Side of the observed ``map`` [cells], a multiple of 2; half of it is how far a waypoint of the level
         of waypoints can lie.
-    egocentric_cells : int
+    egocentric_cells : int, default 64
         Side of each crop of the ``egocentric_map`` [cells of the crop], a multiple of 2.
     egocentric_scales : tuple of int
         Side of a cell of each crop of the ``egocentric_map`` [cells of the map].
-    pyramid_cells : int
+    pyramid_cells : int, default 32
         Side of each picture of the ``pyramid`` [cells of the picture], a multiple of 2.
-    pyramid_levels : int
+    pyramid_levels : int, default 3
         Number of pictures of the ``pyramid``.
-    frontiers : int
+    frontiers : int, default 32
         Maximum number of frontiers that the level of frontiers offers.
-    least_frontier : float
+    least_frontier : float, default 0.5
         Length of a frontier that is offered [m]; shorter ones are offered if no longer one exists.
-    frontiers_by_size : float
+    frontiers_by_size : float, default 0.5
         Share of the frontiers that are offered because they are the longest; the others are those with the
         cheapest way.
     graph : GraphSettings
         The nodes of the level of nodes.
-    state_cells : int
+    state_cells : int, default 32
         Side of the pictures in the true ``state`` of the team [cells].
-    raster_resolution : float
+    raster_resolution : float, default 0.025
         Side of a cell of the world's raster [m]; the maps' cell is a whole multiple of it.
-    decision_period_s : float
+    decision_period_s : float, default 2.0
         Maximum duration of a waypoint or a frontier [s].
-    threads : int
+    threads : int, default 1
         Threads of the kernels; the result does not depend on it.
     """
 

@@ -86,19 +86,19 @@ class FaultSettings:
     ----------
     schedule : tuple of Fault
         Faults at set times.
-    laser_dropout : float
+    laser_dropout : float, default 0.0
         Mean rate at which a robot's laser sees nothing for a while [1/h].
-    blind_sector : float
+    blind_sector : float, default 0.0
         Mean rate at which a sector of a robot's laser goes blind [1/h].
-    stuck_wheel : float
+    stuck_wheel : float, default 0.0
         Mean rate at which a wheel of a robot sticks [1/h].
-    kidnapping : float
+    kidnapping : float, default 0.0
         Mean rate at which a robot is carried elsewhere [1/h].
-    dead_robot : float
+    dead_robot : float, default 0.0
         Mean rate at which a robot stops for good [1/h].
-    dead_radio : float
+    dead_radio : float, default 0.0
         Mean rate at which a robot's radio fails [1/h].
-    lasts_s : float
+    lasts_s : float, default 3.0
         Mean duration of temporary faults [s].
     """
 

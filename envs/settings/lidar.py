@@ -19,11 +19,11 @@ class Lidar(ScanGeometry):
 
     Attributes
     ----------
-    noise_floor : float
+    noise_floor : float, default 0.0
         Minimum standard deviation of the range noise [m].
-    noise_share : float
+    noise_share : float, default 0.0
         Standard deviation of the range noise as a share of the range, above ``noise_floor`` [1].
-    height : float
+    height : float, default 0.3
         Height of the laser's plane above the floor [m].
     """
 

@@ -16,25 +16,25 @@ class OdometrySettings:
 
     Attributes
     ----------
-    distance_bias : float
+    distance_bias : float, default 0.0
         Share by which distances are measured too long or too short all through an episode [1].
-    turn_bias : float
+    turn_bias : float, default 0.0
         Share by which turns are measured too large or too small all through an episode [1].
-    drift : float
+    drift : float, default 0.0
         Turn that a metre feigns, to the left or to the right all through an episode [rad/m].
-    turn_noise_of_turn : float
+    turn_noise_of_turn : float, default 0.0
         Standard deviation of a turn, from the root of the turn [rad^(1/2)].
-    turn_noise_of_distance : float
+    turn_noise_of_distance : float, default 0.0
         Standard deviation of a turn, from the root of the distance [rad/m^(1/2)].
-    distance_noise_of_distance : float
+    distance_noise_of_distance : float, default 0.0
         Standard deviation of a distance, from the root of the distance [m^(1/2)].
-    distance_noise_of_turn : float
+    distance_noise_of_turn : float, default 0.0
         Standard deviation of a distance, from the root of the turn [m/rad^(1/2)].
-    counts_ticks : bool
+    counts_ticks : bool, default False
         Whether encoders count whole ticks; how many make a metre is the robot's.
-    speed_noise : float
+    speed_noise : float, default 0.0
         Standard deviation of the speed that the drive makes of a command, as a share of it [1].
-    turn_rate_noise : float
+    turn_rate_noise : float, default 0.0
         Standard deviation of the turn rate that the drive makes of a command, as a share of it [1].
     """
 

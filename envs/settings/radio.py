@@ -25,29 +25,29 @@ class RadioSettings:
     kind : str
         ``all``, ``none``, ``range`` (within ``reach``), ``line_of_sight`` (within ``reach`` and nothing solid
         between) or ``signal`` (``power`` less the path loss is above ``threshold``).
-    reach : float
+    reach : float, default 10.0
         Of ``range`` and ``line_of_sight`` [m].
-    power : float
+    power : float, default -20.0
         Power of the sender [dBm].
-    threshold : float
+    threshold : float, default -70.0
         Power that the receiver needs [dBm].
-    reference_distance : float
+    reference_distance : float, default 3.5
         Distance at which the loss in free space is known [m].
-    reference_loss : float
+    reference_loss : float, default 31.0
         Loss at that distance [dB].
-    free_exponent : float
+    free_exponent : float, default 2.0
         Growth of the loss with the path through free space [1].
-    wall_exponent : float
+    wall_exponent : float, default 4.0
         Growth of the loss with the path through solids [1].
-    wall_loss : float
+    wall_loss : float, default 6.5
         Loss if any solid is between [dB].
-    shadowing : float
+    shadowing : float, default 0.0
         Standard deviation of the random loss or gain of a link, drawn at every exchange [dB].
-    loss : float
+    loss : float, default 0.0
         Probability that a message is lost [1].
-    latency_s : float
+    latency_s : float, default 0.0
         Time until a message arrives [s].
-    period_s : float
+    period_s : float, default 1.0
         Time between exchanges of maps; poses are sent in every step [s].
     """
 

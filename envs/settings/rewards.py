@@ -18,14 +18,14 @@ class RewardSettings:
 
     Attributes
     ----------
-    area : float
+    area : float, default 1.0
         Per square metre of F that the team had not sensed, shared among the robots that sense it first
         [1/m2].
-    time : float
+    time : float, default 0.01
         Of the time, a term of -1 a second [1/s].
-    contact : float
+    contact : float, default 0.1
         Of contacts, a term of -1 for each step in contact [1].
-    energy : float
+    energy : float, default 0.01
         Of the way driven, a term of -1 a metre [1/m].
     more : tuple of (str, float)
         Registered terms (`lidarium show rewards`), whose sign is their own, with their weights; a mapping is taken as

@@ -82,27 +82,27 @@ class Robot:
 
     Attributes
     ----------
-    radius : float
+    radius : float, default 0.18
         Radius of the body [m].
-    height : float
+    height : float, default 0.52
         Height of the body [m]; solids and other robots' lasers below it meet the body.
-    cruise_speed : float
+    cruise_speed : float, default 0.33
         Speed that its own driving keeps to [m/s].
-    max_speed : float
+    max_speed : float, default 0.77
         Limit of the speed of the drive [m/s].
-    max_turn_rate : float
+    max_turn_rate : float, default 3.14
         Limit of the turn rate [rad/s].
-    max_acceleration : float
+    max_acceleration : float, default 1.0
         Limit of the acceleration [m/s2].
-    max_turn_acceleration : float
+    max_turn_acceleration : float, default 6.0
         Limit of the turn acceleration [rad/s2].
-    wheel_base : float
+    wheel_base : float, default 0.23
         Distance between the driven wheels [m].
-    ticks_per_metre : float
+    ticks_per_metre : float, default 11724.0
         Ticks that the encoder of a wheel counts on a metre [1/m].
-    length : float
+    length : float, default 0.352
         Length of the body's outline [m].
-    width : float
+    width : float, default 0.352
         Width of the body's outline [m].
     build : Build
         Masses, wheels, casters and friction; only worlds with forces know them.

@@ -65,7 +65,7 @@ def _documented_attributes(kind: type) -> dict[str, tuple[str, str]]:
         )
         for entry in entries:
             for name in entry[1].split(", "):
-                found[name] = (entry[2], " ".join(entry[3].split()))
+                found[name] = (entry[2].partition(", default ")[0], " ".join(entry[3].split()))
     return found
 
 

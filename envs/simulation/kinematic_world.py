@@ -162,7 +162,7 @@ class KinematicWorld:
         self, floor: FloorTables, free: NDArray[np.bool_], starts: NDArray[np.float64], seed: int
     ) -> NDArray[np.float64]:
         """Return the faults of an episode; kidnappings go to places that the robots could have reached."""
-        if self._faults.capacity == 0:
+        if not self.faults.shape[1]:
             return np.zeros((self.robots, 0))
         x, y = floor.laser.origin
         room = np.asarray(scipy.ndimage.distance_transform_edt(free)) * floor.laser.resolution

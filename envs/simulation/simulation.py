@@ -195,7 +195,7 @@ class Simulation:
         # Area that the laser cannot see does not count, even if a low body could pass below it.
         smallest = float(self.world.bodies[:, RADIUS].min())
         body = floor.body
-        if self.population is not None:
+        if self.population is not None and self.population.share:
             body = with_shut_doors(body, self.population.draw_doors(floor, seed))
         free = reachable_free_space(body, smallest, starts) & (floor.laser.solid == 0)
         floors = enumerate(self.world.floors)

@@ -254,7 +254,7 @@ def _write(
     found: Benchmark, tasks: Sequence[BenchmarkTask], results: BenchmarkResults, rows: Sequence[Row], folder: Path
 ) -> None:
     write_text(folder / TABLE, table_of(tasks, results))
-    write_text(folder / CARD, card_of(found, tasks, results))
+    write_text(folder / CARD, _card_of(found, tasks, results))
     write_text(folder / RESULTS, json.dumps(jsonable(asdict(results)), indent=1, allow_nan=False) + "\n")
     if rows:
         # The page's reader wants one version; which there were is among the remarks.
@@ -297,7 +297,7 @@ def table_of(tasks: Sequence[BenchmarkTask], results: BenchmarkResults) -> str:
     return "\n\n".join(parts) + "\n"
 
 
-def card_of(found: Benchmark, tasks: Sequence[BenchmarkTask], results: BenchmarkResults) -> str:
+def _card_of(found: Benchmark, tasks: Sequence[BenchmarkTask], results: BenchmarkResults) -> str:
     """Return the card: tasks, rules, floors and licences, how to cite, and the runs."""
     header = ("id", "task", "robots", "floors, easy / full", "baseline", "settings")
     rows = [

@@ -108,7 +108,7 @@ class FilmSettings:
 
     Attributes
     ----------
-    speed : float
+    speed : float, default 10.0
         Simulated seconds per second of the film, above 0.
     width : int or None
         Maximum width of a frame [pixels]; by default (None) that of the format.

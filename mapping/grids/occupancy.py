@@ -38,15 +38,15 @@ class OccupancySettings:
 
     Attributes
     ----------
-    resolution : float
+    resolution : float, default 0.05
         Side of a cell [m].
-    hit : float
+    hit : float, default 0.85
         Added to a cell in which a beam ended [log-odds, positive].
-    miss : float
+    miss : float, default 0.4
         Subtracted from a cell that the scan saw [log-odds, positive].
-    minimum : float
+    minimum : float, default -2.0
         Lower bound of a cell's value [log-odds].
-    maximum : float
+    maximum : float, default 3.5
         Upper bound of a cell's value [log-odds].
     """
 

@@ -90,76 +90,76 @@ class MatchingSettings:
     ----------
     distance_m, angle : float
         A scan is matched after so much motion since the last one [m, rad].
-    beam_interval_s : float
+    beam_interval_s : float, default 0.0
         Time between neighbouring beams; 0 for a scan taken at once [s].
-    range_m : float
+    range_m : float, default 20.0
         Longest range that counts; beams with a return beyond it are free up to it [m].
-    spacing_m : float
+    spacing_m : float, default 0.05
         Returns that are nearer to each other than this count as one [m].
-    points : int
+    points : int, default 350
         Maximum number of matched returns of a scan.
-    least_points : int
+    least_points : int, default 15
         With fewer returns than this (or an eighth of the beams, if that is less) a scan does not measure the
         pose: they fit in many places.
     search_m, search_angle : float
         Reach of the search around odometry beyond its standard deviation [m, rad].
-    search_deviations : float
+    search_deviations : float, default 2.0
         How many standard deviations of odometry the search reaches.
-    search_turn : float
+    search_turn : float, default 0.0
         By how much more the search goes in heading, for each metre of way, if odometry leads nowhere: scans that
         are a metre apart may hide a turn [rad/m].
     blind_m, blind_angle : float
         Reach of the search if there is no odometry, or odometry leads nowhere [m, rad].
-    wide_share : float
+    wide_share : float, default 0.08
         A scan of fewer returns, as a share of the beams, is sought at the pose by odometry and not beyond:
         it fits in many places.
-    blind_overlap : float
+    blind_overlap : float, default 0.7
         Share of the returns near observed cells of the local map below which a match does not count if
         odometry led nowhere.
-    known_overlap : float
+    known_overlap : float, default 0.5
         The same if a scan seems to see new ground where odometry led.
-    clearer_overlap, clearer : float
+    clearer_overlap, clearer : float, default 0.4, 4.0
         The same if the little that is known there does not agree, and how many times as much of the scan has to agree
         elsewhere.
-    evaluations : int
+    evaluations : int, default 100000
         Maximum number of placements, and blocks of them, examined in such a search.
-    explained_share : float
+    explained_share : float, default 0.35
         Agreement of all returns, as a share of that of recent matches, below which the search goes in
         all directions, and a match is doubtful.
-    lost_evaluations : int
+    lost_evaluations : int, default 400000
         The same of a search in all directions, if odometry explains too little of a scan.
-    ambiguity : float
+    ambiguity : float, default 0.9
         A second place that agrees as well as this share of the best refutes what such a search finds.
     apart_m, apart_angle : float
         By how much two such places differ [m, rad].
-    independent_points, independent_share : float
+    independent_points, independent_share : float, default 50.0, 0.15
         As how many independent measurements the returns of a scan count, all of them at most and each:
         neighbouring ones err together.
-    deviation : float
+    deviation : float, default 0.2
         Standard deviation of how far a return is from full agreement with the map, which is 1.
-    surface_m : float
+    surface_m : float, default 0.25
         Returns of a surface so near to one give its direction there, across which the return is moved; 0
         for the nearest two [m].
-    unseen : float
+    unseen : float, default 0.3
         Squared disagreement of a return that lies in cells that the local map has not
         observed.
-    least_score, least_overlap : float
+    least_score, least_overlap : float, default 0.15, 0.2
         Agreement, and share of the returns near observed cells of the local map, below which a match does not
         count.
-    least_share : float
+    least_share : float, default 0.5
         The same for agreement as a share of that of recent matches.
-    most_contradiction : float
+    most_contradiction : float, default 0.25
         Share of the returns in free space of the local map above which a match does not count.
-    convincing_share : float
+    convincing_share : float, default 0.75
         Agreement, as a share of that of recent matches, below which the search goes farther than
         odometry says.
-    better_by : float
+    better_by : float, default 0.1
         By how much more a match that is found there has to agree.
-    wide_after : int
+    wide_after : int, default 3
         Number of scans in a row without a match after which the search goes as far as without odometry.
-    lost_after : int
+    lost_after : int, default 8
         Number of scans in a row without a match after which a new local map is begun.
-    lost_m, lost_angle : float
+    lost_m, lost_angle : float, default 2.0, 0.5
         Standard deviation of the motion into such a new local map [m, rad].
     """
 
@@ -219,15 +219,15 @@ class SubmapSettings:
 
     Attributes
     ----------
-    resolution : float
+    resolution : float, default 0.035
         Side of a cell [m].
-    behind_m, behind_share : float
+    behind_m, behind_share : float, default 0.025
         As far behind the end of a beam, at least and as a share of its range, walls that other scans saw
         count as seen through [m, 1]; twice to three times the standard deviation of a range is right. A share
         of 0 does without.
-    path_m : float
+    path_m : float, default 16.0
         Way driven, turns counted with a metre a radian, after which a local map is finished [m].
-    least_scans : int
+    least_scans : int, default 10
         Minimum number of scans of a local map.
     """
 
@@ -247,46 +247,46 @@ class ClosureSettings:
 
     Attributes
     ----------
-    delay_s : float
+    delay_s : float, default 1.0
         Time after which a closure acts [s].
-    candidates : int
+    candidates : int, default 1
         Maximum number of finished local maps that are tried with a scan.
-    path_m : float
+    path_m : float, default 10.0
         Way driven since a local map was finished before it is tried [m].
-    near_m : float
+    near_m : float, default 4.0
         A local map is tried if one of its scans was taken as near as this, besides the uncertainty [m].
     search_m, search_angle : float
         Minimum reach of the search [m, rad].
     most_m, most_angle : float
         Maximum reach of the search [m, rad].
-    deviations : float
+    deviations : float, default 2.5
         How many standard deviations of the pose the search reaches.
-    evaluations : int
+    evaluations : int, default 60000
         Maximum number of placements examined in a search; one that is not over by then found nothing.
-    least_score, least_overlap : float
+    least_score, least_overlap : float, default 0.3, 0.75
         Agreement of a closure, and share of the returns near observed cells of the local map.
-    least_share : float
+    least_share : float, default 0.85
         Agreement of a closure as a share of that of recent matches with growing local maps.
-    most_contradiction : float
+    most_contradiction : float, default 0.12
         Share of returns that may lie in free space of the local map.
-    as_good : float
+    as_good : float, default 0.8
         Where the robot believes to be is where it is, if the scan agrees there by this share of what it does
         in the best place.
-    ambiguity : float
+    ambiguity : float, default 0.9
         A second place that agrees as well as this share of the best refutes a closure.
     apart_m, apart_angle : float
         By how much two places differ [m, rad].
     least_deviation_m, least_deviation_angle : float
         No closure is better than this [m, rad].
-    confirmed_beyond_m : float
+    confirmed_beyond_m : float, default 0.15
         A closure that would move the robot by more is taken only together with others that say the same: less
         than the thickness of walls, since the other side of one resembles this side [m].
-    confirmed_beyond_deviations : float
+    confirmed_beyond_deviations : float, default 2.5
         So is one that would move it by more standard deviations of the way since; those have to be of at
         least two local maps.
-    doubts_one_map : bool
+    doubts_one_map : bool, default True
         Whether those have to be of at least two local maps also if the way since allows the move.
-    confirmations : int
+    confirmations : int, default 3
         How many have to agree.
     agree_m, agree_angle : float
         By how much they may differ [m, rad]; less than the thickness of walls, lest both sides of one agree.
@@ -329,23 +329,23 @@ class GraphSettings:
 
     Attributes
     ----------
-    start_path_m : float
+    start_path_m : float, default 7.0
         Way driven, turns counted with a metre a radian, after which the first scan is laid on the map that
         has grown since, and the directions of its walls are surveyed [m].
     distance_m, angle : float
         Way and turn between nodes [m, rad].
-    deviation_m, deviation_per_metre : float
+    deviation_m, deviation_per_metre : float, default 0.005, 0.01
         Standard deviation of the motion between neighbouring nodes: at least, and more for each metre [m,
         m/m].
     deviation_angle : float
         The same of its turn [rad].
-    robust_scale : float
+    robust_scale : float, default 2.0
         Residual, in standard deviations, from which on a closure counts less (Cauchy).
     correct_beyond_m, correct_beyond_angle : float
         Closures that contradict the poses by less wait until others come [m, rad].
-    waiting : int
+    waiting : int, default 20
         As many closures that wait are enough.
-    iterations : int
+    iterations : int, default 10
         Maximum number of Gauss-Newton steps.
     """
 
@@ -373,14 +373,14 @@ class CompassSettings:
 
     Attributes
     ----------
-    spacing_m : float
+    spacing_m : float, default 0.01
         Returns that are nearer to each other than this count as one [m].
     deviation_angle : float
         Standard deviation of the direction of a building's walls from place to place [rad].
-    drift : float
+    drift : float, default 0.4
         How much headings drift from node to node, as a share of the standard deviation of their matches:
         neighbouring scans are matched with one local map, and do not err each on its own.
-    deviations : float
+    deviations : float, default 3.0
         A direction that contradicts the heading by more standard deviations does not count: not all walls run
         so.
     most_deviation : float
@@ -411,9 +411,9 @@ class SlamSettings:
 
     Attributes
     ----------
-    uses_odometry : bool
+    uses_odometry : bool, default True
         False if there is none: motion is then predicted to go on as before.
-    uses_walls : bool
+    uses_walls : bool, default True
         Whether the directions of walls keep headings from drifting.
     odometry, matching, submaps, closures, graph, compass
         Settings of each stage.

@@ -175,45 +175,45 @@ class ValidationSettings:
     ----------
     test : str
         ``walls``: over all that both maps know; ``discs``: cells around the inliers, of the thesis.
-    hit_distance_m : float
+    hit_distance_m : float, default 0.075
         A wall agrees if the other map has one within this distance [m], or within a cell and a half.
-    miss_distance_m : float
+    miss_distance_m : float, default 0.175
         A wall contradicts if it is in the open of the other map, farther than this from any wall [m].
-    least_overlap_m2 : float
+    least_overlap_m2 : float, default 5.0
         Least area that both know [m2].
-    least_wall_m : float
+    least_wall_m : float, default 3.0
         Least length of walls that agree [m].
-    least_evidence_m : float
+    least_evidence_m : float, default 3.5
         Least length of walls that agree, less that of walls that do not and three times that of walls that
         contradict [m].
-    least_across_m : float
+    least_across_m : float, default 0.4
         Least length of walls that hold the maps in the direction in which they are held least [m]: two
         straight corridors agree wherever they are overlaid.
-    least_across_share : float
+    least_across_share : float, default 0.0
         The same as a share of the walls that agree, which is at most a half: along a corridor hardly any
         walls hold.
-    least_evidence_per_m2 : float
+    least_evidence_per_m2 : float, default 0.0
         Least evidence on each square metre that both know [m/m2]: open floor agrees with open floor anywhere.
-    hit_rate : float
+    hit_rate : float, default 0.7
         Least share of the walls in the overlap that agree.
-    score : float
+    score : float, default 0.9
         Least score.
-    most_contradiction_m : float
+    most_contradiction_m : float, default 0.15
         Length of contradicting walls that is excused [m].
-    plenty_of_overlap_m2, plenty_of_wall_m, contradiction_share : float
+    plenty_of_overlap_m2, plenty_of_wall_m, contradiction_share : float, default 250.0, 200.0, 0.1
         If both know this area [m2], this share of the walls beyond this length [m] may contradict too: maps
         of whole buildings drift.
     rival_distance_m, rival_angle : float
         A transform is another one if it differs by more than this [m, rad].
-    rival_share : float
+    rival_share : float, default 0.6
         A rival that nothing contradicts makes the best transform ambiguous if the walls that agree under
         it are longer than this share of those under the best.
-    rival_lead : float
+    rival_lead : float, default 1.5
         A rival that is refused still speaks against the best transform if this multiple of wall speaks
         for it.
-    disc_radius_cells : int
+    disc_radius_cells : int, default 25
         Radius of the discs [cells].
-    disc_agreement : float
+    disc_agreement : float, default 0.9
         Least share of cells in the discs that are the same in both maps.
     """
 

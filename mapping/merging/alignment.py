@@ -32,25 +32,25 @@ class AlignmentSettings:
         ``distance``: matched corners come together within the tolerance below; ``ratio``: their coordinates,
         in cells from the corner of the map, differ by less than 8 % each (as it was printed: far from that
         corner a tolerance of half a metre, near it none).
-    tolerance_m : float
+    tolerance_m : float, default 0.12
         Distance at which corners besides the match that proposes the transform coincide [m].
     angle_uncertainty : float
         Error of the proposed rotation [rad]; the tolerance grows with the distance by its tangent, and
         rotations of inliers differ by at most twice as much.
-    ratio : float
+    ratio : float, default 0.92
         Least quotient of coordinates for ``ratio``.
-    least_inliers : int
+    least_inliers : int, default 3
         Fewest inliers of a transform, the proposing match among them; each corner takes part in one.
-    inlier_share : float
+    inlier_share : float, default 0.0
         Fewest inliers as a share of the smaller number of corners.
-    candidates : int
+    candidates : int, default 8
         Number of transforms that are refined and examined more closely.
     refinements : tuple of str
         Done in this order: ``sweep`` of the rotation over 7 degrees to either side, ``least_squares`` of the
         inliers, ``walls`` on walls.
-    refinement_reach_m : float
+    refinement_reach_m : float, default 0.4
         Distance to walls within which ``walls`` pulls at first [m].
-    wall_samples : int
+    wall_samples : int, default 400
         Number of wall cells that are compared while transforms are ranked and refined.
     """
 

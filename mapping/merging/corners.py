@@ -104,11 +104,11 @@ class CornerSettings:
     rule : str
         ``table``: the sixteen codes that are alike in all directions (and eight with 7 neighbours);
         ``literal``: the printed rules of parity, with codes that hold two or three separate openings.
-    separation_m : float
+    separation_m : float, default 0.1
         Of corners nearer than this only the best is kept: 5 neighbours before 4, 6 and 7 [m]; 0 keeps all.
-    limit : int
+    limit : int, default 96
         Maximum number of corners, the best and among equals the most evenly spread; 0 keeps all.
-    free_above, occupied_below : int
+    free_above, occupied_below : int, default 200, 55
         Greys of free and of occupied cells, exclusive; greys between are unknown.
     """
 

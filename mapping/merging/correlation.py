@@ -28,17 +28,17 @@ class CorrelationSettings:
 
     Attributes
     ----------
-    cell_m : float
+    cell_m : float, default 0.15
         Side of a coarse cell [m]; larger for maps that would have more than ``most_cells`` along a side.
-    most_cells : int
+    most_cells : int, default 200
         Bound of time and memory [coarse cells].
-    rotations : int
+    rotations : int, default 72
         Rotations around the circle that the fallback tries; 0 for no fallback.
-    peaks : int
+    peaks : int, default 3
         Translations that are kept for each rotation.
-    miss_weight : float
+    miss_weight : float, default 1.0
         How much a wall in free space counts against one that lies on a wall.
-    free_weight : float
+    free_weight : float, default 0.03
         How much a cell that is free in both maps counts: walls seen from two sides alone are no sign of one
         place.
     """

@@ -121,31 +121,31 @@ class CorrespondenceSettings:
         ``descriptors``, ``distances`` (pairs of corners equally far apart in both maps), ``triplets``
         (corners whose two nearest neighbours form the same triangle) or ``radius`` (corners whose neighbours
         within ``cluster_radius_m`` are equally far away).
-    measure : str
+    measure : str, default "correlation"
         How descriptors are compared: ``correlation``, normalised; ``difference``, 1 less half the mean square
         of the difference of their samples over their mean square.
-    excludes_opposite : bool
+    excludes_opposite : bool, default False
         Whether a match is left out whose corners are as similar turned by 180 degrees: along a straight wall
         either is as good.
-    threshold : float
+    threshold : float, default 0.55
         Similarity of two descriptors from which they match, 1 for equal ones.
-    margin : float
+    margin : float, default 0.1
         A match is at most so much less similar than the best of its corner.
-    per_corner : int
+    per_corner : int, default 5
         Maximum number of matches for a corner of the first map.
     shift_window : float
         How far the rotation may differ from the difference of the corners' angles [rad].
-    is_known_only : bool
+    is_known_only : bool, default True
         Whether the similarity is taken over what is known in both descriptors, about zero; otherwise over all
         samples, about their mean.
-    least_known : float
+    least_known : float, default 0.25
         Share of samples known in both from which descriptors are compared at all, with ``is_known_only``.
-    use_shift : bool
+    use_shift : bool, default True
         Whether the best shift refines a match's rotation; otherwise it is the difference of the corners'
         angles.
-    length_tolerance : float
+    length_tolerance : float, default 0.08
         Two lengths are equal if they differ by at most this share of the longer one.
-    cluster_radius_m : float
+    cluster_radius_m : float, default 3.0
         Reach of the cluster of corners around a corner, with ``radius`` [m].
     """
 

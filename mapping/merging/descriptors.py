@@ -35,15 +35,15 @@ class DescriptorSettings:
     variant : str
         ``polar``: rings at equal distances; ``log_polar``: rings at equal ratios; ``two_rings``: two bands of
         rings, the far one of a smoothed map, which see beyond the corner itself.
-    radius_min, radius_max : float
+    radius_min, radius_max : float, default 0.1, 0.6
         First radius and end of the radii [m].
-    radius_step : float
+    radius_step : float, default 0.1
         Distance of rings [m]; for ``log_polar`` it gives their number alone.
-    far_min, far_max, far_step : float
+    far_min, far_max, far_step : float, default 0.6, 2.6, 0.2
         The same of the far band of ``two_rings`` [m].
-    columns : int
+    columns : int, default 64
         Samples around the corner.
-    occupied, unknown, free : float
+    occupied, unknown, free : float, default 1.0, 0.0, -0.25
         Value of a sample of each type of cell.
     """
 

@@ -61,25 +61,25 @@ class ScaleSettings:
 
     Attributes
     ----------
-    least, most : float
+    least, most : float, default 0.5, 2.0
         By how much the second map may have to grow.
-    step : float
+    step : float, default 0.03
         Between the logarithms of neighbouring scales.
-    slants : int
+    slants : int, default 1
         How many rotations to each side of those that bring walls onto the directions of walls are tried.
     slant : float
         Between these [rad].
     correlation : CorrelationSettings
         How coarsely all translations are tried at each.
-    apart_m : float
+    apart_m : float, default 1.0
         Translations of one scale and rotation are at least so far apart [m].
-    candidates : int
+    candidates : int, default 32
         How many of the best placements are examined.
-    rounds : int
+    rounds : int, default 3
         How often the scale of each is refined by the bend that is left.
-    cell_m : float
+    cell_m : float, default 0.05
         Side of the cells in which they are, or that of the coarser map if it is larger [m].
-    confidence : float
+    confidence : float, default 0.98
         Confidence from which maps are joined: with another freedom, strangers agree by chance more often.
     """
 

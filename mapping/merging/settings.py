@@ -30,7 +30,7 @@ class MergeSettings:
     ----------
     corners, descriptors, correspondence, alignment, validation, correlation
         Settings of each stage.
-    structure : str
+    structure : str, default "corners"
         One of `STRUCTURES`: ``corners``; ``regions`` of free space and the doors between them; ``all`` for
         regions if corners give no transform that passes.
     regions : RegionSettings

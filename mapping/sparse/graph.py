@@ -336,15 +336,15 @@ class GraphSettings:
 
     Attributes
     ----------
-    merge_radius : float
+    merge_radius : float, default 0.15
         Free nodes nearer to each other than this are merged [m].
-    neighbours : int
+    neighbours : int, default 8
         Nearest nodes to which edges are tried.
     longest_edge : float or None
         Longest edge [m]; None for three times the median distance of nearest nodes, at least 1 m.
-    clearance_weight, clearance_m : float
+    clearance_weight, clearance_m : float, default 0.0, 0.5
         By how much an edge near an obstacle is longer, as a share, and from which distance it is not [m].
-    slope_weight : float
+    slope_weight : float, default 0.0
         By how much an edge is longer for each metre it climbs a metre.
     """
 

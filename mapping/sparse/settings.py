@@ -21,17 +21,17 @@ class FloorSettings:
 
     Attributes
     ----------
-    up_x, up_y, up_z : float
+    up_x, up_y, up_z : float, default 0.0, 0.0, 1.0
         Which way is up in the map, about; of any length.
     most_tilt : float
         By how much the floor may lean from there [rad].
-    distance_m : float
+    distance_m : float, default 0.03
         How far a point of the floor may be from its plane [m].
-    least_share : float
+    least_share : float, default 0.03
         Share of the points that has to lie on the floor.
-    most_below : float
+    most_below : float, default 0.03
         Share of the points that may lie below the floor: a table top is none.
-    trials : int
+    trials : int, default 600
         Planes that are tried.
     """
 
@@ -58,40 +58,40 @@ class MapperSettings:
     ----------
     mode : str
         ``default``, or ``thesis`` for codes as points, split by the height of their centroids.
-    split : str
+    split : str, default "height"
         Points of the floor: points below ``floor_height_m``, points of level surfaces, or points that
         are ``both``.
-    floor_height_m : float
+    floor_height_m : float, default 0.1
         Height above the floor's plane up to which points belong to it [m].
     most_slope : float
         Angle by which a level surface may lean [rad].
-    robot_height_m, ceiling_margin_m : float
+    robot_height_m, ceiling_margin_m : float, default 1.2, 0.3
         Points higher than their sum above the floor are ignored [m].
-    noise_depth_m : float
+    noise_depth_m : float, default 0.1
         Points deeper below the floor are ignored [m].
     range_m : float or None
         Points farther from the sensor are left out [m]; None for none.
-    voxel_m : float
+    voxel_m : float, default 0.02
         Side of the voxels whose means are coded [m]; 0 codes all points.
-    floor_share : float
+    floor_share : float, default 0.3
         Share of the codes that goes to the floor.
-    merges : bool
+    merges : bool, default True
         Whether boxes that are mostly empty are cut, and boxes merged. Codes that are to be registered are
         not: a merged one says less of its surface.
-    slack_m : float
+    slack_m : float, default 0.02
         Boxes merge if their union adds nothing that is farther from them than this [m].
-    most_boxes : int
+    most_boxes : int, default 1500
         A map with more boxes merges with a larger slack.
-    merge_radius_m : float
+    merge_radius_m : float, default 0.25
         Free codes nearer to each other than this are merged [m].
     least_motion_m, least_turn : float
         A frame is taken if the robot has moved or turned by so much since the last one [m, rad].
-    seed : int
+    seed : int, default 0
         Of all random draws.
-    floor_gap_m : float
+    floor_gap_m : float, default 0.1
         How far from points of the floor it counts as seen between them [m]: holes wider than twice this stay holes.
         0 for a map that does not know what of its floor was seen.
-    fits_boxes : bool
+    fits_boxes : bool, default True
         Whether boxes are compared with all points, if they merge: those that are mostly empty are divided.
     floor : FloorSettings
         How the floor is found.

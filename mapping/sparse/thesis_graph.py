@@ -142,17 +142,17 @@ class ThesisGraphSettings:
 
     Attributes
     ----------
-    merge_radius : float
+    merge_radius : float, default 0.15
         Free nodes nearer to each other than this are merged [m].
-    collision_radius, height : float
+    collision_radius, height : float, default 0.3, 1.2
         Cylinder that must be free above a node [m].
-    connection_radius : float
+    connection_radius : float, default 0.3
         Cylinder that must be free around an edge [m].
-    neighbours : int
+    neighbours : int, default 6
         Nearest nodes to which edges are tried.
     longest_edge : float or None
         Longest edge [m]; None for three times the median distance of nearest nodes, at least 1 m.
-    support : str
+    support : str, default "voxels"
         Index of the points near an edge: ``voxels``, a ``kd_tree``, or ``none`` to test all. The graph is
         the same.
     """

@@ -28,11 +28,11 @@ class PointSettings:
 
     Attributes
     ----------
-    beam_interval_s : float
+    beam_interval_s : float, default 0.0
         Time between neighbouring beams [s]; 0 for a scan that is taken at once.
-    laser_x : float
+    laser_x : float, default 0.0
         How far the laser sits ahead of the robot's middle [m].
-    noise_floor, noise_share : float
+    noise_floor, noise_share : float, default 0.01
         Standard deviation of a range: max(noise_floor, noise_share * range) [m, 1].
     """
 
@@ -51,24 +51,24 @@ class SegmentationSettings:
 
     Attributes
     ----------
-    test : str
+    test : str, default "adaptive"
         Rule for neighbouring points on different surfaces. ``adaptive``: farther apart than on
         a wall at the grazing angle ``incidence`` and than noise explains; ``dietmayer``: farther apart than
         on a wall at right angles plus a constant, as in the thesis; ``pedraza``: the steps to both sides
         differ by more than ``step_ratio``, or the way turns by more than ``most_turn``.
     incidence : float
         Smallest angle between a beam and a wall that is still one surface [rad].
-    noise_sigmas : float
+    noise_sigmas : float, default 3.0
         Standard deviations of the noise that are no break.
-    dietmayer_floor, dietmayer_share : float
+    dietmayer_floor, dietmayer_share : float, default 0.03
         The constant of Dietmayer's test: max(floor, share * range) [m, 1].
     step_ratio, most_turn : float
         Of Pedraza's test [1, rad].
-    least_points : int
+    least_points : int, default 4
         Smaller clusters are left out.
-    split_distance : float
+    split_distance : float, default 0.04
         Points are split if one lies farther from the line through the ends [m].
-    split_sigmas : float
+    split_sigmas : float, default 4.0
         And farther than this number of standard deviations of its noise.
     collinear_angle : float
         Neighbouring lines that differ by less are tried as one [rad].
@@ -77,10 +77,10 @@ class SegmentationSettings:
     corner_rule : str
         ``angle`` between directions; ``slope``, difference of slopes as in the thesis, against the tangent of
         ``corner_angle``.
-    corner_reach : float
+    corner_reach : float, default 0.25
         Length of wall on both sides on which directions are measured [m], or ten standard deviations of the
         noise.
-    line_points : int
+    line_points : int, default 8
         Minimum number of points of straight pieces that are features.
     """
 
@@ -112,19 +112,19 @@ class FitSettings:
 
     Attributes
     ----------
-    spacing : float
+    spacing : float, default 0.25
         Usual distance of knots [m].
-    finest_spacing : float
+    finest_spacing : float, default 0.08
         Minimum spacing of knots, if the curve does not follow the points [m].
-    rms : float
+    rms : float, default 0.02
         A curve follows if the root mean square of its distances is at most this [m].
-    explained : float
+    explained : float, default 1.25
         It also follows if that is at most this multiple of the standard deviation of the points' noise, if
         that is known.
-    is_sparse : bool
+    is_sparse : bool, default True
         Whether a curve begins as a straight one, then with four free control points, however long, and gets
         more only if it does not follow.
-    stiffness : float
+    stiffness : float, default 1e-06
         Weight of the second differences of control points; keeps undetermined ones in line.
     """
 
@@ -149,18 +149,18 @@ class AssociationSettings:
 
     Attributes
     ----------
-    control_distance : float
+    control_distance : float, default 0.3
         Rough step: some control points of both curves are nearer than this [m].
     mean_distance, mean_turn : float
         Fine step: in the overlap, curves lie at most so far apart and differ at most so much in direction, in
         the mean [m, rad].
-    least_overlap : float
+    least_overlap : float, default 0.2
         Shorter overlaps show nothing [m].
-    point_distance : float
+    point_distance : float, default 0.15
         Corners and ends nearer than this are the same [m].
     line_distance, line_angle : float
         Lines nearer than this are the same [m, rad].
-    line_origin : str
+    line_origin : str, default "segment"
         About which point lines are compared: the middle of the ``segment`` that was seen, or the foot of the
         perpendicular from the ``robot``, as in the thesis, which moves with it.
     """
@@ -185,22 +185,22 @@ class MapSettings:
 
     Attributes
     ----------
-    sample_spacing : float
+    sample_spacing : float, default 0.05
         Curves are joined and compared by points so far apart [m].
-    rms : float
+    rms : float, default 0.004
         Joined curves follow their points to this root mean square [m].
-    most_weight : float
+    most_weight : float, default 40.0
         A point of a curve never weighs more than this number of observations at a standard deviation of 1 cm, so
         that the map can still learn.
-    least_extension : float
+    least_extension : float, default 0.08
         Extensions beyond the end of a curve by less are noise [m].
-    blend_length : float
+    blend_length : float, default 0.5
         Over this length the joint of a curve with its extension fades [m].
-    least_length : float
+    least_length : float, default 0.1
         Shorter curves do not begin a new wall [m].
-    least_sigmas : float
+    least_sigmas : float, default 6.0
         Nor do curves shorter than this number of standard deviations of their noise.
-    explained_distance : float
+    explained_distance : float, default 0.1
         Nor do curves most of which lies nearer than this to curves of the map [m], or nearer than three
         standard deviations.
     trusted_count, trusted_length, trial_updates : int, float, int

@@ -14,11 +14,11 @@ import sys
 import tempfile
 from typing import Any
 
-from lidarium.envs.engine import first_reset
+from lidarium.envs.engine.beginnings import KERNELS_OF_RESET
 from lidarium.mapping.kernels.first_start import SWITCH, encode_type
 from lidarium.scripts.common import KERNELS_OF_RUN
 
-LISTS = {"run": KERNELS_OF_RUN, "reset": first_reset.LIST}
+LISTS = {"run": KERNELS_OF_RUN, "reset": KERNELS_OF_RESET}
 CHILD = "--child"
 LEAST_SHARE = 0.003
 """Kernels are listed if they and their callees take at least this share of the compile time."""

@@ -108,7 +108,7 @@ MOVED: dict[str, str] = {
     "envs.simulation.kernels.floor_tables": "envs.simulation.kernels.floor_cache",
     "envs.simulation.kernels.ray_travel": "envs.simulation.kernels.ray_casting",
     "envs.simulation.kernels.stages": "envs.simulation.kernels.map_updates",
-    "envs.starting.first_reset": "envs.engine.first_reset",
+    "envs.starting.first_reset": "envs.engine.beginnings",
     "envs.station.joining": "envs.onboard.station.joining",
     "envs.station.operating": "envs.onboard.station.operating",
     "envs.station.reports": "envs.onboard.station.reports",

@@ -20,30 +20,30 @@ class PredictionSettings:
 
     Attributes
     ----------
-    seed : int
+    seed : int, default 0
         Seed of all draws.
-    floors : int
+    floors : int, default 3000
         Number of floors that robots explore; each gives several partial maps.
-    maps : int
+    maps : int, default 8
         Partial maps of a floor.
     kinds : dict of float
         How often each kind of floor comes, besides the others.
-    bare_share, noisy_share : float
+    bare_share, noisy_share : float, default 0.35, 0.3
         So many of the buildings have no furniture, and so many of the runs noisy lasers.
-    floors_minutes, fit_minutes : float
+    floors_minutes, fit_minutes : float, default 0.0
         Exploring and fitting end after so long, over all interrupted calls; 0 for no limit. With a limit the
         result depends on the speed of the machine.
-    steps : int
+    steps : int, default 20000
         Steps of gradients.
-    batch : int
+    batch : int, default 128
         Windows of a step.
-    learning_rate, weight_decay : float
+    learning_rate, weight_decay : float, default 0.001, 0.01
         Of AdamW; the rate falls to 0 as a half cosine.
-    held_out : float
+    held_out : float, default 0.05
         Share of the floors that judge the network and are not fitted.
-    far_weight : float
+    far_weight : float, default 0.3
         Weight of unknown squares more than 3 m from what is known, besides nearer ones.
-    checkpoint : int
+    checkpoint : int, default 250
         Steps from one checkpoint to the next.
     """
 

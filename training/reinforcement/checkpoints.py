@@ -53,7 +53,7 @@ class Trained(Protocol):
         """Take weights over."""
 
 
-def files_of(network: Trained) -> WeightFiles:
+def _files_of(network: Trained) -> WeightFiles:
     """Return the files of a network's weights."""
     return WeightFiles({name: array.shape for name, array in network.weights().items()}, "", "", "")
 
@@ -81,7 +81,7 @@ def write_checkpoint(folder: Path, checkpoint: Checkpoint, network: Trained, lea
     found is whole.
     """
     name = _name(checkpoint.decisions)
-    files_of(network).save(folder / f"{name}.safetensors", network.weights())
+    _files_of(network).save(folder / f"{name}.safetensors", network.weights())
     write_whole(folder / f"{name}.learner.safetensors", save(_state_of(learner)))
     write_json(folder / f"{name}.json", {"decisions": checkpoint.decisions, "curve": checkpoint.curve})
     kept = {path.stem for path in sorted(folder.glob("decisions-*.json"))[-KEPT:]}
@@ -106,7 +106,7 @@ def restore(folder: Path, checkpoint: Checkpoint, network: Trained, learner: Lea
     name = _name(checkpoint.decisions)
     path = weights_of(folder, checkpoint)
     try:
-        weights = files_of(network).load(path)
+        weights = _files_of(network).load(path)
         path = folder / f"{name}.learner.safetensors"
         _set_state(learner, load(read_bytes(path)))
     except (OSError, SafetensorError, ValueError, KeyError, RuntimeError) as error:

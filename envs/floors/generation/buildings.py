@@ -185,7 +185,7 @@ class BuildingSettings:
 
     Attributes
     ----------
-    kind : str
+    kind : str, default "any"
         "apartment", "office", "corridors", or "any", drawn by the seed.
     area_m2 : float or None
         Floor area between the walls, furniture not subtracted [m²]; 30 to 1500. Drawn: 40 to 120 for an
@@ -196,19 +196,19 @@ class BuildingSettings:
     clutter : float or None
         Share of that area under furniture, 0 to 0.3. Furniture without enough room is left out, so that about 0.2 is
         reached if more is asked for. Drawn: 0.08 to 0.24; 0 to 0.1 for corridors.
-    door_width : float
+    door_width : float, default 0.9
         Clear width of doors [m], 0.8 to 1.0.
     corridor_width : float or None
         Width of hall or corridors between the middles of their walls [m], 1.2 to 4. Drawn: 1.3 to 1.6 for an
         apartment, 1.7 to 2.3 for an office, 1.5 to 2.4 for corridors.
-    wall_thickness : float
+    wall_thickness : float, default 0.1
         Thickness of the walls between rooms [m], 0.05 to 0.3.
-    outer_wall_thickness : float
+    outer_wall_thickness : float, default 0.2
         Thickness of the walls around the floor [m], 0.1 to 1; rounded to 0.1.
     room_size : (float, float)
         Smallest and largest frontage of a usual room [m]; baths and kitchens of apartments are narrower. The
         smallest is at least 2, the largest at least 1.5 times that.
-    rotation : float
+    rotation : float, default 0.0
         Counter-clockwise rotation of the floor [rad].
     """
 

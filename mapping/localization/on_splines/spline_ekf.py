@@ -44,11 +44,11 @@ class SplineEkfSettings:
     ----------
     tracking : TrackingSettings
         Settings of matching and of the map.
-    gate_sigmas : float
+    gate_sigmas : float, default 3.0
         Measurements that differ from their expectation by more standard deviations are left out.
-    start_distance, start_turn : float
+    start_distance, start_turn : float, default 0.0
         Standard deviations of the first pose [m, rad].
-    distance_bias, turn_bias : float
+    distance_bias, turn_bias : float, default 0.05
         Constant scale errors of odometry's paths and turns, as a standard
         deviation.
     """

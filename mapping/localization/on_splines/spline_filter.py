@@ -127,17 +127,17 @@ class SplineFilterSettings:
     ----------
     tracking : TrackingSettings
         Settings of matching and of the map.
-    particles : int
+    particles : int, default 400
         Number of particles.
-    start_distance, start_turn : float
+    start_distance, start_turn : float, default 0.0
         Standard deviations of the particles around the first pose [m, rad].
-    distance_bias, turn_bias : float
+    distance_bias, turn_bias : float, default 0.05
         Constant scale errors of odometry's paths and turns, as a standard
         deviation: particles try how much, and those that fit the walls teach it.
-    bias_wander : float
+    bias_wander : float, default 0.005
         Standard deviation by which that share is changed whenever particles are drawn again, so that they go
         on trying; at most the share itself. Without evidence it comes back to none.
-    lost_likelihood : float
+    lost_likelihood : float, default 0.3
         If rays fit worse than this in the mean for ten corrections, some particles are drawn again; 0 for
         never.
     recovered_share, recovery_distance, recovery_turn : float

@@ -152,23 +152,23 @@ class TrackingSettings:
     ----------
     splines : SplineSettings
         How scans become curves, and curves a map.
-    turn_per_turn, turn_per_metre, slip_per_metre, slip_per_turn : float
+    turn_per_turn, turn_per_metre, slip_per_metre, slip_per_turn : float, default 0.15, 0.06, 0.1, 0.03
         Standard deviations of odometry: of a turn, for each radian and each metre [1, rad/m]; of a distance,
         for each metre and each radian [1, m/rad].
     feature_sigma, line_angle_sigma : float
         Least standard deviations of features: of points and of the distance of lines [m], of the direction of
         lines [rad].
-    curve_sigma : float
+    curve_sigma : float, default 0.03
         Standard deviation of the distance between a ray's end and its curve [m].
-    curve_distance : float
+    curve_distance : float, default 0.3
         Rays that end farther from any curve see new walls, and do not measure the pose [m].
-    ray_stride : int
+    ray_stride : int, default 8
         Step between the returned beams that count.
-    ray_share : float
+    ray_share : float, default 0.5
         Weight of a ray, since neighbours are correlated.
-    least_sightings : int
+    least_sightings : int, default 3
         Minimum number of scans of corners and peaks that count.
-    least_features, least_rays : int
+    least_features, least_rays : int, default 2, 20
         With fewer matches of both kinds the pose is predicted only.
     still_distance, still_turn : float
         A robot that has moved less since its last correction is not corrected again: what it sees is not new

@@ -197,22 +197,22 @@ class BendSettings:
 
     Attributes
     ----------
-    spacing_m : float
+    spacing_m : float, default 3.0
         Between the nodes of the grid of offsets [m]; more if there would be more than ``most_nodes``.
-    most_nodes : int
+    most_nodes : int, default 14
         Along a side of the grid.
-    reach_m : float
+    reach_m : float, default 0.6
         How far a wall seeks another at first [m].
-    last_reach_m : float
+    last_reach_m : float, default 0.2
         How far at last [m].
-    stiffness : float
+    stiffness : float, default 0.1
         Weight of the difference of two neighbouring offsets against the gaps of the walls of a node.
-    rounds, samples : int
+    rounds, samples : int, default 6, 1500
         Number of rounds, and of wall cells that are aligned.
-    candidates : int
+    candidates : int, default 16
         Number of transforms that are tried with a bend if none is believed without; 0 for maps that are
         not bent.
-    proposals : int
+    proposals : int, default 6
         Number of transforms of a coarse search over all rotations and translations that are tried beside
         these.
     """

@@ -41,35 +41,35 @@ class RegionSettings:
 
     Attributes
     ----------
-    cell_m : float
+    cell_m : float, default 0.05
         Side of the cells in which regions are found, or that of the map if it is larger [m].
-    most_cells : int
+    most_cells : int, default 500000
         Maps that know more of such cells are split in larger ones: a bound of time.
-    least_obstacle_m : float
+    least_obstacle_m : float, default 0.4
         Obstacles in free space that are smaller along both axes do not split it [m].
-    widest_door_m : float
+    widest_door_m : float, default 1.5
         Widest gap that is a door [m].
-    door_share : float
+    door_share : float, default 0.75
         Largest width of a door as a share of the width of the narrower region.
-    least_radius_m : float
+    least_radius_m : float, default 0.35
         Radius of the disc that a region holds at least [m].
-    least_area_m2 : float
+    least_area_m2 : float, default 1.5
         Area of a region at least; smaller ones belong to a neighbour [m2].
-    most_regions, most_doors : int
+    most_regions, most_doors : int, default 24, 32
         Number of the largest regions, and of the widest doors, that are matched.
-    extent_m, extent_share : float
+    extent_m, extent_share : float, default 0.3, 0.08
         By how much the extents of one region may differ between maps [m, share]: the larger of both.
-    door_width_m : float
+    door_width_m : float, default 0.3
         By how much the widths of one door may differ [m].
-    scale_share : float
+    scale_share : float, default 0.08
         By how much the ratio of a region's extents may differ if a scale is sought, as a share.
-    scale_steps : int
+    scale_steps : int, default 4
         Number of scales that are proposed on each side of that of two regions, 3 % apart.
-    candidates : int
+    candidates : int, default 12
         Number of motions that are refined and judged.
     apart_m, apart_angle : float
         These differ by more [m, rad].
-    likely_rotations : bool
+    likely_rotations : bool, default False
         Whether of all rotations only those are tried under which the walls of both maps run alike. That takes
         half the time, and misses rivals by which strangers are known.
     """

@@ -45,18 +45,18 @@ class QuantisationSettings:
 
     Attributes
     ----------
-    method : str
+    method : str, default "kmeans++"
         One of METHODS.
-    steps : int
+    steps : int, default 7
         Lloyd's steps; with LBG, after each splitting. The thesis has 7.
-    seed : int
+    seed : int, default 0
         Of the draws; the same seed gives the same bits.
-    mode : str
+    mode : str, default "default"
         One of MODES.
     budget_s : float or None
         Time of the whole call that codes are moved in from where they are of least use to where the error is
         greatest [s]; such results differ with the machine. None for no such moves.
-    device : str
+    device : str, default "cpu"
         One of DEVICES.
     """
 

@@ -10,7 +10,7 @@ import sys
 import pytest
 from numba.core import types
 
-from lidarium.envs.engine import first_reset
+from lidarium.envs.engine.beginnings import KERNELS_OF_RESET
 from lidarium.mapping.grids.scan_integration import SeenScan
 from lidarium.mapping.kernels import first_start
 from lidarium.mapping.kernels.first_start import (
@@ -157,7 +157,7 @@ def test_a_kernel_is_compiled_for_what_it_is_called_with():
     assert (types.Array(types.int32, 2, "C"), types.int64) in _grown.signatures
 
 
-@pytest.mark.parametrize("path", [KERNELS_OF_RUN, first_reset.LIST], ids=["run", "reset"])
+@pytest.mark.parametrize("path", [KERNELS_OF_RUN, KERNELS_OF_RESET], ids=["run", "reset"])
 def test_every_listed_kernel_can_be_compiled_for_its_types_after_what_it_calls(path):
     entries = json.loads(path.read_text())
     assert len(entries) > 20
