@@ -53,6 +53,9 @@ class FloorChoice:
         if isinstance(floor, str | Path | Floor):
             self._specs = _expanded(floor)
             self.is_set = self._specs != (floor,)
+            if not self.is_set and isinstance(floor, str) and not is_file_name(floor):
+                # A floor of the catalogue never changes, and is looked up once.
+                self._specs = (self._load(floor),)
         elif callable(floor):
             self._source, self.is_set = floor, True
         elif isinstance(floor, Mapping | Sequence) and len(floor):
@@ -73,11 +76,7 @@ class FloorChoice:
         if self._source is not None or (isinstance(floor, str) and floor.startswith(SET_PREFIX)):
             return False
         if isinstance(floor, str | Path | Floor):
-            first = self._load(self._specs[0])
-            if not self.is_set and isinstance(floor, str) and not is_file_name(floor):
-                # A floor of the catalogue never changes, and is looked up once.
-                self._specs = (first,)
-            return first.goal is not None
+            return self._load(self._specs[0]).goal is not None
         return FloorChoice(self._specs[0], self._resolution_of(self._specs[0])).has_goal
 
     def instead(self, floor: Floors) -> "FloorChoice":
