@@ -89,6 +89,13 @@ def test_the_conclusion_is_made_of_the_figures():
 
 def test_networks_that_attend_are_compared_with_what_they_were(tmp_path, monkeypatch):
     module = script("attention", "sb3_contrib", "rl")
+    make, worlds = module.lidarium.sb3_vec_env, []
+
+    def noted(*arguments, **options):
+        worlds.append(options["realism"])
+        return make(*arguments, **options)
+
+    monkeypatch.setattr(module.lidarium, "sb3_vec_env", noted)
     monkeypatch.setattr(module, "ProcessPoolExecutor", Here)
     monkeypatch.setattr(module, "ROLLOUT", 8)
     monkeypatch.setattr(module.torch, "set_num_threads", lambda threads: None)  # it would hold for all tests
@@ -103,8 +110,9 @@ def test_networks_that_attend_are_compared_with_what_they_were(tmp_path, monkeyp
     )
     module.main(plan)
     numbers = json.loads((tmp_path / "attention.json").read_text())
-    assert set(numbers["coverage"]) == {*numbers["drawn"], "trained networks", "untrained networks"}
+    assert set(numbers["coverage"]) == {*numbers["drawn"], module.UNTRAINED, *module.WORLDS}
     assert all(0.0 < each <= 1.0 for reached in numbers["coverage"].values() for each in reached)
+    assert worlds == ["ideal", "fast"]
     page = (tmp_path / "attention.md").read_text()
     assert page.count("\n| `") == len(numbers["drawn"])
     assert "256 decisions" in page

@@ -182,14 +182,14 @@ def table(horizon_s: float, coverage: dict[str, list[float]], drawn: dict[str, l
     ]
     for name, reached in sorted(coverage.items(), key=lambda each: float(np.mean(each[1]))):
         mean, low, high = 100.0 * np.array(interval(np.array(reached)))
-        less = "-" if name == LEARNED else _less(coverage, name)
+        less = "-" if name == LEARNED else more_than(coverage, name)
         other = f"{100.0 * np.mean(drawn[name]):.1f} %" if name in drawn else "-"
         shown = f"`{name}`" if name in drawn else name
         lines.append(f"| {shown} | {mean:.1f} ({low:.1f} to {high:.1f}) % | {less} | {other} |")
     return "\n".join(lines)
 
 
-def _less(coverage: dict[str, list[float]], name: str) -> str:
+def more_than(coverage: dict[str, list[float]], name: str) -> str:
     """Return how much more of a floor trained networks see, in points of per cent."""
     gap, lowest, highest = 100.0 * np.array(interval(np.subtract(coverage[LEARNED], coverage[name])))
     return f"{gap:+.1f} ({lowest:+.1f} to {highest:+.1f}) %"
@@ -203,7 +203,7 @@ def conclusion(horizon_s: float, coverage: dict[str, list[float]]) -> str:
         f"Trained networks see {shares[LEARNED]:.1f} % of an unseen floor in {horizon_s:.0f} s with one robot, "
         f"untrained ones {shares[UNTRAINED]:.1f} %.\nThe nearest frontier sees {shares['nearest_frontier']:.1f} % "
         f"from the same starts, `{best}`, the best classic policy, {shares[best]:.1f} %:\n"
-        f"floor by floor the networks differ from that by {_less(coverage, best)} (mean, 95 % interval)."
+        f"floor by floor the networks differ from that by {more_than(coverage, best)} (mean, 95 % interval)."
     )
 
 
