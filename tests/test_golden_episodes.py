@@ -121,6 +121,8 @@ CASES: dict[str, Case] = {
     "nearest_frontier_merged": policy("nearest_frontier", "apartment", 400, merged=True, robots=2, known_starts=False),
     "utility_frontier": policy("utility_frontier", "building:17", 1000, robots=3),
     "explore_lite": policy("explore_lite", "office:3", 1000, robots=2, noise="thesis"),
+    "tour_frontier": policy("tour_frontier", "apartment", 1000, robots=2, stop_coverage=0.99),
+    "predicted_tours": policy("predicted_tours", "apartment", 1000, robots=2, stop_coverage=0.99),
     "srt": policy("srt", "srt_l_room", 300, robots=1, solves=True),
     "srt_explores": policy("srt", "clinic", 300, robots=1, solves=True, stop_coverage=0.9),
     "srt_team": policy("srt", "apartment", 200, robots=2, solves=True, radio="line_of_sight"),

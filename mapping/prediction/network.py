@@ -1,4 +1,4 @@
-"""A network that predicts which unknown squares of a partial map are free, in plain numpy.
+"""A network that predicts which unknown squares of a partial map are free.
 
 It is a small U-Net: windows are seen at four scales, and what is found at the coarse ones goes into the fine ones.
 
@@ -10,15 +10,14 @@ sub-pixel convolutional neural network", 2016; sums past layers: K. He et al., "
 recognition", 2016.
 """
 
-from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from threadpoolctl import ThreadpoolController
 
 from lidarium.mapping.files.weight_files import WeightFiles, Weights
+from lidarium.mapping.prediction.convolution import Image, Layer
 from lidarium.mapping.prediction.levels import FREE, OCCUPIED
 
 WINDOW = 160
@@ -61,11 +60,6 @@ FILES = WeightFiles(shapes(), "lidarium.mapping.prediction", "prediction.safeten
 
 
 @lru_cache(maxsize=1)
-def _blas() -> ThreadpoolController:
-    return ThreadpoolController()
-
-
-@lru_cache(maxsize=1)
 def _shipped() -> Weights:
     return FILES.load()
 
@@ -75,11 +69,21 @@ def load_weights(path: str | Path = "") -> Weights:
     return FILES.load(path) if path != "" else _shipped()
 
 
-@dataclass(frozen=True, slots=True)
 class MapNetwork:
-    """A network with its weights."""
+    """A network with its weights.
 
-    weights: Weights
+    Parameters
+    ----------
+    weights : dict of str to array
+        Its weights by name, as ``shapes`` has them.
+    """
+
+    def __init__(self, weights: Weights) -> None:
+        self._layers = {
+            name.removesuffix(".weight"): Layer.of(weight, weights.get(name.replace(".weight", ".bias")))
+            for name, weight in weights.items()
+            if name.endswith(".weight")
+        }
 
     def __call__(self, levels: NDArray[np.int8]) -> NDArray[np.float32]:
         """Return the probability that each square of a window is free, (WINDOW, WINDOW) float32.
@@ -89,59 +93,27 @@ class MapNetwork:
         levels : (WINDOW, WINDOW) int8
             Squares of the map; beyond it they are unknown.
         """
-        logits = self.logits(levels)
-        return np.asarray(1.0 / (1.0 + np.exp(-np.clip(logits, -30.0, 30.0))), np.float32)
+        # In float64, as the last bit of an exponential in float32 differs by processor.
+        logits = np.clip(self.logits(levels), -30.0, 30.0).astype(np.float64)
+        return np.asarray(1.0 / (1.0 + np.exp(-logits)), np.float32)
 
     def logits(self, levels: NDArray[np.int8]) -> NDArray[np.float32]:
         """Return the logarithms of the odds that squares are free, (WINDOW, WINDOW) float32."""
-        # Threads of BLAS wait for each other in loops: beside other work they took five times the time of one.
-        with _blas().limit(limits=1, user_api="blas"):
-            return self._logits(levels)
-
-    def _logits(self, levels: NDArray[np.int8]) -> NDArray[np.float32]:
+        layers = self._layers
         seen = np.stack([levels == OCCUPIED, levels == FREE]).astype(np.float32)
-        x = np.maximum(self._layer("enter", _to_channels(seen)), 0.0)
-        kept: list[NDArray[np.float32]] = []
+        x = layers["enter"](Image.of(_to_channels(seen)), rectifies=True)
+        kept: list[Image] = []
         for scale in range(len(WIDTHS) - 1):
-            x = self._residual(f"level{scale}", x)
+            x = layers[f"level{scale}"](x, rectifies=True, adds_input=True)
             kept.append(x)
-            x = np.maximum(self._layer(f"down{scale}", x, stride=2), 0.0)
+            x = layers[f"down{scale}"](x.halved(), rectifies=True)
         for number, dilation in enumerate(DILATIONS):
-            x = self._residual(f"coarse{number}", x, dilation)
+            x = layers[f"coarse{number}"](x.with_border(dilation), rectifies=True, adds_input=True)
         for scale in reversed(range(len(WIDTHS) - 1)):
-            deep = self._layer(f"deep{scale}", x).repeat(2, axis=1).repeat(2, axis=2)
-            deep += self._layer(f"skip{scale}", kept[scale])
-            x = self._residual(f"merge{scale}", np.maximum(deep, 0.0, out=deep))
-        return np.asarray(_to_pixels(self._layer("out", x))[0])
-
-    def _residual(self, name: str, x: NDArray[np.float32], dilation: int = 1) -> NDArray[np.float32]:
-        change = self._layer(name, x, dilation=dilation)
-        np.maximum(change, 0.0, out=change)
-        change += x
-        return change
-
-    def _layer(self, name: str, x: NDArray[np.float32], stride: int = 1, dilation: int = 1) -> NDArray[np.float32]:
-        """Return a convolution of (channels, rows, columns), as one product of matrices."""
-        weight, bias = self.weights[f"{name}.weight"], self.weights.get(f"{name}.bias")
-        outputs, inputs, side, _ = weight.shape
-        rows, columns = x.shape[1] // stride, x.shape[2] // stride
-        if side == 1:
-            pieces = x.reshape(inputs, -1)
-        else:
-            padded = np.zeros((inputs, x.shape[1] + 2 * dilation, x.shape[2] + 2 * dilation), np.float32)
-            padded[:, dilation:-dilation, dilation:-dilation] = x
-            pieces = np.empty((inputs, side, side, rows, columns), np.float32)
-            for i in range(side):
-                for j in range(side):
-                    row, column = i * dilation, j * dilation
-                    pieces[:, i, j] = padded[
-                        :, row : row + rows * stride : stride, column : column + columns * stride : stride
-                    ]
-            pieces = pieces.reshape(inputs * side * side, -1)
-        found = weight.reshape(outputs, -1) @ pieces
-        if bias is not None:
-            found += bias[:, None]
-        return np.asarray(found.reshape(outputs, rows, columns))
+            deep = layers[f"deep{scale}"](x).doubled()
+            x = layers[f"skip{scale}"](kept[scale], rectifies=True, onto=deep)
+            x = layers[f"merge{scale}"](x, rectifies=True, adds_input=True)
+        return np.asarray(_to_pixels(layers["out"](x).inner)[0])
 
 
 def _to_channels(x: NDArray[np.float32]) -> NDArray[np.float32]:

@@ -27,7 +27,7 @@ from lidarium.envs.simulation.kernels.ray_tables import RayTables
 from lidarium.mapping.grids.map_crops import turn_by_cells, turn_in_registers
 from lidarium.mapping.grids.scan_geometry import Beams, ScanGeometry, beam_directions
 from lidarium.mapping.kernels.compilation import Array
-from lidarium.mapping.kernels.simd import cells, clearance, codes, costs, crops, faces, words
+from lidarium.mapping.kernels.simd import cells, clearance, codes, convolution, costs, crops, faces, words
 from lidarium.mapping.kernels.views import vector_at
 
 BLOCKS = 2048
@@ -56,6 +56,8 @@ def _arrays() -> dict[str, NDArray[Any]]:
         "reals": draw.uniform(-9.0, 9.0, (3, BLOCKS, 8)),
         "pixels": draw.uniform(0.0, 1.0, (BLOCKS, BLOCK)).astype(np.float32),
         "labels": np.zeros((BLOCKS, BLOCK), np.int32),
+        "taps": np.arange(9) // 3 * 328 + np.arange(9) % 3 * 4,
+        "totals": np.zeros((BLOCKS, BLOCK), np.float32),
         "grids": grids,
         "kinds": kinds,
         "table": table,
@@ -244,6 +246,43 @@ def _nearest_in_tile(points: int, codes: int, numbers: int, count: int, squares:
 
 
 @_inlined
+def _add_taps(
+    sums: int,
+    row: int,
+    source: int,
+    channel: int,
+    channels: int,
+    taps: int,
+    count: int,
+    weights: int,
+    bias: int,
+    least: float,
+    last: int,
+) -> None:
+    lanes, outputs, shifts = convolution.LANES, convolution.OUTPUTS, vector_at(taps, count, np.int64)
+    factors, begins = (
+        vector_at(weights, channels * count * outputs, np.float32),
+        vector_at(bias, outputs, np.float32),
+    )
+    for output in range(outputs):
+        found = vector_at(sums + output * row, lanes, np.float32)
+        for k in range(lanes):
+            found[k] += begins[output]
+        for k in range(channels):
+            for tap in range(count):
+                numbers = vector_at(source + k * channel + shifts[tap], lanes, np.float32)
+                factor = factors[(k * count + tap) * outputs + output]
+                for lane in range(lanes):
+                    found[lane] += factor * numbers[lane]
+        for k in range(lanes):
+            found[k] = max(found[k], least)
+        if last:
+            added = vector_at(last + output * channel, lanes, np.float32)
+            for k in range(lanes):
+                found[k] += added[k]
+
+
+@_inlined
 def _relax_forwards(costs_at: int, straight_at: int, diagonal_at: int, kinds_at: int, at: int, beside: int) -> Any:  # noqa: ANN401
     size, changed = max(at, beside) + 17, 0
     costs, straight = vector_at(costs_at, size, np.int32), vector_at(straight_at, size, np.int32)
@@ -347,6 +386,9 @@ def _calls() -> dict[str, tuple[Any, Any, Callable[[Any], Any]]]:
         "nearest_in_tile": (codes.nearest_in_tile, _nearest_in_tile,
             lambda op: (lambda d, k: op(d.pixels + 256 * (k & 1023), d.pixels, d.grids, 20,
                 d.pixels + 256 * (k & 255) + 256 * 1100, d.labels + 256 * k))),
+        "add_taps": (convolution.add_taps, _add_taps,
+            lambda op: (lambda d, k: op(d.totals + 256 * (k & 63), 16384, d.pixels + 128 * (k & 255), 8192, 24, d.taps,
+                9, d.pixels, d.pixels, f4(0.0), 0))),
         "relax_forwards": (costs.relax_forwards, _relax_forwards,
             lambda op: (lambda d, k: op(d.grids, d.grids + 192 * BLOCKS, d.grids + 384 * BLOCKS, d.kinds,
                 16 * (k + 1), 16 * (k + 1 + BLOCKS)))),

@@ -7,7 +7,13 @@ import sys
 import numpy as np
 import pytest
 
-from lidarium.benchmarks.speed.cases import cached_start, frontier_decision, tour_decision, waypoint_decision
+from lidarium.benchmarks.speed.cases import (
+    cached_start,
+    frontier_decision,
+    predicted_window,
+    tour_decision,
+    waypoint_decision,
+)
 from lidarium.benchmarks.speed.cases.waypoint_decision import Deciders
 from lidarium.benchmarks.speed.harness import batches
 from lidarium.benchmarks.speed.harness.batches import DrivenBatch
@@ -15,6 +21,7 @@ from lidarium.benchmarks.speed.harness.timing import Effort
 from lidarium.benchmarks.speed.peers.catalogue import PEERS, missing_peers
 from lidarium.benchmarks.speed.profile_step import OBSERVATION, REST, WHOLE, profile, profile_page
 from lidarium.benchmarks.speed.scenes.floors import straight_floor
+from lidarium.mapping.prediction.network import MapNetwork, load_weights
 
 LEAST = Effort(rounds=1, block_s=0.0)
 
@@ -74,6 +81,18 @@ def test_plans_of_tours_and_decisions_at_their_level_are_measured(monkeypatch):
     assert (plan.to_reach, plan.is_upper_bound, plan.unit) == (1.2, True, "ms")
     assert (decisions.to_reach, decisions.unit) == (800.0, "decisions/s")
     assert plan.judged > 0.0
+
+
+def test_a_window_is_predicted_alike_by_the_peer():
+    torch = pytest.importorskip("torch")
+    threads = torch.get_num_threads()
+    levels = predicted_window.half_seen_room()
+    found = predicted_window.by_torch(levels)()
+    np.testing.assert_allclose(MapNetwork(load_weights())(levels), found, atol=1e-4)
+    assert torch.get_num_threads() == threads
+    own, beside = predicted_window.measure(LEAST)
+    assert (own.to_reach, own.is_upper_bound, own.unit) == (15.0, True, "ms")
+    assert beside.judged > 0.0
 
 
 def test_the_profile_has_all_parts_and_they_make_up_the_whole(tmp_path):
