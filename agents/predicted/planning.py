@@ -7,8 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.agents.tours.planning import TourOptions
-from lidarium.mapping.planning.touring.coarse_distances import STRAIGHT, UNREACHED, CoarseGrid, distances_from
+from lidarium.mapping.kernels.simd.lengths import FAR, STRAIGHT
 from lidarium.mapping.planning.touring.expected_views import cover, shares_left
+from lidarium.mapping.planning.touring.many_lengths import lengths_between
 from lidarium.mapping.planning.touring.map_tours import NO_PATH
 from lidarium.mapping.planning.touring.tours import TourWeights, team_tours, tours_cost
 
@@ -96,16 +97,12 @@ def rest_of(
     stops = places[chosen]
     gaps = np.abs(stops[:, None] - robots[None]).max(axis=2).min(axis=1)
     stops = stops[np.argsort(gaps, kind="stable")[:MOST_NEAR]]
-    fields = distances_from(CoarseGrid(is_open, factor, 0, 0, side), stops)
+    paths = _path_lengths(is_open, stops, np.concatenate([robots, views, stops]), side)
+    to_robots, to_views, to_stops = np.split(paths, [len(robots), len(robots) + len(views)], axis=1)
     # Squares close gaps that bodies fit through: in known space, paths between options are those of finer cells.
-    lengths = _metres(fields[:, views[:, 0], views[:, 1]].T, side)
-    from_options = np.minimum(lengths, _shortest(options.between, lengths))
-    from_robots = np.minimum(
-        _metres(fields[:, robots[:, 0], robots[:, 1]].T, side), _shortest(options.lengths, lengths)
-    )
-    between = np.minimum(
-        _metres(fields[:, stops[:, 0], stops[:, 1]], side), _shortest(np.ascontiguousarray(lengths.T), from_options)
-    )
+    from_options = np.minimum(to_views.T, _shortest(options.between, to_views.T))
+    from_robots = np.minimum(to_robots.T, _shortest(options.lengths, to_views.T))
+    between = np.minimum(to_stops, _shortest(to_views, from_options))
     nearest = np.argsort(from_robots.min(axis=0), kind="stable")[:MOST_STOPS]
     stops = stops[nearest]
     return Rest(
@@ -165,5 +162,10 @@ def costs_of(rest: Rest, robot: int, picks: list[int | None]) -> NDArray[np.floa
     return costs
 
 
-def _metres(lengths: NDArray[np.int32], side: float) -> NDArray[np.float64]:
-    return np.where(lengths == UNREACHED, NO_PATH, lengths * (side / STRAIGHT))
+def _path_lengths(
+    is_open: NDArray[np.bool_], starts: NDArray[np.int64], ends: NDArray[np.int64], side: float
+) -> NDArray[np.float64]:
+    """Return the lengths of paths over open squares from each of some to each of others [m]."""
+    bordered = np.pad(is_open, 1).view(np.uint8)
+    lengths = lengths_between(bordered, *((each + 1) @ (bordered.shape[1], 1) for each in (starts, ends)))
+    return np.where(lengths == FAR, NO_PATH, lengths * (side / STRAIGHT))

@@ -45,7 +45,8 @@ class Image:
     @classmethod
     def of(cls, pixels: NDArray[np.float32], border: int = 1) -> Self:
         """Return an image of (channels, rows, columns)."""
-        made = cls.blank(*pixels.shape, border)
+        channels, rows, columns = pixels.shape
+        made = cls.blank(channels, rows, columns, border)
         made.inner[:] = pixels
         return made
 
@@ -201,7 +202,7 @@ def _convolve(
     result : (groups * OUTPUTS, length) float32
         Has the sums added. Up to LANES - 1 numbers after the last pixel have no meaning.
     """
-    least = np.float32(0.0 if rectifies else -np.inf)
+    least = 0.0 if rectifies else -np.inf
     for block in range((count + LANES - 1) // LANES):
         begin = block * LANES
         at = first + begin

@@ -388,7 +388,7 @@ def _calls() -> dict[str, tuple[Any, Any, Callable[[Any], Any]]]:
                 d.pixels + 256 * (k & 255) + 256 * 1100, d.labels + 256 * k))),
         "add_taps": (convolution.add_taps, _add_taps,
             lambda op: (lambda d, k: op(d.totals + 256 * (k & 63), 16384, d.pixels + 128 * (k & 255), 8192, 24, d.taps,
-                9, d.pixels, d.pixels, f4(0.0), 0))),
+                9, d.pixels, d.pixels, 0.0, 0))),
         "relax_forwards": (costs.relax_forwards, _relax_forwards,
             lambda op: (lambda d, k: op(d.grids, d.grids + 192 * BLOCKS, d.grids + 384 * BLOCKS, d.kinds,
                 16 * (k + 1), 16 * (k + 1 + BLOCKS)))),

@@ -1,4 +1,4 @@
-"""Plans of `tour_frontier` by the processor's time, and decisions of a batch at the level of tours.
+"""Plans of `tour_frontier` and `predicted_tours`, and decisions of a batch at the level of tours.
 
 A plan gives all robots of a team their next goals; a decision is that of a robot that has several stops to choose from.
 """
@@ -11,6 +11,7 @@ import numpy as np
 
 import lidarium
 from lidarium.agents.frontier.reach import Choice
+from lidarium.agents.predicted.policy import PredictedTours
 from lidarium.agents.tours.policy import TourFrontier
 from lidarium.benchmarks.speed.harness.lines import Line, shown
 from lidarium.benchmarks.speed.harness.report import run_alone
@@ -19,44 +20,39 @@ from lidarium.benchmarks.speed.harness.timing import Effort
 CORES = 2
 ROBOTS, EPISODES, FLOORS = 2, 32, "set:validation"
 WARM_STEPS = 25
-OPTIONS: dict[str, Any] = {"robots": ROBOTS, "resolution": 0.05, "stop_coverage": 0.99, "horizon_s": 1800.0}
-MOST_MS, TO_REACH = 1.2, 800.0
+OPTIONS: dict[str, Any] = {"resolution": 0.05, "stop_coverage": 0.99, "horizon_s": 1800.0}
+MOST_MS, MOST_PREDICTED_MS, TO_REACH = 1.2, 20.0, 800.0
 
 NOTES = (
     f"*Plan of tours*: all that `tour_frontier` does to choose goals for {ROBOTS} robots, over whole episodes on "
-    f"`{FLOORS}`, in CPU time. *Tour decisions*: level `tour`, {EPISODES} episodes, two threads; choices are drawn "
-    "with equal probability, and robots that continue to their stop are not counted.",
+    f"`{FLOORS}`, in CPU time; *plan of predicted tours*: that of `predicted_tours` for one robot. *Tour decisions*: "
+    f"level `tour`, {EPISODES} episodes, two threads; choices are drawn with equal probability, and robots that "
+    "continue to their stop are not counted.",
 )
 
 
-class _Timed(TourFrontier):
-    """Notes how long plans take."""
+def plan_seconds(kind: type[TourFrontier], robots: int, floors: int) -> float:
+    """Return the mean time of a policy's plan over some floors [s]; the first one warms up."""
+    seconds: list[float] = []
 
-    def __init__(self) -> None:
-        super().__init__()
-        self.seconds: list[float] = []
+    class Timed(kind):  # type: ignore[misc, valid-type]
+        def choose(self, agents: list[str], open_agents: list[str]) -> dict[str, Choice | None]:
+            began = time.process_time()
+            chosen: dict[str, Choice | None] = super().choose(agents, open_agents)
+            seconds.append(time.process_time() - began)
+            return chosen
 
-    def choose(self, agents: list[str], open_agents: list[str]) -> dict[str, Choice | None]:
-        """Plan, and note the processor's time."""
-        began = time.process_time()
-        chosen = super().choose(agents, open_agents)
-        self.seconds.append(time.process_time() - began)
-        return chosen
-
-
-def plan_seconds(floors: int) -> float:
-    """Return the mean time of a plan over some floors [s]; the first one warms up."""
-    policy = _Timed()
+    policy = Timed()
     for number, floor in enumerate(lidarium.floor_set(f"{FLOORS}:{floors + 1}")):
-        lidarium.run_episode(policy, lidarium.parallel_env(floor, **OPTIONS), seed=0)
+        lidarium.run_episode(policy, lidarium.parallel_env(floor, robots=robots, **OPTIONS), seed=0)
         if number == 0:
-            policy.seconds.clear()
-    return statistics.mean(policy.seconds)
+            seconds.clear()
+    return statistics.mean(seconds)
 
 
 def decisions_a_second(seconds: float) -> float:
     """Return how many decisions of a batch at the level of tours are made in a second of the clock."""
-    envs = lidarium.vector_env(EPISODES, FLOORS, level="tour", threads=2, copy=False, **OPTIONS)
+    envs = lidarium.vector_env(EPISODES, FLOORS, level="tour", threads=2, copy=False, robots=ROBOTS, **OPTIONS)
     generator = np.random.default_rng(0)
     mask = envs.reset(seed=0)[0]["action_mask"]
     count, step, began = 0, 0, 0.0
@@ -72,13 +68,17 @@ def decisions_a_second(seconds: float) -> float:
 
 def measure(effort: Effort) -> list[Line]:
     """Measure plans of a team, and decisions at the level of tours."""
-    plan_ms = 1e3 * min(plan_seconds(3) for _ in range(effort.rounds))
     rate = statistics.median(decisions_a_second(4.0 * effort.block_s) for _ in range(effort.rounds))
-    name, unit = f"plan of tours, {ROBOTS} robots", "decisions/s"
     return [
-        Line(name, f"{plan_ms:.2f} ms", "-", None, MOST_MS, plan_ms, is_upper_bound=True, unit="ms"),
-        Line("tour decisions, two cores", f"{shown(rate)} {unit}", "-", None, TO_REACH, rate, unit=unit),
+        _plans(f"plan of tours, {ROBOTS} robots", TourFrontier, ROBOTS, MOST_MS, effort),
+        _plans("plan of predicted tours, one robot", PredictedTours, 1, MOST_PREDICTED_MS, effort),
+        Line("tour decisions, two cores", f"{shown(rate)} decisions/s", "-", None, TO_REACH, rate, unit="decisions/s"),
     ]
+
+
+def _plans(name: str, kind: type[TourFrontier], robots: int, most_ms: float, effort: Effort) -> Line:
+    found = 1e3 * min(plan_seconds(kind, robots, 3) for _ in range(effort.rounds))
+    return Line(name, f"{found:.2f} ms", "-", None, most_ms, found, is_upper_bound=True, unit="ms")
 
 
 if __name__ == "__main__":

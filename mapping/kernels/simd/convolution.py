@@ -84,7 +84,7 @@ def add_taps(
             total += vector_at(last + output * channel, LANES, np.float32)
 
 
-@llvm_overload(add_taps, types.void, *(types.int64,) * 9, types.float32, types.int64)
+@llvm_overload(add_taps, types.void, *(types.int64,) * 9, types.float64, types.int64)
 def _(
     builder: Builder,
     sums: Value,
@@ -118,7 +118,7 @@ def _(
                 builder.store(call(builder, f"llvm.fma.v{LANES}f32", _REALS, *terms), slot)
             builder.store(builder.add(factors, ir.Constant(LONG, OUTPUTS * _SIZE)), weight)
         builder.store(builder.add(begin, channel), plane)
-    bound = splat(builder, least, _REALS)
+    bound = splat(builder, builder.fptrunc(least, _REALS.element), _REALS)
     for slot in found:
         total = builder.load(slot)
         builder.store(builder.select(builder.fcmp_ordered("<", total, bound), bound, total), slot)

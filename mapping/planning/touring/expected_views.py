@@ -4,6 +4,8 @@ A cell is seen with the probability that all cells before it on the ray are free
 """
 
 import math
+from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,8 +54,8 @@ def cover(
     (m,) int64, (m,) float64
         Numbers of the places, and the area that each shows [cells].
     """
-    rays = _rays(GAIN_RAYS), _rays(MARK_RAYS)
-    chosen, gains = _cover(free, unseen.copy(), places, rays, reach, least, spare, most)
+    field = _field(free, unseen, reach)
+    chosen, gains = _cover(field, _cells_of(places, field), least, spare, most)
     return chosen, gains
 
 
@@ -68,80 +70,92 @@ def shares_left(
 
     ``stops`` (m, 2) and ``views`` (n, 2) int64 are cells (row, column); the others as in ``cover``.
     """
-    return np.asarray(_shares_left(free, unseen, stops, views, (_rays(GAIN_RAYS), _rays(MARK_RAYS)), reach))
+    field = _field(free, unseen, reach)
+    return np.asarray(_shares_left(field, _cells_of(stops, field), _cells_of(views, field)))
 
 
-def _rays(count: int) -> NDArray[np.float64]:
-    angles = (np.arange(count) + 0.5) * (2.0 * math.pi / count)
-    return np.stack([np.sin(angles), np.cos(angles)], axis=1)
+class _Field(NamedTuple):
+    """Maps with a border that no ray passes, as wide as a ray is long, and the cells that rays meet.
+
+    Attributes
+    ----------
+    free, unseen : (rows * width,) float32
+        The maps, row by row.
+    width, reach : int
+        Columns with the border, and range of the sensor [cells].
+    gain_rays, mark_rays : (rays, reach) int64
+        Cells that each ray meets, counted from the one where it begins.
+    """
+
+    free: NDArray[np.float32]
+    unseen: NDArray[np.float32]
+    width: int
+    reach: int
+    gain_rays: NDArray[np.int64]
+    mark_rays: NDArray[np.int64]
 
 
-@kernel
-def _area(free: Array, worth: Array, row: int, column: int, rays: Array, reach: int) -> float:
+def _field(free: NDArray[np.float32], unseen: NDArray[np.float32], reach: int) -> _Field:
+    bordered = [np.pad(each, reach + 1) for each in (free, unseen)]
+    width = bordered[0].shape[1]
+    rays = [_rays(count, reach, width) for count in (GAIN_RAYS, MARK_RAYS)]
+    return _Field(bordered[0].reshape(-1), bordered[1].reshape(-1), width, reach, *rays)
+
+
+def _cells_of(places: NDArray[np.int64], field: _Field) -> NDArray[np.int64]:
+    row, column = (places + field.reach + 1).T
+    return np.asarray(row * field.width + column, np.int64)
+
+
+@lru_cache(maxsize=8)
+def _rays(count: int, reach: int, width: int) -> NDArray[np.int64]:
+    angles = (np.arange(count)[:, None] + 0.5) * (2.0 * math.pi / count)
+    row, column = (np.floor(0.5 + np.arange(1, reach + 1) * way(angles)) for way in (np.sin, np.cos))
+    return np.asarray(row * width + column, np.int64)
+
+
+@kernel(nrt=False)
+def _area(free: Array, worth: Array, cell: int, rays: Array) -> float:
     """Return the expected area in view, weighted by the worth of its cells [cells]."""
-    rows, columns = free.shape
     area = 0.0
     for ray in range(rays.shape[0]):
         passed = 1.0
-        for step in range(1, reach + 1):
-            at_row = int(math.floor(row + 0.5 + step * rays[ray, 0]))
-            at_column = int(math.floor(column + 0.5 + step * rays[ray, 1]))
-            if not (0 <= at_row < rows and 0 <= at_column < columns):
-                break
-            area += passed * worth[at_row, at_column] * step
-            passed *= free[at_row, at_column]
+        for step in range(rays.shape[1]):
+            at = cell + rays[ray, step]
+            area += passed * worth[at] * (step + 1)
+            passed *= free[at]
             if passed < DIMMEST:
                 break
     return float(area * (2.0 * math.pi / rays.shape[0]))
 
 
-@kernel
-def _mark(free: Array, row: int, column: int, rays: Array, reach: int, seen: Array) -> None:
+@kernel(nrt=False)
+def _mark(free: Array, cell: int, rays: Array, seen: Array) -> None:
     """Raise the probability with which each cell is seen."""
-    rows, columns = free.shape
-    seen[row, column] = 1.0
+    seen[cell] = 1.0
     for ray in range(rays.shape[0]):
         passed = 1.0
-        for step in range(1, reach + 1):
-            at_row = int(math.floor(row + 0.5 + step * rays[ray, 0]))
-            at_column = int(math.floor(column + 0.5 + step * rays[ray, 1]))
-            if not (0 <= at_row < rows and 0 <= at_column < columns):
-                break
-            seen[at_row, at_column] = max(seen[at_row, at_column], passed)
-            passed *= free[at_row, at_column]
+        for step in range(rays.shape[1]):
+            at = cell + rays[ray, step]
+            seen[at] = max(seen[at], passed)
+            passed *= free[at]
             if passed < DIMMEST:
                 break
 
 
 @kernel
-def _window(row: int, column: int, reach: int, shape: tuple[int, int]) -> tuple[int, int, int, int]:
-    return (
-        max(row - reach - 1, 0),
-        min(row + reach + 2, shape[0]),
-        max(column - reach - 1, 0),
-        min(column + reach + 2, shape[1]),
-    )
-
-
-@kernel
 def _cover(
-    free: Array,
-    unseen: Array,
-    places: Array,
-    rays: tuple[Array, Array],
-    reach: int,
-    least: float,
-    spare: float,
-    most: int,
+    field: _Field, places: Array, least: float, spare: float, most: int
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    count = len(places)
+    """Choose places; the unseen area of the field is written."""
+    free, unseen, count = field.free, field.unseen, len(places)
     bounds = np.empty(count)
     for k in range(count):
-        bounds[k] = _area(free, unseen, places[k, 0], places[k, 1], rays[0], reach)
+        bounds[k] = _area(free, unseen, places[k], field.gain_rays)
     chosen, gains = np.empty(most, np.int64), np.empty(most)
     is_fresh = np.ones(count, np.bool_)
     number, left_area = 0, unseen.sum()
-    seen = np.zeros(free.shape, np.float32)
+    seen = np.zeros(len(free), np.float32)
     while number < most and left_area > spare:
         # What is left to see from a place only shrinks: the greatest bound that is fresh is the greatest of all.
         best = 0
@@ -149,46 +163,45 @@ def _cover(
             best = int(np.argmax(bounds))
             if bounds[best] < least or is_fresh[best]:
                 break
-            bounds[best] = _area(free, unseen, places[best, 0], places[best, 1], rays[0], reach)
+            bounds[best] = _area(free, unseen, places[best], field.gain_rays)
             is_fresh[best] = True
         if bounds[best] < least:
             break
-        row, column = places[best, 0], places[best, 1]
         chosen[number], gains[number] = best, bounds[best]
         number += 1
         bounds[best] = -1.0
         is_fresh[:] = False
-        _mark(free, row, column, rays[1], reach, seen)
-        low, high, left, right = _window(row, column, reach, free.shape)
-        for i in range(low, high):
-            for j in range(left, right):
-                left_area -= unseen[i, j] * seen[i, j]
-                unseen[i, j] *= np.float32(1.0) - seen[i, j]
-                seen[i, j] = 0.0
+        _mark(free, places[best], field.mark_rays, seen)
+        for row in range(-field.reach - 1, field.reach + 2):
+            middle = places[best] + row * field.width
+            for at in range(middle - field.reach - 1, middle + field.reach + 2):
+                left_area -= unseen[at] * seen[at]
+                unseen[at] *= np.float32(1.0) - seen[at]
+                seen[at] = 0.0
     return chosen[:number], gains[:number]
 
 
 @kernel
-def _shares_left(
-    free: Array, unseen: Array, stops: Array, views: Array, rays: tuple[Array, Array], reach: int
-) -> NDArray[np.float64]:
+def _shares_left(field: _Field, stops: Array, views: Array) -> NDArray[np.float64]:
+    free, unseen, width, reach = field.free, field.unseen, field.width, field.reach
     shares = np.ones((len(views), len(stops)))
     shown = np.empty(len(stops))
     for s in range(len(stops)):
-        shown[s] = _area(free, unseen, stops[s, 0], stops[s, 1], rays[0], reach)
-    seen = np.zeros(free.shape, np.float32)
+        shown[s] = _area(free, unseen, stops[s], field.gain_rays)
+    seen = np.zeros(len(free), np.float32)
     rest = unseen.copy()
     for v in range(len(views)):
-        row, column = views[v, 0], views[v, 1]
-        _mark(free, row, column, rays[1], reach, seen)
-        low, high, left, right = _window(row, column, reach, free.shape)
-        for i in range(low, high):
-            for j in range(left, right):
-                rest[i, j] = unseen[i, j] * (np.float32(1.0) - seen[i, j])
+        _mark(free, views[v], field.mark_rays, seen)
+        for row in range(-reach - 1, reach + 2):
+            middle = views[v] + row * width
+            for at in range(middle - reach - 1, middle + reach + 2):
+                rest[at] = unseen[at] * (np.float32(1.0) - seen[at])
         for s in range(len(stops)):
-            if max(abs(stops[s, 0] - row), abs(stops[s, 1] - column)) <= 2 * reach and shown[s] > 0.0:
-                shares[v, s] = _area(free, rest, stops[s, 0], stops[s, 1], rays[0], reach) / shown[s]
-        for i in range(low, high):
-            for j in range(left, right):
-                rest[i, j], seen[i, j] = unseen[i, j], 0.0
+            rows, columns = stops[s] // width - views[v] // width, stops[s] % width - views[v] % width
+            if max(abs(rows), abs(columns)) <= 2 * reach and shown[s] > 0.0:
+                shares[v, s] = _area(free, rest, stops[s], field.gain_rays) / shown[s]
+        for row in range(-reach - 1, reach + 2):
+            middle = views[v] + row * width
+            for at in range(middle - reach - 1, middle + reach + 2):
+                rest[at], seen[at] = unseen[at], 0.0
     return shares

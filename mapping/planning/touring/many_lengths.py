@@ -137,6 +137,31 @@ def lengths_from_many(cells: Cells, starts: Array, known: Array, hubs: Array) ->
     return lanes
 
 
+@kernel
+def lengths_between(is_open: Array, starts: Array, ends: Array) -> NDArray[np.uint16]:
+    """Return the lengths of paths from each of some cells to each of others, (starts, ends), ``FAR`` for none (kernel).
+
+    Parameters
+    ----------
+    is_open : (rows + 2, columns + 2) uint8
+        The grid with its border; cleared.
+    starts, ends : (n,), (m,) int64
+        Cells of the grid with its border. All is found faster if the first ends are near many starts.
+    """
+    window = np.array([0, is_open.shape[0] - 2, 0, is_open.shape[1] - 2])
+    cells = number_cells(is_open, window, np.zeros(is_open.shape, np.int32))
+    hubs, flat = ends[:FEW_LANES], cells.numbers.reshape(-1)
+    known = lengths_from_few(cells, hubs)[0]
+    lengths = np.empty((len(starts), len(ends)), np.uint16)
+    for begin in range(0, len(starts), LANES):
+        group = starts[begin : begin + LANES]
+        lanes = lengths_from_many(cells, group, known, hubs)
+        for k in range(len(group)):
+            for end in range(len(ends)):
+                lengths[begin + k, end] = 0 if ends[end] == group[k] else lanes[flat[ends[end]], k]
+    return lengths
+
+
 @kernel(nrt=False)
 def _begin(cells: Cells, lanes: Array, start: int, lane: int, waiting: Array) -> None:
     """Let lengths spread from a cell: write those of its neighbours."""

@@ -77,10 +77,11 @@ def test_plans_of_tours_and_decisions_at_their_level_are_measured(monkeypatch):
     monkeypatch.setattr(tour_decision, "EPISODES", 2)
     monkeypatch.setattr(tour_decision, "WARM_STEPS", 4)
     monkeypatch.setattr(tour_decision, "OPTIONS", {**tour_decision.OPTIONS, "stop_coverage": 0.4})
-    plan, decisions = tour_decision.measure(LEAST)
+    plan, predicted, decisions = tour_decision.measure(LEAST)
     assert (plan.to_reach, plan.is_upper_bound, plan.unit) == (1.2, True, "ms")
+    assert (predicted.to_reach, predicted.is_upper_bound, predicted.unit) == (20.0, True, "ms")
     assert (decisions.to_reach, decisions.unit) == (800.0, "decisions/s")
-    assert plan.judged > 0.0
+    assert 0.0 < plan.judged < predicted.judged
 
 
 def test_a_window_is_predicted_alike_by_the_peer():

@@ -19,9 +19,9 @@ def test_sums_are_those_of_plain_python(channels, count, least, adds_last):
     weights, taps = whole(channels, count, OUTPUTS), 4 * generator.integers(0, 2 * LANES, count)
     last = source.ctypes.data + 20 if adds_last else 0
     row, channel = sums.strides[0], source.strides[0]
-    found = assert_forms_agree(
-        add_taps, sums, row, source, channel, channels, taps, count, weights, bias, np.float32(least), last
-    )[1]
+    found = assert_forms_agree(add_taps, sums, row, source, channel, channels, taps, count, weights, bias, least, last)[
+        1
+    ]
     wanted = sums[:, :LANES] + bias[:, None]
     for k in range(channels):
         for tap, shift in enumerate(taps // 4):

@@ -8,7 +8,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lidarium.mapping.kernels.simd.lengths import FAR, FEW_LANES, LANES
-from lidarium.mapping.planning.touring.many_lengths import lengths_from_few, lengths_from_many, number_cells
+from lidarium.mapping.planning.touring.many_lengths import (
+    lengths_between,
+    lengths_from_few,
+    lengths_from_many,
+    number_cells,
+)
 
 
 def lengths_by_heap(is_open, start):
@@ -58,6 +63,18 @@ def test_lengths_are_those_of_a_plain_search(seed, share):
         np.testing.assert_array_equal(many[numbers, k][is_numbered], lengths_by_heap(is_open, start)[is_numbered])
     assert (few[:, 0] == FAR).all()
     assert (many[0] == FAR).all()
+
+
+@settings(deadline=None)
+@given(st.integers(0, 10**6), st.integers(1, LANES + 3), st.integers(1, 2 * FEW_LANES))
+def test_lengths_between_places_are_those_of_a_plain_search(seed, starts, ends):
+    generator = np.random.default_rng(seed)
+    is_open = np.zeros((22, 17), np.uint8)
+    is_open[1:-1, 1:-1] = generator.random((20, 15)) < 0.75
+    inside = np.flatnonzero(is_open)
+    starts, ends = generator.choice(inside, starts), generator.choice(inside, ends)
+    found = lengths_between(is_open.copy(), starts, ends)
+    np.testing.assert_array_equal(found, [lengths_by_heap(is_open, start)[ends] for start in starts])
 
 
 def test_cells_are_numbered_row_by_row_and_the_grid_is_cleared():

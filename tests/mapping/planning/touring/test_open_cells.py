@@ -1,7 +1,7 @@
-"""Lengths of paths over coarse cells against a plain search."""
+"""Coarse cells in which a body may stand."""
 
-import heapq
 import math
+from collections import namedtuple
 
 import numpy as np
 import pytest
@@ -10,8 +10,9 @@ from lidarium.mapping.planning.clearance import ClearanceField, limit_of
 from lidarium.mapping.planning.footprint import Footprint
 from lidarium.mapping.planning.grid_planning import search
 from lidarium.mapping.planning.search.path_search import SearchSpace
-from lidarium.mapping.planning.touring.coarse_distances import UNREACHED, CoarseGrid, distances_from
 from lidarium.mapping.planning.touring.open_cells import Standing, open_cells
+
+CoarseGrid = namedtuple("CoarseGrid", "is_open factor row column side")
 
 
 def coarse_grid(log_odds, field, radius, starts=()):
@@ -27,27 +28,6 @@ def coarse_grid(log_odds, field, radius, starts=()):
     return CoarseGrid(inside, factor, low * factor, left * factor, factor * field.resolution)
 
 
-def lengths_by_heap(is_open, start):
-    """Return lengths in fifths of a side, written plainly."""
-    lengths = np.full(is_open.shape, UNREACHED, np.int64)
-    lengths[start] = 0
-    heap = [(0, start)]
-    while heap:
-        length, (row, column) = heapq.heappop(heap)
-        if length > lengths[row, column]:
-            continue
-        for i in (-1, 0, 1):
-            for j in (-1, 0, 1):
-                other = row + i, column + j
-                if (i, j) == (0, 0) or not (0 <= other[0] < is_open.shape[0] and 0 <= other[1] < is_open.shape[1]):
-                    continue
-                further = length + (7 if i and j else 5)
-                if is_open[other] and further < lengths[other]:
-                    lengths[other] = further
-                    heapq.heappush(heap, (further, other))
-    return lengths
-
-
 def drawn_map(seed, shape=(90, 120)):
     generator = np.random.default_rng(seed)
     log_odds = np.full(shape, -20, np.int8)
@@ -59,16 +39,6 @@ def drawn_map(seed, shape=(90, 120)):
     field = ClearanceField(shape, 0.05, 0.6)
     field.update(log_odds)
     return log_odds, field
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_lengths_are_those_of_a_plain_search(seed):
-    log_odds, field = drawn_map(seed)
-    grid = coarse_grid(log_odds, field, 0.18)
-    starts = np.argwhere(grid.is_open)[:: max(len(np.argwhere(grid.is_open)) // 4, 1)][:4]
-    lengths = distances_from(grid, starts)
-    for start, found in zip(starts, lengths, strict=True):
-        assert np.array_equal(found, lengths_by_heap(grid.is_open, tuple(start)))
 
 
 def test_a_cell_is_open_where_the_body_may_stand_in_it():
@@ -86,20 +56,6 @@ def test_a_cell_is_open_where_the_body_may_stand_in_it():
             r, c = grid.row + row * grid.factor, grid.column + column * grid.factor
             assert grid.is_open[row, column] == may_stand[r : r + grid.factor, c : c + grid.factor].any()
     assert clearance is None or clearance.shape == log_odds.shape
-
-
-def test_walls_part_cells_and_far_cells_are_left_out():
-    log_odds = np.full((40, 80), -20, np.int8)
-    log_odds[:, 40] = 20
-    field = ClearanceField(log_odds.shape, 0.05, 0.6)
-    field.update(log_odds)
-    grid = coarse_grid(log_odds, field, 0.18)
-    lengths = distances_from(grid, np.array([[5, 5]]))[0]
-    assert (lengths[:, 25:] == UNREACHED).all()
-    assert lengths[5, 15] == 50
-    near = distances_from(grid, np.array([[5, 5]]), maximum=0.5)[0]
-    assert near[5, 10] == 25
-    assert near[5, 15] == UNREACHED
 
 
 def test_a_map_without_anything_known_has_one_closed_cell():
