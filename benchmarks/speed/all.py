@@ -31,6 +31,7 @@ from lidarium.benchmarks.speed.cases import (
 )
 from lidarium.benchmarks.speed.cases.learners import (
     attention_training,
+    batch_memory,
     first_reset,
     frontier_threads,
     learned_training,
@@ -66,6 +67,7 @@ _MODULES: tuple[ModuleType, ...] = (
     masked_training,
     attention_training,
     learned_training,
+    batch_memory,
     first_reset,
     bullet_world,
     cached_start,

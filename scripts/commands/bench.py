@@ -30,8 +30,8 @@ class _Bench(Command):
 
     Questions are kernel_step, ray_casting, range_error, map_update, exploration_projects,
     environment_step, batch_step, thread_scaling, learning_preset, waypoint_decision, frontier_decision, tour_decision,
-    predicted_window, frontier_threads, masked_training, attention_training, learned_training, first_reset,
-    cached_start, bullet_world, depth_image, quantisation, sparse_planning,
+    predicted_window, frontier_threads, masked_training, attention_training, learned_training, batch_memory,
+    first_reset, cached_start, bullet_world, depth_image, quantisation, sparse_planning,
     path_server.
     """
     guard: Path | None = None

@@ -21,7 +21,7 @@ from lidarium.benchmarks.speed.harness.report import run_alone
 from lidarium.benchmarks.speed.harness.timing import Effort
 
 CORES = 1
-ALLOWED_S = 1.5
+ALLOWED_S = 0.7
 
 NOTES = (
     "*Cached start*: `import lidarium`, `lidarium.parallel_env()` and its first reset in a fresh process, after one "

@@ -17,7 +17,7 @@ from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.settings.making import make_settings
 
 ROBOTS = 3
-ALLOWED = 1.4
+ALLOWED = 1.3
 _HOLD, _DRAWS = 20, 50
 
 CORES = 1

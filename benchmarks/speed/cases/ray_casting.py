@@ -4,9 +4,9 @@ import itertools
 
 import numpy as np
 
-from lidarium.benchmarks.speed.harness.lines import Line, faster, faster_than_quoted
+from lidarium.benchmarks.speed.harness.lines import Line, faster, faster_than_quoted, shown
 from lidarium.benchmarks.speed.harness.report import run_alone
-from lidarium.benchmarks.speed.harness.timing import Contender, Effort, interleaved, repeated
+from lidarium.benchmarks.speed.harness.timing import Contender, Effort, interleaved, rate, repeated
 from lidarium.benchmarks.speed.peers import f1tenth_scans
 from lidarium.benchmarks.speed.peers.bullet import bullet_scan
 from lidarium.benchmarks.speed.peers.f1tenth_scans import F1tenthScanner
@@ -19,6 +19,8 @@ F1TENTH_RAYS = 10e6
 """Rays per second of f1tenth's scan simulator. Measured on an AMD Zen 5 core on floors like these (9 to 12 M)."""
 
 CORES = 1
+LARGE_TURNED_RAYS = 130e6
+"""Rays a second that are to be reached on the large turned floor."""
 
 NOTES = (
     "*Rays alone*: `cast_scans` on 32 poses, 720 beams over 240 deg to 5.6 m, without noise or map. The larger floor "
@@ -84,6 +86,11 @@ def measure(effort: Effort) -> list[Line]:
             lines.append(
                 faster_than_quoted(line, seconds[name], "f1tenth's scan simulator", F1TENTH_RAYS, wanted, "rays/s")
             )
+    slowest = list(floors)[-1]
+    rays = rate(seconds[slowest])
+    lines.append(
+        Line(f"rays alone, {slowest}, rate", f"{shown(rays)} rays/s", "-", None, LARGE_TURNED_RAYS, rays, unit="rays/s")
+    )
     lines.append(
         faster(
             f"rays alone, exact, {small.name} cells",

@@ -8,6 +8,7 @@ import pytest
 from lidarium.benchmarks.speed.cases import frontier_decision
 from lidarium.benchmarks.speed.cases.learners import (
     attention_training,
+    batch_memory,
     first_reset,
     frontier_threads,
     learned_training,
@@ -42,10 +43,20 @@ def test_where_there_is_one_core_two_threads_are_not_compared(monkeypatch):
     assert line.ratio is None
 
 
+def test_memory_is_told_over_episodes(monkeypatch):
+    monkeypatch.setattr(batch_memory, "ROWS", 2)
+    monkeypatch.setattr(batch_memory, "FEW_EPISODES", 40)
+    peak, growth = batch_memory.measure(LEAST)
+    assert 50.0 < peak.figure < 10_000.0
+    assert 0.5 < growth.judged < 2.0
+    assert (growth.to_reach, growth.is_upper_bound) == (1.05, True)
+
+
 @pytest.fixture
 def short(monkeypatch):
     """A short training, and what memory floors may take in each."""
-    monkeypatch.setattr(masked_training, "FLOORS", "apartment")
+    monkeypatch.setattr(masked_training, "MANY_FLOORS", "apartment")
+    monkeypatch.setattr(attention_training, "FLOORS", "apartment")
     monkeypatch.setattr(masked_training, "WARM_DECISIONS", 8)
     monkeypatch.setattr(masked_training, "TIMED_ROLLOUTS", 1)
     monkeypatch.setenv(SIZE_VARIABLE, "100")
@@ -61,11 +72,11 @@ def short(monkeypatch):
 
 def test_a_training_is_measured_by_its_steps(monkeypatch, short):
     pytest.importorskip("sb3_contrib", reason='sb3-contrib is not installed: extra "rl"')
-    few = replace(masked_training.LEARNER, episodes=2, rollout=4, epochs=1)
+    few = replace(masked_training.LEARNER, episodes=2, rollout=4, epochs=1, floors="apartment")
     monkeypatch.setattr(masked_training, "LEARNER", few)
     lines = masked_training.measure(LEAST)
     assert all(line.figure > 0.0 and line.ours.endswith("steps/s") for line in lines)
-    assert short == ["100", str(masked_training.ALL_MIB)]
+    assert short == ["100", str(masked_training.ALL_MIB), "100"]
     assert os.environ[SIZE_VARIABLE] == "100"
 
 
@@ -74,10 +85,10 @@ def test_attention_is_measured_with_the_simulators_share(monkeypatch, short):
     for name, value in {"EPISODES": 2, "ROLLOUT": 4, "BATCH": 8, "EPOCHS": 1}.items():
         monkeypatch.setattr(attention_training, name, value)
     lines = attention_training.measure(LEAST)
-    assert [line.is_upper_bound for line in lines] == [False, True, False, True]
+    assert [line.is_upper_bound for line in lines] == [False, True] * 3
     assert all(line.figure > 0.0 for line in lines)
     assert all(line.figure < 1.0 for line in lines if line.is_upper_bound)
-    assert short == ["100", str(masked_training.ALL_MIB)]
+    assert short == ["100", str(masked_training.ALL_MIB), "100"]
 
 
 def test_without_the_extra_a_training_is_not_measured(monkeypatch):
@@ -95,10 +106,26 @@ def test_a_first_reset_begins_with_empty_caches(monkeypatch):
         seen.append(environment)
         return type("Start", (), {"seconds": 1.5})
 
+    def run(environment):
+        seen.append(environment)
+        return 7.0
+
     monkeypatch.setattr(first_reset, "start", start)
-    (line,) = first_reset.measure(LEAST)
-    assert (line.figure, line.is_upper_bound, line.to_reach) == (1.5, True, 25.0)
-    assert seen[0]["NUMBA_CACHE_DIR"] != seen[0]["XDG_CACHE_HOME"]
+    monkeypatch.setattr(first_reset, "run_seconds", run)
+    reset, whole = first_reset.measure(LEAST)
+    assert (reset.figure, reset.is_upper_bound, reset.to_reach) == (1.5, True, 12.0)
+    assert (whole.figure, whole.is_upper_bound, whole.to_reach) == (7.0, True, 30.0)
+    assert len({environment[name] for environment in seen for name in ("NUMBA_CACHE_DIR", "XDG_CACHE_HOME")}) == 4
+
+
+def test_the_first_run_is_that_of_the_command_line(monkeypatch):
+    asked = []
+    monkeypatch.setattr(first_reset.subprocess, "run", lambda command, **options: asked.append((command, options)))
+    assert first_reset.run_seconds({"A": "b"}) >= 0.0
+    ((command, options),) = asked
+    assert command[1:4] == ["-m", "lidarium", "run"]
+    assert options["check"]
+    assert options["env"] == {"A": "b"}
 
 
 def test_a_training_by_rewards_is_measured_with_the_simulators_share(monkeypatch):

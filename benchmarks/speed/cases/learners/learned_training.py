@@ -16,7 +16,7 @@ from lidarium.benchmarks.speed.harness.timing import Effort
 from lidarium.extras import install_command
 
 CORES = 2
-TO_REACH, MOST_SHARE = 2000.0, 0.6
+TO_REACH, MOST_SHARE = 800.0, 0.6
 ENVIRONMENTS, STEPS = 2, 128
 TRAINING = f"""
 [settings]

@@ -6,7 +6,7 @@ import statistics
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from lidarium.benchmarks.speed.harness.lines import Line, shown
@@ -15,7 +15,7 @@ from lidarium.benchmarks.speed.harness.timing import Effort
 from lidarium.envs.simulation.kernels.floor_cache import DEFAULT_MIB, SIZE_VARIABLE
 from lidarium.extras import install_command
 
-FLOORS = "set:train:300"
+FLOORS, MANY_FLOORS = "set:train:300", "set:train:10000"
 ROBOT = {"level": "frontier", "observe": ["frontiers", "time_left"], "robots": 1, "horizon_s": 60.0}
 ALL_MIB = 3072
 """Memory that holds the tables of all these floors [MiB]."""
@@ -29,7 +29,7 @@ class FrontierLearner:
 
     `policy`: as ``MaskablePPO`` takes it; `episodes`, `rollout`: episodes side by side, and decisions of each between
     two updates; `batch`, `epochs`: decisions of a step of gradients, and how often an update sees all; `threads`: of
-    PyTorch.
+    PyTorch; `floors`, `realism`: of the environments.
     """
 
     policy: Any
@@ -37,7 +37,9 @@ class FrontierLearner:
     rollout: int
     batch: int
     epochs: int
+    floors: str
     threads: int = 1
+    realism: str = "ideal"
 
 
 def is_there() -> bool:
@@ -57,7 +59,7 @@ def timings(learner: FrontierLearner, rounds: int, mebibytes: int | None = None)
     torch.set_num_threads(learner.threads)
     try:
         with _floors_in_memory(mebibytes):
-            env = VecMonitor(lidarium.sb3_vec_env(learner.episodes, FLOORS, **ROBOT))
+            env = VecMonitor(lidarium.sb3_vec_env(learner.episodes, learner.floors, realism=learner.realism, **ROBOT))
             inside = timed(env)
             model = MaskablePPO(
                 learner.policy, env, n_steps=learner.rollout, batch_size=learner.batch, n_epochs=learner.epochs, seed=0
@@ -105,8 +107,8 @@ def _floors_in_memory(mebibytes: int | None) -> Iterator[None]:
 
 
 CORES = 2
-TO_REACH = 3000.0
-LEARNER = FrontierLearner("MultiInputPolicy", episodes=64, rollout=32, batch=512, epochs=4)
+TO_REACH = 4000.0
+LEARNER = FrontierLearner("MultiInputPolicy", episodes=64, rollout=32, batch=512, epochs=4, floors=FLOORS)
 
 NOTES = (
     f"*MaskablePPO*: of sb3-contrib, its `MultiInputPolicy`, {LEARNER.episodes} episodes of one robot on `{FLOORS}` "
@@ -117,13 +119,18 @@ NOTES = (
 
 
 def measure(effort: Effort) -> list[Line]:
-    """Measure training with as many floors in memory as usual, and with all of them."""
+    """Measure training with as many floors in memory as usual, with all of them, and on many floors."""
     name = f"MaskablePPO, {LEARNER.episodes} episodes, two cores"
     if not is_there():
         return [Line(name, "-", f"not measured: {install_command('rl')}", None, TO_REACH, unit="steps/s")]
     lines = []
-    for title, mebibytes in ((name, None), (f"{name}, all floors in memory", ALL_MIB)):
-        rate = statistics.median(rate for rate, _ in timings(LEARNER, effort.rounds, mebibytes))
+    many = replace(LEARNER, floors=MANY_FLOORS)
+    for title, learner, mebibytes in (
+        (name, LEARNER, None),
+        (f"{name}, all floors in memory", LEARNER, ALL_MIB),
+        (f"{name}, floors drawn from 10,000", many, None),
+    ):
+        rate = statistics.median(rate for rate, _ in timings(learner, effort.rounds, mebibytes))
         lines.append(Line(title, f"{shown(rate)} steps/s", "-", None, TO_REACH, rate, unit="steps/s"))
     return lines
 
