@@ -5,6 +5,8 @@ A plan gives all robots of a team their next goals; a decision is that of a robo
 
 import statistics
 import time
+from importlib import resources
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,13 +15,16 @@ import lidarium
 from lidarium.agents.frontier.reach import Choice
 from lidarium.agents.predicted.policy import PredictedTours
 from lidarium.agents.tours.policy import TourFrontier
+from lidarium.benchmarks.speed.cases.learners.masked_training import Learner, is_there, timings
 from lidarium.benchmarks.speed.harness.lines import Line, shown
 from lidarium.benchmarks.speed.harness.report import run_alone
 from lidarium.benchmarks.speed.harness.timing import Effort
+from lidarium.extras import install_command
 
 CORES = 2
 ROBOTS, EPISODES, FLOORS = 2, 32, "set:validation"
 WARM_STEPS = 25
+ROLLOUT, BATCH, EPOCHS = 32, 512, 3
 OPTIONS: dict[str, Any] = {"resolution": 0.05, "stop_coverage": 0.99, "horizon_s": 1800.0}
 MOST_MS, MOST_PREDICTED_MS, TO_REACH = 1.2, 20.0, 800.0
 
@@ -27,7 +32,8 @@ NOTES = (
     f"*Plan of tours*: all that `tour_frontier` does to choose goals for {ROBOTS} robots, over whole episodes on "
     f"`{FLOORS}`, in CPU time; *plan of predicted tours*: that of `predicted_tours` for one robot. *Tour decisions*: "
     f"level `tour`, {EPISODES} episodes, two threads; choices are drawn with equal probability, and robots that "
-    "continue to their stop are not counted.",
+    "continue to their stop are not counted. *Training on tours*: `MaskablePPO` with the network and world of "
+    "`lidarium train tours-2`, by the clock; robots that continue to their stop are counted.",
 )
 
 
@@ -73,7 +79,23 @@ def measure(effort: Effort) -> list[Line]:
         _plans(f"plan of tours, {ROBOTS} robots", TourFrontier, ROBOTS, MOST_MS, effort),
         _plans("plan of predicted tours, one robot", PredictedTours, 1, MOST_PREDICTED_MS, effort),
         Line("tour decisions, two cores", f"{shown(rate)} decisions/s", "-", None, TO_REACH, rate, unit="decisions/s"),
+        _training(effort),
     ]
+
+
+def _training(effort: Effort) -> Line:
+    name, unit = "training on tours, two cores", "decisions/s"
+    if not is_there():
+        return Line(name, "-", f"not measured: {install_command('rl')}", None, TO_REACH, unit=unit)
+    from lidarium.training.reinforcement.frontier_policy import TourPolicy
+    from lidarium.training.settings import TeamSettings, read_any_training
+
+    team = read_any_training(Path(str(resources.files("lidarium.training.teams") / "data" / "tours-2.toml")))
+    assert isinstance(team, TeamSettings)
+    world = {"level": team.level, "threads": 2, **team.options(team.realism)}
+    learner = Learner(TourPolicy, EPISODES // ROBOTS, ROLLOUT, BATCH, EPOCHS, team.floors, world=world)
+    rate = statistics.median(rate for rate, _ in timings(learner, effort.rounds))
+    return Line(name, f"{shown(rate)} {unit}", "-", None, TO_REACH, rate, unit=unit)
 
 
 def _plans(name: str, kind: type[TourFrontier], robots: int, most_ms: float, effort: Effort) -> Line:

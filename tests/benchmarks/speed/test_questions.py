@@ -14,6 +14,7 @@ from lidarium.benchmarks.speed.cases import (
     tour_decision,
     waypoint_decision,
 )
+from lidarium.benchmarks.speed.cases.learners import masked_training
 from lidarium.benchmarks.speed.cases.waypoint_decision import Deciders
 from lidarium.benchmarks.speed.harness import batches
 from lidarium.benchmarks.speed.harness.batches import DrivenBatch
@@ -76,8 +77,12 @@ def test_decisions_by_frontiers_are_counted_by_robot(monkeypatch):
 def test_plans_of_tours_and_decisions_at_their_level_are_measured(monkeypatch):
     monkeypatch.setattr(tour_decision, "EPISODES", 2)
     monkeypatch.setattr(tour_decision, "WARM_STEPS", 4)
+    monkeypatch.setattr(tour_decision, "ROLLOUT", 4)
+    monkeypatch.setattr(masked_training, "WARM_DECISIONS", 8)
+    monkeypatch.setattr(masked_training, "TIMED_ROLLOUTS", 1)
     monkeypatch.setattr(tour_decision, "OPTIONS", {**tour_decision.OPTIONS, "stop_coverage": 0.4})
-    plan, predicted, decisions = tour_decision.measure(LEAST)
+    plan, predicted, decisions, training = tour_decision.measure(LEAST)
+    assert (training.to_reach, training.unit) == (800.0, "decisions/s")
     assert (plan.to_reach, plan.is_upper_bound, plan.unit) == (1.2, True, "ms")
     assert (predicted.to_reach, predicted.is_upper_bound, predicted.unit) == (20.0, True, "ms")
     assert (decisions.to_reach, decisions.unit) == (800.0, "decisions/s")

@@ -3,7 +3,7 @@
 import statistics
 from dataclasses import replace
 
-from lidarium.benchmarks.speed.cases.learners.masked_training import ALL_MIB, FLOORS, FrontierLearner, is_there, timings
+from lidarium.benchmarks.speed.cases.learners.masked_training import ALL_MIB, FLOORS, ROBOT, Learner, is_there, timings
 from lidarium.benchmarks.speed.harness.lines import Line, shown
 from lidarium.benchmarks.speed.harness.report import run_alone
 from lidarium.benchmarks.speed.harness.timing import Effort
@@ -28,12 +28,12 @@ def measure(effort: Effort) -> list[Line]:
         return [Line(name, "-", f"not measured: {install_command('rl')}", None, TO_REACH, unit="decisions/s")]
     from lidarium.training.reinforcement.frontier_policy import FrontierPolicy
 
-    full = FrontierLearner(FrontierPolicy, EPISODES, ROLLOUT, BATCH, EPOCHS, FLOORS, threads=2)
+    full = Learner(FrontierPolicy, EPISODES, ROLLOUT, BATCH, EPOCHS, FLOORS, threads=2)
     lines = []
     for title, learner, mebibytes, goal in (
         (name, full, None, TO_REACH),
         (f"{name}, all floors in memory", full, ALL_MIB, TO_REACH),
-        (f"{name}, fast", replace(full, realism="fast"), None, TO_REACH_FAST),
+        (f"{name}, fast", replace(full, world={**ROBOT, "realism": "fast"}), None, TO_REACH_FAST),
     ):
         found = timings(learner, effort.rounds, mebibytes)
         rate, share = (statistics.median(each) for each in zip(*found, strict=True))

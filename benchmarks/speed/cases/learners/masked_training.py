@@ -4,9 +4,9 @@ import importlib.util
 import os
 import statistics
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from lidarium.benchmarks.speed.harness.lines import Line, shown
@@ -24,12 +24,12 @@ WARM_DECISIONS, TIMED_ROLLOUTS = 25_000, 4
 
 
 @dataclass(frozen=True, slots=True)
-class FrontierLearner:
-    """A learner of sb3-contrib, with one robot an episode.
+class Learner:
+    """A learner of sb3-contrib.
 
     `policy`: as ``MaskablePPO`` takes it; `episodes`, `rollout`: episodes side by side, and decisions of each between
     two updates; `batch`, `epochs`: decisions of a step of gradients, and how often an update sees all; `threads`: of
-    PyTorch; `floors`, `realism`: of the environments.
+    PyTorch; `floors`, `world`: floors and settings of the episodes.
     """
 
     policy: Any
@@ -39,7 +39,7 @@ class FrontierLearner:
     epochs: int
     floors: str
     threads: int = 1
-    realism: str = "ideal"
+    world: Mapping[str, Any] = field(default_factory=lambda: ROBOT)
 
 
 def is_there() -> bool:
@@ -47,7 +47,7 @@ def is_there() -> bool:
     return all(importlib.util.find_spec(name) is not None for name in ("torch", "sb3_contrib"))
 
 
-def timings(learner: FrontierLearner, rounds: int, mebibytes: int | None = None) -> list[tuple[float, float]]:
+def timings(learner: Learner, rounds: int, mebibytes: int | None = None) -> list[tuple[float, float]]:
     """Return decisions a second, and the share of the time within environments, of each round."""
     import torch
     from sb3_contrib import MaskablePPO
@@ -59,7 +59,7 @@ def timings(learner: FrontierLearner, rounds: int, mebibytes: int | None = None)
     torch.set_num_threads(learner.threads)
     try:
         with _floors_in_memory(mebibytes):
-            env = VecMonitor(lidarium.sb3_vec_env(learner.episodes, learner.floors, realism=learner.realism, **ROBOT))
+            env = VecMonitor(lidarium.sb3_vec_env(learner.episodes, learner.floors, **learner.world))
             inside = timed(env)
             model = MaskablePPO(
                 learner.policy, env, n_steps=learner.rollout, batch_size=learner.batch, n_epochs=learner.epochs, seed=0
@@ -108,7 +108,7 @@ def _floors_in_memory(mebibytes: int | None) -> Iterator[None]:
 
 CORES = 2
 TO_REACH = 4000.0
-LEARNER = FrontierLearner("MultiInputPolicy", episodes=64, rollout=32, batch=512, epochs=4, floors=FLOORS)
+LEARNER = Learner("MultiInputPolicy", episodes=64, rollout=32, batch=512, epochs=4, floors=FLOORS)
 
 NOTES = (
     f"*MaskablePPO*: of sb3-contrib, its `MultiInputPolicy`, {LEARNER.episodes} episodes of one robot on `{FLOORS}` "
