@@ -6,12 +6,12 @@ python benchmarks/speed/growth/idle_memory.py
 import gc
 import json
 from dataclasses import asdict, dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from lidarium.benchmarks.speed.harness.batches import OBSERVED, ROBOTS
+from lidarium.benchmarks.speed.harness.memory import resident
 from lidarium.benchmarks.speed.scenes.floors import straight_floor
 from lidarium.benchmarks.speed.scenes.teams import LIDAR
 from lidarium.envs.faces.vector_env import ExplorationVectorEnv
@@ -73,15 +73,6 @@ def array_bytes(thing: Any) -> int:  # noqa: ANN401
         elif isinstance(each, dict | list | tuple) or type(each).__module__.startswith("lidarium."):
             pending += gc.get_referents(each)
     return total
-
-
-def resident() -> int | None:
-    """Return how much memory of this process lies in the machine's [bytes]. None if the system does not tell."""
-    try:
-        status = Path("/proc/self/status").read_text()
-    except OSError:
-        return None
-    return next(int(line.split()[1]) * 1024 for line in status.splitlines() if line.startswith("VmRSS"))
 
 
 def standing(robots: int) -> ExplorationVectorEnv:

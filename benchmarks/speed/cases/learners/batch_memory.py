@@ -6,8 +6,8 @@ from multiprocessing import get_context
 import numpy as np
 
 import lidarium
-from lidarium.benchmarks.speed.growth.idle_memory import resident
 from lidarium.benchmarks.speed.harness.lines import Line
+from lidarium.benchmarks.speed.harness.memory import resident
 from lidarium.benchmarks.speed.harness.report import run_alone
 from lidarium.benchmarks.speed.harness.timing import Effort
 
