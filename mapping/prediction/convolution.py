@@ -1,7 +1,7 @@
 """Convolutions of images with a border of zeros.
 
-An image lies flat in memory, so that each weight of a convolution meets all of its pixels in one row, shifted by a
-constant: its border separates the rows of pixels, and what is computed for the border is cleared.
+Images are stored flat, row after row. A weight of a convolution is then applied to all pixels at once, by a shift of
+the flat array. The border keeps the rows apart; values that are computed for the border are set to 0.
 """
 
 from dataclasses import dataclass
@@ -134,7 +134,7 @@ class Layer:
         Parameters
         ----------
         image : Image
-            What is read. The shifts of a 3 x 3 convolution are as wide as its border.
+            The input. The dilation of a 3 x 3 convolution is the width of its border.
         rectifies : bool, default False
             Whether negative numbers become 0.
         adds_input : bool, default False
@@ -156,7 +156,7 @@ class Layer:
 
 
 def _taps(image: Image, count: int) -> NDArray[np.int64]:
-    """Return by how many bytes each weight's pixel lies after that of the result, counted from the first pixels."""
+    """Return the offset of each weight's input pixel [bytes]; the first output pixel reads at these offsets."""
     if count == 1:
         return np.array([4 * image.first], np.int64)
     row, column = np.divmod(np.arange(9), 3)

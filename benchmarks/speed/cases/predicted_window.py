@@ -1,4 +1,4 @@
-"""Prediction of a window of a map by the shipped network, beside PyTorch."""
+"""Time to predict a window of a map with the shipped network, compared with PyTorch."""
 
 import importlib.util
 import statistics
@@ -74,4 +74,4 @@ def measure(effort: Effort) -> list[Line]:
 
 
 if __name__ == "__main__":
-    run_alone(measure, "Prediction of a window of a map, beside PyTorch.", CORES)
+    run_alone(measure, "Time to predict a window of a map, compared with PyTorch.", CORES)

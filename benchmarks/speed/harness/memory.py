@@ -4,7 +4,7 @@ from pathlib import Path
 
 
 def resident() -> int | None:
-    """Return how much memory of this process lies in the machine's [bytes]. None if the system does not tell."""
+    """Return the resident memory of this process [bytes], or None if the system does not report it."""
     try:
         status = Path("/proc/self/status").read_text()
     except OSError:

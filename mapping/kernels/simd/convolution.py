@@ -63,7 +63,7 @@ def add_taps(
     weights : int
         Address of the weights, (channels, count, OUTPUTS) float32.
     bias : int
-        Address of what is added to the sums of each row first, (OUTPUTS,) float32.
+        Address of the bias of each row, (OUTPUTS,) float32; it is added first.
     least : float
         Sums below are raised to it then.
     last : int

@@ -1,4 +1,4 @@
-"""Memory of a learner's batch at the level of frontiers, over episodes on floors that are ever new."""
+"""Memory of a learner's batch at the level of frontiers, over many episodes on new floors."""
 
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
@@ -40,7 +40,7 @@ def memory_over_episodes(rows: int, episodes: int) -> list[int]:
 
 
 def measure(effort: Effort) -> list[Line]:
-    """Measure a batch in a process of its own."""
+    """Measure a batch in a separate process."""
     episodes = EPISODES if effort.is_full else FEW_EPISODES
     with ProcessPoolExecutor(1, get_context("spawn")) as pool:
         taken = pool.submit(memory_over_episodes, ROWS, episodes).result()

@@ -1,4 +1,4 @@
-"""Views of maps of probabilities, beside plain Python."""
+"""Views of maps of probabilities, compared with plain Python."""
 
 import math
 
