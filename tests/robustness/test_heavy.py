@@ -1,13 +1,13 @@
 """A file of at most 1 MiB is read or refused without end of memory or time.
 
 ``python -m robustness.heavy`` measures what each takes: a second of the processor and 512 MB are the promise.
-On a busy machine a second says little, so that tests ask for the end alone.
+On a slow or busy machine a second says little, so that tests ask for the end alone.
 """
 
 import pytest
 from robustness.heavy import MOST_MB, measured
 
-HANG_S = 5.0
+HANG_S = 60.0
 
 
 @pytest.mark.filterwarnings("ignore")
