@@ -41,6 +41,8 @@ class Reproduce(Command):
     """a small part, in at most five minutes on two cores"""
     runs: Path = Path("runs/reproduce")
     """folder for episodes and other work"""
+    parts: Path | None = None
+    """file of finished parts, as docs/results/parts has them: what it has is not run, and at the end it has all"""
     workers: int = 0
     """processes that run episodes; 0 for as many as there are cores; timed parts run in one"""
     records: bool = False
@@ -51,6 +53,7 @@ def execute(command: Reproduce) -> Answer:
     """Run the missing parts, then write the page."""
     from lidarium.benchmarks.results_page import about, publish
     from lidarium.benchmarks.studies import STUDIES
+    from lidarium.benchmarks.studies.shared.archive import pack_parts, unpack_parts
     from lidarium.evaluation.suites.campaign import Campaign
     from lidarium.mapping.files.output import check_writable
 
@@ -63,15 +66,21 @@ def execute(command: Reproduce) -> Answer:
         check_installed(f"the study {command.name}", packages, extra)
     check_writable(out)
     folder = command.runs / command.name
+    if command.parts is not None:
+        unpack_parts(command.parts, folder)
     workers = command.workers or len(os.sched_getaffinity(0))
     campaigns = {
         name: Campaign(suite, folder / name, workers, command.records)
         for name, suite in study.suites(command.data, every).items()
     }
-    for name, campaign in campaigns.items():
-        if not _ran(campaign, name, command.json):
-            return Answer(_progress_of(campaigns), "interrupted; the same command goes on", INTERRUPTED)
-    if study.work is not None and not _worked(study.work(folder, command.data, every, workers), command.json):
+    try:
+        is_whole = all(_ran(campaign, name, command.json) for name, campaign in campaigns.items())
+        if is_whole and study.work is not None:
+            is_whole = _worked(study.work(folder, command.data, every, workers), command.json)
+    finally:
+        if command.parts is not None and folder.is_dir():
+            pack_parts(folder, command.parts)
+    if not is_whole:
         return Answer(_progress_of(campaigns), "interrupted; the same command goes on", INTERRUPTED)
     if study.pictures is not None:
         study.pictures(folder, out)

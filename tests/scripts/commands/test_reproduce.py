@@ -1,11 +1,15 @@
 """Parts of a study that are asked for, and the command that a page names."""
 
 import importlib.util
+from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 
+from lidarium.benchmarks import studies
+from lidarium.benchmarks.studies.shared.study import Study, Task, do_missing, kept_lines
 from lidarium.scripts.commands.reproduce import Reproduce, _command_line, _every, _worked, execute
+from lidarium.scripts.common import INTERRUPTED
 
 
 @pytest.mark.parametrize(
@@ -63,3 +67,35 @@ def test_work_shows_each_new_part_and_ends_where_it_is_broken_off(capsys):
     assert capsys.readouterr().err == "maps: 1 of 9\nlogs: 3\n"
     assert not _worked(work(breaks=True), is_quiet=True)
     assert capsys.readouterr().err == ""
+
+
+@dataclass(frozen=True)
+class Square(Task):
+    """A part of a small study."""
+
+    number: int
+
+
+def test_an_interrupted_study_goes_on_in_another_folder_from_its_parts(tmp_path, monkeypatch):
+    done = []
+
+    def measure(square):
+        if len(done) == 2 and not (tmp_path / "parts.zip").exists():
+            raise KeyboardInterrupt
+        done.append(square.number)
+        return {"square": square.number**2}
+
+    def work(folder, _data, _every, workers):
+        yield from do_missing(folder / "squares.jsonl", "squares", [Square(k) for k in range(4)], measure, workers)
+
+    def page(folder):
+        return f"# Squares\n\n{[line['square'] for line in kept_lines(folder / 'squares.jsonl')]}\n"
+
+    monkeypatch.setattr(studies, "STUDIES", {"squares": Study(page, work=work)})
+    asked = {"name": "squares", "out": tmp_path / "out", "parts": tmp_path / "parts.zip", "workers": 1}
+    assert execute(Reproduce(**asked, runs=tmp_path / "first")).code == INTERRUPTED
+    assert execute(Reproduce(**asked, runs=tmp_path / "second")).code == 0
+    assert done == [0, 1, 2, 3]
+    assert "[0, 1, 4, 9]" in (tmp_path / "out" / "squares.md").read_text()
+    assert execute(Reproduce(**asked, runs=tmp_path / "third")).code == 0
+    assert done == [0, 1, 2, 3]

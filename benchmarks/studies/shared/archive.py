@@ -1,0 +1,76 @@
+"""The finished parts of a study in one file: others go on from there, or make its page again."""
+
+import io
+import json
+import tempfile
+import zipfile
+from pathlib import Path, PurePosixPath
+
+from lidarium.evaluation.suites.episodes_file import KEY
+from lidarium.mapping.files.guarded_reading import GuardedArchive, read_bytes, reading
+from lidarium.mapping.files.output import write_whole
+
+SUFFIXES = (".jsonl", ".json", ".csv", ".safetensors")
+"""Kinds of files that are kept."""
+
+_LEFT_OUT = {"records", "checkpoints", "tensorboard"}
+"""Folders that finished parts do not need."""
+
+_EPOCH = (1980, 1, 1, 0, 0, 0)
+
+
+def unpack_parts(path: Path, folder: Path) -> None:
+    """Begin a folder with the files of an archive.
+
+    Nothing happens if the folder has files, or if there is no archive.
+    """
+    if not path.exists() or (folder.exists() and any(folder.iterdir())):
+        return
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(dir=folder.parent, prefix=f".{folder.name}.") as beside:
+        begun = Path(beside, folder.name)
+        for name, content in _files_of(path).items():
+            (begun / name).parent.mkdir(parents=True, exist_ok=True)
+            (begun / name).write_bytes(content)
+        begun.replace(folder)
+
+
+def pack_parts(folder: Path, path: Path) -> None:
+    """Write the finished parts of a folder into an archive; the same parts give the same file.
+
+    An archive with parts that the folder lacks is not replaced.
+    """
+    files = {
+        file.relative_to(folder).as_posix(): file.read_bytes()
+        for file in sorted(folder.rglob("*"))
+        if file.suffix in SUFFIXES and not file.name.startswith(".") and _LEFT_OUT.isdisjoint(file.parts)
+    }
+    for name, content in _files_of(path).items() if path.exists() else ():
+        lost = [name] if name not in files else sorted(_keys(name, content) - _keys(name, files[name]))
+        if lost:
+            raise ValueError(
+                f"{path} has {lost[0]!r}, which {folder} lacks; choose another file with --parts, or a new folder "
+                "with --runs, which begins with the parts of the file"
+            )
+    made = io.BytesIO()
+    with zipfile.ZipFile(made, "w") as archive:
+        for name, content in files.items():
+            archive.writestr(zipfile.ZipInfo(name, _EPOCH), content, zipfile.ZIP_DEFLATED, 9)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    write_whole(path, made.getvalue())
+
+
+def _files_of(path: Path) -> dict[str, bytes]:
+    content = read_bytes(path)
+    with reading(path, "an archive of finished parts", "want one that lidarium reproduce --parts wrote"):
+        archive = GuardedArchive(content)
+        for name in archive.names:
+            inner = PurePosixPath(name)
+            if inner.is_absolute() or ".." in inner.parts or "\\" in name or inner.suffix not in SUFFIXES:
+                raise ValueError(f"it holds {name!r}")
+        return {name: archive.read(name) for name in archive.names}
+
+
+def _keys(name: str, content: bytes) -> set[str]:
+    """Return the keys of the lines of a file; other files have none."""
+    return {json.loads(line)[KEY] for line in content.splitlines()} if name.endswith(".jsonl") else set()
