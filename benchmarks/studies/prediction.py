@@ -35,8 +35,8 @@ FLOORS = {
 }
 """Kinds of floors that are explored."""
 
-REAL_FLOORS = {"kth": slice(0, None, 4), "lifull": slice(1, None, 2), "slam": slice(0, None, 6)}
-"""Which real floors are explored: those of the study ``learned``."""
+REAL_FLOORS = {"lifull": slice(1, None, 2), "slam": slice(0, None), "kth": slice(0, None, 4)}
+"""Which real floors are explored: those of the study ``learned``, and all maps of robots."""
 
 MAPPED = 24
 """Floors of each family on which predictions are judged."""
@@ -71,11 +71,10 @@ squares of 0.2 m, as a perfect network would predict.
 
 def suites(data: Path | None, every: int = 1) -> dict[str, Suite]:
     """Return a suite for each kind of floor."""
-    floors = {"test": list(set_floors("test"))[::every]}
-    if data is not None:
-        real = {kind: paths for kind, paths in real_floors(data).items() if kind in REAL_FLOORS and len(paths) >= every}
-        floors |= {kind: [str(path) for path in paths[REAL_FLOORS[kind]][::every]] for kind, paths in real.items()}
-    return {kind: _suite(names) for kind, names in floors.items() if names}
+    real = {} if data is None else real_floors(data)
+    floors = {kind: [str(path) for path in real.get(kind, [])[part]] for kind, part in REAL_FLOORS.items()}
+    floors["test"] = list(set_floors("test"))
+    return {kind: _suite(names[::every]) for kind, names in floors.items() if len(names) >= every}
 
 
 def _suite(floors: Sequence[str]) -> Suite:

@@ -51,6 +51,7 @@ def timings(learner: Learner, rounds: int, mebibytes: int | None = None) -> list
     """Return decisions a second, and the share of the time within environments, of each round."""
     import torch
     from sb3_contrib import MaskablePPO
+    from stable_baselines3.common.logger import Logger
     from stable_baselines3.common.vec_env import VecMonitor
 
     import lidarium
@@ -64,6 +65,7 @@ def timings(learner: Learner, rounds: int, mebibytes: int | None = None) -> list
             model = MaskablePPO(
                 learner.policy, env, n_steps=learner.rollout, batch_size=learner.batch, n_epochs=learner.epochs, seed=0
             )
+            model.set_logger(Logger(None, []))  # its own makes a folder in the system's one for temporary files
             model.learn(WARM_DECISIONS)  # floors come into the store, and from it into memory
             count, found = TIMED_ROLLOUTS * learner.episodes * learner.rollout, []
             for _ in range(rounds):
