@@ -2,7 +2,6 @@
 
 import os
 import re
-import signal
 import subprocess
 import sys
 import tempfile
@@ -52,7 +51,7 @@ def _served(path: Path) -> Iterator[PathClient]:
         with PathClient(int(found[1])) as client:
             yield client
     finally:
-        process.send_signal(signal.SIGTERM if os.name == "nt" else signal.SIGINT)
+        process.terminate()  # programs that run in the background ignore Ctrl-C, and so do those that they start
         process.wait()
 
 
