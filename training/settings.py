@@ -6,6 +6,7 @@ from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
+from lidarium.agents.learned.network import NO_PREDICTOR
 from lidarium.agents.supervisor.settings import SupervisorSettings
 from lidarium.agents.zoo.network import OBSERVED, TOURS
 from lidarium.envs.floors.generation.buildings import KINDS
@@ -13,13 +14,20 @@ from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.settings.making import make_settings
 from lidarium.mapping.files.guarded_reading import read_text, reading
 from lidarium.mapping.geometry.bounds import above, check_settings, share, shown, within
-from lidarium.training.prediction.settings import PredictionSettings
+from lidarium.mapping.prediction.predictors import make_predictor
+from lidarium.training.prediction.settings import DUNGEON, PredictionSettings
 
 MOST_BYTES = 1 << 20
 """Files of settings are no larger."""
 
-FLOOR_KINDS = ("building", *KINDS)
+FLOOR_KINDS = ("building", *KINDS, DUNGEON)
 """Kinds of generated floors to train on."""
+
+SHIPPED = "shipped"
+"""The network of the package, to begin with."""
+
+BEGINNINGS = ("tours", SHIPPED)
+"""Networks to begin with; the first one corrects nothing."""
 
 Part = TypeVar("Part")
 
@@ -360,6 +368,10 @@ class TrainingSettings:
     ----------
     seed : int, default 0
         Seed of all draws.
+    predictor : str, default "nothing"
+        Predictor of maps whose tours the network corrects, such as "network"; "nothing" for tours past known frontiers.
+    begin : str, default "tours"
+        Network to begin with: "tours" for one that corrects nothing, "shipped" for that of the package.
     settings : dict
         Options of the environment, as in a suite.
     rounds : tuple of Round
@@ -369,6 +381,8 @@ class TrainingSettings:
     """
 
     seed: Annotated[int, within(0, 2**31 - 1)] = 0
+    predictor: str = NO_PREDICTOR
+    begin: str = BEGINNINGS[0]
     settings: Mapping[str, Any] = field(default_factory=dict)
     rounds: tuple[Round, ...] = (Round(),)
     fit: FitSettings = field(default_factory=FitSettings)
@@ -377,6 +391,9 @@ class TrainingSettings:
 
     def __post_init__(self) -> None:
         check_settings(self, "training")
+        make_predictor(self.predictor)
+        if self.begin not in BEGINNINGS:
+            raise ValueError(f"begin is {shown(self.begin)}; want {' or '.join(map(repr, BEGINNINGS))}")
         if "robots" in self.settings:
             raise ValueError("settings has 'robots'; want them in [[rounds]] and [validation]")
         for size in sorted({*self.validation.robots, *(size for each in self.rounds for size in each.robots)}):

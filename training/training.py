@@ -89,7 +89,7 @@ class Training:
             return path
         parts = [load_weights(file) for file in files]
         mean = {name: np.asarray(np.mean([part[name] for part in parts], axis=0), np.float32) for name in parts[0]}
-        save_weights(path, mean)
+        save_weights(path, mean, self.settings.predictor)
         return path
 
     def _learn(self, begin: Path) -> Generator[Progress, None, Path]:
@@ -122,7 +122,7 @@ class Training:
     def _keep_best(self, candidates: dict[str, Path]) -> None:
         """Write the best weights, and the card that says where they come from."""
         best = self._best(candidates)
-        digest = save_weights(self.folder / WEIGHTS_FILE, load_weights(candidates[best]))
+        digest = save_weights(self.folder / WEIGHTS_FILE, load_weights(candidates[best]), self.settings.predictor)
         fits = {
             f"round-{number}": _fitted(RoundFolder(self.folder, number)) for number in range(len(self.settings.rounds))
         }

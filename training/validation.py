@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from lidarium.agents.learned.network import NO_PREDICTOR
 from lidarium.evaluation.suites.campaign import EPISODES_FILE, SUITE_FILE, Campaign
 from lidarium.evaluation.suites.episodes_file import read_episodes
 from lidarium.evaluation.suites.suite import MOST_SUITE_BYTES, Suite
@@ -51,6 +52,8 @@ class Validated:
 
 def validation_suite(training: TrainingSettings, candidates: Mapping[str, Path]) -> Suite:
     """Return the suite on which networks are compared with classic tours."""
+    # Checkpoints do not say on whose maps they were trained.
+    predictor = {} if training.predictor == NO_PREDICTOR else {"predictor": training.predictor}
     return Suite(
         policies=(CLASSIC, *candidates),
         floors=training.validation.floors,
@@ -58,7 +61,8 @@ def validation_suite(training: TrainingSettings, candidates: Mapping[str, Path])
         seeds=(0,),
         variants={DEFAULT_VARIANT: training.options},
         policy_settings={
-            name: {"policy": "learned", "weights": str(path.absolute())} for name, path in candidates.items()
+            name: {"policy": "learned", "weights": str(path.absolute()), **predictor}
+            for name, path in candidates.items()
         },
     )
 

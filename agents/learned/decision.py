@@ -48,7 +48,8 @@ class Decision:
     situation : (len(SITUATION_FEATURES),) float32
         Features of the situation.
     scores : (n,) float32
-        Ranks by classic tours: minus the extra cost [m], 0 for the option that they begin with.
+        Ranks by classic tours, or by those on a predicted map: minus the extra cost [m], 0 for the option that they
+        begin with.
     mask : (n,) bool
         The options that it can reach and that no robot has picked just before.
     """
@@ -62,7 +63,7 @@ class Decision:
 
     @property
     def classic(self) -> int:
-        """The option with which classic tours begin."""
+        """The option with which tours begin."""
         return int(np.argmax(np.where(self.mask, self.scores, -np.inf)))
 
 
@@ -75,7 +76,7 @@ class Chooser(Protocol):
 
 
 def choose_classic(decision: Decision) -> int:
-    """Choose the option that classic tours begin with."""
+    """Choose the option that tours begin with."""
     return decision.classic
 
 
@@ -156,7 +157,13 @@ def scene_of(
     return Scene(options, resolution, crops, (positions, directions), shared, situation, weights)
 
 
-def decision_of(scene: Scene, robot: int, sequence: NDArray[np.int64], picks: Sequence[int | None]) -> Decision | None:
+def decision_of(
+    scene: Scene,
+    robot: int,
+    sequence: NDArray[np.int64],
+    picks: Sequence[int | None],
+    extra: NDArray[np.float64] | None = None,
+) -> Decision | None:
     """Return the decision of a robot, None if its tour is empty.
 
     Parameters
@@ -169,15 +176,20 @@ def decision_of(scene: Scene, robot: int, sequence: NDArray[np.int64], picks: Se
         The tours, given the picks of others.
     picks : sequence of int or None
         Picks of the robots before it.
+    extra : (n,) float64, optional
+        Extra costs of the options by a predicted map [m]; by default those of tours past known frontiers.
     """
     options = scene.options
     tours = _tours_in(sequence, len(options.numbers))
     if not tours[robot] or not options.is_reached[robot, tours[robot][0]]:
         return None
     first = tours[robot][0]
-    costs = costs_of_firsts(sequence, robot, options.first, options.between, options.gains, scene.weights)
-    costs = np.clip(costs, MIN_DETOUR, MAX_DETOUR)
-    costs[first] = 0.0
+    if extra is None:
+        costs = costs_of_firsts(sequence, robot, options.first, options.between, options.gains, scene.weights)
+        costs = np.clip(costs, MIN_DETOUR, MAX_DETOUR)
+        costs[first] = 0.0
+    else:
+        costs = np.minimum(extra, MAX_DETOUR)
     mask = options.is_reached[robot].copy()
     mask[[pick for pick in picks if pick is not None]] = False
     own = option_features(options, robot, costs, tours[robot], scene.views)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from lidarium.agents.attention import WIDTH, AttentionNetwork, attention_shapes, linear_shapes
 from lidarium.agents.learned.decision import CROP_SIDE, Decision
 from lidarium.agents.learned.features import OPTION_FEATURES, SITUATION_FEATURES, TEAMMATE_FEATURES
-from lidarium.mapping.files.weight_files import WeightFiles
+from lidarium.mapping.files.weight_files import WeightFiles, Weights
 from lidarium.mapping.planning.touring.map_crops import FREE, OCCUPIED
 
 CROP_WIDTH = 48
@@ -65,14 +65,26 @@ class Network(AttentionNetwork):
 FILES = WeightFiles(_shapes(), "lidarium.agents.learned", SHIPPED, CARD)
 """Files of this network's weights."""
 
-save_weights, _check_weights = FILES.save, FILES.check
+PREDICTOR, NO_PREDICTOR = "predictor", "nothing"
+"""Note of a file of weights: the predictor of the maps on which they were trained, by default none."""
+
+
+def save_weights(path: Path, weights: Weights, predictor: str = NO_PREDICTOR) -> str:
+    """Write weights that were trained on maps of a predictor, and return the SHA-256 of the file."""
+    return FILES.save(path, weights, None if predictor == NO_PREDICTOR else {PREDICTOR: predictor})
+
+
+def predictor_of(path: str | Path = "") -> str:
+    """Return the predictor of the maps on which the weights of a file were trained."""
+    notes = FILES.notes(path) if path != "" else _shipped()[1]
+    return notes.get(PREDICTOR, NO_PREDICTOR)
 
 
 def load_weights(path: str | Path = "") -> dict[str, NDArray[np.float32]]:
     """Return the weights of a file; if ``path`` is empty, the package's."""
-    return FILES.load(path) if path != "" else dict(_shipped())
+    return FILES.load(path) if path != "" else dict(_shipped()[0])
 
 
 @lru_cache(maxsize=1)
-def _shipped() -> dict[str, NDArray[np.float32]]:
-    return FILES.load()
+def _shipped() -> tuple[dict[str, NDArray[np.float32]], dict[str, str]]:
+    return FILES.load(), FILES.notes()

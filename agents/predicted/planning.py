@@ -29,6 +29,12 @@ KEPT_SHARE = 0.15
 VISIT_M = 0.5
 """Cost of slowing down, turning and setting out at each stop [m]."""
 
+LEAST_SAVED = 0.5
+"""Robots depart from tours if that saves so much [m]; one that the rest does not need keeps to them."""
+
+LEAST_EXTRA = 0.01
+"""Least extra cost of options besides the one that tours begin with [m]."""
+
 WEIGHTS = TourWeights(1.0, 0.4, 0.0)
 """Weights of tours past stops: the longest, the sum, and nothing for waiting."""
 
@@ -160,6 +166,26 @@ def costs_of(rest: Rest, robot: int, picks: list[int | None]) -> NDArray[np.floa
         tours = team_tours(starts, between, worth, WEIGHTS)
         costs[option] = tours_cost(tours, starts, between, worth, WEIGHTS)
     return costs
+
+
+def extra_costs(rest: Rest, robot: int, first: int | None, picks: list[int | None]) -> NDArray[np.float64]:
+    """Return by how much all tours cost more if a robot sets out to each option, (options,) [m]; inf if it cannot.
+
+    The option ``first``, with which its own tour begins, costs nothing if it is the robot's goal (then no other one is
+    rated), or if no other one saves much.
+    """
+    is_open = first is not None and first not in picks
+    if is_open and rest.options.is_kept[robot, first]:
+        extra = np.full(len(rest.lengths), np.inf)
+        extra[first] = 0.0
+        return extra
+    costs = costs_of(rest, robot, picks)
+    least = costs.min()
+    extra = costs - least if np.isfinite(least) else costs
+    if is_open and costs[first] <= least + LEAST_SAVED:
+        extra = np.maximum(extra, LEAST_EXTRA)
+        extra[first] = 0.0
+    return extra
 
 
 def _path_lengths(

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.agents.policy import Team
-from lidarium.agents.predicted.planning import costs_of, rest_of
+from lidarium.agents.predicted.planning import Rest, extra_costs, rest_of
 from lidarium.agents.tours.planning import TourOptions, first_options
 from lidarium.agents.tours.policy import TourFrontier
 from lidarium.mapping.geometry.bounds import shown
@@ -30,9 +30,6 @@ from lidarium.mapping.prediction.predictors import (
 
 PREDICTED = "predicted"
 """Sent by the prediction to an option other than the first of the tour."""
-
-LEAST_SAVED = 0.5
-"""Robots depart from tours if that saves so much [m]; one that the rest does not need keeps to them."""
 
 
 class PredictedTours(TourFrontier):
@@ -80,30 +77,32 @@ class PredictedTours(TourFrontier):
         A robot keeps its goal if tours go on to that.
         """
         classic = first_options(options)[: len(agents)]
-        if len(options.numbers) < 2:
-            return classic
-        navigation = self.navigation(agents[0])
-        factor = factor_of(navigation.resolution)
-        side = factor * navigation.resolution
-        free = self._predicted(PartialMap(levels_of(navigation.log_odds, factor), side, agents[0]))
-        if free is None:
-            return classic
-        unseen = free * shares_unknown(navigation.log_odds, factor)
-        rest = rest_of(options, free, unseen, (side, factor), self._range, self._enough)
+        rest = self.rest(agents[0], options)
         if rest is None:
             return classic
         picks: list[int | None] = []
         for robot, first in enumerate(classic):
-            if first is not None and options.is_kept[robot, first] and first not in picks:
-                picks.append(first)
-                continue
-            costs = costs_of(rest, robot, picks)
-            is_good = first is not None and first not in picks and costs[first] <= costs.min() + LEAST_SAVED
-            best = int(np.argmin(costs)) if np.isfinite(costs).any() else None
-            picks.append(first if is_good else best)
+            extra = extra_costs(rest, robot, first, picks)
+            picks.append(int(np.argmin(extra)) if np.isfinite(extra).any() else None)
             if picks[robot] != first:
                 self._sent_by[agents[robot]] = PREDICTED
         return picks
+
+    def rest(self, agent: str, options: TourOptions) -> Rest | None:
+        """Return what is probably left to see on a robot's map.
+
+        None if it is too small, if nothing is predicted, or if there is one option.
+        """
+        if len(options.numbers) < 2:
+            return None
+        navigation = self.navigation(agent)
+        factor = factor_of(navigation.resolution)
+        side = factor * navigation.resolution
+        free = self._predicted(PartialMap(levels_of(navigation.log_odds, factor), side, agent))
+        if free is None:
+            return None
+        unseen = free * shares_unknown(navigation.log_odds, factor)
+        return rest_of(options, free, unseen, (side, factor), self._range, self._enough)
 
     def _predicted(self, partial: PartialMap) -> NDArray[np.float32] | None:
         """Return the prediction of a map, None if there is none."""

@@ -48,11 +48,19 @@ class WeightFiles:
 
     def load(self, path: str | Path = "") -> dict[str, NDArray[np.float32]]:
         """Return the weights of a file; if ``path`` is empty, the package's."""
+        return self.read(self._content(path), str(path) or self.shipped)
+
+    def notes(self, path: str | Path = "") -> dict[str, str]:
+        """Return what the file says of its weights besides them, checked as ``load`` does."""
+        content = self._content(path)
+        self.read(content, str(path) or self.shipped)
+        header = json.loads(content[8 : 8 + int.from_bytes(content[:8], "little")])  # the format of safetensors
+        return dict(header.get("__metadata__", {}))
+
+    def _content(self, path: str | Path) -> bytes:
         if not isinstance(path, str | Path):
             raise ValueError(f"weights is {shown(path)}; want the name of a file")
-        if not str(path):
-            return self._load_shipped()
-        return self.read(read_bytes(Path(path), MAX_BYTES), str(path))
+        return read_bytes(Path(path), MAX_BYTES) if str(path) else self._shipped_content()
 
     def read(self, content: bytes, name: str) -> dict[str, NDArray[np.float32]]:
         """Return the weights of a file's content; ``name`` is its name in messages."""
@@ -66,11 +74,11 @@ class WeightFiles:
         self.check(weights, name)
         return weights
 
-    def save(self, path: Path, weights: Weights) -> str:
+    def save(self, path: Path, weights: Weights, notes: dict[str, str] | None = None) -> str:
         """Write weights to a file, whole or not at all, and return its SHA-256."""
         self.check(weights, "what was trained")
         kind = np.float16 if self.is_half else np.float32
-        content = save({name: np.ascontiguousarray(array, kind) for name, array in weights.items()})
+        content = save({name: np.ascontiguousarray(array, kind) for name, array in weights.items()}, notes)
         path.parent.mkdir(parents=True, exist_ok=True)
         write_whole(path, content)
         return hashlib.sha256(content).hexdigest()
@@ -90,8 +98,8 @@ class WeightFiles:
             if not np.isfinite(array).all():
                 raise ValueError(f"{name} holds {key!r} with numbers that are not finite; train again")
 
-    def _load_shipped(self) -> dict[str, NDArray[np.float32]]:
-        """Return the package's weights, checked against the hash that their card names."""
+    def _shipped_content(self) -> bytes:
+        """Return the file of the package's weights, checked against the hash that its card names."""
         folder = resources.files(self.package) / "data"
         try:
             content = lzma.decompress((folder / self.shipped).read_bytes())
@@ -103,4 +111,4 @@ class WeightFiles:
             ) from error
         if hashlib.sha256(content).hexdigest() != wanted:
             raise ValueError(f"{self.shipped} is not what its card {self.card} names; install the package again")
-        return self.read(content, self.shipped)
+        return content

@@ -44,7 +44,7 @@ def test_bare_floors_are_the_same_rooms_without_furniture():
         floor = load_floor(usual.floor)
         assert place.floor.bounds == floor.bounds
         assert len(place.floor.solids) < len(floor.solids)
-        assert place.name == f"{place.floor.name} without furniture"
+        assert place.name.endswith(" without furniture")
         assert (place.settings, place.seed) == (usual.settings, usual.seed)
 
 
@@ -59,3 +59,12 @@ def test_a_place_depends_on_its_number_and_the_seed_alone():
 def test_rounds_follow_each_other():
     training = TrainingSettings(rounds=(Round(floors=5), Round(floors=7)))
     assert [first_number(training, number) for number in range(3)] == [0, 5, 12]
+
+
+def test_dungeons_are_drawn_by_the_same_seeds():
+    training = TrainingSettings(rounds=(Round(kinds={"dungeon": 1.0}, bare_share=1.0),), predictor="network")
+    place = place_of(training, training.rounds[0], 3)
+    assert place.name == f"dungeon of seed {SETS['train'][0] + 3}"
+    assert place.predictor == "network"
+    again = place_of(training, training.rounds[0], 3)
+    assert place.floor.sha256 == again.floor.sha256

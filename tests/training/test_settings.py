@@ -27,6 +27,17 @@ robots = [1]
 """
 
 
+def test_a_predictor_that_is_not_there_is_named():
+    with pytest.raises(ValueError, match="did you mean 'network'"):
+        training_of({"predictor": "netwrok"})
+    assert training_of({"predictor": "network"}).predictor == "network"
+
+
+def test_a_network_to_begin_with_that_is_not_there_is_named():
+    with pytest.raises(ValueError, match="begin is 'learned'; want 'tours' or 'shipped'"):
+        training_of({"begin": "learned"})
+
+
 def test_a_file_says_what_to_train(tmp_path):
     path = tmp_path / "training.toml"
     path.write_text(WHOLE)

@@ -5,7 +5,7 @@ import pytest
 import torch
 from drawn_decisions import drawn_decision
 
-from lidarium.agents.learned.network import Network, _check_weights
+from lidarium.agents.learned.network import FILES, Network
 from lidarium.training.decisions import stacked
 from lidarium.training.torch_network import ExplorerNetwork, Seen
 
@@ -25,7 +25,7 @@ def test_numpy_and_pytorch_agree(scale):
     shapes = [(2, 0), (14, 8), (5, 1), (9, 3)]
     decisions = [drawn_decision(generator, *shape) for shape in shapes]
     made = network(scale)
-    _check_weights(made.weights(), "the network")
+    FILES.check(made.weights(), "the network")
     with torch.no_grad():
         found = made(Seen(stacked(decisions)))[0].numpy()
     plain = Network(made.weights())

@@ -1,5 +1,7 @@
 """Floors of rooms and tunnels, drawn by a seed: what planners are often compared on, and no building looks like."""
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -32,7 +34,8 @@ def draw_dungeon(seed: int) -> Floor:
             if len(middles) > other:
                 _dig(is_free, place, middles[-1 - int(generator.integers(0, min(len(middles), 3)))], generator)
         middles.append(place)
-    return load_floor(np.where(is_free, np.uint8(255), np.uint8(0)), PIXEL_M)
+    floor = load_floor(np.where(is_free, np.uint8(255), np.uint8(0)), PIXEL_M)
+    return replace(floor, name=f"dungeon of seed {seed}")
 
 
 def _dig(

@@ -120,7 +120,7 @@ class AskedEpisode:
         try:
             starts = drawn_starts(place.floor, place.settings, place.seed)
             options = None if starts is None else {"starts": starts}
-            run_episode(ChosenTours(self._choose), self._env, place.seed, options)
+            run_episode(ChosenTours(self._choose, place.predictor), self._env, place.seed, options)
             self._questions.put(self._asked(None))
         except _AbandonedError:
             pass

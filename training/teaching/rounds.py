@@ -5,7 +5,9 @@ from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
 
+import numpy as np
 import torch
+from numpy.typing import NDArray
 
 from lidarium.agents.learned.decision import Chooser, choose_classic
 from lidarium.agents.learned.network import Network, load_weights, save_weights
@@ -17,7 +19,7 @@ from lidarium.mapping.files.output import write_json
 from lidarium.training.failures import raise_named
 from lidarium.training.places import first_number, place_of
 from lidarium.training.progress import Progress
-from lidarium.training.settings import TrainingSettings
+from lidarium.training.settings import SHIPPED, TrainingSettings
 from lidarium.training.teaching.fitting import Fit, fit
 from lidarium.training.teaching.samples import Samples, read_samples, samples_of, write_samples
 from lidarium.training.teaching.teacher import TaughtTours
@@ -51,10 +53,11 @@ class RoundFolder:
         """The fitted network."""
         return self.path / WEIGHTS
 
-    @property
-    def before(self) -> Path | None:
-        """The weights that decide in it, None if classic tours do."""
-        return RoundFolder(self.training, self.number - 1).weights if self.number else None
+    def before(self, begin: str) -> dict[str, NDArray[np.float32]] | None:
+        """Return the weights that decide in it, None if tours do; a training may ``begin`` with shipped ones."""
+        if self.number:
+            return load_weights(RoundFolder(self.training, self.number - 1).weights)
+        return load_weights() if begin == SHIPPED else None
 
     def lessons(self, number: int) -> Path:
         """Return the file of the lessons of an episode."""
@@ -88,11 +91,12 @@ def _is_done(path: Path) -> bool:
 
 def _teach(training: TrainingSettings, folder: RoundFolder, number: int) -> int:
     """Teach robots on a floor and write their lessons; return how many there are."""
-    choose: Chooser = choose_classic if folder.before is None else Network(load_weights(folder.before))
+    before = folder.before(training.begin)
+    choose: Chooser = choose_classic if before is None else Network(before)
     stage = training.rounds[folder.number]
     place = place_of(training, stage, number)
     env = ExplorationEnv(place.floor, place.settings)
-    policy = TaughtTours(env, choose, stage.teaching_share, place.seed)
+    policy = TaughtTours(env, choose, stage.teaching_share, place.seed, place.predictor)
     starts = drawn_starts(place.floor, place.settings, place.seed)
     run_episode(policy, env, place.seed, None if starts is None else {"starts": starts})
     path = folder.lessons(number)
@@ -107,8 +111,9 @@ def _fit(training: TrainingSettings, folder: RoundFolder) -> Generator[Progress,
     """Fit a network to the lessons of this round and all before it."""
     torch.manual_seed(training.seed + folder.number)
     network = ExplorerNetwork()
-    if folder.before is not None:
-        network.set_weights(load_weights(folder.before))
+    before = folder.before(training.begin)
+    if before is not None:
+        network.set_weights(before)
     floors: list[Samples] = []
     for number in range(folder.number + 1):
         part = RoundFolder(folder.training, number).path / LESSONS
@@ -121,4 +126,4 @@ def _fit(training: TrainingSettings, folder: RoundFolder) -> Generator[Progress,
     samples = sum(len(each) for each in floors)
     write_json(folder.path / FIT, {"floors": len(floors), "samples": samples, "epochs": [asdict(e) for e in course]})
     # Last: where it is, the round has ended.
-    save_weights(folder.weights, network.weights())
+    save_weights(folder.weights, network.weights(), training.predictor)

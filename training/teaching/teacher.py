@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.agents.learned.decision import Chooser, Decision, Scene
+from lidarium.agents.learned.network import NO_PREDICTOR
 from lidarium.agents.learned.policy import ChosenTours
 from lidarium.agents.tours.planning import NO_PATH, TourOptions
 from lidarium.envs.faces.parallel import ExplorationEnv
@@ -82,8 +83,15 @@ class TaughtTours(ChosenTours):
         One for each decision so far.
     """
 
-    def __init__(self, env: ExplorationEnv, choose: Chooser, teaching_share: float, seed: int) -> None:
-        super().__init__(choose)
+    def __init__(
+        self,
+        env: ExplorationEnv,
+        choose: Chooser,
+        teaching_share: float,
+        seed: int,
+        predictor: str = NO_PREDICTOR,
+    ) -> None:
+        super().__init__(choose, predictor)
         self._env, self._share = env, teaching_share
         self._generator = np.random.default_rng([seed, 5])
         self._floor: KnownFloor | None = None

@@ -13,7 +13,16 @@ import pytest
 from drawn_decisions import drawn_decision
 
 from lidarium.agents.learned import network
-from lidarium.agents.learned.network import CARD, SHIPPED, Network, _check_weights, _shapes, load_weights, save_weights
+from lidarium.agents.learned.network import (
+    CARD,
+    FILES,
+    SHIPPED,
+    Network,
+    _shapes,
+    load_weights,
+    predictor_of,
+    save_weights,
+)
 from lidarium.mapping.files import weight_files
 
 
@@ -80,7 +89,7 @@ def test_weights_of_another_network_are_refused(change, message):
     arrays = weights()
     change(arrays)
     with pytest.raises(ValueError, match=message):
-        _check_weights(arrays, "a file")
+        FILES.check(arrays, "a file")
 
 
 def drawn():
@@ -97,6 +106,18 @@ def test_what_was_saved_is_loaded(tmp_path):
     assert found.keys() == saved.keys()
     for name, array in saved.items():
         np.testing.assert_array_equal(found[name], array)
+
+
+def test_files_say_on_whose_maps_the_weights_were_trained(tmp_path):
+    files = [tmp_path / "plain.safetensors", tmp_path / "predicted.safetensors"]
+    save_weights(files[0], drawn())
+    save_weights(files[1], drawn(), "network")
+    assert [predictor_of(file) for file in files] == ["nothing", "network"]
+    assert predictor_of() == "nothing"
+    np.testing.assert_array_equal(load_weights(files[0])["option.bias"], load_weights(files[1])["option.bias"])
+    files[1].write_bytes(files[1].read_bytes()[:100])
+    with pytest.raises(ValueError, match="no file of weights, or is truncated"):
+        predictor_of(files[1])
 
 
 @pytest.mark.parametrize("length", [0, 5, 100, 5000])

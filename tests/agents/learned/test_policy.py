@@ -6,7 +6,9 @@ import pytest
 from lidarium.agents import make_policy
 from lidarium.agents.learned.decision import choose_classic
 from lidarium.agents.learned.features import OPTION_FEATURES, SITUATION_FEATURES, TEAMMATE_FEATURES
+from lidarium.agents.learned.network import load_weights, save_weights
 from lidarium.agents.learned.policy import ChosenTours
+from lidarium.agents.predicted.policy import PredictedTours
 from lidarium.agents.tours.policy import TourFrontier
 from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.settings.making import make_settings
@@ -25,6 +27,28 @@ def test_classic_choices_make_classic_tours_to_the_bit(robots):
     classic, chosen = episode(TourFrontier(), robots), episode(ChosenTours(choose_classic), robots)
     assert classic.scorer.time == chosen.scorer.time
     np.testing.assert_array_equal(classic.world.poses, chosen.world.poses)
+
+
+@pytest.mark.parametrize(("predictor", "robots"), [("truth", 1), ("network", 3)])
+def test_on_predicted_maps_choices_of_tours_are_predicted_tours_to_the_bit(predictor, robots):
+    policies = PredictedTours(predictor), ChosenTours(choose_classic, predictor)
+    predicted, chosen = (episode(policy, robots, floor="building:2000015") for policy in policies)
+    assert predicted.scorer.time == chosen.scorer.time
+    np.testing.assert_array_equal(predicted.world.poses, chosen.world.poses)
+    counts = [policy.report().decided_by for policy in policies]
+    assert counts[0] == counts[1]
+    assert counts[0]["predicted"] > 0
+
+
+def test_a_network_explores_on_the_maps_that_it_was_trained_on(tmp_path):
+    path = tmp_path / "weights.safetensors"
+    save_weights(path, load_weights(), "network")
+    assert make_policy("learned", weights=str(path)).predicts
+    assert not make_policy("learned", weights=str(path), predictor="nothing").predicts
+    assert not make_policy("learned").predicts
+    save_weights(path, load_weights(), "truht")
+    with pytest.raises(ValueError, match="did you mean 'truth'"):
+        make_policy("learned", weights=str(path))
 
 
 def test_decisions_show_what_there_is():

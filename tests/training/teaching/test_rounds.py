@@ -1,6 +1,7 @@
 """Rounds of lessons, after each of which a network is fitted."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,7 +9,7 @@ import torch
 
 from lidarium.agents import make_policy
 from lidarium.agents.learned.decision import choose_classic
-from lidarium.agents.learned.network import load_weights
+from lidarium.agents.learned.network import load_weights, predictor_of
 from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.evaluation.episodes.runner import run_episode
 from lidarium.evaluation.suites.starts import drawn_starts
@@ -16,7 +17,7 @@ from lidarium.training.settings import FitSettings, TrainingSettings, training_o
 from lidarium.training.teaching import rounds
 from lidarium.training.teaching.fitting import evaluate, fit
 from lidarium.training.teaching.rounds import RoundFolder, run_round
-from lidarium.training.teaching.samples import joined, samples_of
+from lidarium.training.teaching.samples import joined, read_samples, samples_of
 from lidarium.training.teaching.teacher import TaughtTours
 from lidarium.training.torch_network import ExplorerNetwork
 
@@ -54,7 +55,8 @@ def test_a_finished_round_does_nothing(trained):
 
 def test_the_next_round_has_other_floors_and_all_lessons(trained):
     folder = RoundFolder(trained[0].training, 1)
-    assert folder.before == trained[0].weights
+    before = folder.before("tours")
+    assert (before["option.bias"] == load_weights(trained[0].weights)["option.bias"]).all()
     list(run_round(TWO, folder, 1))
     assert sorted(path.name for path in folder.lessons(0).parent.iterdir()) == ["000002.npz", "000003.npz"]
     content = json.loads((folder.path / "fit.json").read_text())
@@ -103,6 +105,29 @@ def test_a_team_of_four_explores_with_a_network_trained_on_two(trained):
     env = ExplorationEnv("apartment:7", team)
     run_episode(make_policy("learned", weights=str(trained[0].weights)), env, 0)
     assert env.scorer.coverage >= 0.99
+
+
+def test_a_network_is_taught_on_predicted_maps(trained, tmp_path):
+    folder = RoundFolder(tmp_path, 0)
+    list(run_round(replace(TWO, predictor="truth"), folder, 1))
+    assert predictor_of(folder.weights) == "truth"
+    assert predictor_of(trained[0].weights) == "nothing"
+    scores = [read_samples(each.lessons(0)).decisions.scores for each in (trained[0], folder)]
+    assert scores[0].shape != scores[1].shape or (scores[0] != scores[1]).any()
+    policy = make_policy("learned", weights=str(folder.weights))
+    env = ExplorationEnv("apartment:7", TrainingSettings(settings={"resolution": 0.1}).team(2))
+    run_episode(policy, env, 0)
+    assert env.scorer.coverage >= 0.99
+
+
+def test_a_training_goes_on_from_the_shipped_network(tmp_path):
+    folder = RoundFolder(tmp_path, 0)
+    assert folder.before("tours") is None
+    begin = folder.before("shipped")
+    fitting = replace(TWO.fit, epochs=1, learning_rate=1e-9, weight_decay=0.0)
+    list(run_round(replace(TWO, begin="shipped", fit=fitting), folder, 1))
+    for name, array in load_weights(folder.weights).items():
+        np.testing.assert_allclose(array, begin[name], atol=1e-6)
 
 
 def test_cloning_reaches_the_teacher_on_one_small_floor():
