@@ -18,6 +18,9 @@ os.environ["LIDARIUM_FLOOR_STORE"] = "off"
 # Each process of the suite would begin others that compile kernels.
 os.environ["LIDARIUM_FIRST_START"] = "off"
 
+# Processes of the suite share the cores: threads of PyTorch, which wait busily, would take them from each other.
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+
 
 def _data_folder() -> Path:
     return Path(os.environ.get("LIDARIUM_DATA", Path(__file__).resolve().parents[2] / "shared" / "data"))
