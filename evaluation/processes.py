@@ -21,6 +21,7 @@ from pathlib import Path
 from types import FrameType, TracebackType
 from typing import Any, TypeVar
 
+from lidarium.mapping.kernels.interrupts import is_wrapped_interrupt
 from lidarium.registry import import_own
 
 
@@ -40,17 +41,6 @@ class Termination:
         """Raise ``KeyboardInterrupt``."""
         self.is_asked = True
         raise KeyboardInterrupt
-
-
-def is_wrapped_interrupt(error: Exception) -> bool:
-    """Whether an error is an interrupt that compiled code has passed on as a ``SystemError``.
-
-    Numba calls the interpreter while a kernel returns; an interrupt that is raised there comes out so.
-    """
-    cause: BaseException | None = error
-    while isinstance(cause, SystemError):
-        cause = cause.__cause__ or cause.__context__
-    return isinstance(cause, KeyboardInterrupt)
 
 
 _entered: list["PatientInterrupt"] = []

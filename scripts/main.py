@@ -90,7 +90,7 @@ def _ended(arguments: Sequence[str] | None) -> int:
         )
         return BAD_INPUT
     except Exception as error:
-        from lidarium.evaluation.processes import is_wrapped_interrupt
+        from lidarium.mapping.kernels.interrupts import is_wrapped_interrupt
 
         if is_wrapped_interrupt(error):
             raise KeyboardInterrupt from error

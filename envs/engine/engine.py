@@ -47,6 +47,7 @@ from lidarium.envs.settings.reset_options import Curriculum, ResetOptions
 from lidarium.envs.simulation.endings import HORIZON, REASONS, make_rules, note_endings
 from lidarium.envs.simulation.kernels.arrays import ENDED
 from lidarium.envs.simulation.rewards import TERMS
+from lidarium.mapping.kernels.interrupts import interruptible
 from lidarium.mapping.kernels.views import table_of
 from lidarium.mapping.kernels.work_queue import new_work
 
@@ -287,6 +288,7 @@ class Engine:
         """Begin episodes as they were drawn, or as they began before."""
         self._run(None, starts, False, None, None)
 
+    @interruptible
     def _run(
         self,
         decoded: Any,  # noqa: ANN401

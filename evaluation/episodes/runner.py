@@ -16,6 +16,7 @@ from lidarium.envs.faces.team_exchange import MergeEvent, MergingSettings
 from lidarium.evaluation.episodes.events import merge_event
 from lidarium.evaluation.episodes.watching import WatchedExploration
 from lidarium.evaluation.processes import PatientInterrupt
+from lidarium.mapping.kernels.interrupts import interruptible
 
 Progress = Callable[[ExplorationEnv], None]
 
@@ -63,6 +64,7 @@ class Episode:
     report_error: str = ""
 
 
+@interruptible
 def run_episode(
     policy: Policy,
     env: ExplorationEnv,

@@ -16,7 +16,6 @@ from lidarium.evaluation.processes import (
     PatientInterrupt,
     Termination,
     is_end_asked,
-    is_wrapped_interrupt,
     shared_out,
     stopped_workers,
 )
@@ -78,21 +77,6 @@ def test_a_handler_of_an_application_is_left_alone():
     finally:
         signal.signal(signal.SIGINT, before)
     assert heard == [signal.SIGINT]
-
-
-def test_an_interrupt_is_found_through_the_errors_of_compiled_code():
-    def wrapped(error, times):
-        for _ in range(times):
-            outer = SystemError("<function> returned a result with an exception set")
-            outer.__cause__ = error
-            error = outer
-        return error
-
-    assert is_wrapped_interrupt(wrapped(KeyboardInterrupt(), 1))
-    assert is_wrapped_interrupt(wrapped(KeyboardInterrupt(), 3))
-    assert not is_wrapped_interrupt(SystemError("a defect"))
-    assert not is_wrapped_interrupt(wrapped(ValueError("bad input"), 2))
-    assert not is_wrapped_interrupt(ValueError("bad input"))
 
 
 linux_only = pytest.mark.skipif(

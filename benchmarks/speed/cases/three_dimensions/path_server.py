@@ -1,6 +1,5 @@
 """Requests a second of a path server, with its client on the same core."""
 
-import os
 import re
 import subprocess
 import sys
