@@ -67,6 +67,7 @@ def execute(command: Reproduce) -> Answer:
     check_writable(out)
     folder = command.runs / command.name
     if command.parts is not None:
+        check_writable(command.parts.parent)
         unpack_parts(command.parts, folder)
     workers = command.workers or len(os.sched_getaffinity(0))
     campaigns = {

@@ -4,6 +4,7 @@ import io
 import json
 import tempfile
 import zipfile
+from collections.abc import Mapping
 from pathlib import Path, PurePosixPath
 
 from lidarium.evaluation.suites.episodes_file import KEY
@@ -20,11 +21,14 @@ _EPOCH = (1980, 1, 1, 0, 0, 0)
 
 
 def unpack_parts(path: Path, folder: Path) -> None:
-    """Begin a folder with the files of an archive.
+    """Begin a folder with the files of an archive, if there is one.
 
-    Nothing happens if the folder has files, or if there is no archive.
+    A folder with files stays as it is; it has to have all parts of the archive.
     """
-    if not path.exists() or (folder.exists() and any(folder.iterdir())):
+    if not path.exists():
+        return
+    if folder.exists() and any(folder.iterdir()):
+        _check_held(path, folder, _kept(folder))
         return
     folder.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(dir=folder.parent, prefix=f".{folder.name}.") as beside:
@@ -40,24 +44,37 @@ def pack_parts(folder: Path, path: Path) -> None:
 
     An archive with parts that the folder lacks is not replaced.
     """
-    files = {
+    kept = _kept(folder)
+    if path.exists():
+        _check_held(path, folder, kept)
+    made = io.BytesIO()
+    with zipfile.ZipFile(made, "w") as archive:
+        for name, content in kept.items():
+            archive.writestr(zipfile.ZipInfo(name, _EPOCH), content, zipfile.ZIP_DEFLATED, 9)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    write_whole(path, made.getvalue())
+
+
+def _kept(folder: Path) -> dict[str, bytes]:
+    """Return the files of a folder that archives keep, by their names within it."""
+    return {
         file.relative_to(folder).as_posix(): file.read_bytes()
         for file in sorted(folder.rglob("*"))
-        if file.suffix in SUFFIXES and not file.name.startswith(".") and _LEFT_OUT.isdisjoint(file.parts)
+        if file.suffix in SUFFIXES
+        and not file.name.startswith(".")
+        and _LEFT_OUT.isdisjoint(file.relative_to(folder).parts)
     }
-    for name, content in _files_of(path).items() if path.exists() else ():
-        lost = [name] if name not in files else sorted(_keys(name, content) - _keys(name, files[name]))
+
+
+def _check_held(path: Path, folder: Path, kept: Mapping[str, bytes]) -> None:
+    """Check that a folder has all parts of an archive."""
+    for name, content in _files_of(path).items():
+        lost = [name] if name not in kept else sorted(_keys(name, content) - _keys(name, kept[name]))
         if lost:
             raise ValueError(
                 f"{path} has {lost[0]!r}, which {folder} lacks; choose another file with --parts, or a new folder "
                 "with --runs, which begins with the parts of the file"
             )
-    made = io.BytesIO()
-    with zipfile.ZipFile(made, "w") as archive:
-        for name, content in files.items():
-            archive.writestr(zipfile.ZipInfo(name, _EPOCH), content, zipfile.ZIP_DEFLATED, 9)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    write_whole(path, made.getvalue())
 
 
 def _files_of(path: Path) -> dict[str, bytes]:

@@ -43,10 +43,10 @@ def test_parts_come_back_and_what_they_do_not_need_stays_out(tmp_path):
 def test_a_folder_with_files_is_left_alone_and_no_archive_is_none(tmp_path):
     write(tmp_path / "runs", "runs.jsonl", lines("a"))
     pack_parts(tmp_path / "runs", tmp_path / "parts.zip")
-    write(tmp_path / "other", "runs.jsonl", lines("b"))
+    write(tmp_path / "other", "runs.jsonl", lines("b", "a"))
     unpack_parts(tmp_path / "parts.zip", tmp_path / "other")
     unpack_parts(tmp_path / "none.zip", tmp_path / "empty")
-    assert (tmp_path / "other" / "runs.jsonl").read_bytes() == lines("b")
+    assert (tmp_path / "other" / "runs.jsonl").read_bytes() == lines("b", "a")
     assert not (tmp_path / "empty").exists()
 
 
@@ -57,8 +57,9 @@ def test_an_archive_with_more_is_not_replaced(tmp_path, name, keys, lost):
     pack_parts(tmp_path / "runs", path)
     before = path.read_bytes()
     write(tmp_path / "less", name, lines(*keys))
-    with pytest.raises(ValueError, match=rf"parts.zip has {lost}, which .*less lacks; choose another file"):
-        pack_parts(tmp_path / "less", path)
+    for act in (lambda: pack_parts(tmp_path / "less", path), lambda: unpack_parts(path, tmp_path / "less")):
+        with pytest.raises(ValueError, match=rf"parts.zip has {lost}, which .*less lacks; choose another file"):
+            act()
     assert path.read_bytes() == before
 
 
