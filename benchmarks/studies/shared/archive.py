@@ -30,10 +30,11 @@ def unpack_parts(path: Path, folder: Path) -> None:
     if folder.exists() and any(folder.iterdir()):
         _check_held(path, folder, _kept(folder))
         return
+    files = _files_of(path)
     folder.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(dir=folder.parent, prefix=f".{folder.name}.") as beside:
         begun = Path(beside, folder.name)
-        for name, content in _files_of(path).items():
+        for name, content in files.items():
             (begun / name).parent.mkdir(parents=True, exist_ok=True)
             (begun / name).write_bytes(content)
         begun.replace(folder)

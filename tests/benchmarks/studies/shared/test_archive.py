@@ -72,5 +72,5 @@ def test_other_archives_are_refused_before_anything_is_written(tmp_path, name):
         unpack_parts(tmp_path / "parts.zip", tmp_path / "runs")
     (tmp_path / "damaged.zip").write_bytes((tmp_path / "parts.zip").read_bytes()[:-30])
     with pytest.raises(ValueError, match=r"damaged.zip is not an archive of finished parts"):
-        unpack_parts(tmp_path / "damaged.zip", tmp_path / "runs")
+        unpack_parts(tmp_path / "damaged.zip", tmp_path / "deep" / "runs")
     assert sorted(each.name for each in tmp_path.iterdir()) == ["damaged.zip", "parts.zip"]
