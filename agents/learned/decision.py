@@ -16,6 +16,7 @@ from lidarium.agents.learned.features import (
     table_of,
     teammate_features,
 )
+from lidarium.agents.predicted.planning import LEAST_EXTRA
 from lidarium.agents.tours.planning import TourOptions
 from lidarium.envs.onboard.navigation import NavigationMap
 from lidarium.mapping.planning.grid_planning import centres_of
@@ -25,9 +26,6 @@ from lidarium.mapping.planning.touring.tours import TourWeights, costs_of_firsts
 
 CROP_SIDE, CROP_STEP = 24, 0.25
 """Squares a side of the crop around each option, and the side of a square [m]."""
-
-MIN_DETOUR = 0.01
-"""Least detour of an option with which tours do not begin [m]."""
 
 MAX_DETOUR = 50.0
 """Longer detours count as this one [m]."""
@@ -186,7 +184,7 @@ def decision_of(
     first = tours[robot][0]
     if extra is None:
         costs = costs_of_firsts(sequence, robot, options.first, options.between, options.gains, scene.weights)
-        costs = np.clip(costs, MIN_DETOUR, MAX_DETOUR)
+        costs = np.clip(costs, LEAST_EXTRA, MAX_DETOUR)
         costs[first] = 0.0
     else:
         costs = np.minimum(extra, MAX_DETOUR)

@@ -89,9 +89,9 @@ class PredictedTours(TourFrontier):
         return picks
 
     def rest(self, agent: str, options: TourOptions) -> Rest | None:
-        """Return what is probably left to see on a robot's map.
+        """Return the unseen area of a robot's predicted map.
 
-        None if it is too small, if nothing is predicted, or if there is one option.
+        None if it is too small for a stop, if nothing is predicted, or if there is only one option.
         """
         if len(options.numbers) < 2:
             return None

@@ -51,7 +51,7 @@ class WeightFiles:
         return self.read(self._content(path), str(path) or self.shipped)
 
     def notes(self, path: str | Path = "") -> dict[str, str]:
-        """Return what the file says of its weights besides them, checked as ``load`` does."""
+        """Return the metadata of a file of weights, which is checked as by ``load``."""
         content = self._content(path)
         self.read(content, str(path) or self.shipped)
         header = json.loads(content[8 : 8 + int.from_bytes(content[:8], "little")])  # the format of safetensors

@@ -42,7 +42,7 @@ class Reproduce(Command):
     runs: Path = Path("runs/reproduce")
     """folder for episodes and other work"""
     parts: Path | None = None
-    """file of finished parts, as docs/results/parts has them: what it has is not run, and at the end it has all"""
+    """archive of finished parts, such as those in docs/results/parts: read at the start, updated at the end"""
     workers: int = 0
     """processes that run episodes; 0 for as many as there are cores; timed parts run in one"""
     records: bool = False

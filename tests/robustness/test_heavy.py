@@ -1,7 +1,7 @@
 """A file of at most 1 MiB is read or refused without end of memory or time.
 
 ``python -m robustness.heavy`` measures what each takes: a second of the processor and 512 MB are the promise.
-On a slow or busy machine a second says little, so that tests ask for the end alone.
+A slow or busy machine may take longer than a second, so the test only checks that reading ends.
 """
 
 import pytest

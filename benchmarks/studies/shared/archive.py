@@ -17,8 +17,6 @@ SUFFIXES = (".jsonl", ".json", ".csv", ".safetensors")
 _LEFT_OUT = {"records", "checkpoints", "tensorboard"}
 """Folders that finished parts do not need."""
 
-_EPOCH = (1980, 1, 1, 0, 0, 0)
-
 
 def unpack_parts(path: Path, folder: Path) -> None:
     """Begin a folder with the files of an archive, if there is one.
@@ -32,12 +30,12 @@ def unpack_parts(path: Path, folder: Path) -> None:
         return
     files = _files_of(path)
     folder.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(dir=folder.parent, prefix=f".{folder.name}.") as beside:
-        begun = Path(beside, folder.name)
+    with tempfile.TemporaryDirectory(dir=folder.parent, prefix=f".{folder.name}.") as temporary:
+        unpacked = Path(temporary, folder.name)
         for name, content in files.items():
-            (begun / name).parent.mkdir(parents=True, exist_ok=True)
-            (begun / name).write_bytes(content)
-        begun.replace(folder)
+            (unpacked / name).parent.mkdir(parents=True, exist_ok=True)
+            (unpacked / name).write_bytes(content)
+        unpacked.replace(folder)
 
 
 def pack_parts(folder: Path, path: Path) -> None:
@@ -51,7 +49,7 @@ def pack_parts(folder: Path, path: Path) -> None:
     made = io.BytesIO()
     with zipfile.ZipFile(made, "w") as archive:
         for name, content in kept.items():
-            archive.writestr(zipfile.ZipInfo(name, _EPOCH), content, zipfile.ZIP_DEFLATED, 9)
+            archive.writestr(zipfile.ZipInfo(name), content, zipfile.ZIP_DEFLATED, 9)
     path.parent.mkdir(parents=True, exist_ok=True)
     write_whole(path, made.getvalue())
 
