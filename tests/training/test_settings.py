@@ -52,8 +52,10 @@ def test_a_file_says_what_to_train(tmp_path):
     assert (team.robots, team.occupancy.resolution, team.stop_coverage) == (2, 0.05, 0.99)
 
 
-def test_the_recipe_of_the_weights_can_be_used():
-    training = read_training(Path(__file__).parents[2] / "docs" / "tutorials" / "learned.toml")
+@pytest.mark.parametrize(("recipe", "predictor"), [("learned", "nothing"), ("learned_predicted", "network")])
+def test_recipes_of_weights_can_be_used(recipe, predictor):
+    training = read_training(Path(__file__).parents[2] / "docs" / "tutorials" / f"{recipe}.toml")
+    assert training.predictor == predictor
     assert len(training.rounds) >= 2
     assert all(floor.startswith("set:validation") for floor in training.validation.floors)
 
