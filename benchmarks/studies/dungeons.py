@@ -9,11 +9,13 @@ ICRA 2023.
 
 import csv
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from lidarium.agents.tours.planning import TourSettings
 from lidarium.benchmarks.studies.shared.study import Study
 from lidarium.evaluation.episodes.stop_rules import STOP_REASON
 from lidarium.evaluation.statistics.estimates import paired_ratio
@@ -24,11 +26,26 @@ from lidarium.evaluation.suites.suite import Suite
 from lidarium.evaluation.suites.trial import DEFAULT_VARIANT
 from lidarium.mapping.files.output import write_text
 
-POLICIES = ("nearest_frontier", "utility_frontier", "explore_lite", "srt", "tour_frontier", "learned")
+POLICIES = (
+    "nearest_frontier",
+    "utility_frontier",
+    "explore_lite",
+    "srt",
+    "tour_frontier",
+    "learned",
+    "predicted_tours",
+)
+TOURS = "tour_frontier"
 MAPS, WAYS, WAYS_FILE = "dungeon_test", "dungeon_test_ways.csv", "ways.csv"
 SMALL_MAPS, ARIADNE = "synthetic_dungeon", "ariadne"
 BY_NODES = ("level", "graph")
 """Settings of the preset that are left out: robots drive here."""
+
+BUILDINGS, BUILDING_FLOORS = "buildings", ("set:validation:24",)
+"""Ordinary floors, on which tours are tried with a laser that sees 20 m."""
+
+NORMAL_RANGE_M = 5.6
+"""Range of the laser with which the settings of tours were chosen [m]."""
 
 ARIADNE_STOP = {"figure": "remaining_cells", "at_most": 250.0}
 """ARiADNE's rule, without its maximum of decisions at nodes."""
@@ -53,6 +70,39 @@ SETTINGS: dict[str, Any] = {
     "stop_coverage": 0.999,
     "horizon_s": 3600.0,
 }
+
+BUILDING_SETTINGS: dict[str, Any] = {
+    "lidar": {"beams": 720, "field_of_view": 2.0 * np.pi, "range_min": 0.1, "range_max": SENSOR_M},
+    "resolution": 0.05,
+    "stop_coverage": 0.99,
+    "horizon_s": 1800.0,
+}
+
+SOONER: Mapping[str, Any] = {"waiting": 0.0, "kept_share": 0.4}
+"""Tours that are short alone, and planned again when 0.6 of what a view shows is seen."""
+
+
+def scaled_tours(range_m: float) -> dict[str, float]:
+    """Return settings of tours whose lengths and areas grow with the range of the laser."""
+    scale, default = range_m / NORMAL_RANGE_M, TourSettings()
+    lengths = ("reach", "depth", "around", "spacing", "minimum_size", "kept", "turn_length")
+    return {
+        **{name: getattr(default, name) * scale for name in lengths},
+        "least_gain": default.least_gain * scale**2,
+        "waiting": default.waiting / scale**2,
+    }
+
+
+def variants(range_m: float) -> dict[str, dict[str, Any]]:
+    """Return settings of policies that show what tours lose by, by their names on the page."""
+    scaled = {"policy": TOURS, **scaled_tours(range_m)}
+    return {
+        "sooner": {"policy": TOURS, **SOONER},
+        "scaled": scaled,
+        "scaled_sooner": {**scaled, **SOONER},
+        "truth": {"policy": "predicted_tours", "predictor": "truth"},
+    }
+
 
 PLANNERS = {
     "nearest": "nearest frontier node",
@@ -87,6 +137,18 @@ Policies on all {count} maps: ways to 99 %, and over that of `nearest_frontier`.
 |---|---:|---:|---:|---:|
 {all_maps}
 
+## What tours lose by
+
+Tours that show much early leave small corners behind, and each may cost a way back. *Sooner*: nothing for showing
+much early (`waiting` 0), and a new plan when 60 % of what a view shows is seen (`kept_share` 0.4). *Scaled*: lengths
+of `TourSettings` times the range of the laser over {normal} m, areas times its square. *Truth*: `predicted_tours` that
+knows the floor, which bounds the gain of any prediction. *Buildings*: the same with a laser of 20 m on {buildings}
+generated floors of the set `validation`. Ratios of times to 99 % with one robot.
+
+| tours | dungeons, over `nearest_frontier` | buildings, over `nearest_frontier` | buildings, over `tour_frontier` |
+|---|---:|---:|---:|
+{why}
+
 ## By ARiADNE's sensor and stop rule
 
 [ARiADNE](https://github.com/marmotlab/ARiADNE) sees 80 pixels around and ends when 250 free ones are left
@@ -105,7 +167,14 @@ def suites(data: Path | None, every: int = 1) -> dict[str, Suite]:
     maps = maps_of(data)[::every] if data is not None else []
     if not maps:
         return {}
-    found = {"maps": _suite(maps, SETTINGS)}
+    found = {
+        "maps": _suite(maps, SETTINGS, own=variants(float(SETTINGS["lidar"]["range_max"]))),
+        BUILDINGS: replace(
+            _suite(BUILDING_FLOORS, BUILDING_SETTINGS, own=variants(SENSOR_M)),
+            policies=(POLICIES[0], TOURS, "predicted_tours", *variants(SENSOR_M)),
+            draws_starts=True,
+        ),
+    }
     small = sorted((Path(data) / "floorplans" / SMALL_MAPS).glob("*.png"))[::every] if data else []
     if small:
         settings = {name: value for name, value in PRESETS[ARIADNE].settings.items() if name not in BY_NODES}
@@ -113,9 +182,16 @@ def suites(data: Path | None, every: int = 1) -> dict[str, Suite]:
     return found
 
 
-def _suite(maps: Sequence[Path], settings: Mapping[str, Any], stop: Mapping[str, Any] | None = None) -> Suite:
+def _suite(
+    maps: Sequence[Path | str],
+    settings: Mapping[str, Any],
+    stop: Mapping[str, Any] | None = None,
+    own: Mapping[str, Mapping[str, Any]] | None = None,
+) -> Suite:
+    own = own or {}
     return Suite(
-        policies=POLICIES,
+        policies=(*POLICIES, *own),
+        policy_settings=dict(own),
         floors=tuple(str(path) for path in maps),
         robots=(1,),
         seeds=(0,),
@@ -139,7 +215,10 @@ def work(folder: Path, data: Path | None, _every: int, _workers: int) -> Any:  #
 
 def page(folder: Path) -> str:
     """Return the results as markdown."""
-    ours = ways_of(read_episodes(folder / "maps" / EPISODES_FILE))
+    every = ways_of(read_episodes(folder / "maps" / EPISODES_FILE))
+    ours = {policy: found for policy, found in every.items() if policy in POLICIES}
+    path = folder / BUILDINGS / EPISODES_FILE
+    in_buildings = ways_of(read_episodes(path)) if path.exists() else {}
     names = sorted({name for of_policy in ours.values() for name in of_policy})
     theirs = printed_ways(folder / WAYS_FILE, names)
     path = folder / ARIADNE / EPISODES_FILE
@@ -150,6 +229,9 @@ def page(folder: Path) -> str:
         count=len(names),
         all_maps=_all_maps(ours),
         sisters=len(next(iter(small.values()))) - len(_of_ariadne(small)) if small else 0,
+        normal=NORMAL_RANGE_M,
+        buildings=len(in_buildings.get(TOURS, {})),
+        why=_why(every, in_buildings),
         by_ariadne=_by_ariadne(small),
     )
 
@@ -226,6 +308,33 @@ def _all_maps(ours: Ways) -> str:
         cells = f"{reached} of {len(names)} | {np.mean(ways):.0f} | {' | '.join(ratios)}"
         rows.append(f"| `{policy}` | {cells} |")
     return "\n".join(rows)
+
+
+def _why(ours: Ways, in_buildings: Ways) -> str:
+    """Return times to 99 % of tours and their variants, over those of others."""
+    rows = []
+    for policy in (TOURS, *variants(SENSOR_M), "predicted_tours"):
+        cells = [
+            _time_ratio(ours, policy, POLICIES[0], float(SETTINGS["horizon_s"])),
+            *(
+                _time_ratio(in_buildings, policy, other, float(BUILDING_SETTINGS["horizon_s"]))
+                for other in (POLICIES[0], TOURS)
+            ),
+        ]
+        name = policy.replace("_", ", ") if policy in variants(SENSOR_M) else f"`{policy}`"
+        rows.append(f"| {name} | {' | '.join(cells)} |")
+    return "\n".join(rows)
+
+
+def _time_ratio(ours: Ways, policy: str, other: str, horizon_s: float) -> str:
+    """Return the ratio of two policies' times to 99 % on the floors of both."""
+    names = sorted(set(ours.get(policy, {})) & set(ours.get(other, {})))
+    if not names:
+        return "-"
+    if policy == other:
+        return "1"
+    times, base = ([float(ours[which][name]["t99_s"] or horizon_s) for name in names] for which in (policy, other))
+    return f"{paired_ratio(times, base):.3f}"
 
 
 def _of_ariadne(ours: Ways) -> list[str]:

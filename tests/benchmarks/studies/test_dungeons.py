@@ -5,6 +5,7 @@ import json
 import pytest
 from published_pages import assert_published
 
+from lidarium.agents.tours.planning import TourSettings
 from lidarium.benchmarks.studies import STUDIES, dungeons
 
 PRINTED = "map,method,way_m,decisions,explored_share\n" + "".join(
@@ -92,3 +93,28 @@ def test_the_maps_at_hand_are_run_from_their_marks(shared_data, tmp_path):
     assert small.stop == {"figure": "remaining_cells", "at_most": 250.0}
     assert list(dungeons.work(tmp_path, shared_data, 1, 1)) == [("ways of planners", 1, 1)]
     assert len(dungeons.printed_ways(tmp_path / "ways.csv", [p.name for p in dungeons.maps_of(shared_data)])) == 4
+
+
+def test_variants_of_tours_stand_beside_both_baselines_by_their_times(folder):
+    assert row_of(dungeons.page(folder), "truth")[1:] == ["-", "-", "-"]
+    times = {"nearest_frontier": 40.0, "tour_frontier": 20.0, "scaled_sooner": 30.0, "truth": None}
+    lines = [
+        episode(policy, f"building:{number}", None, 9.0, None if time_s is None else time_s + number)
+        for policy, time_s in times.items()
+        for number in range(3)
+    ]
+    (folder / dungeons.BUILDINGS).mkdir()
+    (folder / dungeons.BUILDINGS / "episodes.jsonl").write_text("".join(json.dumps(line) + "\n" for line in lines))
+    page = dungeons.page(folder)
+    assert row_of(page, "scaled, sooner")[2].startswith("0.756")
+    assert row_of(page, "scaled, sooner")[3].startswith("1.477")
+    assert row_of(page, "truth")[3].startswith("85.7"), "runs that miss count whole"
+    assert row_of(page, "`tour_frontier`", -1)[3] == "1"
+    assert "on 3\ngenerated floors" in page
+
+
+def test_tours_grow_with_the_range_of_the_laser_alone():
+    scaled = dungeons.scaled_tours(2.0 * dungeons.NORMAL_RANGE_M)
+    assert (scaled["reach"], scaled["least_gain"], scaled["waiting"]) == (6.0, 1.6, 0.0125)
+    same = TourSettings(**dungeons.scaled_tours(dungeons.NORMAL_RANGE_M))
+    assert same == TourSettings()
