@@ -141,8 +141,8 @@ Policies on all {count} maps: ways to 99 %, and over that of `nearest_frontier`.
 
 Tours that show much early leave small corners behind, and each may cost a way back. *Sooner*: nothing for showing
 much early (`waiting` 0), and a new plan when 60 % of what a view shows is seen (`kept_share` 0.4). *Scaled*: lengths
-of `TourSettings` times the range of the laser over {normal} m, areas times its square. *Truth*: `predicted_tours` that
-knows the floor, which bounds the gain of any prediction. *Buildings*: the same with a laser of 20 m on {buildings}
+of `TourSettings` times the range of the laser over {normal} m, areas times its square. *Truth*: `predicted_tours` with
+the floor in place of a prediction. *Buildings*: the same with a laser of 20 m on {buildings}
 generated floors of the set `validation`. Ratios of times to 99 % with one robot.
 
 | tours | dungeons, over `nearest_frontier` | buildings, over `nearest_frontier` | buildings, over `tour_frontier` |
