@@ -21,7 +21,7 @@ from lidarium.evaluation.suites.presets import PRESETS, preset_suite
 from lidarium.evaluation.suites.suite import Starts, Suite
 
 NODES = ("nearest_node", "utility_node")
-WAYPOINTS = ("nearest_frontier", "utility_frontier", "explore_lite", "tour_frontier", "learned")
+WAYPOINTS = ("nearest_frontier", "utility_frontier", "explore_lite", "tour_frontier", "learned", "predicted_tours")
 ARIADNE = {"ariadne": "test100", "ariadne_easy": "easy", "ariadne_medium": "medium"}
 """Folder of each of ARiADNE's sets of maps."""
 
@@ -130,13 +130,14 @@ Episodes = Mapping[str, Mapping[str, Mapping[str, Any]]]
 
 
 def by_policy(preset: str, path: Path) -> dict[str, dict[str, Mapping[str, Any]]]:
-    """Return the episodes of a preset by policy, those of floors and starts that all policies have."""
+    """Return the episodes of a preset by policy, those of floors and starts that all policies which ran have."""
     found: dict[str, dict[str, Mapping[str, Any]]] = {policy: {} for policy in POLICIES[preset]}
     for episode in read_episodes(path) if path.exists() else []:
         place = f"{episode['floor']} {episode['starts']}"
         found.setdefault(episode["policy"], {})[place] = episode
-    common = sorted(set.intersection(*(set(each) for each in found.values())))
-    return {policy: {place: each[place] for place in common} for policy, each in found.items()}
+    ran = [set(each) for each in found.values() if each]
+    common = sorted(set.intersection(*ran)) if ran else []
+    return {policy: {place: each[place] for place in common if each} for policy, each in found.items()}
 
 
 def _printed() -> str:

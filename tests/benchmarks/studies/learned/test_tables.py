@@ -16,6 +16,7 @@ def episodes():
     return {
         "tour_frontier": {key: episode(100.0) for key in floors},
         "learned": {key: episode(80.0 + k, 8.0) for k, key in enumerate(floors)},
+        "learned_predicted": {key: episode(70.0 + k, 8.0) for k, key in enumerate(floors)},
         "nearest_frontier": {key: episode(200.0) for key in floors[:4]},
         "utility_frontier": {key: episode(150.0) for key in floors[:4]},
         "explore_lite": {key: episode(None) for key in floors[:4]},
@@ -35,9 +36,10 @@ def test_means_have_a_row_for_each_kind_and_team_that_ran(episodes):
     cells = [cell.strip() for cell in row.strip("|").split("|")]
     assert cells[:3] == [learned.KINDS["test"], "1", "8"]
     assert cells[3].startswith("0.835 (")
-    assert cells[4].startswith("0.667 (")
-    assert cells[4].endswith(", `utility_frontier`")
-    assert learned.times_table({"test": episodes}).count("\n| generated") == 2
+    assert cells[4].startswith("0.735 (")
+    assert cells[5].startswith("0.667 (")
+    assert cells[5].endswith(", `utility_frontier`")
+    assert learned.times_table({"test": episodes}).count("\n| generated") == 4
 
 
 def test_two_pairs_are_too_few_for_an_interval(episodes):
@@ -57,7 +59,7 @@ def test_bounds_say_what_is_saved(episodes):
     bounds.append({"floor": "f3", "robots": 1, "known_s": None})
     lines = learned.bounds_table(bounds, episodes).splitlines()
     cells = [cell.strip() for cell in lines[-1].strip("|").split("|")]
-    assert cells == ["1", "2", "3.33", "2.50", "30.00", "1.67", "1.34", "49 %"]
+    assert cells == ["1", "2", "3.33", "2.50", "30.00", "1.67", "1.34", "1.18", "49 %"]
     assert learned.bounds_table([], episodes).startswith("No floor")
 
 
