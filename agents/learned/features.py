@@ -130,8 +130,8 @@ def option_features(
         "nearest": apart.min(axis=1),
         "mean": np.minimum(options.between, 100.0).mean(axis=1),
         "count_near": is_near.sum(axis=1) - 1.0,
-        "gain_near": is_near @ options.gains,
-        "gain_around": is_around @ options.gains,
+        "gain_near": np.where(is_near, options.gains, 0.0).sum(axis=1),
+        "gain_around": np.where(is_around, options.gains, 0.0).sum(axis=1),
     }
 
 

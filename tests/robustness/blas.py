@@ -1,4 +1,4 @@
-"""Runs with SLAM under several kernels of the linear algebra library.
+"""Runs with SLAM, or of a policy, under several kernels of the linear algebra library.
 
 ``python -m robustness.blas --count 12``
 
@@ -48,10 +48,10 @@ def main():
     """Run cases under each kernel and print how many differ."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--count", type=int, default=12)
-    parser.add_argument("--ideal", action="store_true", help="without SLAM: poses are known")
+    parser.add_argument("--policy", default="", help="one that runs with known poses, without SLAM; such as learned")
     chosen = parser.parse_args()
     count = chosen.count
-    options = ("--realism", "ideal", "--policy", "utility_frontier") if chosen.ideal else ()
+    options = ("--realism", "ideal", "--policy", chosen.policy) if chosen.policy else ()
     differ = []
     for number in range(count):
         floor, seed = FLOORS[number % len(FLOORS)], number // len(FLOORS)
