@@ -73,7 +73,7 @@ class AttentionNetwork:
 
     def linear(self, name: str, inputs: NDArray[np.float32]) -> NDArray[np.float32]:
         """Return the linear map of some inputs (n, inputs)."""
-        return product(inputs, self._transposed[f"{name}.weight"]) + self.weights[f"{name}.bias"]
+        return np.asarray(product(inputs, self._transposed[f"{name}.weight"]) + self.weights[f"{name}.bias"])
 
     def _layer(self, name: str, tokens: NDArray[np.float32]) -> NDArray[np.float32]:
         tokens = tokens + self._attended(name, self._normalised(f"{name}.before_attention", tokens))
@@ -99,4 +99,4 @@ def _mixed_values(
     alike = product(queries, np.ascontiguousarray(keys.T)) / np.float32(math.sqrt(WIDTH // HEADS))
     shares = np.exp(alike - alike.max(axis=-1, keepdims=True))
     shares /= shares.sum(axis=-1, keepdims=True)
-    return product(shares, values)
+    return np.asarray(product(shares, values))

@@ -23,11 +23,8 @@ MOST_BYTES = 1 << 20
 FLOOR_KINDS = ("building", *KINDS, DUNGEON)
 """Kinds of generated floors to train on."""
 
-SHIPPED = "shipped"
-"""The network of the package, to begin with."""
-
-BEGINNINGS = ("tours", SHIPPED)
-"""Networks to begin with; the first one corrects nothing."""
+FROM_TOURS, SHIPPED = "tours", "shipped"
+"""Networks to begin with: one that corrects nothing, and that of the package."""
 
 Part = TypeVar("Part")
 
@@ -371,7 +368,8 @@ class TrainingSettings:
     predictor : str, default "nothing"
         Predictor of maps whose tours the network corrects, such as "network"; "nothing" for tours past known frontiers.
     begin : str, default "tours"
-        Network to begin with: "tours" for one that corrects nothing, "shipped" for that of the package.
+        Network to begin with: "tours" for one that corrects nothing, "shipped" for that of the package, or a file
+        of weights.
     settings : dict
         Options of the environment, as in a suite.
     rounds : tuple of Round
@@ -382,7 +380,7 @@ class TrainingSettings:
 
     seed: Annotated[int, within(0, 2**31 - 1)] = 0
     predictor: str = NO_PREDICTOR
-    begin: str = BEGINNINGS[0]
+    begin: str = FROM_TOURS
     settings: Mapping[str, Any] = field(default_factory=dict)
     rounds: tuple[Round, ...] = (Round(),)
     fit: FitSettings = field(default_factory=FitSettings)
@@ -392,8 +390,8 @@ class TrainingSettings:
     def __post_init__(self) -> None:
         check_settings(self, "training")
         make_predictor(self.predictor)
-        if self.begin not in BEGINNINGS:
-            raise ValueError(f"begin is {shown(self.begin)}; want {' or '.join(map(repr, BEGINNINGS))}")
+        if self.begin not in (FROM_TOURS, SHIPPED) and not Path(self.begin).is_file():
+            raise ValueError(f"begin is {shown(self.begin)}; want {FROM_TOURS!r}, {SHIPPED!r} or a file of weights")
         if "robots" in self.settings:
             raise ValueError("settings has 'robots'; want them in [[rounds]] and [validation]")
         for size in sorted({*self.validation.robots, *(size for each in self.rounds for size in each.robots)}):

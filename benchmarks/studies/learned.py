@@ -29,10 +29,10 @@ from lidarium.evaluation.suites.episodes_file import KEY, read_episodes
 from lidarium.evaluation.suites.suite import Suite
 from lidarium.evaluation.suites.trial import DEFAULT_VARIANT
 
-LEARNED, TOURS, PREDICTED = "learned", "tour_frontier", "learned_predicted"
+LEARNED, TOURS, UNPREDICTED = "learned", "tour_frontier", "learned_tours"
 CLASSICS = ("nearest_frontier", "utility_frontier", "explore_lite")
-PREDICTED_WEIGHTS = Path("docs/results/parts/learned_predicted.safetensors")
-"""Weights of ``learned`` for predicted maps, in the repository; without them its column is empty."""
+UNPREDICTED_WEIGHTS = Path("docs/results/parts/learned_tours.safetensors")
+"""Weights of ``learned`` for maps without predictions, in the repository; without them their column is empty."""
 
 TEAMS = (1, 2, 3)
 HORIZON_S = 1800.0
@@ -52,7 +52,7 @@ Times = dict[str, dict[tuple[str, int], Mapping[str, Any]]]
 def means_table(found: Mapping[str, Times]) -> str:
     """Return the mean ratios of times by kind of floor and size of team."""
     rows = [
-        f"| floors | robots | number | `{LEARNED}` over `{TOURS}` | on predicted maps | "
+        f"| floors | robots | number | `{LEARNED}` over `{TOURS}` | without predictions | "
         f"`{TOURS}` over the best classic |",
         "|---|---:|---:|---:|---:|---:|",
     ]
@@ -60,11 +60,11 @@ def means_table(found: Mapping[str, Times]) -> str:
         for robots in TEAMS:
             pairs = _comparisons(episodes, robots)
             over_tours = {cells[1]: cells for cells in pairs if cells[2] == f"`{TOURS}`"}
-            first, predicted = (over_tours.get(f"`{name}`") for name in (LEARNED, PREDICTED))
+            first, unpredicted = (over_tours.get(f"`{name}`") for name in (LEARNED, UNPREDICTED))
             if first:
                 classic = next((f"{cells[5]}, {cells[2]}" for cells in pairs if cells[1] == f"`{TOURS}`"), "-")
-                new = predicted[5] if predicted else "-"
-                rows.append(f"| {KINDS[kind]} | {robots} | {first[3]} | {first[5]} | {new} | {classic} |")
+                without = unpredicted[5] if unpredicted else "-"
+                rows.append(f"| {KINDS[kind]} | {robots} | {first[3]} | {first[5]} | {without} | {classic} |")
     return "\n".join(rows)
 
 
@@ -83,7 +83,7 @@ def times_table(found: Mapping[str, Times]) -> str:
 def _comparisons(episodes: Times, robots: int) -> list[tuple[str, ...]]:
     """Return the cells of the learned explorers over tours, and of tours over the best classic one."""
     best = best_classic(episodes, robots)
-    pairs = [(LEARNED, TOURS), (PREDICTED, TOURS), (PREDICTED, LEARNED), *([(TOURS, best)] if best else [])]
+    pairs = [(LEARNED, TOURS), (UNPREDICTED, TOURS), (LEARNED, UNPREDICTED), *([(TOURS, best)] if best else [])]
     found = [_cells(episodes, ours, theirs, robots) for ours, theirs in pairs]
     return [cells for cells in found if cells]
 
@@ -150,7 +150,7 @@ def _time(episode: Mapping[str, Any]) -> float:
 
 def bounds_table(bounds: Sequence[Mapping[str, Any]], episodes: Times) -> str:
     """Return multiples of the bound by size of team, and what is saved of the time above it."""
-    names = [name for name in (*CLASSICS, TOURS, LEARNED, PREDICTED) if name in episodes]
+    names = [name for name in (*CLASSICS, TOURS, UNPREDICTED, LEARNED) if name in episodes]
     rows = [
         "| robots | floors | " + " | ".join(f"`{name}`" for name in names) + " | saved |",
         "|---:|" + "---:|" * (len(names) + 2),
@@ -177,15 +177,9 @@ def bounds_table(bounds: Sequence[Mapping[str, Any]], episodes: Times) -> str:
 
 def card_text(card: Mapping[str, Any]) -> str:
     """Return what the card of the weights says."""
-    training, lines = card["training"], []
-    floors = sum(each["floors"] for each in training["rounds"])
-    lessons = max((each["samples"] for each in card["fits"].values()), default=0)
-    lines.append(
-        f"`lidarium train docs/tutorials/learned.toml`: {floors:,} floors of the training set in "
-        f"{len(training['rounds'])} rounds, {lessons:,} decisions taught, {card['hours']:.1f} hours with "
-        f"{card['workers']} workers, PyTorch {card['versions']['torch']}, seed {training['seed']}. "
-        f"Best on the floors of the validation: `{card['best']}`."
-    )
+    stages = (("learned_tours", card.get("began_with")), ("learned", card))
+    lines = [_training_text(recipe, each) for recipe, each in stages if each]
+    lines[-1] += f" Best on the floors of the validation: `{card['best']}`."
     lines.append(
         "| weights | over `tour_frontier`, mean | faster | episodes |\n|---|---:|---:|---:|\n"
         + "\n".join(
@@ -194,6 +188,17 @@ def card_text(card: Mapping[str, Any]) -> str:
         )
     )
     return "\n\n".join(lines)
+
+
+def _training_text(recipe: str, card: Mapping[str, Any]) -> str:
+    training = card["training"]
+    floors = sum(each["floors"] for each in training["rounds"])
+    lessons = max((each["samples"] for each in card["fits"].values()), default=0)
+    return (
+        f"`lidarium train docs/tutorials/{recipe}.toml`: {floors:,} floors of the training set in "
+        f"{len(training['rounds'])} rounds, {lessons:,} decisions taught, {card['hours']:.1f} hours with "
+        f"{card['workers']} workers, PyTorch {card['versions']['torch']}, seed {training['seed']}."
+    )
 
 
 def missing_text(kinds: Sequence[str]) -> str:
@@ -223,10 +228,9 @@ count with {horizon:.0f} s. Nothing was chosen by these floors. `srt`, SLAM and 
 
 ## Times
 
-Geometric means with 95 % intervals; below 1 is faster. *On predicted maps*: `learned` with
-[weights](parts/learned_predicted.safetensors) that were trained to correct `predicted_tours`
-([recipe](../tutorials/learned_predicted.toml)), over `tour_frontier`. Classic explorers ran on every fourth floor of
-the set `test`.
+Geometric means with 95 % intervals; below 1 is faster. *Without predictions*: the first
+[weights](parts/learned_tours.safetensors), which correct `tour_frontier`, over it. Classic explorers ran on every
+fourth floor of the set `test`.
 
 {means}
 
@@ -272,8 +276,8 @@ def suites(data: Path | None, every: int = 1) -> dict[str, Suite]:
 
 def _suite(policies: Sequence[str], floors: Sequence[str]) -> Suite:
     settings = {}
-    if LEARNED in policies and PREDICTED_WEIGHTS.is_file():
-        settings[PREDICTED] = {"policy": LEARNED, "weights": str(PREDICTED_WEIGHTS)}
+    if LEARNED in policies and UNPREDICTED_WEIGHTS.is_file():
+        settings[UNPREDICTED] = {"policy": LEARNED, "weights": str(UNPREDICTED_WEIGHTS)}
     return Suite(
         policies=(*policies, *settings),
         floors=tuple(floors),

@@ -89,20 +89,38 @@ class BenchmarkResults:
 
 def reference_rows(name: str) -> dict[str, list[Row]]:
     """Return the shipped rows of reference policies by task; none for a benchmark without any."""
-    path = DATA / f"{name}.jsonl.xz"
+    path = DATA / rows_file(name)
     if not path.is_file():
         return {}
-    rows: dict[str, list[Row]] = {}
+    rows: dict[int, Row] = {}
     for line in lzma.decompress(path.read_bytes()).decode("utf-8").splitlines():
-        row = json.loads(line)
-        rows.setdefault(row["variant"], []).append(row)
-    return rows
+        column, numbers, values = json.loads(line)
+        for number, value in zip(range(len(values)) if numbers is None else numbers, values, strict=True):
+            rows.setdefault(number, {})[column] = value
+    by_task: dict[str, list[Row]] = {}
+    for number in sorted(rows):
+        by_task.setdefault(rows[number]["variant"], []).append(rows[number])
+    return by_task
+
+
+def rows_file(name: str) -> str:
+    """Return the file of a benchmark's shipped rows, in the folder of its data."""
+    return f"{name}.rows.jsonl.xz"
 
 
 def packed(rows: Iterable[Row]) -> bytes:
-    """Return rows as the package ships them: without what differs between two runs of one episode."""
-    kept = [{key: value for key, value in row.items() if key not in (*TIMINGS, "record")} for row in rows]
-    lines = sorted(json.dumps(row, sort_keys=True, separators=(",", ":")) for row in kept)
+    """Return rows as the package ships them: without what differs between two runs of one episode.
+
+    Each line is a column: its name, the numbers of the rows that have it (null for all) and their values; a fifth is
+    saved by columns.
+    """
+    kept = sorted(rows, key=lambda row: row[KEY])
+    lines = []
+    for column in sorted({key for row in kept for key in row} - {*TIMINGS, "record"}):
+        numbers = [number for number, row in enumerate(kept) if column in row]
+        values = [kept[number][column] for number in numbers]
+        line = (column, None if len(numbers) == len(kept) else numbers, values)
+        lines.append(json.dumps(line, sort_keys=True, separators=(",", ":")))
     return lzma.compress("\n".join(lines).encode("utf-8"), preset=9 | lzma.PRESET_EXTREME)
 
 

@@ -34,7 +34,7 @@ def test_a_predictor_that_is_not_there_is_named():
 
 
 def test_a_network_to_begin_with_that_is_not_there_is_named():
-    with pytest.raises(ValueError, match="begin is 'learned'; want 'tours' or 'shipped'"):
+    with pytest.raises(ValueError, match="begin is 'learned'; want 'tours', 'shipped' or a file of weights"):
         training_of({"begin": "learned"})
 
 
@@ -52,8 +52,12 @@ def test_a_file_says_what_to_train(tmp_path):
     assert (team.robots, team.occupancy.resolution, team.stop_coverage) == (2, 0.05, 0.99)
 
 
-@pytest.mark.parametrize(("recipe", "predictor"), [("learned", "nothing"), ("learned_predicted", "network")])
-def test_recipes_of_weights_can_be_used(recipe, predictor):
+@pytest.mark.parametrize(("recipe", "predictor"), [("learned_tours", "nothing"), ("learned", "network")])
+def test_recipes_of_weights_can_be_used(recipe, predictor, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    first = Path("runs", "learned_tours", "weights.safetensors")  # which the second recipe begins with
+    first.parent.mkdir(parents=True)
+    first.touch()
     training = read_training(Path(__file__).parents[2] / "docs" / "tutorials" / f"{recipe}.toml")
     assert training.predictor == predictor
     assert len(training.rounds) >= 2

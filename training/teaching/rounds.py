@@ -19,7 +19,7 @@ from lidarium.mapping.files.output import write_json
 from lidarium.training.failures import raise_named
 from lidarium.training.places import first_number, place_of
 from lidarium.training.progress import Progress
-from lidarium.training.settings import SHIPPED, TrainingSettings
+from lidarium.training.settings import FROM_TOURS, SHIPPED, TrainingSettings
 from lidarium.training.teaching.fitting import Fit, fit
 from lidarium.training.teaching.samples import Samples, read_samples, samples_of, write_samples
 from lidarium.training.teaching.teacher import TaughtTours
@@ -54,10 +54,10 @@ class RoundFolder:
         return self.path / WEIGHTS
 
     def before(self, begin: str) -> dict[str, NDArray[np.float32]] | None:
-        """Return the weights that decide in it, None if tours do; a training may ``begin`` with shipped ones."""
+        """Return the weights that decide in it, None if tours do; a training may ``begin`` with weights."""
         if self.number:
             return load_weights(RoundFolder(self.training, self.number - 1).weights)
-        return load_weights() if begin == SHIPPED else None
+        return None if begin == FROM_TOURS else load_weights("" if begin == SHIPPED else begin)
 
     def lessons(self, number: int) -> Path:
         """Return the file of the lessons of an episode."""

@@ -45,7 +45,9 @@ def test_a_network_explores_on_the_maps_that_it_was_trained_on(tmp_path):
     save_weights(path, load_weights(), "network")
     assert make_policy("learned", weights=str(path)).predicts
     assert not make_policy("learned", weights=str(path), predictor="nothing").predicts
-    assert not make_policy("learned").predicts
+    assert make_policy("learned").predicts
+    save_weights(path, load_weights())
+    assert not make_policy("learned", weights=str(path)).predicts
     save_weights(path, load_weights(), "truht")
     with pytest.raises(ValueError, match="did you mean 'truth'"):
         make_policy("learned", weights=str(path))

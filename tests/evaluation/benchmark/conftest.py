@@ -64,7 +64,7 @@ def frozen(tmp_path_factory):
             for _ in Campaign(task.suite(task.policies, "easy"), runs, records=False).run():
                 pass
             rows += read_episodes(runs).rows
-        (folder / "tiny.jsonl.xz").write_bytes(results.packed(rows))
+        (folder / "tiny.rows.jsonl.xz").write_bytes(results.packed(rows))
     return folder
 
 

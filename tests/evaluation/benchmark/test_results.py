@@ -1,13 +1,12 @@
 """A benchmark from the command to the table, the page and the card."""
 
 import json
-import lzma
 
 import pytest
 
 from lidarium.evaluation.analysis.episodes import read_episodes
 from lidarium.evaluation.benchmark import results
-from lidarium.evaluation.benchmark.results import packed, reference_rows
+from lidarium.evaluation.benchmark.results import packed, reference_rows, rows_file
 from lidarium.evaluation.benchmark.tasks import benchmark
 from lidarium.scripts.main import main
 
@@ -66,13 +65,18 @@ def test_rows_are_the_shipped_ones_to_the_bit_with_any_number_of_workers(tiny, t
         answer(out / task, "--reference", "--quick", "--tasks", task, "--workers", workers)
         rows += read_episodes(out / task / task).rows
     shipped = [row for kept in reference_rows("tiny").values() for row in kept]
-    again = set(lines_of(packed(rows)))
-    assert again <= set(lines_of(packed(shipped)))
-    assert len(again) == 13
+    keys = {row["key"] for row in rows}
+    assert len(keys) == 13
+    assert packed(rows) == packed(row for row in shipped if row["key"] in keys)
 
 
-def lines_of(content):
-    return lzma.decompress(content).decode().splitlines()
+def test_rows_come_back_as_they_were_packed(tiny):
+    before = reference_rows("tiny")
+    rows = [dict(row) for kept in before.values() for row in kept]
+    del rows[2]["auc"], rows[5]["given_up"]  # rows of older versions lack what came later
+    (tiny / rows_file("tiny")).write_bytes(packed(reversed(rows)))
+    again = [row for kept in reference_rows("tiny").values() for row in kept]
+    assert sorted(again, key=lambda row: row["key"]) == sorted(rows, key=lambda row: row["key"])
 
 
 @pytest.mark.usefixtures("without_page")
@@ -113,7 +117,7 @@ def test_a_task_in_which_all_episodes_failed_leaves_the_others(tiny, tmp_path):
 @pytest.mark.usefixtures("without_page")
 def test_rows_of_another_version_are_said_to_be(tiny, tmp_path):
     rows = [{**row, "version": "0.0.9"} for kept in reference_rows("tiny").values() for row in kept]
-    (tiny / "tiny.jsonl.xz").write_bytes(packed(rows))
+    (tiny / rows_file("tiny")).write_bytes(packed(rows))
     _, written = answer(tmp_path / "mine", "--policies", "explore_lite", "--tasks", "Homes-1", "--quick")
     assert any("Rows are of lidarium 0.0.9 and" in remark for remark in written["remarks"])
 
@@ -139,7 +143,7 @@ def test_bad_options_are_answered_in_a_line(tiny, tmp_path, capsys, options, mes
 
 @pytest.mark.usefixtures("without_page")
 def test_without_rows_of_the_baseline_nothing_is_compared_and_that_is_said(tiny, tmp_path, capsys):
-    (tiny / "tiny.jsonl.xz").unlink()
+    (tiny / rows_file("tiny")).unlink()
     code, written = answer(tmp_path / "mine", "--policies", "explore_lite", "--tasks", "Homes-1", "--quick")
     assert code == 0
     (mine,) = written["standings"]

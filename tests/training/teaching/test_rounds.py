@@ -120,12 +120,14 @@ def test_a_network_is_taught_on_predicted_maps(trained, tmp_path):
     assert env.scorer.coverage >= 0.99
 
 
-def test_a_training_goes_on_from_the_shipped_network(tmp_path):
+@pytest.mark.parametrize("network", ["shipped", "file"])
+def test_a_training_goes_on_from_a_network(network, trained, tmp_path):
+    network = network if network == "shipped" else str(trained[0].weights)
     folder = RoundFolder(tmp_path, 0)
     assert folder.before("tours") is None
-    begin = folder.before("shipped")
+    begin = folder.before(network)
     fitting = replace(TWO.fit, epochs=1, learning_rate=1e-9, weight_decay=0.0)
-    list(run_round(replace(TWO, begin="shipped", fit=fitting), folder, 1))
+    list(run_round(replace(TWO, begin=network, fit=fitting), folder, 1))
     for name, array in load_weights(folder.weights).items():
         np.testing.assert_allclose(array, begin[name], atol=1e-6)
 
