@@ -26,7 +26,7 @@ from lidarium.registry import import_own
 
 
 class Termination:
-    """Handler of SIGTERM that acts as Ctrl-C does, and remembers that it was SIGTERM.
+    """Handler of a signal that acts as Ctrl-C does, and remembers that the signal came.
 
     Attributes
     ----------
@@ -270,8 +270,11 @@ def shared_out(
     workers as it is loaded: each of them loads it, too.
     """
     if workers <= 1 and not is_apart:
-        for task in tasks:
-            yield task, _attempted(work, task)
+        with _remembered_interrupts() as handlers:
+            for task in tasks:
+                yield task, _attempted(work, task)
+                if any(handler.is_asked for handler in handlers):
+                    raise KeyboardInterrupt
         return
     pending = iter(tasks)
     suspects: list[Task] = []
@@ -346,6 +349,26 @@ def _in_pool(
         finally:
             _end_pool(pool, are_ending=is_whole)
     return lost
+
+
+@contextmanager
+def _remembered_interrupts() -> Iterator[list[Termination]]:
+    """Yield the handlers of Ctrl-C and SIGTERM, which raise at once and remember it.
+
+    An interrupt that falls into a finalizer or a callback is lost there: Python prints it and goes on.
+    """
+    is_ours = (
+        threading.current_thread() is threading.main_thread()
+        and signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    )
+    if is_ours:
+        signal.signal(signal.SIGINT, Termination())
+    found = [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)]
+    try:
+        yield [handler for handler in found if isinstance(handler, Termination)]
+    finally:
+        if is_ours and signal.getsignal(signal.SIGINT) is found[0]:
+            signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 class _Watch:

@@ -217,10 +217,10 @@ BOUNDS_FILE = "bounds.jsonl"
 
 PAGE = """# Learned explorers
 
-Simulated time to 99 % of `C_free` of `learned` over `tour_frontier`, whose tours it corrects, and of `tour_frontier`
-over the best classic explorer, from the same starts. Kobuki, URG-04LX, perfect poses, no noise, maps of 5 cm; misses
-count with {horizon:.0f} s. Nothing was chosen by these floors. `srt`, SLAM and unknown starts are on the
-[leaderboard](leaderboard.md).
+Simulated time to 99 % of `C_free` of `learned`, which corrects [`predicted_tours`](prediction.md), over
+`tour_frontier`, and of `tour_frontier` over the best classic explorer, from the same starts. Kobuki, URG-04LX, perfect
+poses, no noise, maps of 5 cm; misses count with {horizon:.0f} s. Nothing was chosen by these floors. `srt`, SLAM and
+unknown starts are on the [leaderboard](leaderboard.md).
 
 ## The weights
 
@@ -255,8 +255,8 @@ the set `test`. *Saved*: share of the time between `tour_frontier` and the bound
 ## What limits it
 
 The teacher, which has the floor plan, takes 0.77, 0.85 and 0.87 of the time of tours with one, two and three robots
-([decision 22](../decisions/0022-learned-corrections.md)). More or bare floors would not help: a training on 2,700
-furnished floors gave 0.878, 0.896 and 0.938 on the set `test`, and 1.03, 0.99 and 0.98 on LIFULL.
+([decision 22](../decisions/0022-learned-corrections.md)). More or bare floors did not help without predictions: a
+training on 2,700 furnished floors gave 0.878, 0.896 and 0.938 on the set `test`, and 1.03, 0.99 and 0.98 on LIFULL.
 """
 
 

@@ -160,6 +160,28 @@ def test_an_interrupt_out_of_compiled_code_is_no_result():
         list(shared_out(kernel, [1, 2], 1))
 
 
+class Interrupting:
+    """Is interrupted while it is finalized, where Python loses exceptions."""
+
+    def __del__(self):
+        signal.raise_signal(signal.SIGINT)
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+def test_an_interrupt_that_is_lost_in_a_finalizer_ends_the_work():
+    done = []
+
+    def work(task):
+        done.append(task)
+        if task == 1:
+            Interrupting()
+
+    with pytest.raises(KeyboardInterrupt):
+        list(shared_out(work, range(5), workers=1))
+    assert done == [0, 1]
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
 def test_a_process_that_dies_takes_no_other_task_with_it():
     tasks = [str(number) for number in range(12)]
     results = dict(shared_out(eval, [*tasks[:5], DIES, *tasks[5:]], 2))
