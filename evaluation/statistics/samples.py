@@ -19,6 +19,7 @@ improvements for inference with clustered errors, Review of Economics and Statis
 """
 
 import math
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
@@ -79,9 +80,15 @@ class Interval:
         return math.isfinite(self.low) or math.isfinite(self.high)
 
     def __format__(self, spec: str) -> str:
-        """Return the estimate and the ends of the interval, each by a format of numbers; inf is a dash."""
+        """Return the estimate and the ends of the interval, each by a format of numbers; inf is a dash.
+
+        They have more digits if both ends would look the same: no interval is of zero width.
+        """
         if not self.is_known:
             return f"{format(self.estimate, spec)} (no interval)"
+        digits = re.search(r"\.(\d)[ef%]?$", spec)
+        if digits and self.low < self.high and format(self.low, spec) == format(self.high, spec) and digits[1] < "9":
+            return format(self, f"{spec[: digits.start(1)]}{int(digits[1]) + 1}{spec[digits.end(1) :]}")
         low, high = (format(end, spec) if math.isfinite(end) else "-" for end in (self.low, self.high))
         return f"{format(self.estimate, spec)} ({low} to {high})"
 

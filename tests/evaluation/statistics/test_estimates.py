@@ -292,3 +292,9 @@ def test_the_optimality_gap_is_the_share_above_the_bound():
 def test_an_interval_is_written_with_its_ends_or_without():
     assert f"{mean_interval(skewed[:30]):.1f}".count("to") == 1
     assert f"{mean_interval([1.0, 2.0]):.1f}" == "1.5 (no interval)"
+
+
+def test_an_interval_that_is_narrower_than_its_digits_has_more():
+    values = [1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0002, 1.0, 1.0, 0.99995]
+    assert f"{mean_interval(values):.2f}" == "1.0000 (1.0000 to 1.0001)"
+    assert f"{mean_interval([1.0] * 10):.2f}" == "1.00 (no interval)"
