@@ -176,10 +176,14 @@ def test_an_interrupt_that_is_lost_in_a_finalizer_ends_the_work():
         if task == 1:
             Interrupting()
 
-    with pytest.raises(KeyboardInterrupt):
-        list(shared_out(work, range(5), workers=1))
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)  # other tests may have left theirs
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            list(shared_out(work, range(5), workers=1))
+        assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    finally:
+        signal.signal(signal.SIGINT, before)
     assert done == [0, 1]
-    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
 def test_a_process_that_dies_takes_no_other_task_with_it():
