@@ -219,7 +219,7 @@ PAGE = """# Learned explorers
 
 Simulated time to 99 % of `C_free` of `learned`, which corrects [`predicted_tours`](prediction.md), over
 `tour_frontier`, and of `tour_frontier` over the best classic explorer, from the same starts. Kobuki, URG-04LX, perfect
-poses, no noise, maps of 5 cm; misses count with {horizon:.0f} s. Nothing was chosen by these floors. `srt`, SLAM and
+poses, no noise, maps of 5 cm; misses count with {horizon:.0f} s. No training saw these floors. `srt`, SLAM and
 unknown starts are on the [leaderboard](leaderboard.md).
 
 ## The weights

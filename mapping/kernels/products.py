@@ -1,7 +1,7 @@
 """Products of small matrices, each number summed in one order.
 
-BLAS sums in an order of the processor, and beside other programs its threads wait for each other in loops: networks of
-explorers took four times the processor time on two busy cores.
+The order of sums in BLAS depends on the processor. Its threads also busy-wait for each other when other programs use
+the cores: with two busy cores, networks of explorers took four times the processor time.
 """
 
 import numpy as np
