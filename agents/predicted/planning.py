@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.agents.tours.planning import TourOptions
+from lidarium.agents.tours.planning import TourOptions, first_places
 from lidarium.mapping.kernels.simd.lengths import FAR, STRAIGHT
 from lidarium.mapping.planning.touring.expected_views import cover, shares_left
 from lidarium.mapping.planning.touring.many_lengths import lengths_between
@@ -30,7 +30,7 @@ VISIT_M = 0.5
 """Cost of slowing down, turning and setting out at each stop [m]."""
 
 LEAST_SAVED = 0.5
-"""Robots depart from tours if that saves so much [m]; one that the rest does not need keeps to them."""
+"""Robots depart from tours, which may have nothing for them, if that saves so much [m]."""
 
 LEAST_EXTRA = 0.01
 """Least extra cost of options besides the one that tours begin with [m]."""
@@ -144,35 +144,46 @@ def costs_of(rest: Rest, robot: int, picks: list[int | None]) -> NDArray[np.floa
 
     ``picks`` are the options of the robots before it.
     """
-    options = rest.options
-    mask = options.is_reached[robot].copy()
+    begin, left = _begun(rest, picks)
+    mask = rest.options.is_reached[robot].copy()
     mask[[pick for pick in picks if pick is not None]] = False
     costs = np.full(len(mask), np.inf)
-    begin, left = rest.robots.copy(), np.ones(rest.left.shape[1])
-    for other, pick in enumerate(picks):
-        if pick is not None:
-            begin[other] = options.first[other, pick] + rest.lengths[pick]
-            left = left * rest.left[pick]
     for option in np.flatnonzero(mask):
-        first = float(options.first[robot, option])
-        wanted = left * rest.left[option] > KEPT_SHARE
-        begin[robot] = first + rest.lengths[option]
-        if not wanted.any():
-            costs[option] = first * (WEIGHTS.longest + WEIGHTS.total)
-            continue
-        starts = np.minimum(begin[:, wanted], NO_PATH) + VISIT_M
-        between = np.ascontiguousarray(rest.between[wanted][:, wanted]) + VISIT_M
-        worth = np.zeros(int(wanted.sum()))
-        tours = team_tours(starts, between, worth, WEIGHTS)
-        costs[option] = tours_cost(tours, starts, between, worth, WEIGHTS)
+        leg = float(rest.options.first[robot, option])
+        begin[robot] = leg + rest.lengths[option]
+        costs[option] = _cost(rest, robot, begin, left * rest.left[option], leg)
     return costs
+
+
+def _begun(rest: Rest, picks: list[int | None]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return paths to all stops, (robots, stops) [m], and what is left of these, if robots set out to their picks."""
+    begin, left = rest.robots.copy(), np.ones(rest.left.shape[1])
+    for robot, pick in enumerate(picks):
+        if pick is not None:
+            begin[robot] = rest.options.first[robot, pick] + rest.lengths[pick]
+            left = left * rest.left[pick]
+    return begin, left
+
+
+def _cost(rest: Rest, robot: int, begin: NDArray[np.float64], left: NDArray[np.float64], leg: float) -> float:
+    """Return the cost of all tours [m], and of the first leg of a robot that visits nothing after it."""
+    wanted = left > KEPT_SHARE
+    if not wanted.any():
+        return leg * (WEIGHTS.longest + WEIGHTS.total)
+    starts = np.minimum(begin[:, wanted], NO_PATH) + VISIT_M
+    between = np.ascontiguousarray(rest.between[wanted][:, wanted]) + VISIT_M
+    worth = np.zeros(len(between))
+    tours = team_tours(starts, between, worth, WEIGHTS)
+    cost = tours_cost(tours, starts, between, worth, WEIGHTS)
+    return cost if first_places(tours, len(worth))[robot] is not None else cost + WEIGHTS.total * leg
 
 
 def extra_costs(rest: Rest, robot: int, first: int | None, picks: list[int | None]) -> NDArray[np.float64]:
     """Return by how much all tours cost more if a robot sets out to each option, (options,) [m]; inf if it cannot.
 
     The option ``first``, with which its own tour begins, costs nothing if it is the robot's goal (then no other one is
-    rated), or if no other one saves much.
+    rated), or if no other one saves much. A robot without a tour has no option if none saves much: it would take it
+    from a teammate that is nearer.
     """
     is_open = first is not None and first not in picks
     if is_open and rest.options.is_kept[robot, first]:
@@ -181,6 +192,8 @@ def extra_costs(rest: Rest, robot: int, first: int | None, picks: list[int | Non
         return extra
     costs = costs_of(rest, robot, picks)
     least = costs.min()
+    if first is None and least > _cost(rest, robot, *_begun(rest, picks), 0.0) - LEAST_SAVED:
+        return np.full(len(costs), np.inf)
     extra = costs - least if np.isfinite(least) else costs
     if is_open and costs[first] <= least + LEAST_SAVED:
         extra = np.maximum(extra, LEAST_EXTRA)

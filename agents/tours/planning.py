@@ -367,11 +367,11 @@ def _options_of(request: TourRequest, k: int, plans: Plans, rules: PlanRules) ->
 
 def first_options(options: TourOptions) -> list[int | None]:
     """Return the option at which each robot's tour begins, None if there is none that it reaches."""
-    firsts = _first_places(options.sequence, len(options.numbers))
+    firsts = first_places(options.sequence, len(options.numbers))
     return [number if number is not None and options.is_reached[k, number] else None for k, number in enumerate(firsts)]
 
 
-def _first_places(sequence: NDArray[np.int64], count: int) -> list[int | None]:
+def first_places(sequence: NDArray[np.int64], count: int) -> list[int | None]:
     """Return the number of the first place of each robot's tour, None if it has none.
 
     Parameters
