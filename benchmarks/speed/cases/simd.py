@@ -228,6 +228,19 @@ def _raise_pixels(address: int, start: np.float32, slope: np.float32, first: int
 
 
 @_inlined
+def _bound_columns(edges: int, row: float, columns: float, begins: int, ends: int) -> None:
+    bounds = vector_at(edges, 16, np.float64)
+    firsts, lasts = vector_at(begins, 8, np.int32), vector_at(ends, 8, np.int32)
+    for k in range(8):
+        low, high = -0.5, columns - 0.5
+        for edge in range(0, 8, 2):
+            low = max(low, bounds[edge] + bounds[edge + 1] * (row + k))
+            high = min(high, bounds[edge + 8] + bounds[edge + 9] * (row + k))
+        firsts[k] = np.int32(np.ceil(min(low, columns) - 1e-7))
+        lasts[k] = np.int32(np.floor(max(high, -1.0) + 1e-7))
+
+
+@_inlined
 def _nearest_in_tile(points: int, codes: int, numbers: int, count: int, squares: int, labels: int) -> None:
     point, nearest = vector_at(points, 3 * BLOCK, np.float32), vector_at(squares, BLOCK, np.float32)
     code, number, chosen = (
@@ -383,6 +396,9 @@ def _calls() -> dict[str, tuple[Any, Any, Callable[[Any], Any]]]:
                 d.reals + 64 * (k + 2 * BLOCKS), 3.0, 0.5, -5.0, 5.0))),
         "raise_pixels": (faces.raise_pixels, _raise_pixels,
             lambda op: lambda d, k: op(d.pixels + 256 * k, f4(0.3), f4(0.01), k & 7, 12)),
+        "bound_columns": (faces.bound_columns, _bound_columns,
+            lambda op: (lambda d, k: op(d.reals + 64 * (k & ~1), 2.0, 64.0, d.labels + 64 * k,
+                d.labels + 64 * k + 32))),
         "nearest_in_tile": (codes.nearest_in_tile, _nearest_in_tile,
             lambda op: (lambda d, k: op(d.pixels + 256 * (k & 1023), d.pixels, d.grids, 20,
                 d.pixels + 256 * (k & 255) + 256 * 1100, d.labels + 256 * k))),

@@ -12,6 +12,7 @@ from lidarium.envs.simulation.depth.face_drawing import (
     FOCAL,
     NEAR,
     ROWS,
+    sides_beyond,
 )
 from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.kernels.views import scratch_vector
@@ -21,19 +22,24 @@ from lidarium.mapping.kernels.views import scratch_vector
 def _box_around(
     centre: Array, radius: float, height: float, axes: Array, eye: Array, view: Array
 ) -> tuple[int, int, int, int]:
-    """Return the first and last row and column of an image between which a cylinder lies."""
+    """Return the first and last row and column of an image between which a cylinder lies; none if first > last."""
     low_row, high_row, low_column, high_column = math.inf, -math.inf, math.inf, -math.inf
+    beyond, is_ahead = 63, True
     for corner in range(8):
         x = centre[0] - eye[0] + (radius if corner & 1 else -radius)
         y = centre[1] - eye[1] + (radius if corner & 2 else -radius)
         z = centre[2] - eye[2] + (height if corner & 4 else 0.0)
+        across = axes[0, 0] * x + axes[0, 1] * y + axes[0, 2] * z
+        down = axes[1, 0] * x + axes[1, 1] * y + axes[1, 2] * z
         ahead = axes[2, 0] * x + axes[2, 1] * y + axes[2, 2] * z
-        if ahead < NEAR:
-            return 0, int(view[ROWS]) - 1, 0, int(view[COLUMNS]) - 1
-        across = (axes[0, 0] * x + axes[0, 1] * y + axes[0, 2] * z) / ahead
-        down = (axes[1, 0] * x + axes[1, 1] * y + axes[1, 2] * z) / ahead
-        low_row, high_row = min(low_row, down), max(high_row, down)
-        low_column, high_column = min(low_column, across), max(high_column, across)
+        beyond &= sides_beyond(across, down, ahead, view)
+        is_ahead &= ahead >= NEAR
+        low_row, high_row = min(low_row, down / ahead), max(high_row, down / ahead)
+        low_column, high_column = min(low_column, across / ahead), max(high_column, across / ahead)
+    if beyond:
+        return 1, 0, 1, 0
+    if not is_ahead:
+        return 0, int(view[ROWS]) - 1, 0, int(view[COLUMNS]) - 1
     focal = view[FOCAL]
     return (
         max(int(math.ceil(max(view[CENTRE_ROW] + focal * low_row, 0.0))), 0),

@@ -15,7 +15,7 @@ from typing import Annotated, NamedTuple
 import numpy as np
 
 from lidarium.mapping.kernels.compilation import Array, kernel
-from lidarium.mapping.kernels.simd.faces import PIXELS, raise_pixels
+from lidarium.mapping.kernels.simd.faces import LINES, OVERLAP, PIXELS, WORD, bound_columns, raise_pixels
 from lidarium.mapping.kernels.views import scratch_grid
 
 FOCAL, CENTRE_COLUMN, CENTRE_ROW, DEPTH_MIN, DEPTH_MAX, COLUMNS, ROWS = range(7)
@@ -24,9 +24,6 @@ FOCAL, CENTRE_COLUMN, CENTRE_ROW, DEPTH_MIN, DEPTH_MAX, COLUMNS, ROWS = range(7)
 CORNERS = 4
 NEAR = 1e-3
 """Depth of the plane at which the rows of a face are bounded [m]."""
-
-OVERLAP = 1e-7
-"""Overlap of faces beyond their edges, so that rounding leaves no gap between two [pixels]."""
 
 LEVEL = 1e-12
 """An edge whose line hardly changes along a row bounds rows, not columns."""
@@ -57,21 +54,22 @@ class Span(NamedTuple):
     ----------
     camera_corners : (4, 3) float64
         Corners in the optical frame [m].
-    bounds : (2, rows) float64
-        First and last column position of the face on each row [columns].
-    columns : (2, rows) int64
+    edges : (2, 4, 2) float64
+        Lines that bound the columns from below and from above: column at row 0, and its change a row.
+    columns : (2, rows + padding) int32
         First and last column of each row with its centre in the face; empty if the first is greater.
     """
 
     camera_corners: Array
-    bounds: Array
+    edges: Array
     columns: Array
 
 
 @kernel
 def new_span(rows: int) -> Span:
     """Return scratch for the faces of an image."""
-    return Span(np.empty((CORNERS, 3)), np.empty((2, rows)), np.empty((2, rows), np.int64))
+    padded = (rows + LINES - 1) // LINES * LINES
+    return Span(np.empty((CORNERS, 3)), np.empty((2, CORNERS, 2)), np.empty((2, padded), np.int32))
 
 
 @kernel(nrt=False)
@@ -128,31 +126,62 @@ def _rows_of(corners: Array, view: Array) -> tuple[int, int]:
     return int(math.ceil(max(first, 0.0))), int(math.floor(min(last, view[ROWS] - 1.0)))
 
 
-@kernel(nrt=False)
-def _is_outside(corners: Array, view: Array) -> bool:
-    """Whether all corners in the optical frame lie beyond one of the planes around the view."""
-    left, right = (
-        (-0.5 - view[CENTRE_COLUMN]) / view[FOCAL],
-        (view[COLUMNS] - 0.5 - view[CENTRE_COLUMN]) / view[FOCAL],
+@kernel(forceinline=True, nrt=False)
+def sides_beyond(x: float, y: float, z: float, view: Array) -> int:
+    """Return the planes around the view beyond which a point in the optical frame lies, as bits.
+
+    What has all its corners beyond one of them is not in the image.
+    """
+    focal = view[FOCAL]
+    return (
+        (1 if focal * x < (-0.5 - view[CENTRE_COLUMN]) * z else 0)
+        | (2 if focal * x > (view[COLUMNS] - 0.5 - view[CENTRE_COLUMN]) * z else 0)
+        | (4 if focal * y < (-0.5 - view[CENTRE_ROW]) * z else 0)
+        | (8 if focal * y > (view[ROWS] - 0.5 - view[CENTRE_ROW]) * z else 0)
+        | (16 if z <= 0.0 else 0)
+        | (32 if z > view[DEPTH_MAX] else 0)
     )
-    top, bottom = (-0.5 - view[CENTRE_ROW]) / view[FOCAL], (view[ROWS] - 0.5 - view[CENTRE_ROW]) / view[FOCAL]
+
+
+@kernel(nrt=False)
+def _outline(corners: Array, axes: Array, eye: Array, view: Array, span: Span) -> tuple[int, int]:
+    """Find the edges of a face in an image; return the first and the last row that it may cover."""
+    places, lows, highs = span.camera_corners, span.edges[0], span.edges[1]
     beyond = 63
     for k in range(CORNERS):
-        x, y, z = corners[k, 0], corners[k, 1], corners[k, 2]
-        beyond &= (
-            (1 if x < left * z else 0)
-            | (2 if x > right * z else 0)
-            | (4 if y < top * z else 0)
-            | (8 if y > bottom * z else 0)
-            | (16 if z <= 0.0 else 0)
-            | (32 if z > view[DEPTH_MAX] else 0)
-        )
-    return beyond != 0
+        x, y, z = corners[k, 0] - eye[0], corners[k, 1] - eye[1], corners[k, 2] - eye[2]
+        for axis in range(3):
+            places[k, axis] = axes[axis, 0] * x + axes[axis, 1] * y + axes[axis, 2] * z
+        beyond &= sides_beyond(places[k, 0], places[k, 1], places[k, 2], view)
+    if beyond:
+        return 1, 0
+    first, last = _rows_of(places, view)
+    scale = 1.0 / view[FOCAL]
+    for k in range(CORNERS):
+        a, b = places[k], places[(k + 1) % CORNERS]
+        along = (a[1] * b[2] - a[2] * b[1]) * scale
+        across = (a[2] * b[0] - a[0] * b[2]) * scale
+        ahead = a[0] * b[1] - a[1] * b[0]
+        lows[k, 0], lows[k, 1], highs[k, 0], highs[k, 1] = -0.5, 0.0, view[COLUMNS] - 0.5, 0.0
+        # The edge bounds columns u with along * (u - cx) + across * (v - cy) + ahead <= 0.
+        if abs(along) > LEVEL * (abs(across) + abs(ahead)):
+            inverse = 1.0 / along
+            slope = -across * inverse
+            start = view[CENTRE_COLUMN] - ahead * inverse - slope * view[CENTRE_ROW]
+            edge = highs[k] if along > 0.0 else lows[k]
+            edge[0], edge[1] = start, slope
+        elif abs(across) > 0.0:
+            bound = view[CENTRE_ROW] - ahead / across
+            if across > 0.0:
+                last = min(last, int(math.floor(min(bound + OVERLAP, view[ROWS]))))
+            else:
+                first = max(first, int(math.ceil(max(bound - OVERLAP, 0.0))))
+    return first, last
 
 
 @kernel(nrt=False)
 def cover(corners: Array, axes: Array, eye: Array, view: Array, span: Span) -> tuple[int, int]:
-    """Find the columns that a face covers on each row of an image.
+    """Find the columns that a face covers on each row of an image; return its first and last row.
 
     Parameters
     ----------
@@ -163,44 +192,11 @@ def cover(corners: Array, axes: Array, eye: Array, view: Array, span: Span) -> t
     view : (7,) float64
         Numbers of the view.
     """
-    places = span.camera_corners
-    for k in range(CORNERS):
-        x, y, z = corners[k, 0] - eye[0], corners[k, 1] - eye[1], corners[k, 2] - eye[2]
-        for axis in range(3):
-            places[k, axis] = axes[axis, 0] * x + axes[axis, 1] * y + axes[axis, 2] * z
-    if _is_outside(places, view):
-        return 1, 0
-    first, last = _rows_of(places, view)
-    low, high = span.bounds[0], span.bounds[1]
-    for row in range(first, last + 1):
-        low[row], high[row] = -0.5, view[COLUMNS] - 0.5
-    scale = 1.0 / view[FOCAL]
-    for k in range(CORNERS):
-        a, b = places[k], places[(k + 1) % CORNERS]
-        along = (a[1] * b[2] - a[2] * b[1]) * scale
-        across = (a[2] * b[0] - a[0] * b[2]) * scale
-        ahead = a[0] * b[1] - a[1] * b[0]
-        # The edge bounds columns u with along * (u - cx) + across * (v - cy) + ahead <= 0.
-        if abs(along) > LEVEL * (abs(across) + abs(ahead)):
-            inverse = 1.0 / along
-            slope = -across * inverse
-            start = view[CENTRE_COLUMN] - ahead * inverse - slope * view[CENTRE_ROW]
-            if along > 0.0:
-                for row in range(first, last + 1):
-                    high[row] = min(high[row], start + slope * row)
-            else:
-                for row in range(first, last + 1):
-                    low[row] = max(low[row], start + slope * row)
-        elif abs(across) > 0.0:
-            bound = view[CENTRE_ROW] - ahead / across
-            if across > 0.0:
-                last = min(last, int(math.floor(min(bound + OVERLAP, view[ROWS]))))
-            else:
-                first = max(first, int(math.ceil(max(bound - OVERLAP, 0.0))))
-    begins, ends = span.columns[0], span.columns[1]
-    for row in range(first, last + 1):
-        begins[row] = int(math.ceil(low[row] - OVERLAP))
-        ends[row] = int(math.floor(high[row] + OVERLAP))
+    first, last = _outline(corners, axes, eye, view, span)
+    begins, ends = span.columns[0].ctypes.data, span.columns[1].ctypes.data
+    for row in range(first & -LINES, last + 1, LINES):
+        offset = WORD * row
+        bound_columns(span.edges.ctypes.data, float(row), view[COLUMNS], begins + offset, ends + offset)
     return first, last
 
 
@@ -235,7 +231,7 @@ def draw_faces(faces: FaceArrays, axes: Array, eye: Array, view: Array, span: Sp
         start, along, across = inverse_plane(faces.planes[face], axes, eye, view)
         slope = np.float32(along)
         for row in range(first, last + 1):
-            left, right = begins[row], ends[row]
+            left, right = int(begins[row]), int(ends[row])
             # Rounded once a block: the inverse depth at a block's first column.
             base, address = start + across * row, pixels + 4 * row * width
             for column in range(left & -PIXELS, right + 1, PIXELS):

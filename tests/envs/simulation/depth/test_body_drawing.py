@@ -80,3 +80,10 @@ def test_what_is_nearer_stays():
 @pytest.mark.parametrize("centre", [(-1.5, 0.0, 0.0), (9.0, 0.0, 0.0), (1.0, 3.0, 0.0), (0.0, 0.0, 0.0)])
 def test_bodies_behind_beyond_and_around_the_camera_are_not_seen(centre):
     assert not drawn(centre, 0.3, 1.0).any()
+
+
+@pytest.mark.parametrize("heading", np.arange(0.0, 2.0 * math.pi, 0.2))
+def test_a_body_beside_or_behind_the_camera_is_drawn_where_rays_meet_it(heading):
+    near = (0.3 * math.cos(heading), 0.3 * math.sin(heading), 0.0)
+    inverse, depths = drawn(near, 0.2, 0.6), depths_by_steps(near, 0.2, 0.6)
+    assert ((inverse > 0.0) != np.isfinite(depths)).sum() <= 3
