@@ -9,7 +9,8 @@ Only files with names of entries are read and removed, and nothing is reached th
 
 The entries lie in a few folders, each bounded by its share of the whole: a process that writes makes room in
 one of them without reading the others, independent of what other processes write. The entry used
-longest ago goes first; a process that is reading it can continue.
+longest ago goes first; a process that is reading it can continue. A process looks at a folder again once it has written
+a part of what was left there, since thousands of entries take longer to list than a floor to make.
 """
 
 import contextlib
@@ -51,6 +52,12 @@ PARTS = 16
 They are chosen by the first digit of the hash of their keys.
 """
 
+SHARERS = 4
+"""Number of processes that may write without looking before a folder grows larger than its share."""
+
+SPARED = 1.0 / 16.0
+"""Share of a folder that is emptied beyond what is needed, so that the next entries find room."""
+
 _MAGIC = b"lidarium"
 _DIGEST_BYTES = 32
 _BLOCK = 4096
@@ -74,6 +81,7 @@ class Store:
 
     def __init__(self, folder: Path | None, max_bytes: int) -> None:
         self.folder, self.max_bytes = folder, max_bytes
+        self._unseen: dict[Path, int] = {}  # what this process may still write before it looks at a folder again
 
     def load(self, key: str) -> Arrays | None:
         """Return the arrays of a key, read-only.
@@ -100,14 +108,19 @@ class Store:
             return
         packed = _packed(arrays)
         content = _MAGIC + _digest(key, packed) + packed
-        path, room = self._path(key), self.max_bytes // PARTS - _on_disk(len(content))
-        if room < 0:
+        path, size, most = self._path(key), _on_disk(len(content)), self.max_bytes // PARTS
+        if size > most:
             return
+        part = path.parent
         with contextlib.suppress(OSError):
-            path.parent.mkdir(parents=True, exist_ok=True)
-            if not path.parent.is_symlink():
-                _shrink(path.parent, room)
-                write_whole(path, content, is_lasting=False)
+            part.mkdir(parents=True, exist_ok=True)
+            if part.is_symlink():
+                return
+            unseen = self._unseen.get(part, 0) - size
+            if unseen < 0:
+                unseen = (most - size - _shrink(part, most - size)) // SHARERS
+            write_whole(path, content, is_lasting=False)
+            self._unseen[part] = unseen
 
     def size(self) -> int:
         """Return how many bytes the entries take."""
@@ -210,13 +223,12 @@ def _content(path: Path) -> bytes:
     return path.read_bytes()
 
 
-def _files(folder: Path) -> list[tuple[float, int, Path]]:
+def _files(folder: Path) -> list[tuple[float, int, str]]:
     """Return time of last use, size and path of a folder's entries.
 
-    Unfinished writes of broken processes are included; other files are never removed, nor is the target of a link
-    leads to is another's.
+    Unfinished writes of broken processes are included. Others' files are not, nor are links.
     """
-    files: list[tuple[float, int, Path]] = []
+    files: list[tuple[float, int, str]] = []
     if folder.is_symlink():
         return files
     with contextlib.suppress(OSError), os.scandir(folder) as entries:
@@ -226,17 +238,20 @@ def _files(folder: Path) -> list[tuple[float, int, Path]]:
             with contextlib.suppress(OSError):
                 status = entry.stat(follow_symlinks=False)
                 if stat.S_ISREG(status.st_mode):
-                    files.append((status.st_mtime, _on_disk(status.st_size), Path(entry.path)))
+                    files.append((status.st_mtime, _on_disk(status.st_size), entry.path))
     return files
 
 
-def _shrink(folder: Path, max_bytes: int) -> None:
-    """Remove the least recently used entries until a folder is not larger than that."""
+def _shrink(folder: Path, max_bytes: int) -> int:
+    """Remove the least recently used entries if a folder is larger than that; return its size then."""
     files = _files(folder)
     size = sum(size for _, size, _ in files)
+    if size <= max_bytes:
+        return size
     for _, length, path in sorted(files):
-        if size <= max_bytes:
-            return
+        if size <= max_bytes - int(SPARED * max_bytes) // _BLOCK * _BLOCK:
+            break
         with contextlib.suppress(OSError):
-            path.unlink()
+            os.unlink(path)
         size -= length
+    return size

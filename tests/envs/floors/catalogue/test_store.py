@@ -105,6 +105,26 @@ def test_the_bound_holds_and_what_was_used_longest_ago_goes_first(tmp_path):
     assert 0.8 * kept.max_bytes < kept.size() <= kept.max_bytes
 
 
+def test_a_full_folder_is_not_listed_for_each_entry(tmp_path, monkeypatch):
+    """The fault that was found: a full store took 50 ms for each new floor."""
+    kept, looks = Store(tmp_path, PARTS * 256 * 4096), []
+    files = store._files
+    monkeypatch.setattr(store, "_files", lambda folder: looks.append(folder) or files(folder))
+    keys = [key for key in map(str, range(7_000)) if kept._path(key).parent.name == "7"][:400]
+    for key in keys:
+        kept.save(key, ARRAYS)
+    assert len(looks) < len(keys) // 3
+    assert 240 * 4096 <= kept.size() <= 256 * 4096
+    assert kept.load(keys[-1]) is not None
+
+
+def test_what_other_processes_write_is_seen_before_a_folder_is_too_large(tmp_path):
+    stores = [Store(tmp_path, PARTS * 32 * 4096) for _ in range(store.SHARERS)]
+    for number in range(1200):
+        stores[number % len(stores)].save(str(number), ARRAYS)
+    assert all(sum(size for _, size, _ in store._files(part)) <= 32 * 4096 for part in tmp_path.glob("?"))
+
+
 def test_what_is_larger_than_its_part_is_not_kept(tmp_path):
     kept = Store(tmp_path, PARTS * 4096)
     kept.save("large", {"noise": np.random.default_rng(0).integers(0, 255, 5000, np.uint8)})
