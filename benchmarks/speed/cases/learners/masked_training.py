@@ -116,12 +116,12 @@ NOTES = (
     f"*MaskablePPO*: of sb3-contrib, its `MultiInputPolicy`, {LEARNER.episodes} episodes of one robot on `{FLOORS}` "
     f"from the store of floors, {LEARNER.rollout} decisions of each between updates of {LEARNER.epochs} epochs. Steps "
     f"are decisions, by the clock. *All floors in memory*: `{SIZE_VARIABLE}={ALL_MIB}`; the default is {DEFAULT_MIB:g} "
-    "MiB.",
+    "MiB. *Prepared*: the same training again, whose floors come from the store. *Simulator's share*: of the time.",
 )
 
 
 def measure(effort: Effort) -> list[Line]:
-    """Measure training with as many floors in memory as usual, with all of them, and on many floors."""
+    """Measure training with as many floors in memory as usual, with all of them, on many floors, and in `fast`."""
     name = f"MaskablePPO, {LEARNER.episodes} episodes, two cores"
     if not is_there():
         return [Line(name, "-", f"not measured: {install_command('rl')}", None, TO_REACH, unit="steps/s")]
@@ -131,9 +131,16 @@ def measure(effort: Effort) -> list[Line]:
         (name, LEARNER, None),
         (f"{name}, all floors in memory", LEARNER, ALL_MIB),
         (f"{name}, floors drawn from 10,000", many, None),
+        (f"{name}, floors drawn from 10,000, prepared", many, None),
+        (f"{name}, all floors in memory, fast", replace(LEARNER, world={**ROBOT, "realism": "fast"}), ALL_MIB),
     ):
-        rate = statistics.median(rate for rate, _ in timings(learner, effort.rounds, mebibytes))
-        lines.append(Line(title, f"{shown(rate)} steps/s", "-", None, TO_REACH, rate, unit="steps/s"))
+        found = timings(learner, effort.rounds, mebibytes)
+        rate, share = (statistics.median(each) for each in zip(*found, strict=True))
+        told = f"{shown(rate)} steps/s"
+        lines += [
+            Line(title, told, "-", None, TO_REACH, rate, unit="steps/s"),
+            Line(f"{title}, the simulator's share", f"{share:.2f}", "-", None, None, share, unit="of the time"),
+        ]
     return lines
 
 
