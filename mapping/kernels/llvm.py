@@ -165,8 +165,8 @@ def max_lanes(builder: Builder, value: Value, other: Value) -> Value:
 def smaller(builder: Builder, value: Value, other: Value) -> Value:
     """Return the smaller of two float64 in each lane; none is nan.
 
-    If ``other`` was loaded from where the result goes, a selection would become a masked store, which takes 12
-    cycles on a Zen 3.
+    If ``other`` was loaded from where the result goes, a selection would become a masked store, which processors
+    without AVX-512 may carry out lane by lane.
     """
     kind = value.type
     name = f"llvm.minnum.v{kind.count}f64"
