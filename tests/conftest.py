@@ -1,6 +1,8 @@
 """What all tests share."""
 
 import os
+import signal
+from collections.abc import Iterator
 from pathlib import Path
 
 import hypothesis
@@ -42,6 +44,16 @@ def shared_cases() -> Path:
     if not folder.is_dir():
         pytest.skip(f"no files of other programs at {folder}; set LIDARIUM_DATA to a folder beside it")
     return folder
+
+
+@pytest.fixture(autouse=True)
+def handlers_of_signals() -> Iterator[None]:
+    """Put back the handlers of Ctrl-C and SIGTERM: a command that was interrupted leaves one that ends the process."""
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    yield
+    for number, handler in before.items():
+        if signal.getsignal(number) is not handler:
+            signal.signal(number, handler)
 
 
 _FIRST = (
