@@ -162,18 +162,6 @@ def max_lanes(builder: Builder, value: Value, other: Value) -> Value:
     return builder.select(builder.icmp_signed(">", value, other), value, other)
 
 
-def smaller(builder: Builder, value: Value, other: Value) -> Value:
-    """Return the smaller of two float64 in each lane; none is nan.
-
-    If ``other`` was loaded from where the result goes, a selection would become a masked store, which processors
-    without AVX-512 may carry out lane by lane.
-    """
-    kind = value.type
-    name = f"llvm.minnum.v{kind.count}f64"
-    function = _utils.get_or_insert_function(builder.module, ir.FunctionType(kind, [kind, kind]), name)
-    return builder.call(function, [value, other], fastmath=("nnan", "nsz"))
-
-
 HAS_GATHERS = has_feature("avx512f")
 """Whether the processor looks up sixteen numbers at once in registers that are wide enough."""
 

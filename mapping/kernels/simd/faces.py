@@ -1,7 +1,5 @@
 """Drawing a face: ranges of eight beams, or inverse depths of sixteen pixels, at once."""
 
-import math
-
 import numpy as np
 from llvmlite import ir
 from numba import types
@@ -15,7 +13,6 @@ from lidarium.mapping.kernels.llvm import (
     lanewise,
     llvm_overload,
     load_at,
-    smaller,
     splat,
     store_at,
     vector,
@@ -70,8 +67,9 @@ def _(
     along = builder.fadd(run, builder.fmul(candidates, load_at(builder, directions, _BEAMS)))
     is_within = builder.and_(builder.fcmp_ordered("<=", low, along), builder.fcmp_ordered("<=", along, high))
     is_ahead = builder.fcmp_ordered(">", candidates, constant(_BEAMS, 0.0))
-    met = builder.select(builder.and_(is_within, is_ahead), candidates, constant(_BEAMS, math.inf))
-    store_at(builder, smaller(builder, met, nearest), ranges)
+    is_nearer = builder.and_(is_ahead, builder.fcmp_ordered("<", candidates, nearest))
+    is_met = builder.and_(is_within, is_nearer)
+    store_at(builder, builder.select(is_met, candidates, nearest), ranges)
 
 
 def raise_pixels(address: int, start: np.float32, slope: np.float32, first: int, last: int) -> None:
@@ -96,7 +94,8 @@ def _(builder: Builder, address: Value, start: Value, slope: Value, first: Value
     after = builder.sext(builder.icmp_signed(">", low, indices), _INDICES)
     before = builder.sext(builder.icmp_signed(">", indices, high), _INDICES)
     is_within = builder.not_(builder.or_(after, before))
-    # Numbers that are not negative compare as their words do. `smaller` says what a selection would cost.
+    # Numbers that are not negative compare as their words do. A store of a selection between new and old pixels would
+    # become a masked one, which processors without AVX-512 may carry out lane by lane.
     words = builder.and_(builder.bitcast(new, _INDICES), is_within)
     store_at(builder, lanewise(builder, "smax", words, old), address)
 

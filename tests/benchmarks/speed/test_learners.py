@@ -75,8 +75,11 @@ def test_a_training_is_measured_by_its_steps(monkeypatch, short):
     few = replace(masked_training.LEARNER, episodes=2, rollout=4, epochs=1, floors="apartment")
     monkeypatch.setattr(masked_training, "LEARNER", few)
     lines = masked_training.measure(LEAST)
-    assert all(line.figure > 0.0 and line.ours.endswith("steps/s") for line in lines)
-    assert short == ["100", str(masked_training.ALL_MIB), "100"]
+    rates, shares = lines[::2], lines[1::2]
+    assert all(line.figure > 0.0 and line.ours.endswith("steps/s") for line in rates)
+    assert all(0.0 < line.figure < 1.0 and line.name.endswith("the simulator's share") for line in shares)
+    everything = str(masked_training.ALL_MIB)
+    assert short == ["100", everything, "100", "100", everything]
     assert os.environ[SIZE_VARIABLE] == "100"
 
 
