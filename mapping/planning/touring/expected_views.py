@@ -54,6 +54,8 @@ def cover(
     (m,) int64, (m,) float64
         Numbers of the places, and the area that each shows [cells].
     """
+    if len(places) == 0:
+        return np.zeros(0, np.int64), np.zeros(0)
     field = _field(free, unseen, reach)
     chosen, gains = _cover(field, _cells_of(places, field), least, spare, most)
     return chosen, gains

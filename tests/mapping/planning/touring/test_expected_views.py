@@ -49,6 +49,12 @@ def maps():
     return free, unseen.astype(np.float32)
 
 
+def test_without_a_place_nothing_is_chosen(maps):
+    """The fault that was found: on a map of MapEx robots stood where no place of the lattice is open."""
+    chosen, gains = cover(*maps, np.zeros((0, 2), np.int64), 9, 4.0, 20.0, 8)
+    assert (len(chosen), len(gains)) == (0, 0)
+
+
 def test_places_are_chosen_by_what_they_add(maps):
     free, unseen = maps
     places = np.argwhere(np.ones((8, 10))) * 3
