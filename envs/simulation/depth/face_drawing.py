@@ -193,6 +193,8 @@ def cover(corners: Array, axes: Array, eye: Array, view: Array, span: Span) -> t
         Numbers of the view.
     """
     first, last = _outline(corners, axes, eye, view, span)
+    if first > last:
+        return first, last
     begins, ends = span.columns[0].ctypes.data, span.columns[1].ctypes.data
     for row in range(first & -LINES, last + 1, LINES):
         offset = WORD * row
