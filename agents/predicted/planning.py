@@ -174,7 +174,7 @@ def _cost(rest: Rest, robot: int, begin: NDArray[np.float64], left: NDArray[np.f
     between = np.ascontiguousarray(rest.between[wanted][:, wanted]) + VISIT_M
     worth = np.zeros(len(between))
     tours = team_tours(starts, between, worth, WEIGHTS)
-    cost = tours_cost(tours, starts, between, worth, WEIGHTS)
+    cost = float(tours_cost(tours, starts, between, worth, WEIGHTS))
     return cost if first_places(tours, len(worth))[robot] is not None else cost + WEIGHTS.total * leg
 
 
