@@ -156,7 +156,7 @@ def costs_of(rest: Rest, robot: int, picks: list[int | None]) -> NDArray[np.floa
 
 
 def _begun(rest: Rest, picks: list[int | None]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return paths to all stops, (robots, stops) [m], and what is left of these, if robots set out to their picks."""
+    """Return the paths to all stops, (robots, stops) [m], and the share left of each, after all picks."""
     begin, left = rest.robots.copy(), np.ones(rest.left.shape[1])
     for robot, pick in enumerate(picks):
         if pick is not None:

@@ -9,8 +9,8 @@ Only files with names of entries are read and removed, and nothing is reached th
 
 The entries lie in a few folders, each bounded by its share of the whole: a process that writes makes room in
 one of them without reading the others, independent of what other processes write. The entry used
-longest ago goes first; a process that is reading it can continue. A process looks at a folder again once it has written
-a part of what was left there, since thousands of entries take longer to list than a floor to make.
+longest ago goes first; a process that is reading it can continue. A process lists a folder again only
+after it has written a part of the free space: listing thousands of entries takes half as long as making a floor.
 """
 
 import contextlib
@@ -53,10 +53,10 @@ They are chosen by the first digit of the hash of their keys.
 """
 
 SHARERS = 4
-"""Number of processes that may write without looking before a folder grows larger than its share."""
+"""Number of processes that can write between two listings without exceeding a folder's limit."""
 
 SPARED = 1.0 / 16.0
-"""Share of a folder that is emptied beyond what is needed, so that the next entries find room."""
+"""Share of a full folder that is freed in addition to what the new entry needs."""
 
 _MAGIC = b"lidarium"
 _DIGEST_BYTES = 32
@@ -81,7 +81,7 @@ class Store:
 
     def __init__(self, folder: Path | None, max_bytes: int) -> None:
         self.folder, self.max_bytes = folder, max_bytes
-        self._unseen: dict[Path, int] = {}  # what this process may still write before it looks at a folder again
+        self._unseen: dict[Path, int] = {}  # bytes that may be written before the next listing
 
     def load(self, key: str) -> Arrays | None:
         """Return the arrays of a key, read-only.

@@ -22,7 +22,7 @@ from lidarium.mapping.kernels.views import scratch_vector
 def _box_around(
     centre: Array, radius: float, height: float, axes: Array, eye: Array, view: Array
 ) -> tuple[int, int, int, int]:
-    """Return the first and last row and column of an image between which a cylinder lies; none if first > last."""
+    """Return the first and last row and column of a cylinder in the image; it is not in it if first > last."""
     low_row, high_row, low_column, high_column = math.inf, -math.inf, math.inf, -math.inf
     beyond, is_ahead = 63, True
     for corner in range(8):

@@ -128,9 +128,9 @@ def _rows_of(corners: Array, view: Array) -> tuple[int, int]:
 
 @kernel(forceinline=True, nrt=False)
 def sides_beyond(x: float, y: float, z: float, view: Array) -> int:
-    """Return the planes around the view beyond which a point in the optical frame lies, as bits.
+    """Return which planes of the view frustum a point in the optical frame is outside of, as bits.
 
-    What has all its corners beyond one of them is not in the image.
+    A body whose corners are all outside of the same plane is not in the image.
     """
     focal = view[FOCAL]
     return (

@@ -8,7 +8,7 @@ from lidarium.agents.predicted.planning import Rest, extra_costs
 
 
 def rest_of(robots, options, stops, shown):
-    """Return the rest of a floor along a line; ``shown`` says which option shows which stop."""
+    """Return the rest of a one-dimensional floor; ``shown`` has a row of stops for each option."""
     robots, options, stops = (np.array(each, np.float64) for each in (robots, options, stops))
 
     def apart(first, second):

@@ -50,7 +50,7 @@ def maps():
 
 
 def test_without_a_place_nothing_is_chosen(maps):
-    """The fault that was found: on a map of MapEx robots stood where no place of the lattice is open."""
+    """On a map of MapEx no point of the lattice near the robot was free, and the policy crashed."""
     chosen, gains = cover(*maps, np.zeros((0, 2), np.int64), 9, 4.0, 20.0, 8)
     assert (len(chosen), len(gains)) == (0, 0)
 
