@@ -15,7 +15,7 @@ from lidarium.envs.settings.making import make_settings
 from lidarium.mapping.files.guarded_reading import read_text, reading
 from lidarium.mapping.geometry.bounds import above, check_settings, share, shown, within
 from lidarium.mapping.prediction.predictors import make_predictor
-from lidarium.training.prediction.settings import DUNGEON, PredictionSettings
+from lidarium.training.prediction.settings import DUNGEON, SHIPPED, PredictionSettings
 
 MOST_BYTES = 1 << 20
 """Files of settings are no larger."""
@@ -23,8 +23,8 @@ MOST_BYTES = 1 << 20
 FLOOR_KINDS = ("building", *KINDS, DUNGEON)
 """Kinds of generated floors to train on."""
 
-FROM_TOURS, SHIPPED = "tours", "shipped"
-"""Networks to begin with: one that corrects nothing, and that of the package."""
+FROM_TOURS = "tours"
+"""Network to begin with that corrects nothing."""
 
 Part = TypeVar("Part")
 

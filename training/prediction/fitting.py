@@ -17,10 +17,10 @@ from torch.nn import functional
 from lidarium.mapping.files.guarded_reading import read_bytes
 from lidarium.mapping.files.output import write_whole
 from lidarium.mapping.prediction.levels import FREE, OCCUPIED, SIDE, UNKNOWN
-from lidarium.mapping.prediction.network import WINDOW
+from lidarium.mapping.prediction.network import WINDOW, load_weights
 from lidarium.training.prediction.maps import FloorMaps
 from lidarium.training.prediction.quality import NEAR_M, Quality, QualityTally
-from lidarium.training.prediction.settings import PredictionSettings
+from lidarium.training.prediction.settings import SHIPPED, PredictionSettings
 from lidarium.training.prediction.torch_map_network import TorchMapNetwork
 
 JITTER = 40
@@ -115,6 +115,8 @@ class Fitting:
         self._settings, self._path, self.device = settings, path, torch.device(device)
         torch.manual_seed(settings.seed)
         self.network = TorchMapNetwork().to(self.device)
+        if settings.begin:
+            self.network.set_weights(dict(load_weights("" if settings.begin == SHIPPED else settings.begin)))
         self._optimizer = torch.optim.AdamW(
             self.network.parameters(), lr=settings.learning_rate, weight_decay=settings.weight_decay
         )

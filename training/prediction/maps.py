@@ -22,14 +22,15 @@ from lidarium.mapping.files.output import write_whole
 from lidarium.mapping.prediction.levels import factor_of, levels_of
 from lidarium.mapping.prediction.predictors import PartialMap
 from lidarium.training.prediction.dungeons import draw_dungeon
-from lidarium.training.prediction.settings import DUNGEON, PredictionSettings
+from lidarium.training.prediction.plans import draw_plan, plan_number
+from lidarium.training.prediction.settings import DUNGEON, PLAN, PredictionSettings
 
 EXPLORERS = ("nearest_frontier", "tour_frontier")
 LIDARS = ("urg", "urg", "lidar_360_6m", "lidar_360_20m")
 COVERAGES = (0.02, 0.97)
 """Maps are taken when a team has seen so much, at least and at most."""
 
-BUILDING_SEEDS = 2
+BUILDING_SEEDS, PLAN_SEEDS = 2, 12
 """Floors of a seed differ from those that other trainings make of it by this second word of their draws."""
 
 
@@ -49,14 +50,32 @@ class FloorMaps:
     is_free: NDArray[np.bool_]
 
 
-def floor_of(settings: PredictionSettings, number: int) -> Floor:
-    """Return the n-th floor of a training; buildings are of seeds of the training set, with sizes of many plans."""
+def source_of(settings: PredictionSettings, number: int) -> tuple[int, ...]:
+    """Return what the n-th floor of a training is made of: floors of one plan share it."""
+    if _drawn_kind(settings, number)[0] == PLAN:
+        return (plan_number(settings.plans, _plan_seed(settings, number)), PLAN_SEEDS)
+    return (number,)
+
+
+def _drawn_kind(settings: PredictionSettings, number: int) -> tuple[str, np.random.Generator]:
+    """Return the kind of the n-th floor, and the generator of what else is drawn."""
     generator = np.random.default_rng([settings.seed, BUILDING_SEEDS, number])
     often = np.array(list(settings.kinds.values()), np.float64)
-    kind = str(generator.choice(list(settings.kinds), p=often / often.sum()))
+    return str(generator.choice(list(settings.kinds), p=often / often.sum())), generator
+
+
+def _plan_seed(settings: PredictionSettings, number: int) -> tuple[int, int, int]:
+    return settings.seed, PLAN_SEEDS, number
+
+
+def floor_of(settings: PredictionSettings, number: int) -> Floor:
+    """Return the n-th floor of a training; buildings are of seeds of the training set, with sizes of many plans."""
+    kind, generator = _drawn_kind(settings, number)
     seed = SETS["train"][0] + number
     if kind == DUNGEON:
         return draw_dungeon(seed)
+    if kind == PLAN:
+        return draw_plan(settings.plans, _plan_seed(settings, number), settings.bare_share)
     is_bare, is_usual = generator.random() < settings.bare_share, generator.random() < 0.6
     clutter = 0.0 if is_bare else None
     if is_usual:

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Annotated
 
 from lidarium.envs.floors.generation.buildings import KINDS
@@ -10,8 +11,14 @@ from lidarium.mapping.geometry.bounds import above, check_settings, share, shown
 DUNGEON = "dungeon"
 """Kind of the floors of rooms and tunnels that are drawn for this training."""
 
-MAP_KINDS = (*KINDS, DUNGEON)
+PLAN = "plan"
+"""Kind of the floors that are variants of given ones."""
+
+MAP_KINDS = (*KINDS, DUNGEON, PLAN)
 """Kinds of floors to learn from."""
+
+SHIPPED = "shipped"
+"""Network to begin with that is the package's."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -28,8 +35,12 @@ class PredictionSettings:
         Partial maps of a floor.
     kinds : dict of float
         How often each kind of floor comes, besides the others.
+    plans : tuple of str, default ()
+        Names or files of the floors whose variants are of the kind "plan"; two at least.
+    begin : str, default ""
+        Network to begin with: a file of weights, "shipped" for that of the package, or "" for none.
     bare_share, noisy_share : float, default 0.35, 0.3
-        So many of the buildings have no furniture, and so many of the runs noisy lasers.
+        So many of the buildings and plans have no furniture, and so many of the runs noisy lasers.
     floors_minutes, fit_minutes : float, default 0.0
         Exploring and fitting end after so long, over all interrupted calls; 0 for no limit. With a limit the
         result depends on the speed of the machine.
@@ -53,6 +64,8 @@ class PredictionSettings:
     kinds: Mapping[str, float] = field(
         default_factory=lambda: {"apartment": 0.4, "office": 0.25, "corridors": 0.15, DUNGEON: 0.2}
     )
+    plans: tuple[str, ...] = ()
+    begin: str = ""
     bare_share: Annotated[float, share()] = 0.35
     noisy_share: Annotated[float, share()] = 0.3
     floors_minutes: Annotated[float, within(0.0, 10_000.0)] = 0.0
@@ -74,3 +87,7 @@ class PredictionSettings:
                 raise ValueError(f"kinds.{kind} is {shown(often)}; want a number of 0 or more")
         if not sum(self.kinds.values()) > 0.0:
             raise ValueError(f"kinds is {shown(dict(self.kinds))}; want at least one above 0")
+        if self.kinds.get(PLAN, 0.0) > 0.0 and len(set(self.plans)) < 2:
+            raise ValueError(f"plans is {shown(self.plans)}, and kinds has {PLAN!r}; want two floors at least")
+        if self.begin not in ("", SHIPPED) and not Path(self.begin).is_file():
+            raise ValueError(f"begin is {shown(self.begin)}; want {SHIPPED!r}, a file of weights, or nothing")

@@ -5,7 +5,7 @@ Finished parts are on the disk. The same call continues an interrupted one.
 
 import json
 import time
-from collections.abc import Generator
+from collections.abc import Generator, Sequence
 from contextlib import closing
 from dataclasses import asdict, dataclass
 from functools import partial
@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import torch
 
+from lidarium.envs.floors.catalogue.names import load_floor
 from lidarium.evaluation.processes import shared_out
 from lidarium.mapping.files.guarded_reading import read_text, reading
 from lidarium.mapping.files.output import clear_unfinished, only_writer, remove_unfinished, write_json
@@ -21,7 +22,7 @@ from lidarium.mapping.prediction.network import FILES
 from lidarium.training.failures import raise_named
 from lidarium.training.folder import asked_for, begin_folder, versions
 from lidarium.training.prediction.fitting import Fitting, Windows, judged
-from lidarium.training.prediction.maps import FloorMaps, explore, read_maps, write_maps
+from lidarium.training.prediction.maps import FloorMaps, explore, read_maps, source_of, write_maps
 from lidarium.training.prediction.settings import PredictionSettings
 from lidarium.training.progress import Progress
 
@@ -48,6 +49,8 @@ class PredictionTraining:
         if self.workers < 1:
             raise ValueError(f"workers is {self.workers}; want at least 1")
         _check_device(self.device)
+        for plan in self.settings.plans:
+            load_floor(plan)
         begin_folder(self.folder / TRAINING_FILE, asdict(self.settings))
         with only_writer(self.folder / TRAINING_FILE):
             clear_unfinished(self.folder, ".json")
@@ -90,11 +93,13 @@ class PredictionTraining:
         if (self.folder / CARD_FILE).exists():
             return
         paths = sorted((self.folder / MAPS).glob("*.npz"))
-        if len(paths) < 2:
-            raise ValueError(f"{self.folder / MAPS} has maps of {len(paths)} floors; want 2 at least: one is held out")
-        numbers = [int(path.stem) for path in paths]
+        sources = [source_of(self.settings, int(path.stem)) for path in paths]
+        if len(set(sources)) < 2:
+            raise ValueError(
+                f"{self.folder / MAPS} has maps of {len(set(sources))} floors; want 2 at least: one is held out"
+            )
         floors = [read_maps(path) for path in paths]
-        is_held_out = held_out(numbers, self.settings.held_out)
+        is_held_out = held_out(sources, self.settings.held_out)
         fitted = [floor for floor, is_out in zip(floors, is_held_out, strict=True) if not is_out]
         others = [floor for floor, is_out in zip(floors, is_held_out, strict=True) if is_out]
         fitting = Fitting(self.settings, self.folder / FIT_FILE, self.device)
@@ -127,12 +132,11 @@ def _explored(settings: PredictionSettings, folder: Path, number: int) -> int:
     return len(maps.levels)
 
 
-def held_out(numbers: list[int], share: float) -> list[bool]:
-    """Return which of some floors are held out: one at least, and not all."""
-    draws = [float(np.random.default_rng([HELD_OUT_SEED, number]).random()) for number in numbers]
-    found = [draw < share for draw in draws]
-    found[int(np.argmin(draws))], found[int(np.argmax(draws))] = True, False
-    return found
+def held_out(sources: Sequence[tuple[int, ...]], share: float) -> list[bool]:
+    """Return which of some floors are held out, by what they are made of: one at least, and not all."""
+    draws = [float(np.random.default_rng([HELD_OUT_SEED, *source]).random()) for source in sources]
+    lowest, limit = min(draws), min(share, max(draws))
+    return [draw == lowest or draw < limit for draw in draws]
 
 
 def _check_device(device: str) -> None:

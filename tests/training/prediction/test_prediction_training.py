@@ -8,10 +8,12 @@ import pytest
 
 pytest.importorskip("torch")
 
+from lidarium.envs.floors.catalogue.names import load_floor
 from lidarium.mapping.prediction.levels import FREE, OCCUPIED, UNKNOWN
 from lidarium.mapping.prediction.network import WINDOW, load_weights
 from lidarium.training.prediction.fitting import Windows
-from lidarium.training.prediction.maps import FloorMaps, read_maps, write_maps
+from lidarium.training.prediction.maps import FloorMaps, read_maps, source_of, write_maps
+from lidarium.training.prediction.plans import draw_plan, plan_number
 from lidarium.training.prediction.quality import QualityTally
 from lidarium.training.prediction.settings import PredictionSettings
 from lidarium.training.prediction.training import PredictionTraining, held_out
@@ -38,6 +40,8 @@ def test_a_table_of_predictions_asks_for_this_training(tmp_path):
         ("prediction = 3\n", "want a table"),
         ("[prediction]\nkinds = { castle = 1.0 }\n", "kinds has 'castle'"),
         ("[prediction]\nbatch = 0\n", "batch"),
+        ('[prediction]\nkinds = { plan = 1.0 }\nplans = ["home:01", "home:01"]\n', "want two floors at least"),
+        ('[prediction]\nbegin = "nowhere.safetensors"\n', "begin is 'nowhere.safetensors'"),
     ],
 )
 def test_bad_tables_are_refused(tmp_path, text, message):
@@ -87,10 +91,49 @@ def test_windows_are_pieces_of_maps_with_their_truth():
 
 
 def test_floors_that_are_held_out_stay_so():
-    few, many = held_out(list(range(40)), 0.2), held_out(list(range(80)), 0.2)
+    few, many = held_out([(k,) for k in range(40)], 0.2), held_out([(k,) for k in range(80)], 0.2)
     assert many[:40] == few
     assert 0 < sum(few) < 40
-    assert sum(held_out([0, 1], 0.0)) == 1
+    assert sum(held_out([(0,), (1,)], 0.0)) == 1
+
+
+def test_variants_of_a_plan_are_held_out_together():
+    settings = PredictionSettings(kinds={"plan": 0.8, "office": 0.2}, plans=("home:01", "home:02", "home:04"))
+    sources = [source_of(settings, number) for number in range(60)]
+    is_out = {}
+    for source, out in zip(sources, held_out(sources, 0.3), strict=True):
+        is_out.setdefault(source, set()).add(out)
+    assert all(len(outs) == 1 for outs in is_out.values())
+    assert sum(len(source) == 2 for source in is_out) == 3
+    assert {frozenset(outs) for outs in is_out.values()} == {frozenset({True}), frozenset({False})}
+
+
+def test_variants_of_plans_are_as_large_and_in_one_piece():
+    plans = ("home:01", "home:02")
+    for number in range(8):
+        seed = (0, 12, number)
+        plan, floor = load_floor(plans[plan_number(plans, seed)]), draw_plan(plans, seed, 0.5)
+        free_m2 = (floor.raster(0.05, 0.3, 0.3).solid == 0).sum() * 0.05**2
+        plan_m2 = (plan.raster(0.05, 0.3, 0.3).solid == 0).sum() * 0.05**2
+        assert 0.5 * 0.85**2 < free_m2 / plan_m2 < 1.05 * 1.2**2
+        assert floor.sha256 == draw_plan(plans, seed, 0.5).sha256
+    bare, full = (draw_plan(plans, (0, 12, 0), share).raster(0.05, 0.3, 0.3) for share in (1.0, 0.0))
+    assert bare.solid.shape == full.solid.shape
+    assert (full.solid >= bare.solid).all()
+    assert (full.solid != bare.solid).any()
+
+
+def test_a_training_on_plans_begins_with_other_weights(tmp_path):
+    settings = replace(
+        SETTINGS, kinds={"plan": 1.0}, plans=("home:01", "home:02"), floors=4, begin="shipped", learning_rate=1e-9
+    )
+    list(PredictionTraining(settings, tmp_path / "training").run())
+    shipped = load_weights()
+    for name, array in load_weights(tmp_path / "training" / "weights.safetensors").items():
+        np.testing.assert_allclose(array, shipped[name], atol=1e-3)
+    with pytest.raises(ValueError, match="home:999"):
+        list(PredictionTraining(replace(settings, plans=("home:01", "home:999")), tmp_path / "other").run())
+    assert not (tmp_path / "other").exists()
 
 
 def test_quality_counts_near_unknown_squares():
