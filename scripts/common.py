@@ -7,7 +7,7 @@ import math
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import suppress
+from contextlib import closing, nullcontext, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
@@ -196,23 +196,33 @@ def file_name(name: str) -> str:
 
 
 def counted(
-    items: Iterable[T], total: int, what: str, is_quiet: bool, clock: Callable[[], float] = time.monotonic
+    items: Iterable[T],
+    total: int,
+    what: str,
+    is_quiet: bool,
+    clock: Callable[[], float] = time.monotonic,
+    done: Callable[[], int] | None = None,
 ) -> Iterator[T]:
-    """Yield items and report how many there were.
+    """Yield items and report how many there were; ``done`` counts those of earlier calls too.
 
     A bar on a terminal, otherwise a line every few seconds, on standard error.
     """
+    bar: Any = None
     if not is_quiet and sys.stderr.isatty():
         from tqdm import tqdm
 
-        yield from tqdm(items, what, total, file=sys.stderr, leave=False, dynamic_ncols=True)
-        return
+        bar = tqdm(desc=what, total=total, file=sys.stderr, leave=False, dynamic_ncols=True)
     last = clock()
-    for count, item in enumerate(items, 1):
-        yield item
-        if (now := clock()) - last >= LINE_PERIOD_S:
-            last = now
-            notify(f"{what}: {count:,} of {total:,}")
+    with nullcontext() if bar is None else closing(bar):
+        for count, item in enumerate(items, 1):
+            yield item
+            finished = count if done is None else done()
+            if bar is not None:
+                bar.initial = finished - count  # rates are of this call alone
+                bar.update(finished - bar.n)
+            elif (now := clock()) - last >= LINE_PERIOD_S:
+                last = now
+                notify(f"{what}: {finished:,} of {total:,}")
 
 
 class Progress:

@@ -37,7 +37,9 @@ POLICIES = (
 )
 TOURS = "tour_frontier"
 MAPS, WAYS, WAYS_FILE = "dungeon_test", "dungeon_test_ways.csv", "ways.csv"
-SMALL_MAPS, ARIADNE = "synthetic_dungeon", "ariadne"
+ARIADNE = {"ariadne_test": "ariadne/test100", "ariadne": "synthetic_dungeon"}
+"""Folders of the maps that run by ARiADNE's sensor and stop rule: its test maps, and some of three projects."""
+
 BY_NODES = ("level", "graph")
 """Settings of the preset that are left out: robots drive here."""
 
@@ -152,12 +154,12 @@ generated floors of the set `validation`. Ratios of times to 99 % with one robot
 ## By ARiADNE's sensor and stop rule
 
 [ARiADNE](https://github.com/marmotlab/ARiADNE) sees 80 pixels around and ends when 250 free ones are left
-unseen; so does the preset [`ariadne`](../reference/presets.md), with pixels of 0.1 m. Four of its maps are at hand,
-and {sisters} of the same kind from two projects beside it. Its paper's table is not at hand, so only our policies
-are listed.
+unseen; so does the preset [`ariadne`](../reference/presets.md), with pixels of 0.1 m. Robots drive here, and see while
+they drive; by its other rules they run on the page of [printed tables](printed.md). *Others*: four of its larger maps,
+and maps of two projects beside it. Ways over those of `nearest_frontier`.
 
-| policy | ended so | way [m] | over `nearest_frontier` | way on ARiADNE's four [m] |
-|---|---:|---:|---:|---:|
+| policy | test maps: ended so | way [m] | over `nearest_frontier` | others: ended so | way [m] | over `nearest_frontier` |
+|---|---:|---:|---:|---:|---:|---:|
 {by_ariadne}
 """
 
@@ -175,10 +177,11 @@ def suites(data: Path | None, every: int = 1) -> dict[str, Suite]:
             draws_starts=True,
         ),
     }
-    small = sorted((Path(data) / "floorplans" / SMALL_MAPS).glob("*.png"))[::every] if data else []
-    if small:
-        settings = {name: value for name, value in PRESETS[ARIADNE].settings.items() if name not in BY_NODES}
-        found[ARIADNE] = _suite(small, settings, ARIADNE_STOP)
+    settings = {name: value for name, value in PRESETS["ariadne"].settings.items() if name not in BY_NODES}
+    for name, below in ARIADNE.items():
+        paths = sorted((Path(data) / "floorplans" / below).glob("*.png"))[::every] if data else []
+        if paths:
+            found[name] = _suite(paths, settings, ARIADNE_STOP)
     return found
 
 
@@ -217,22 +220,18 @@ def page(folder: Path) -> str:
     """Return the results as markdown."""
     every = ways_of(read_episodes(folder / "maps" / EPISODES_FILE))
     ours = {policy: found for policy, found in every.items() if policy in POLICIES}
-    path = folder / BUILDINGS / EPISODES_FILE
-    in_buildings = ways_of(read_episodes(path)) if path.exists() else {}
+    in_buildings = _ways_in(folder / BUILDINGS)
     names = sorted({name for of_policy in ours.values() for name in of_policy})
     theirs = printed_ways(folder / WAYS_FILE, names)
-    path = folder / ARIADNE / EPISODES_FILE
-    small = ways_of(read_episodes(path)) if path.exists() else {}
     return PAGE.format(
         printed=len(next(iter(theirs.values()), {})),
         same=_same_maps(ours, theirs),
         count=len(names),
         all_maps=_all_maps(ours),
-        sisters=len(next(iter(small.values()))) - len(_of_ariadne(small)) if small else 0,
         normal=NORMAL_RANGE_M,
         buildings=len(in_buildings.get(TOURS, {})),
         why=_why(every, in_buildings),
-        by_ariadne=_by_ariadne(small),
+        by_ariadne=_by_ariadne([_ways_in(folder / name) for name in ARIADNE]),
     )
 
 
@@ -247,6 +246,11 @@ def ways_of(episodes: Sequence[Mapping[str, Any]]) -> dict[str, dict[str, Mappin
         name = Path(episode[KEY].split(" | ")[1]).name
         found.setdefault(episode["policy"], {})[name] = episode
     return found
+
+
+def _ways_in(folder: Path) -> dict[str, dict[str, Mapping[str, Any]]]:
+    path = folder / EPISODES_FILE
+    return ways_of(read_episodes(path)) if path.exists() else {}
 
 
 def printed_ways(path: Path, names: Sequence[str]) -> dict[str, dict[str, float]]:
@@ -337,22 +341,23 @@ def _time_ratio(ours: Ways, policy: str, other: str, horizon_s: float) -> str:
     return f"{paired_ratio(times, base):.3f}"
 
 
-def _of_ariadne(ours: Ways) -> list[str]:
-    """Return the names of ARiADNE's own maps."""
-    return sorted(name for name in next(iter(ours.values()), {}) if name.startswith("ARiADNE"))
-
-
-def _by_ariadne(ours: Ways) -> str:
-    """Return ways to the end by ARiADNE's stop rule, in our metres."""
-    if not ours:
-        return "| not run | - | - | - | - |"
-    baseline, own, rows = ours[POLICIES[0]], _of_ariadne(ours), []
-    for policy, episodes in ours.items():
-        ways, others = ([sum(found[name]["path_m"]) for name in episodes] for found in (episodes, baseline))
-        ended = sum(STOP_REASON in each["ended_because"].values() for each in episodes.values())
-        ratio = "1" if policy == POLICIES[0] else f"{paired_ratio(ways, others):.3f}"
-        on_own = np.mean([sum(episodes[name]["path_m"]) for name in own]) if own else np.nan
-        rows.append(f"| `{policy}` | {ended} of {len(episodes)} | {np.mean(ways):.1f} | {ratio} | {on_own:.1f} |")
+def _by_ariadne(ours: Sequence[Ways]) -> str:
+    """Return ways to the end by ARiADNE's stop rule, in our metres, on each set of maps."""
+    if not any(ours):
+        return "| not run | - | - | - | - | - | - |"
+    rows = []
+    for policy in POLICIES:
+        cells: list[str] = []
+        for found in ours:
+            episodes, baseline = found.get(policy, {}), found.get(POLICIES[0], {})
+            if not episodes:
+                cells += ["-", "-", "-"]
+                continue
+            ways, others = ([sum(each[name]["path_m"]) for name in episodes] for each in (episodes, baseline))
+            ended = sum(STOP_REASON in each["ended_because"].values() for each in episodes.values())
+            ratio = "1" if policy == POLICIES[0] else f"{paired_ratio(ways, others):.3f}"
+            cells += [f"{ended} of {len(episodes)}", f"{np.mean(ways):.1f}", ratio]
+        rows.append(f"| `{policy}` | {' | '.join(cells)} |")
     return "\n".join(rows)
 
 

@@ -112,7 +112,7 @@ def _run(
     runs = campaign.run()
     is_interrupted = False
     try:
-        for _ in counted(runs, len(trials), f"episodes of {task.name}", command.json):
+        for _ in counted(runs, len(trials), f"episodes of {task.name}", command.json, done=lambda: campaign.done):
             pass
     except KeyboardInterrupt:
         is_interrupted = True

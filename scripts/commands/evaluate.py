@@ -110,7 +110,7 @@ def execute(command: _Evaluate) -> Answer:
     is_interrupted = False
     runs = campaign.run()
     try:
-        for _ in counted(runs, len(campaign.trials or ()), "episodes", command.json):
+        for _ in counted(runs, len(campaign.trials or ()), "episodes", command.json, done=lambda: campaign.done):
             pass
     except KeyboardInterrupt:
         is_interrupted = True

@@ -113,7 +113,7 @@ def _ran(campaign: "Campaign", name: str, is_quiet: bool) -> bool:
     runs = campaign.run()
     total = sum(1 for _ in campaign.suite.trials())
     try:
-        for _ in counted(runs, total, f"{name} episodes", is_quiet):
+        for _ in counted(runs, total, f"{name} episodes", is_quiet, done=lambda: campaign.done):
             pass
     except KeyboardInterrupt:
         return False

@@ -1,5 +1,6 @@
 """Answers, names and progress of all commands."""
 
+import itertools
 import os
 import sys
 from types import SimpleNamespace
@@ -75,3 +76,13 @@ def test_options_that_were_left_out_are_left_to_the_realism():
 def test_a_seed_below_0_is_refused():
     with pytest.raises(ValueError, match="seed is -1; want zero or more"):
         Command(seed=-1)
+
+
+@pytest.mark.parametrize("is_terminal", [False, True])
+def test_what_earlier_calls_did_counts_too(capsys, monkeypatch, is_terminal):
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: is_terminal, raising=False)
+    finished = iter([8, 9, 10])
+    times = itertools.count(0.0, 10.0)
+    list(counted("abc", 10, "files", is_quiet=False, clock=lambda: next(times), done=lambda: next(finished)))
+    shown = capsys.readouterr().err
+    assert ("files:" in shown and "0/10" in shown) if is_terminal else shown.startswith("files: 8 of 10\nfiles: 9 of")

@@ -66,18 +66,16 @@ def test_ways_by_ariadnes_rule_are_set_beside_the_nearest_frontier(folder):
     assert row_of(dungeons.page(folder), "not run")[1] == "-"
     lines = []
     for policy, way in {"nearest_frontier": 20.0, "learned": 15.0}.items():
-        for number, name in enumerate(("ARiADNE__1.png", "DRL__2.png", "large__3.png")):
+        for number, name in enumerate(("img_1.png", "img_2.png", "img_3.png")):
             row = episode(policy, name, None, way + number)
             ended = "horizon" if (policy, number) == ("learned", 2) else "stop_rule"
             lines.append({**row, "ended_because": {"robot_0": ended}})
-    (folder / "ariadne").mkdir()
-    (folder / "ariadne" / "episodes.jsonl").write_text("".join(json.dumps(line) + "\n" for line in lines))
-    page = dungeons.page(folder)
-    cells = row_of(page, "`learned`", 2)
+    (folder / "ariadne_test").mkdir()
+    (folder / "ariadne_test" / "episodes.jsonl").write_text("".join(json.dumps(line) + "\n" for line in lines))
+    cells = row_of(dungeons.page(folder), "`learned`", 2)
     assert cells[1:3] == ["2 of 3", "16.0"]
     assert cells[3].startswith("0.761 (")
-    assert cells[4] == "15.0"
-    assert "and 2 of the same kind" in page
+    assert cells[4:] == ["-", "-", "-"]
 
 
 def test_without_data_there_is_nothing_to_run():
@@ -88,9 +86,10 @@ def test_the_maps_at_hand_are_run_from_their_marks(shared_data, tmp_path):
     suite = dungeons.suites(shared_data, 10)["maps"]
     assert len(suite.floors) == 10
     assert not suite.draws_starts
-    small = dungeons.suites(shared_data, 1)["ariadne"]
-    assert len(small.floors) == 12
-    assert small.stop == {"figure": "remaining_cells", "at_most": 250.0}
+    for name, count in {"ariadne_test": 100, "ariadne": 12}.items():
+        small = dungeons.suites(shared_data, 1)[name]
+        assert len(small.floors) == count
+        assert small.stop == {"figure": "remaining_cells", "at_most": 250.0}
     assert list(dungeons.work(tmp_path, shared_data, 1, 1)) == [("ways of planners", 1, 1)]
     assert len(dungeons.printed_ways(tmp_path / "ways.csv", [p.name for p in dungeons.maps_of(shared_data)])) == 4
 
