@@ -25,9 +25,13 @@ WAYPOINTS = ("nearest_frontier", "utility_frontier", "explore_lite", "tour_front
 ARIADNE = {"ariadne": "test100", "ariadne_easy": "easy", "ariadne_medium": "medium"}
 """Folder of each of ARiADNE's sets of maps."""
 
+TRUTH = {"truth": {"policy": "predicted_tours", "predictor": "truth"}}
+"""Predicted tours with the floor in place of a prediction."""
+
 POLICIES = {
-    "dare": NODES + WAYPOINTS,
-    **dict.fromkeys(ARIADNE, NODES + WAYPOINTS),
+    "dare": (*NODES, *WAYPOINTS, *TRUTH),
+    "ariadne": (*NODES, *WAYPOINTS, *TRUTH),
+    **dict.fromkeys([name for name in ARIADNE if name != "ariadne"], NODES + WAYPOINTS),
     "mapex": (*WAYPOINTS, "srt"),
 }
 """Policies by part; the first is the one that others are compared with."""
@@ -58,7 +62,8 @@ scan 20 m around at nodes only; an episode ends when no node has utility. Ways a
 maps. *Over nearest* is the ratio of the printed means; for our policies it is the geometric mean of the ratios to
 `nearest_node`, map by map, with a 95 % interval. Compare ratios between the two parts of the table, not ways: the
 project's beams leave unknown gaps that robots have to visit. With an exact laser, its own nearest and utility planners
-take the ways of `nearest_node` and `utility_node` within 1 %.
+take the ways of `nearest_node` and `utility_node` within 1 %. *Truth*: `predicted_tours` with the floor in place of a
+prediction.
 
 | planner | way [m] | over nearest |
 |---|---:|---:|
@@ -95,7 +100,9 @@ def suites(data: Path | None, every: int = 1) -> dict[str, Suite]:
     for name, policies in POLICIES.items():
         folder = data / "floorplans" / "ariadne" / ARIADNE.get(name, "")
         floors = tuple(str(path) for path in sorted(folder.glob("*.png"))) if name != "ariadne" else ()
-        found[name] = _part(preset_suite(name.partition("_")[0], policies, (0,), data, floors), every)
+        suite = preset_suite(name.partition("_")[0], NODES + WAYPOINTS, (0,), data, floors)
+        own = {policy: settings for policy, settings in TRUTH.items() if policy in policies}
+        found[name] = _part(replace(suite, policies=policies, policy_settings=own), every)
     return found
 
 
