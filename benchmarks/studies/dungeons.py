@@ -84,6 +84,10 @@ SOONER: Mapping[str, Any] = {"waiting": 0.0, "kept_share": 0.4}
 """Tours that are short alone, and planned again when 0.6 of what a view shows is seen."""
 
 
+TRUTH: dict[str, dict[str, Any]] = {"truth": {"policy": "predicted_tours", "predictor": "truth"}}
+"""Predicted tours with the floor in place of a prediction."""
+
+
 def scaled_tours(range_m: float) -> dict[str, float]:
     """Return settings of tours whose lengths and areas grow with the range of the laser."""
     scale, default = range_m / NORMAL_RANGE_M, TourSettings()
@@ -102,7 +106,7 @@ def variants(range_m: float) -> dict[str, dict[str, Any]]:
         "sooner": {"policy": TOURS, **SOONER},
         "scaled": scaled,
         "scaled_sooner": {**scaled, **SOONER},
-        "truth": {"policy": "predicted_tours", "predictor": "truth"},
+        **TRUTH,
     }
 
 
@@ -181,7 +185,7 @@ def suites(data: Path | None, every: int = 1) -> dict[str, Suite]:
     for name, below in ARIADNE.items():
         paths = sorted((Path(data) / "floorplans" / below).glob("*.png"))[::every] if data else []
         if paths:
-            found[name] = _suite(paths, settings, ARIADNE_STOP)
+            found[name] = _suite(paths, settings, ARIADNE_STOP, own=TRUTH)
     return found
 
 
@@ -346,7 +350,7 @@ def _by_ariadne(ours: Sequence[Ways]) -> str:
     if not any(ours):
         return "| not run | - | - | - | - | - | - |"
     rows = []
-    for policy in POLICIES:
+    for policy in (*POLICIES, *TRUTH):
         cells: list[str] = []
         for found in ours:
             episodes, baseline = found.get(policy, {}), found.get(POLICIES[0], {})

@@ -29,9 +29,7 @@ TRUTH = {"truth": {"policy": "predicted_tours", "predictor": "truth"}}
 """Predicted tours with the floor in place of a prediction."""
 
 POLICIES = {
-    "dare": (*NODES, *WAYPOINTS, *TRUTH),
-    "ariadne": (*NODES, *WAYPOINTS, *TRUTH),
-    **dict.fromkeys([name for name in ARIADNE if name != "ariadne"], NODES + WAYPOINTS),
+    **dict.fromkeys(("dare", *ARIADNE), (*NODES, *WAYPOINTS, *TRUTH)),
     "mapex": (*WAYPOINTS, "srt"),
 }
 """Policies by part; the first is the one that others are compared with."""

@@ -31,7 +31,7 @@ COVERAGES = (0.02, 0.97)
 """Maps are taken when a team has seen so much, at least and at most."""
 
 BUILDING_SEEDS, PLAN_SEEDS = 2, 12
-"""Floors of a seed differ from those that other trainings make of it by this second word of their draws."""
+"""Floors of a seed differ from those that other trainings make of it by these second words of their draws."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,7 +20,7 @@ BOXES_M2, BOX_M, AT_WALL_SHARE, AT_WALL_M = 0.2, (0.15, 1.2), 0.7, 0.5
 """Up to so many boxes a square metre, their sides [m], and the share of them whose middles are so near to walls."""
 
 LEFT_SHARE = 0.8
-"""The largest free area keeps so much of itself when boxes are put in, or there are none."""
+"""The largest free area is at least so much of all that boxes leave free, or there are none."""
 
 LASER_M = 0.3
 """Plans are cut at this height [m]."""
