@@ -162,7 +162,7 @@ unseen; so does the preset [`ariadne`](../reference/presets.md), with pixels of 
 they drive; by its other rules they run on the page of [printed tables](printed.md). *Others*: four of its larger maps,
 and maps of two projects beside it. Ways over those of `nearest_frontier`.
 
-| policy | test maps: ended so | way [m] | over `nearest_frontier` | others: ended so | way [m] | over `nearest_frontier` |
+| policy | test: ended so | way [m] | over `nearest_frontier` | others: ended so | way [m] | over `nearest_frontier` |
 |---|---:|---:|---:|---:|---:|---:|
 {by_ariadne}
 """
