@@ -51,7 +51,7 @@ class FloorMaps:
 
 
 def source_of(settings: PredictionSettings, number: int) -> tuple[int, ...]:
-    """Return what the n-th floor of a training is made of: floors of one plan share it."""
+    """Return the source of the n-th floor: its plan, or the floor alone if it is generated."""
     if _drawn_kind(settings, number)[0] == PLAN:
         return (plan_number(settings.plans, _plan_seed(settings, number)), PLAN_SEEDS)
     return (number,)

@@ -14,13 +14,13 @@ CELL_M = 0.025
 """Side of a cell of the drawing [m]: walls stay closed when they are turned."""
 
 SCALES, TURNED_SHARE = (0.85, 1.2), 0.4
-"""Plans are made so much larger, and so many of them are turned by any angle."""
+"""Range of the factor that scales a plan, and the share of the plans that are turned by any angle."""
 
 BOXES_M2, BOX_M, AT_WALL_SHARE, AT_WALL_M = 0.2, (0.15, 1.2), 0.7, 0.5
-"""Up to so many boxes a square metre, their sides [m], and the share of them whose middles are so near to walls."""
+"""Maximum number of boxes per m2, range of their sides [m], share of boxes near walls, and how near [m]."""
 
 LEFT_SHARE = 0.8
-"""The largest free area is at least so much of all that boxes leave free, or there are none."""
+"""Minimum share of the free area that has to stay connected; otherwise no boxes are put in."""
 
 LASER_M = 0.3
 """Plans are cut at this height [m]."""
@@ -45,7 +45,7 @@ def plan_number(plans: Sequence[str], seed: Sequence[int]) -> int:
 
 
 def _turned(solid: NDArray[np.uint8], degrees: float) -> NDArray[np.uint8]:
-    """Turn a plan about its middle; what opens beside it is solid."""
+    """Rotate a plan about its middle; the new corners are solid."""
     rows, columns = solid.shape
     turn = cv2.getRotationMatrix2D(((columns - 1) / 2.0, (rows - 1) / 2.0), degrees, 1.0)
     cosine, sine = abs(turn[0, 0]), abs(turn[0, 1])

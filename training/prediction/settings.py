@@ -40,7 +40,7 @@ class PredictionSettings:
     begin : str, default ""
         Network to begin with: a file of weights, "shipped" for that of the package, or "" for none.
     bare_share, noisy_share : float, default 0.35, 0.3
-        So many of the buildings and plans have no furniture, and so many of the runs noisy lasers.
+        Share of the buildings and plans without furniture, and share of the runs with noisy lasers.
     floors_minutes, fit_minutes : float, default 0.0
         Exploring and fitting end after so long, over all interrupted calls; 0 for no limit. With a limit the
         result depends on the speed of the machine.

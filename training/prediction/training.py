@@ -133,7 +133,7 @@ def _explored(settings: PredictionSettings, folder: Path, number: int) -> int:
 
 
 def held_out(sources: Sequence[tuple[int, ...]], share: float) -> list[bool]:
-    """Return which of some floors are held out, by what they are made of: one at least, and not all."""
+    """Return which floors are held out: at least one, not all, and all floors of one source alike."""
     draws = [float(np.random.default_rng([HELD_OUT_SEED, *source]).random()) for source in sources]
     lowest, limit = min(draws), min(share, max(draws))
     return [draw == lowest or draw < limit for draw in draws]

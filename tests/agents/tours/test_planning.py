@@ -111,7 +111,7 @@ def test_robots_without_a_frontier_stay():
     assert sum(leg is None for leg in legs) == 1
 
 
-def testfirst_places_are_those_behind_each_separator():
+def test_first_places_are_those_behind_each_separator():
     assert first_places(np.array([2, 0, 4, 1, 3]), 4) == [2, 1]
     assert first_places(np.array([3, 1, 0, 4, 2]), 3) == [None, 1, 2]
     assert first_places(np.array([0, 1]), 0) == [None, None, None]
