@@ -14,13 +14,16 @@ from lidarium.agents.tours.policy import NEAREST
 from lidarium.agents.tours.policy import TOURS as BY_TOURS
 from lidarium.benchmarks.results_page import in_file
 from lidarium.benchmarks.studies.shared.study import (
+    HORIZON_S,
+    SETTINGS,
+    TEAMS,
     Bounded,
     Progress,
     Study,
+    compared_floors,
     do_missing,
     kept_lines,
     measure_bound,
-    real_floors,
 )
 from lidarium.envs.floors.catalogue.names import set_floors
 from lidarium.evaluation.statistics.estimates import median_interval, paired_ratio
@@ -33,9 +36,6 @@ LEARNED, TOURS, UNPREDICTED = "learned", "tour_frontier", "learned_tours"
 CLASSICS = ("nearest_frontier", "utility_frontier", "explore_lite")
 UNPREDICTED_WEIGHTS = Path("docs/results/parts/learned_tours.safetensors")
 """Weights of ``learned`` for maps without predictions, in the repository; without them their column is empty."""
-
-TEAMS = (1, 2, 3)
-HORIZON_S = 1800.0
 
 KINDS = {
     "test": "generated floors of the set `test`",
@@ -206,12 +206,8 @@ def missing_text(kinds: Sequence[str]) -> str:
     return f"\nNot in it: {', '.join(KINDS[kind] for kind in kinds)}.\n" if kinds else ""
 
 
-SETTINGS: dict[str, Any] = {"resolution": 0.05, "stop_coverage": 0.99, "horizon_s": HORIZON_S}
 CLASSICS_EVERY, BOUNDS_EVERY = 4, 8
 """Classic explorers run on every so many-th floor of the set; every so many-th has a bound."""
-
-REAL_FLOORS = {"kth": slice(0, None, 4), "lifull": slice(1, None, 2), "slam": slice(None)}
-"""Which real floors run; settings of tours were chosen on some of the others."""
 
 BOUNDS_FILE = "bounds.jsonl"
 
@@ -263,10 +259,8 @@ training on 2,700 furnished floors gave 0.878, 0.896 and 0.938 on the set `test`
 def suites(data: Path | None, every: int = 1) -> dict[str, Suite]:
     """Return the suites: all floors for tours and learned explorers, then a part of them for classic ones."""
     floors = {"test": list(set_floors("test"))[::every]}
-    if data is not None:
-        real = {kind: paths for kind, paths in real_floors(data).items() if kind in KINDS and len(paths) >= every}
-        floors |= {kind: [str(path) for path in paths[REAL_FLOORS[kind]][::every]] for kind, paths in real.items()}
-    floors = {kind: names for kind, names in floors.items() if names}
+    real = compared_floors(data)
+    floors |= {kind: names[::every] for kind, names in real.items() if kind in KINDS and len(names) >= every}
     parts = {kind: names[::CLASSICS_EVERY] if kind == "test" else names for kind, names in floors.items()}
     return {
         **{kind: _suite((TOURS, LEARNED), names) for kind, names in floors.items()},

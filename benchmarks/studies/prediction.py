@@ -7,7 +7,17 @@ from typing import Any
 
 import numpy as np
 
-from lidarium.benchmarks.studies.shared.study import Progress, Study, Task, do_missing, kept_lines, real_floors
+from lidarium.benchmarks.studies.shared.study import (
+    HORIZON_S,
+    SETTINGS,
+    TEAMS,
+    Progress,
+    Study,
+    Task,
+    compared_floors,
+    do_missing,
+    kept_lines,
+)
 from lidarium.envs.floors.catalogue.names import SETS, set_floors
 from lidarium.envs.floors.floor import Floor
 from lidarium.envs.floors.generation.buildings import KINDS, BuildingSettings, generate_building
@@ -22,9 +32,6 @@ TOURS = "tour_frontier"
 PREDICTORS = {"predicted": "network", "true": "truth"}
 """Predictors by the names of the policies that use them."""
 
-TEAMS = (1, 2, 3)
-HORIZON_S = 1800.0
-SETTINGS: dict[str, Any] = {"resolution": 0.05, "stop_coverage": 0.99, "horizon_s": HORIZON_S}
 QUALITY_FILE = "quality.jsonl"
 
 FLOORS = {
@@ -34,9 +41,6 @@ FLOORS = {
     "slam": "maps that robots made of real buildings",
 }
 """Kinds of floors that are explored."""
-
-REAL_FLOORS = {"lifull": slice(1, None, 2), "kth": slice(0, None, 4), "slam": slice(0, None)}
-"""Which real floors are explored: those of the study ``learned``, and all maps of robots."""
 
 MAPPED = 24
 """Floors of each family on which predictions are judged."""
@@ -71,10 +75,8 @@ squares of 0.2 m, as a perfect network would predict.
 
 def suites(data: Path | None, every: int = 1) -> dict[str, Suite]:
     """Return a suite for each kind of floor."""
-    real = {} if data is None else real_floors(data)
-    floors = {kind: [str(path) for path in real.get(kind, [])[part]] for kind, part in REAL_FLOORS.items()}
-    floors["test"] = list(set_floors("test"))
-    return {kind: _suite(names[::every]) for kind, names in floors.items() if len(names) >= every}
+    floors = {**compared_floors(data), "test": set_floors("test")}
+    return {kind: _suite(floors[kind][::every]) for kind in FLOORS if len(floors.get(kind, ())) >= every}
 
 
 def _suite(floors: Sequence[str]) -> Suite:

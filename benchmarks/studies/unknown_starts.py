@@ -5,8 +5,8 @@ from pathlib import Path
 from typing import Any
 
 from lidarium.benchmarks.studies.leaderboard.pairs import pairs_table
-from lidarium.benchmarks.studies.leaderboard.worlds import HORIZON_S, SETTINGS, WORLDS
-from lidarium.benchmarks.studies.shared.study import Study
+from lidarium.benchmarks.studies.leaderboard.worlds import WORLDS
+from lidarium.benchmarks.studies.shared.study import HORIZON_S, SETTINGS, Study
 from lidarium.envs.floors.catalogue.names import set_floors
 from lidarium.evaluation.suites.campaign import EPISODES_FILE
 from lidarium.evaluation.suites.episodes_file import read_episodes

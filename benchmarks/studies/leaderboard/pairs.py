@@ -3,20 +3,23 @@
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from lidarium.benchmarks.studies.leaderboard.worlds import HORIZON_S, TEAMS
+from lidarium.benchmarks.studies.shared.study import HORIZON_S, TEAMS
 from lidarium.evaluation.statistics.estimates import paired_ratio
 from lidarium.evaluation.suites.episodes_file import KEY
 
 PAIRS = (
     ("ideal", "tour_frontier", "explore_lite"),
     ("ideal", "srt", "tour_frontier"),
+    ("ideal", "predicted_tours", "tour_frontier"),
     ("ideal", "learned", "tour_frontier"),
     ("ideal", "learned", "srt"),
     ("lab", "tour_frontier", "explore_lite"),
     ("lab", "srt", "tour_frontier"),
+    ("lab", "predicted_tours", "tour_frontier"),
     ("lab", "learned", "tour_frontier"),
     ("unknown", "supervised", "independent"),
     ("unknown", "supervised_tours", "supervised"),
+    ("unknown", "supervised_predicted", "supervised"),
     ("unknown", "supervised_learned", "supervised"),
 )
 """World, policy, and which one it is set beside."""

@@ -10,16 +10,23 @@ from lidarium.benchmarks.studies.leaderboard.pairs import merges_text, pairs_tab
 from lidarium.benchmarks.studies.leaderboard.tables import Multiples, Part, short_table, table
 from lidarium.benchmarks.studies.leaderboard.worlds import (
     BOUNDED,
-    HORIZON_S,
     KINDS,
-    SETTINGS,
-    TEAMS,
     WORLDS,
     floors_of,
     parts,
     suites,
 )
-from lidarium.benchmarks.studies.shared.study import Bounded, Progress, Study, do_missing, kept_lines, measure_bound
+from lidarium.benchmarks.studies.shared.study import (
+    HORIZON_S,
+    SETTINGS,
+    TEAMS,
+    Bounded,
+    Progress,
+    Study,
+    do_missing,
+    kept_lines,
+    measure_bound,
+)
 from lidarium.evaluation.analysis.figures import over_bound
 from lidarium.evaluation.report import write_report
 from lidarium.evaluation.suites.campaign import EPISODES_FILE

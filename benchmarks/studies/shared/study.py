@@ -132,6 +132,20 @@ def real_floors(data: Path) -> dict[str, list[Path]]:
     return found
 
 
+TEAMS, HORIZON_S = (1, 2, 3), 1800.0
+SETTINGS: dict[str, Any] = {"resolution": 0.05, "stop_coverage": 0.99, "horizon_s": HORIZON_S}
+"""Teams and settings of comparisons in the ideal world; an episode is the same in all studies that have it."""
+
+COMPARED = {"kth": slice(0, None, 4), "lifull": slice(1, None, 2)}
+"""Real floors on which policies are compared, by kind; settings of tours were chosen on some of the others."""
+
+
+def compared_floors(data: Path | None) -> dict[str, list[str]]:
+    """Return the files of the real floors below a folder on which policies are compared, by kind; none without data."""
+    found = {} if data is None else real_floors(data)
+    return {kind: [str(path) for path in paths[COMPARED.get(kind, slice(None))]] for kind, paths in found.items()}
+
+
 @dataclass(frozen=True, slots=True)
 class Bounded(Task):
     """A floor, a number of robots and their settings."""

@@ -38,7 +38,7 @@ def test_the_page_has_a_table_of_what_ran_and_names_what_did_not(folder, tmp_pat
     rows = [line for line in page.splitlines() if line.startswith("| 3 | ideal |")]
     assert [row.split(" | ")[2] for row in rows] == ["`nearest_frontier`", "`random_walk`"]
     # Nobody got to 99 % in 40 s, so that all took the horizon of the leaderboard.
-    assert rows[1].split(" | ")[6] == f"{worlds.HORIZON_S / 9.0:.2f}"
+    assert rows[1].split(" | ")[6] == f"{study.HORIZON_S / 9.0:.2f}"
     assert "Not in it: LIFULL apartments; KTH campus floors" in page
     assert "generated floors of the set `test` in the world lab;" in page
 
@@ -59,9 +59,9 @@ def test_beside_it_are_the_page_for_browsers_and_the_table_of_the_readme(folder,
 
 def test_bounds_are_wanted_of_a_part_of_the_floors(tmp_path, monkeypatch):
     monkeypatch.setattr(study, "measure_bound", _known)
-    done = list(study.work(tmp_path, None, 50, 1))
-    assert done[-1] == ("bounds", 6, 6)  # two floors of four
-    assert study._bounds_in(tmp_path)[worlds.floors_of(None, 50)["test"][0], 2] == 20.0
+    done = list(study.work(tmp_path, None, 10, 1))
+    assert done[-1] == ("bounds", 9, 9)  # three floors of twenty
+    assert study._bounds_in(tmp_path)[worlds.floors_of(None, 10)["test"][0], 2] == 20.0
 
 
 def _known(team):

@@ -16,10 +16,9 @@ def test_floors_run_in_all_worlds_and_fewer_of_them_in_slow_ones():
 
 def test_all_policies_that_need_no_goal_are_in_it():
     asked = {policy for world in worlds.WORLDS.values() for policy in world.policies}
-    # A bound of supervised teams, the systems as they were printed, predicted tours and meetings are compared in their
-    # own studies, teams of the zoo on their own page; two policies move between the nodes of a graph.
+    # A bound of supervised teams, the systems as they were printed and meetings are compared in their own studies,
+    # teams of the zoo on their own page; two policies move between the nodes of a graph.
     own = {"oracle_starts", "supervised:thesis", "srt:thesis", "nearest_node", "utility_node"}
-    own |= {"predicted_tours", "supervised_predicted"}
     own |= {name for name in POLICIES if name.startswith("zoo:")}
     own |= {"meeting_frontier", "meeting_tours", "oblivious", "tethered"}
     assert set(POLICIES) - asked == own
