@@ -107,7 +107,7 @@ POLICIES.register(
 POLICIES.register(
     "zoo:signal-2",
     "lidarium.agents.zoo.policy:signal_2",
-    "as zoo:ppo-2, trained with a radio that breaks behind walls",
+    "as zoo:ppo-2, trained with radio links that break behind walls",
 )
 POLICIES.register(
     "zoo:tours-2",

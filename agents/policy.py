@@ -39,7 +39,7 @@ class Team(Protocol):
 
     @property
     def level(self) -> str:
-        """The level of decision of its actions."""
+        """Its action level."""
         ...
 
     @property

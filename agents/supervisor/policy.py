@@ -161,7 +161,7 @@ class _LedTeam:
 
     @property
     def level(self) -> str:
-        """The level of decision of the actions."""
+        """The action level."""
         return self._team.level
 
     @property

@@ -39,7 +39,7 @@ class SupervisedTeam(TeamWrapper):
     Parameters
     ----------
     env : ParallelEnv
-        The environment of a team, at any level of decision.
+        The environment of a team, at any action level.
     make : callable
         Takes the level and returns a supervisor.
     masks_orders : bool, optional

@@ -27,7 +27,7 @@ STOP_NUMBERS = ("x", "y", "way", "gain", "size", "place", "is_own", "is_kept")
 """The numbers of a stop.
 
 Position relative to the robot and length of the way there [m], unknown area in view [m2], length of the frontier [m],
-place in its tour from 1 on, whether that is the robot's own tour, and whether the robot drives there already.
+position in its tour starting at 1, whether that is the robot's own tour, and whether the robot drives there already.
 """
 
 

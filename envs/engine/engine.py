@@ -194,7 +194,7 @@ class Engine:
         self.use_level(level)
 
     def use_level(self, name: str, shares_map: bool = True, decision_period_s: float | None = None) -> None:
-        """Let actions be those of another level of decision; episodes have to begin anew.
+        """Let actions be those of another action level; episodes have to begin anew.
 
         ``shares_map`` and ``decision_period_s`` are those of `Level`.
         """

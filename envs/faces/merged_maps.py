@@ -34,7 +34,7 @@ class MergedMaps(TeamWrapper):
     Parameters
     ----------
     env : ParallelEnv
-        The environment of a team of two robots or more, at any level of decision.
+        The environment of a team of two robots or more, at any action level.
     settings : MergingSettings, optional
         Settings of map merging. The defaults of `MergingSettings` by default.
     can_talk : (robots, robots) bool or callable, optional

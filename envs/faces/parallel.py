@@ -132,7 +132,7 @@ class ExplorationEnv(ParallelEnv[str, Any, Any]):
         self._note_level()
 
     def use_level(self, name: str, shares_map: bool = True, decision_period_s: float | None = None) -> None:
-        """Let actions be those of another level of decision, from the next reset on.
+        """Let actions be those of another action level, from the next reset on.
 
         Parameters
         ----------
@@ -357,7 +357,7 @@ class ExplorationEnv(ParallelEnv[str, Any, Any]):
 
     @property
     def level(self) -> str:
-        """The level of decision of the actions."""
+        """The action level."""
         return self.engine.level_name
 
     @property

@@ -56,7 +56,7 @@ class EpisodeTeam:
 
     @property
     def level(self) -> str:
-        """The level of decision of the actions."""
+        """The action level."""
         return self._engine.level_name
 
     @property

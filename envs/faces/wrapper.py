@@ -17,7 +17,7 @@ class TeamWrapper(ParallelEnv[str, Any, Any]):
     Parameters
     ----------
     env : ParallelEnv
-        The environment of a team, at any level of decision.
+        The environment of a team, at any action level.
 
     Notes
     -----

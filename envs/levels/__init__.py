@@ -7,7 +7,7 @@ from lidarium.envs.levels.level import Level
 from lidarium.registry import Registry
 
 LEVELS: Registry[type[Level]] = Registry("level")
-"""The levels of decision by name."""
+"""The action levels by name."""
 
 LEVELS.register("velocity", "lidarium.envs.levels.velocity:VelocityLevel", "speed and turn rate, for a step")
 LEVELS.register("waypoint", "lidarium.envs.levels.waypoint:WaypointLevel", "a point to drive to")
@@ -19,7 +19,7 @@ L = TypeVar("L", bound=type[Level])
 
 
 def level(name: str, summary: str = "") -> Callable[[L], L]:
-    """Register a level of decision, a subclass of `Level`; environments then take its name.
+    """Register an action level, a subclass of `Level`; environments then take its name.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The base class of levels of decision."""
+"""The base class of action levels."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping

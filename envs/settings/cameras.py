@@ -52,7 +52,7 @@ class DepthCamera:
     pan : float
         Angle by which the axis points to the left of the robot's heading [rad].
     rate_hz : float
-        Images per second; at most one a time step is taken [1/s].
+        Images per second; at most one per time step is taken [1/s].
     noise_floor : float
         Standard deviation of the noise at ``depth_min`` [m].
     noise_share : float

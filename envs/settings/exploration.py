@@ -42,7 +42,7 @@ class SparseMapSettings:
     Attributes
     ----------
     codes : int, default 256
-        Codes of an image, at most, of floor and obstacles together.
+        Maximum number of codes of an image, for floor and obstacles together.
     most_boxes : int, default 1500
         A map with more boxes merges them with a larger slack.
     least_motion_m : float, default 0.3
@@ -52,7 +52,7 @@ class SparseMapSettings:
     cell_m : float, default 0.1
         Side of the cells of seen ground [m].
     margin_m : float, default 0.05
-        Paths on the map keep the body so far from boxes [m].
+        Minimum distance between body and boxes on paths on the map [m].
     mode : str
         What codes are: boxes (``default``), or points without extent (``thesis``).
     """
@@ -78,7 +78,7 @@ class GraphSettings:
     Attributes
     ----------
     spacing : float, default 4.0
-        Distance of the nodes along each axis [m].
+        Distance between nodes along each axis [m].
     neighbours : int, default 2
         An edge leads to nodes up to this many spacings away along each axis, if the line between is known to be free.
     utility_share : float, default 0.8
@@ -86,9 +86,9 @@ class GraphSettings:
     least_utility : int, default 1
         A node with at most this many frontiers in view counts as having none, from then on.
     frontier_spacing : float, default 1.6
-        Of the frontier cells in a square of this side one is counted [m].
+        Side of the squares in each of which one frontier cell is counted [m].
     offers : int, default 400
-        Maximum number of nodes that are observed, those with the shortest ways.
+        Maximum number of nodes that are observed, those with the shortest paths.
     """
 
     spacing: Annotated[float, above(0.0, 1e3)] = 4.0
@@ -143,15 +143,15 @@ class ExplorationSettings:
         The body of each; with ``kinds`` a body with room for all of them and the limits of the slowest, by
         which paths are planned.
     kinds : tuple of str
-        Names of the robots of a mixed team, in order, from the front again if these are too few; empty
+        Names of the robots of a mixed team, in order, repeated from the first if there are too few; empty
         if all are ``robot``.
     lidar : Lidar
         The laser of each; with ``lidars`` one with the longest range, the widest view and the most noise of them.
     lidars : tuple of Lidar
-        The lasers of a team whose lasers differ, in order, from the front again if these are too few; empty if all
+        The lasers of a team whose lasers differ, in order, repeated from the first if there are too few; empty if all
         are ``lidar``. The numbers of beams and the heights must be equal.
     camera : DepthCamera or None
-        The depth camera of each; None for none.
+        The depth camera of each robot; None for no camera.
     occupancy : OccupancySettings
         Their maps.
     sparse_map : SparseMapSettings
@@ -159,17 +159,18 @@ class ExplorationSettings:
     reward : RewardSettings
         Weights of the reward.
     known_starts : bool, default True
-        Whether the robots know their start poses; otherwise each believes to start at (0, 0, 0).
+        Whether the robots know their start poses; otherwise each believes that it starts at (0, 0, 0).
     starts : str or None
-        Start poses: ``fixed`` uses the starts of the floor as far as it has some; ``drawn`` draws them by the seed.
-        None is ``drawn`` for the makers of environments and if each episode draws its floor, else ``fixed``.
+        Start poses: ``fixed`` uses the starts of the floor as far as it has any; ``drawn`` draws them from the
+        seed. None is ``drawn`` for the functions that make environments and if each episode draws its floor, else
+        ``fixed``.
     reveals_starts : bool, default False
         Whether reports include the true starts of robots with unknown starts, as a bound for the results of map
         merging.
     localization : str
         Source of the robot's pose: ``truth`` or the name of a localizer.
     localizer : object or None
-        Own settings of that localizer, of its class ``Settings``; None for its defaults.
+        Settings of that localizer, an instance of its class ``Settings``; None for its defaults.
     odometry : OdometrySettings
         Accuracy of the wheels' path measurement.
     radio : RadioSettings
@@ -184,7 +185,7 @@ class ExplorationSettings:
         Share of the openings between rooms that have doors: sliding doors that open when somebody comes, stand open
         or stay shut.
     pauses_when_blocked : bool, default False
-        Whether a robot pauses until it is ordered to resume if its bumper touches anything, or its way is blocked.
+        Whether a robot whose bumper touches anything, or whose path is blocked, pauses until it is ordered to resume.
     backend : str, default "kinematic"
         The world: ``kinematic``, ``bullet`` or another that is registered.
     time_step : float, default 0.1
@@ -195,17 +196,17 @@ class ExplorationSettings:
     horizon_s : float or None, default 600.0
         Simulated time after which the episode is truncated [s]; None for no horizon.
     stop_coverage : float or None, default 0.99
-        Share of F at which all robots end as ``covered``; None for off.
+        Share of F at which all robots end as ``covered``; None to disable.
     stop_on_contact : bool, default False
         Whether a robot that touches anything ends as ``collision``.
     goal_radius : float, default 0.3
         Distance to the goal, if the floor has one, at which a robot ends as ``reached`` [m].
     observe : tuple of str
         The observations: any of ``OBSERVABLES``, kept in that order, and of the registry
-        ``observable``. The makers of environments leave out ``pose`` if it is not named.
+        ``observable``. Functions that make environments leave out ``pose`` if it is not named.
     map_cells : int, default 256
-        Side of the observed ``map`` [cells], a multiple of 2; half of it is how far a waypoint of the level
-        of waypoints can lie.
+        Side of the observed ``map`` [cells], a multiple of 2; half of it is the maximum distance of a waypoint
+        along each axis.
     egocentric_cells : int, default 64
         Side of each crop of the ``egocentric_map`` [cells of the crop], a multiple of 2.
     egocentric_scales : tuple of int
@@ -217,10 +218,10 @@ class ExplorationSettings:
     frontiers : int, default 32
         Maximum number of frontiers that the level of frontiers offers.
     least_frontier : float, default 0.5
-        Length of a frontier that is offered [m]; shorter ones are offered if no longer one exists.
+        Length of a frontier that is offered [m]; shorter ones are offered only if none of this length exists.
     frontiers_by_size : float, default 0.5
-        Share of the frontiers that are offered because they are the longest; the others are those with the
-        cheapest way.
+        Share of the frontiers that are offered because they are the longest; the others are those with the cheapest
+        paths.
     graph : GraphSettings
         The nodes of the level of nodes.
     state_cells : int, default 32

@@ -153,14 +153,14 @@ def observed_names(names: Iterable[str]) -> tuple[str, ...]:
 
 
 def check_level(names: Iterable[str], level: str) -> None:
-    """Check that the observations exist at a level of decision."""
+    """Check that the observations exist at an action level."""
     absent = [name for name in names if name in LEVEL_OBSERVABLES]
     if absent and level != "frontier":
         raise ValueError(f"observe has {absent[0]!r}, which needs level='frontier'; level is {level!r}")
 
 
 def level_for(names: Iterable[str]) -> str:
-    """Return a level of decision at which all observations exist."""
+    """Return an action level at which all observations exist."""
     return "frontier" if any(name in LEVEL_OBSERVABLES for name in names) else "velocity"
 
 

@@ -17,25 +17,25 @@ class OdometrySettings:
     Attributes
     ----------
     distance_bias : float, default 0.0
-        Share by which distances are measured too long or too short all through an episode [1].
+        Share by which distances are measured too long or too short throughout an episode [1].
     turn_bias : float, default 0.0
-        Share by which turns are measured too large or too small all through an episode [1].
+        Share by which turns are measured too large or too small throughout an episode [1].
     drift : float, default 0.0
-        Turn that a metre feigns, to the left or to the right all through an episode [rad/m].
+        False turn measured per metre, to the left or to the right throughout an episode [rad/m].
     turn_noise_of_turn : float, default 0.0
-        Standard deviation of a turn, from the root of the turn [rad^(1/2)].
+        Growth of a turn's standard deviation with the square root of the turn [rad^(1/2)].
     turn_noise_of_distance : float, default 0.0
-        Standard deviation of a turn, from the root of the distance [rad/m^(1/2)].
+        Growth of a turn's standard deviation with the square root of the distance [rad/m^(1/2)].
     distance_noise_of_distance : float, default 0.0
-        Standard deviation of a distance, from the root of the distance [m^(1/2)].
+        Growth of a distance's standard deviation with the square root of the distance [m^(1/2)].
     distance_noise_of_turn : float, default 0.0
-        Standard deviation of a distance, from the root of the turn [m/rad^(1/2)].
+        Growth of a distance's standard deviation with the square root of the turn [m/rad^(1/2)].
     counts_ticks : bool, default False
-        Whether encoders count whole ticks; how many make a metre is the robot's.
+        Whether encoders count whole ticks; the robot defines how many make a metre.
     speed_noise : float, default 0.0
-        Standard deviation of the speed that the drive makes of a command, as a share of it [1].
+        Standard deviation of the speed with which the drive executes a command, as a share of it [1].
     turn_rate_noise : float, default 0.0
-        Standard deviation of the turn rate that the drive makes of a command, as a share of it [1].
+        Standard deviation of the turn rate with which the drive executes a command, as a share of it [1].
     """
 
     distance_bias: Annotated[float, share(has_maximum=False)] = 0.0

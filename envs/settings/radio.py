@@ -26,7 +26,7 @@ class RadioSettings:
         ``all``, ``none``, ``range`` (within ``reach``), ``line_of_sight`` (within ``reach`` and nothing solid
         between) or ``signal`` (``power`` less the path loss is above ``threshold``).
     reach : float, default 10.0
-        Of ``range`` and ``line_of_sight`` [m].
+        Maximum distance for ``range`` and ``line_of_sight`` [m].
     power : float, default -20.0
         Power of the sender [dBm].
     threshold : float, default -70.0

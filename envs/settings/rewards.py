@@ -22,14 +22,14 @@ class RewardSettings:
         Per square metre of F that the team had not sensed, shared among the robots that sense it first
         [1/m2].
     time : float, default 0.01
-        Of the time, a term of -1 a second [1/s].
+        Weight of the time, a term of -1 per second [1/s].
     contact : float, default 0.1
-        Of contacts, a term of -1 for each step in contact [1].
+        Weight of contacts, a term of -1 for each step in contact [1].
     energy : float, default 0.01
-        Of the way driven, a term of -1 a metre [1/m].
+        Weight of the distance driven, a term of -1 per metre [1/m].
     more : tuple of (str, float)
-        Registered terms (`lidarium show rewards`), whose sign is their own, with their weights; a mapping is taken as
-        well.
+        Registered terms (`lidarium show rewards`), which keep their own sign, with their weights; a mapping is also
+        accepted.
     """
 
     area: Annotated[float, within(-1e6, 1e6)] = 1.0

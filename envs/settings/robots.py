@@ -56,7 +56,7 @@ class Build:
     body_friction : float
         Friction between the body and objects that it touches [1].
     motor_torque : float
-        Greatest torque of a wheel's motor [N m].
+        Maximum torque of a wheel's motor [N m].
     """
 
     base_mass: Mass = 2.3
@@ -87,7 +87,7 @@ class Robot:
     height : float, default 0.52
         Height of the body [m]; solids and other robots' lasers below it meet the body.
     cruise_speed : float, default 0.33
-        Speed that its own driving keeps to [m/s].
+        Speed that the onboard driver keeps to [m/s].
     max_speed : float, default 0.77
         Limit of the speed of the drive [m/s].
     max_turn_rate : float, default 3.14
@@ -99,7 +99,7 @@ class Robot:
     wheel_base : float, default 0.23
         Distance between the driven wheels [m].
     ticks_per_metre : float, default 11724.0
-        Ticks that the encoder of a wheel counts on a metre [1/m].
+        Ticks that the encoder of a wheel counts per metre [1/m].
     length : float, default 0.352
         Length of the body's outline [m].
     width : float, default 0.352

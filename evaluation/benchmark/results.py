@@ -283,7 +283,7 @@ def _write(
 
 def table_of(tasks: Sequence[BenchmarkTask], results: BenchmarkResults) -> str:
     """Return the table as markdown."""
-    header = ("task", "policy", "runs", "99 % [%]", "time to 99 % [s]", "time over the baseline's", "P(sooner)")
+    header = ("task", "policy", "runs", "99 % [%]", "time to 99 % [s]", "time relative to the baseline", "P(sooner)")
     horizons = {task.name: float(task.settings["horizon_s"]) for task in tasks}
     lines = []
     for each in results.standings:
@@ -302,13 +302,13 @@ def table_of(tasks: Sequence[BenchmarkTask], results: BenchmarkResults) -> str:
     overall = [(code(policy), f"{mean:.3f}", str(number)) for policy, (mean, number) in results.overall.items()]
     parts = [
         f"# {results.benchmark}, size {results.size}",
-        "In brackets 95 % intervals over floors. Policies in bold ran here; rows of the others are shipped. The time "
-        "over the baseline's is a geometric mean over floors with the same starts; a run that did not see 99 % counts "
-        "with the horizon.",
+        "Brackets contain 95 % intervals over floors. Policies in bold ran here; rows of the others are shipped. The "
+        "time relative to the baseline is a geometric mean over floors with the same starts; a run that did not see "
+        "99 % counts as the horizon.",
         markdown_table(header, lines) if lines else "No rows.",
         "## Over all tasks",
         "Geometric mean of the ratios of the tasks that a policy ran in, each with the same weight.",
-        markdown_table(("policy", "time over the baselines'", "tasks"), overall) if overall else NONE,
+        markdown_table(("policy", "time relative to the baselines", "tasks"), overall) if overall else NONE,
     ]
     if results.remarks:
         parts += ["## Remarks", "\n".join(f"- {plain(remark)}" for remark in results.remarks)]

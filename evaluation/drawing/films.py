@@ -271,12 +271,12 @@ FILMS: Registry[FramesMaker] = Registry("film")
 FILMS.register(
     "maps",
     "lidarium.evaluation.drawing.map_film:MapFrames",
-    "what each robot knows and how maps are joined, of robots that do not know their starts",
+    "for robots that do not know their starts: what each knows and how maps are joined",
 )
 FILMS.register(
     "prediction",
     "lidarium.evaluation.drawing.films:PredictionFrames",
-    "as scans, and what a network predicts beyond the explored part",
+    "like `scans`, plus what a network predicts beyond the explored part",
 )
 FILMS.register(
     "scans",

@@ -525,11 +525,11 @@ _SAFETY: tuple[tuple[str, int, str, str, Direction], ...] = (
     ("closest_approach_m", CLOSEST, "smallest gap between a robot and a person", "m", "higher"),
     ("speed_at_closest_m_s", CLOSEST_SPEED, "speed of the robot at `closest_approach_m`", "m/s", "lower"),
     ("near_misses", NEAR_MISSES, "how often a gap to a person fell below 0.5 m", "", "lower"),
-    ("time_near_people_s", NEAR_STEPS, "time with a gap to a person below 0.5 m, all robots", "s", "lower"),
+    ("time_near_people_s", NEAR_STEPS, "time with a gap to a person below 0.5 m, summed over robots", "s", "lower"),
     ("speed_near_people_m_s", NEAR_SPEED, "maximum speed of a robot in that time", "m/s", "lower"),
     ("contacts_by_robot", BY_ROBOT, "contacts of a robot that drove into a person", "", "lower"),
     ("contacts_by_person", BY_PERSON, "contacts of a person who walked into a robot", "", "lower"),
-    ("yielding_s", YIELDED, "time that robots lost by slowing down for people, all robots", "s", "lower"),
+    ("yielding_s", YIELDED, "time that robots lost by slowing down for people, summed", "s", "lower"),
 )
 for _key, _column, _text, _unit, _direction in _SAFETY:
     _add(_key, partial(_among_people, column=_column), f"{_text}; null without people", _unit, _direction)
@@ -586,7 +586,7 @@ _add(
 _add(
     "c_others_final",
     _others_coverage,
-    "coverage by the robots that have not failed, of the floor still in reach; null if none has failed",
+    "coverage, by the robots that have not failed, of the floor that they can still reach; null if none has failed",
     direction="higher",
 )
 _add(

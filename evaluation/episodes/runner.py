@@ -83,7 +83,7 @@ def run_episode(
     policy : Policy
         The policy; its ``Stop`` ends a robot at its next step.
     env : ExplorationEnv
-        The environment; it is switched to the level of decision.
+        The environment; it is switched to the action level.
     seed : int
         Seed of all draws of the environment and the policy.
     options : mapping, optional

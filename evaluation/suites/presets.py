@@ -158,8 +158,8 @@ PRESETS: dict[str, _Preset] = {
         ),
         differences=(
             _CLOCK,
-            "the six scenes of 25 m x 25 m are drawn anew after their names",
-            "path_m has every robot; the project prints that of robot 0",
+            "the six scenes of 25 m x 25 m are redrawn from their names",
+            "path_m covers every robot; the project reports only robot 0",
         ),
     ),
     "ariadne": _Preset(
@@ -203,9 +203,9 @@ PRESETS: dict[str, _Preset] = {
         differences=(
             "walls keep the pixels of 0.2 m; the project halves its pictures",
             "the laser sees all free space in sight; the project walks along lines of cells that end where they pass a "
-            "corner of a wall, so that more has to be looked at. Its nearest and utility take 671 m and 631 m on its "
-            "first 27 maps, ours by its rules 607 m and 581 m. Its own code, given a laser like ours, takes 580 m and "
-            "549 m on twelve of these maps, where ours take 586 m and 554 m",
+            "corner of a wall, so that more has to be looked at. Its nearest and utility planners take 671 m and "
+            "631 m on its first 27 maps, ours 607 m and 581 m; with a laser like ours, its own take 580 m and 549 m on "
+            "twelve of these maps, ours 586 m and 554 m",
         ),
     ),
     "chen": _Preset(

@@ -47,7 +47,7 @@ NOBODY = "The whole floor"
 BEHIND = 0.0, -4.5, 6.0
 """Position of the camera relative to a robot when it begins to follow it [m]."""
 
-PAUSE, GO_ON = "Pause", "Go on"
+PAUSE, RESUME = "Pause", "Resume"
 
 
 class Controls:
@@ -100,7 +100,7 @@ class Controls:
 
     def _turn_pause(self) -> None:
         self._is_paused = not self._is_paused
-        self._pause.label = GO_ON if self._is_paused else PAUSE
+        self._pause.label = RESUME if self._is_paused else PAUSE
 
     @property
     def is_paused(self) -> bool:

@@ -145,9 +145,9 @@ def _text(results: "BenchmarkResults", folder: Path) -> str:
     return "\n".join(
         [
             f"{results.benchmark}, size {results.size}; * ran here, rows of the others are shipped",
-            table(rows, ("task", "policy", "runs", "99 %", "median [s]", "time over the baseline's")),
+            table(rows, ("task", "policy", "runs", "99 %", "median [s]", "time relative to the baseline")),
             "",
-            table(overall, ("policy", "time over the baselines'", "tasks")),
+            table(overall, ("policy", "time relative to the baselines", "tasks")),
             *(f"  {remark}" for remark in results.remarks),
             f"  {folder}: table.md, card.md, results.json, report/report.html",
         ]

@@ -65,10 +65,10 @@ FLOOR, SEEDS, HORIZON_S = "apartment", 10, 600.0
 """Floor, number of starts and horizon [s] of the figures on the pages of one robot."""
 
 OF_GYMNASIUM = {
-    "Exploration": "One robot with a laser; an action is speed and turn rate for 0.1 s.",
-    "WaypointExploration": "One robot with a laser; an action is a place near it, to which it drives for 2 s.",
+    "Exploration": "One robot with a laser; an action is a speed and a turn rate for 0.1 s.",
+    "WaypointExploration": "One robot with a laser; an action is a point near the robot, to which it drives for 2 s.",
     "FrontierExploration": "One robot with a laser; an action is one of the frontiers that it can reach.",
-    "Exploration3D": "One robot with a laser and a depth camera; an action is speed and turn rate.",
+    "Exploration3D": "One robot with a laser and a depth camera; an action is a speed and a turn rate.",
 }
 """The ids of one robot, and what they ask."""
 
@@ -131,7 +131,7 @@ def page(entry: Entry, found: Benchmark) -> str:
     parts = [
         f"# {entry.name}",
         f"![{entry.policy} on {entry.floor}](../images/gallery/{entry.name}.webp)",
-        f"{about[0].upper()}{about[1:]} The film shows `{entry.policy}` on `{entry.floor}`, fifteen times as fast.",
+        f"{about[0].upper()}{about[1:]} The film shows `{entry.policy}` on `{entry.floor}`, sped up fifteen times.",
         _usage(entry),
         "## Observation",
         markdown_table(("name", "shape", "dtype", "from", "to"), _boxes(env.observation_space("robot_0"))),
@@ -192,11 +192,11 @@ def _rewards(settings: RewardSettings) -> str:
 
 
 def _endings(settings: Any) -> str:  # noqa: ANN401
-    ends = [] if settings.stop_coverage is None else [f"{100.0 * settings.stop_coverage:g} % of the floor are seen"]
-    ends += (
-        [] if settings.horizon_s is None else [f"{settings.horizon_s:,.0f} s of simulated time are over (truncated)"]
-    )
-    ends.append("a policy stops its robot")
+    ends = ["a policy stops its robot"]
+    if settings.horizon_s is not None:
+        ends.insert(0, f"{settings.horizon_s:,.0f} s of simulated time have passed (truncated)")
+    if settings.stop_coverage is not None:
+        ends.insert(0, f"{100.0 * settings.stop_coverage:g} % of the floor has been seen")
     return f"When {', or when '.join(ends)}."
 
 
@@ -235,9 +235,9 @@ def _standings(found: Benchmark, task: BenchmarkTask) -> str:
         )
         for each in sorted(standings, key=lambda each: each.time_s.estimate)
     ]
-    header = ("policy", "runs that see 99 % [%]", "median time to 99 % [s]", "time over the baseline's")
+    header = ("policy", "runs that see 99 % [%]", "median time to 99 % [s]", "time relative to the baseline")
     command = f"`lidarium benchmark {found.name} --tasks {task.name} --policies mine:Policy`"
-    return f"{markdown_table(header, rows)}\n\nIn brackets 95 % intervals over floors. Your own policy: {command}."
+    return f"{markdown_table(header, rows)}\n\nBrackets contain 95 % intervals over floors. Your own policy: {command}."
 
 
 @cache
@@ -255,8 +255,8 @@ def _from_starts(has_camera: bool) -> str:
     header = ("policy", "runs that see 99 % [%]", "median time to 99 % [s]")
     command = f'`lidarium.evaluate("mine:Policy", robots=1, seeds={SEEDS}, settings={json.dumps(settings)})`'
     return (
-        f"{markdown_table(header, lines)}\n\nFrom {SEEDS} starts on `{FLOOR}`, in brackets the soonest and the latest; "
-        f"each policy decides at its own level. Your own policy: {command}."
+        f"{markdown_table(header, lines)}\n\nFrom {SEEDS} starts on `{FLOOR}`, with the shortest and the longest time "
+        f"in brackets; each policy decides at its own level. Your own policy: {command}."
     )
 
 
@@ -264,13 +264,13 @@ def index(listed: list[Entry]) -> str:
     """Return the gallery: a film of each environment, and floors."""
     parts = [
         "# Gallery",
-        "Each environment has a page. Films are fifteen times as fast as the robots.",
+        "Each environment has a page. Films are sped up fifteen times.",
         "## One robot, Gymnasium",
         _pictures([entry for entry in listed if entry.task is None]),
         "## Tasks of lidarium-1",
         _pictures([entry for entry in listed if entry.task is not None]),
         "## Floors",
-        "Drawn, generated (`apartment:SEED`, `office:SEED`, `corridors:SEED`), and real ones: "
+        "Drawn, generated (`apartment:SEED`, `office:SEED`, `corridors:SEED`) and real floors: see "
         "[floors](../reference/floors.md).",
         _grid([(f"![{name}](../images/gallery/{_file(name)}.png)", f"`{name}`") for name in FLOORS]),
         "## Films",

@@ -7,11 +7,11 @@ from typing import Any
 from lidarium.benchmarks.studies.leaderboard.worlds import WORLDS, World
 
 HEADER = (
-    "| robots | world | policy | runs | reached 99 % | time to 99 % [s] | over the bound | less the baseline "
+    "| robots | world | policy | runs | reached 99 % | time to 99 % [s] | over the bound | minus the baseline "
     "[s] | path of all [m] | overlap [%] |\n|---:|---|---|---:|---:|---:|---:|---:|---:|---:|"
 )
 SHORT_HEADER = (
-    "| policy | reached 99 % | time to 99 % [s] | over the bound | less the baseline [s] |\n|---|---:|---:|---:|---:|"
+    "| policy | reached 99 % | time to 99 % [s] | over the bound | minus the baseline [s] |\n|---|---:|---:|---:|---:|"
 )
 
 Multiples = Mapping[tuple[str, int], float]

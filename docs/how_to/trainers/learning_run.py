@@ -203,7 +203,7 @@ def conclusion(horizon_s: float, coverage: dict[str, list[float]]) -> str:
         f"Trained networks see {shares[LEARNED]:.1f} % of an unseen floor in {horizon_s:.0f} s with one robot, "
         f"untrained ones {shares[UNTRAINED]:.1f} %.\nThe nearest frontier sees {shares['nearest_frontier']:.1f} % "
         f"from the same starts, `{best}`, the best classic policy, {shares[best]:.1f} %:\n"
-        f"floor by floor the networks differ from that by {more_than(coverage, best)} (mean, 95 % interval)."
+        f"floor by floor the networks differ from `tour_frontier` by {more_than(coverage, best)} (mean, 95 % interval)."
     )
 
 

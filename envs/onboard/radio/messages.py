@@ -94,7 +94,7 @@ class Route:
 
 @dataclass(frozen=True, slots=True)
 class Stop:
-    """An action by which a robot ends its work, at any level of decision.
+    """An action by which a robot ends its work, at any action level.
 
     Attributes
     ----------

@@ -63,7 +63,7 @@ class OperatingEvent:
         The state's or the order's name.
     reason : str
         Why: of a state ``order``, ``contact``, ``blocked`` or the reason of its ending; of an order that of
-        the order; of a refused one the robot's state, ``no_driver`` (no driver serves its level of decision),
+        the order; of a refused one the robot's state, ``no_driver`` (no driver serves its action level),
         ``outside`` or ``occupied`` (the target on its map).
     target : Target or None
         Target of an order to drive, in the robot's map frame.

@@ -150,7 +150,7 @@ def test_without_rows_of_the_baseline_nothing_is_compared_and_that_is_said(tiny,
     assert (mine["policy"], mine["is_baseline"], mine["ratio"]) == ("explore_lite", False, None)
     assert any("no rows of its baseline nearest_frontier" in remark for remark in written["remarks"])
     assert "| baseline |" not in (tmp_path / "mine" / "table.md").read_text()
-    assert "baseline\n" not in capsys.readouterr().out
+    assert "  baseline\n" not in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(

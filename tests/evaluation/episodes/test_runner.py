@@ -1,4 +1,4 @@
-"""Running a policy through an episode, at every level of decision."""
+"""Running a policy through an episode, at every action level."""
 
 import numpy as np
 import pytest

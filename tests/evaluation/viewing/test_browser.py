@@ -43,8 +43,8 @@ def page(driver):
         yield page
         env.stop("robot_0", "nobody looks any more")
         env.stop("robot_1", "nobody looks any more")
-        if says(page, "Go on"):
-            page.button("Go on").click()
+        if says(page, "Resume"):
+            page.button("Resume").click()
         run.join(60.0)
     assert not run.is_alive()
 
@@ -99,7 +99,7 @@ def test_the_page_says_how_far_the_run_is(page):
 def test_a_pause_stops_the_run_and_layers_go_and_come_meanwhile(page):
     page.wait(lambda: page.env.scorer.time > 1.0, 60.0)
     page.button("Pause").click()
-    page.wait(lambda: says(page, "Go on"), 20.0)
+    page.wait(lambda: says(page, "Resume"), 20.0)
     whole, time_s = still(page), page.env.scorer.time
     assert whole.std() > 10.0  # something is drawn
     for label in ("True walls", "Robots"):
@@ -109,7 +109,7 @@ def test_a_pause_stops_the_run_and_layers_go_and_come_meanwhile(page):
         page.run("arguments[0].click()", field)
         page.wait(lambda: are_alike(picture(page), whole), 30.0)
     assert page.env.scorer.time == time_s
-    page.button("Go on").click()
+    page.button("Resume").click()
     page.wait(lambda: page.env.scorer.time > time_s and says(page, "Pause"), 20.0)
 
 

@@ -9,10 +9,10 @@ from recorded_scene import RecordedServer
 
 from lidarium.evaluation.viewing.controls import (
     BEHIND,
-    GO_ON,
     NOBODY,
     OF_CAMERAS,
     PAUSE,
+    RESUME,
     SPEEDS,
     Controls,
     Layer,
@@ -33,7 +33,7 @@ def test_a_run_waits_from_a_click_to_the_next():
     for _ in range(2):
         boxes[PAUSE].press()
         seen.append((controls.is_paused, boxes[PAUSE].label))
-    assert seen == [(False, PAUSE), (True, GO_ON), (False, PAUSE)]
+    assert seen == [(False, PAUSE), (True, RESUME), (False, PAUSE)]
 
 
 @pytest.mark.parametrize("name", SPEEDS)

@@ -19,7 +19,7 @@ from lidarium.envs.floors.catalogue.names import load_floor
 from lidarium.envs.settings.making import make_settings
 from lidarium.evaluation.episodes.runner import run_episode
 from lidarium.evaluation.episodes.watching import WatchedExploration, Watcher
-from lidarium.evaluation.viewing.controls import GO_ON, PAUSE
+from lidarium.evaluation.viewing.controls import PAUSE, RESUME
 from lidarium.evaluation.viewing.live_view import (
     LONGEST_WAIT_S,
     MOST_BEHIND_S,
@@ -187,7 +187,7 @@ def test_a_pause_holds_the_run_until_it_goes_on():
     run.join(0.3)
     assert run.is_alive()
     assert env.scorer.time == pytest.approx(0.3)
-    assert button.label == GO_ON
+    assert button.label == RESUME
     button.press()
     run.join(PATIENCE_S)
     assert not run.is_alive()
