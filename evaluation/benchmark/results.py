@@ -108,15 +108,19 @@ def rows_file(name: str) -> str:
     return f"{name}.rows.jsonl.xz"
 
 
+NOT_SHIPPED = (*TIMINGS, "record", "operating", "given_up")
+"""What differs between two runs of one episode, and lists that no table shows."""
+
+
 def packed(rows: Iterable[Row]) -> bytes:
-    """Return rows as the package ships them: without what differs between two runs of one episode.
+    """Return rows as the package ships them, without `NOT_SHIPPED`.
 
     Each line is a column: its name, the numbers of the rows that have it (null for all) and their values; a fifth is
     saved by columns.
     """
     kept = sorted(rows, key=lambda row: row[KEY])
     lines = []
-    for column in sorted({key for row in kept for key in row} - {*TIMINGS, "record"}):
+    for column in sorted({key for row in kept for key in row} - set(NOT_SHIPPED)):
         numbers = [number for number, row in enumerate(kept) if column in row]
         values = [kept[number][column] for number in numbers]
         line = (column, None if len(numbers) == len(kept) else numbers, values)

@@ -153,7 +153,7 @@ def benchmark(name: str) -> Benchmark:
             robots=given["robots"],
             easy=given["easy"],
             settings={**common, **_flat(given.get("settings", {}))},
-            policies=tuple(given.get("policies", content["policies"])),
+            policies=(*given.get("policies", content["policies"]), *given.get("also", ())),
             baseline=given.get("baseline", content["baseline"]),
             hashes=TaskHashes(known["settings"], tuple(known["floors"]), tuple(known["starts"])) if known else None,
         )
