@@ -4,7 +4,8 @@ import tomllib
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
-from typing import Annotated, Any, TypeVar
+from types import UnionType
+from typing import Annotated, Any, TypeVar, get_args, get_origin, get_type_hints
 
 from lidarium.agents.learned.network import NO_PREDICTOR
 from lidarium.agents.supervisor.settings import SupervisorSettings
@@ -162,6 +163,11 @@ class PpoSettings(_Budget):
                 f"checkpoint of ppo is {self.checkpoint}; want a whole multiple of environments times steps, "
                 f"{update}: so many decisions are made between two updates"
             )
+        if update % self.batch == 1:
+            raise ValueError(
+                f"batch of ppo is {self.batch}; {update} decisions (environments times steps) leave a batch of one, "
+                "which has no spread to normalize by; want another batch"
+            )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -203,6 +209,8 @@ class ValueSettings(_Budget):
                 f"checkpoint of value is {self.checkpoint}; want a whole multiple of environments, "
                 f"{self.environments}: all robots decide together"
             )
+        if self.kept < self.batch:
+            raise ValueError(f"kept of value is {self.kept}; want at least the batch, {self.batch}")
 
 
 TEAM_PPO: Mapping[str, Any] = {
@@ -289,6 +297,11 @@ class TeamSettings:
             )
         if not learning.decisions:
             raise ValueError(f"decisions of {name} is 0; want how many the team makes while it learns")
+        if self.algorithm in VALUES and learning.checkpoint < learning.batch * self.robots:
+            raise ValueError(
+                f"checkpoint of {name} is {learning.checkpoint}; want at least batch times robots, "
+                f"{learning.batch * self.robots}: each checkpoint begins with an empty memory"
+            )
         if self.supervisor is not None and self.algorithm != "ppo":
             raise ValueError(f"algorithm of a team under a supervisor is {self.algorithm!r}; want ppo")
         try:
@@ -298,7 +311,8 @@ class TeamSettings:
         taken = sorted({"robots", "horizon_s", "realism", "observe"} & set(self.settings))
         if taken:
             raise ValueError(f"settings of team has {shown(taken[0])}; the table [team] sets it, observe is fixed")
-        self.options("ideal")
+        for realism in dict.fromkeys(("ideal", self.realism)):
+            self.options(realism)
 
     @property
     def table(self) -> str:
@@ -471,6 +485,9 @@ def _team_of(content: Mapping[str, Any]) -> TeamSettings:
         learning: PpoSettings | ValueSettings = _made(ValueSettings, given, name)
     else:
         learning = _made(PpoSettings, {**TEAM_PPO, **given} if isinstance(given, Mapping) else given, name)
+    inner = sorted({"ppo", "value"} & set(table))
+    if inner:
+        raise ValueError(f"team has the table {shown(inner[0])}; want [{inner[0]}], beside [team]")
     seed = {"seed": content["seed"]} if "seed" in content else {}
     return _made(TeamSettings, {**seed, **table, name: learning}, "team")
 
@@ -497,8 +514,22 @@ def _made(kind: type[Part], content: Any, name: str) -> Part:  # noqa: ANN401
     unknown = sorted(set(content) - set(known))
     if unknown:
         raise ValueError(f"{name} has no {shown(unknown[0])}; it has {', '.join(known)}")
+    hints = get_type_hints(kind)
+    for key, value in content.items():
+        allowed = _plain_types(hints[key])
+        for plain, taken, wanted in ((tuple, (list, *allowed), "a list"), (Mapping, allowed, "a table")):
+            if plain in allowed and not isinstance(value, taken):
+                raise ValueError(f"{key} of {name} is {shown(value)}; want {wanted}")
     values = {key: tuple(value) if isinstance(value, list) else value for key, value in content.items()}
     try:
         return kind(**values)
     except TypeError as error:
         raise ValueError(f"{name} cannot be used: {error}") from error
+
+
+def _plain_types(hint: Any) -> tuple[type, ...]:  # noqa: ANN401
+    """Return the classes that a hint allows, without their parameters."""
+    if get_origin(hint) is UnionType:
+        return tuple(each for part in get_args(hint) for each in _plain_types(part))
+    plain = get_origin(hint) or hint
+    return (plain,) if isinstance(plain, type) else ()

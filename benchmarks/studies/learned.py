@@ -10,6 +10,7 @@ import numpy as np
 
 from lidarium.agents.learned.network import CARD
 from lidarium.agents.learned.policy import CORRECTED
+from lidarium.agents.predicted.policy import PREDICTED
 from lidarium.agents.tours.policy import NEAREST
 from lidarium.agents.tours.policy import TOURS as BY_TOURS
 from lidarium.benchmarks.results_page import in_file
@@ -126,9 +127,9 @@ def _cells(episodes: Times, ours: str, theirs: str, robots: int) -> tuple[str, .
 def senders_table(episodes: Mapping[str, Times]) -> str:
     """Return what sent the robots of the learned explorer, by kind of floor and size of team."""
     rows = [
-        "| floors | robots | set out, a run | by tours | by the network, elsewhere | to the nearest frontier "
-        "| runs with that |",
-        "|---|---:|---:|---:|---:|---:|---:|",
+        "| floors | robots | departures per run | by tours | by the network | by the prediction "
+        "| to the nearest frontier | runs with that |",
+        "|---|---:|---:|---:|---:|---:|---:|---:|",
     ]
     for kind, found in episodes.items():
         for robots in TEAMS:
@@ -136,7 +137,9 @@ def senders_table(episodes: Mapping[str, Times]) -> str:
             counts = [run["decided_by"] for run in runs if run.get("decided_by")]
             if not counts:
                 continue
-            sums = [sum(count.get(sender, 0) for count in counts) for sender in (BY_TOURS, CORRECTED, NEAREST)]
+            sums = [
+                sum(count.get(sender, 0) for count in counts) for sender in (BY_TOURS, CORRECTED, PREDICTED, NEAREST)
+            ]
             shares = " | ".join(f"{100 * each / sum(sums):.1f} %" for each in sums)
             ending = np.mean([NEAREST in count for count in counts])
             often = f"{sum(sums) / len(counts):.1f}"
@@ -236,8 +239,8 @@ All comparisons, with medians, runs that reached 99 % and the ratio of the longe
 {missing}
 ## What sends the robots
 
-How often robots of `learned` leave for a target in a run, and whether tours chose it, the network, or the nearest
-frontier (if too little is left for a stop of a tour).
+How often robots of `learned` leave for a target in a run, and what chose it: tours, the network instead of them, costs
+on the predicted map alone, or the nearest frontier (if too little is left for a stop of a tour).
 
 {senders}
 

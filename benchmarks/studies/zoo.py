@@ -1,11 +1,13 @@
 """The study ``zoo``: teams that learned by rewards, five trainings of each, beside classic teams on unseen floors."""
 
+import hashlib
 import itertools
 import json
 import math
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from functools import cache
 from importlib import resources
 from importlib.resources.abc import Traversable
 from pathlib import Path
@@ -26,7 +28,7 @@ from lidarium.evaluation.episodes.history import History
 from lidarium.evaluation.episodes.runner import run_episode
 from lidarium.evaluation.episodes.watching import WatchedExploration
 from lidarium.evaluation.statistics import FEWEST_FOR_INTERVAL, Interval, paired_ratio
-from lidarium.mapping.files.output import write_text
+from lidarium.mapping.files.output import write_json, write_text
 
 TEAMS = {
     "tours-2": 2,
@@ -66,7 +68,7 @@ LARGE_FLOORS = 16
 
 HORIZON_S, SHARE, EARLY_S = 1200.0, 0.99, 60.0
 
-LESSONS_FILE, RUNS_FILE, LESSONS = "lessons.jsonl", "runs.jsonl", "lessons"
+LESSONS_FILE, RUNS_FILE, LESSONS, PROCESSOR_FILE = "lessons.jsonl", "runs.jsonl", "lessons", "processor.json"
 CURVE, WEIGHTS, CURVES_PICTURE = "curve.csv", "weights.safetensors", "zoo_curves.png"
 
 PAGE = """# The zoo
@@ -88,7 +90,7 @@ are geometric means of times over floors, with 95 % intervals; a floor counts by
 
 {tables}
 
-## Teams of eight
+{whole}## Teams of eight
 
 Networks of smaller teams, with 8 robots.
 
@@ -130,23 +132,32 @@ class Run(Task):
     robots: int
     weights: Path | None
     world: str = ""
+    digest: str = field(init=False)
+    """Beginning of the hash of the weights: other weights are another task."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "digest", "" if self.weights is None else _digest(self.weights))
+
+
+@cache
+def _digest(weights: Path) -> str:
+    return hashlib.sha256(weights.read_bytes()).hexdigest()[:8]
 
 
 def learn(lesson: Lesson) -> dict[str, Any]:
-    """Train a team; return the processor time that it took."""
+    """Train a team; return the processor time that it took, in all calls."""
     from lidarium.training.settings import TeamSettings, read_any_training
     from lidarium.training.teams.training import TeamTraining
 
     settings = read_any_training(Path(str(resources.files("lidarium.training.teams") / "data" / f"{lesson.team}.toml")))
     assert isinstance(settings, TeamSettings)
-    began = time.process_time()
-    *_, last = TeamTraining(replace(settings, seed=lesson.seed), lesson.folder).run()
-    assert last.done
-    return {
-        "team": lesson.team,
-        "seed": lesson.seed,
-        "processor_s": time.process_time() - began,
-    }
+    kept = lesson.folder / PROCESSOR_FILE
+    before = float(json.loads(kept.read_text(encoding="utf-8"))["seconds"]) if kept.exists() else 0.0
+    began, spent = time.process_time() - before, before
+    for _ in TeamTraining(replace(settings, seed=lesson.seed), lesson.folder).run():
+        spent = time.process_time() - began
+        write_json(kept, {"seconds": spent})
+    return {"team": lesson.team, "seed": lesson.seed, "processor_s": spent}
 
 
 def _curve(path: Path) -> list[list[float]]:
@@ -155,14 +166,21 @@ def _curve(path: Path) -> list[list[float]]:
     return [[int(step), float(coverage)] for step, coverage in (line.split(",") for line in lines)]
 
 
+def _compared(key: tuple[str, str]) -> bool:
+    """Whether a training stands for a seed of its own; that which was made again does not."""
+    return key != AGAIN
+
+
 def _trainings(folder: Path) -> dict[tuple[str, str], Path]:
-    """Return the folders of trainings by team and seed, in the order of the teams."""
-    return {
+    """Return the folders of finished trainings by team and seed, in the order of the teams."""
+    lines = kept_lines(folder / LESSONS_FILE) if (folder / LESSONS_FILE).exists() else []
+    finished = {(line["team"], str(line["seed"])) for line in lines}
+    found = {
         (team, path.name.rpartition("-")[2]): path
         for team in TEAMS
         for path in sorted((folder / LESSONS).glob(f"{team}-*"))
-        if (path / WEIGHTS).exists()
     }
+    return {key: path for key, path in found.items() if key in finished or key[1] == SHIPPED}
 
 
 def _level(team: str) -> str:
@@ -302,6 +320,13 @@ def _mean(lines: Sequence[Line], of: Callable[[Line], float]) -> float:
     return float(np.mean([of(line) for line in lines]))
 
 
+def _slowness(policy: str, found: Mapping[str, Sequence[Line]]) -> float:
+    """Return the mean logarithm of the times of a policy over those of nearest frontiers, on the floors of both."""
+    known = {line["floor"]: math.log(_seconds(line)) for line in found.get(NEAREST, [])}
+    excess = [math.log(_seconds(line)) - known[line["floor"]] for line in found[policy] if line["floor"] in known]
+    return float(np.mean(excess)) if excess else math.inf
+
+
 def _by_policy(lines: Sequence[Line], robots: int, world: str = "") -> dict[str, list[Line]]:
     """Return the runs of teams of a size in a world, by policy."""
     found: dict[str, list[Line]] = {}
@@ -322,7 +347,7 @@ def _written(ratio: Interval | None) -> str:
 def _table(found: Mapping[str, Sequence[Line]]) -> str:
     """Return the table of teams of a size, fastest first."""
     rows = []
-    for policy in sorted(found, key=lambda name: _mean(found[name], lambda line: math.log(_seconds(line)))):
+    for policy in sorted(found, key=lambda name: _slowness(name, found)):
         lines = found[policy]
         over = [_written(_ratio(lines, found.get(other, []))) if other != policy else "-" for other in (NEAREST, TOURS)]
         reached = sum(line["time_s"] is not None for line in lines)
@@ -335,6 +360,15 @@ def _table(found: Mapping[str, Sequence[Line]]) -> str:
         f"| time over `{TOURS}` | reached 99 % |\n|---|---:|---:|---:|---:|---:|---:|"
     )
     return "\n".join([header, *rows])
+
+
+def _on_all_floors(lines: Sequence[Line]) -> str:
+    """Return the section of shipped teams and classic policies on all floors, none if no more floors ran."""
+    if not lines:
+        return ""
+    tables = "\n\n".join(f"Teams of {robots}:\n\n{_table(_by_policy(lines, robots))}" for robots in SIZES)
+    number = len({line["floor"] for line in lines})
+    return f"## All floors\n\nShipped teams and classic policies on {number} floors.\n\n{tables}\n\n"
 
 
 def _worlds(lines: Sequence[Line]) -> str:
@@ -359,7 +393,7 @@ def _worlds(lines: Sequence[Line]) -> str:
 def _best(found: Mapping[str, Sequence[Line]], is_by_tours: bool) -> str | None:
     """Return the team of the zoo at a level that takes least time, over all its trainings."""
     teams = [name for name in found if name.startswith("zoo:") and ("tours" in name) == is_by_tours]
-    return min(teams, key=lambda name: _mean(found[name], lambda line: math.log(_seconds(line))), default=None)
+    return min(teams, key=lambda name: _slowness(name, found), default=None)
 
 
 def _goals(lines: Sequence[Line]) -> str:
@@ -376,9 +410,9 @@ def _goals(lines: Sequence[Line]) -> str:
                 continue
             sure = len({line["floor"] for line in found[best]}) >= FEWEST_FOR_INTERVAL
             if other == TOURS:
-                goal, said = ("at most 1", _said(ratio.low <= 1.0, sure)) if is_by_tours else ("published", "-")
+                goal, said = ("at most 1", _said(ratio.estimate <= 1.0, sure)) if is_by_tours else ("published", "-")
             elif robots == LARGE:
-                goal, said = "at most 1", _said(ratio.low <= 1.0, sure)
+                goal, said = "at most 1", _said(ratio.estimate <= 1.0, sure)
             elif other == NEAREST:
                 goal, said = "at most 0.90, interval below 1", _said(ratio.estimate <= 0.9 and ratio.high < 1.0, sure)
             else:
@@ -456,7 +490,8 @@ def _lessons(folder: Path) -> list[dict[str, Any]]:
 def _curve_rows(lessons: Sequence[Line]) -> str:
     """Return the mean curve of each team at a few points."""
     rows = ["| decisions | " + " | ".join(f"`{team}`" for team in TEAMS) + " |", "|---:|" + "---:|" * len(TEAMS)]
-    curves = {team: [dict(map(tuple, line["curve"])) for line in lessons if line["team"] == team] for team in TEAMS}
+    own = [line for line in lessons if _compared((line["team"], line["seed"]))]
+    curves = {team: [dict(map(tuple, line["curve"])) for line in own if line["team"] == team] for team in TEAMS}
     for step in sorted({step for found in curves.values() for each in found for step in each}):
         cells = [
             f"{100 * np.mean([each[step] for each in curves[team]]):.1f} %"
@@ -471,16 +506,19 @@ def _curve_rows(lessons: Sequence[Line]) -> str:
 def page(folder: Path) -> str:
     """Return the results as markdown."""
     runs, lessons = kept_lines(folder / RUNS_FILE), _lessons(folder)
-    lines = [line for line in runs if (line["policy"].removeprefix("zoo:"), line["training"]) != AGAIN]
+    few = [line for line in runs if line["floor"] in FLOORS]
+    lines = [line for line in few if _compared((line["policy"].removeprefix("zoo:"), line["training"]))]
+    whole = [line for line in runs if line["training"] in ("", SHIPPED)] if len(few) < len(runs) else []
     return PAGE.format(
-        floors=len({line["floor"] for line in lines if line["training"] not in ("", SHIPPED)}),
-        all_floors=len({line["floor"] for line in lines}),
+        floors=len({line["floor"] for line in lines}),
+        all_floors=len({line["floor"] for line in whole or lines}),
         horizon=HORIZON_S,
-        goals="\n".join((_goals(lines), *_again(folder, runs))),
+        goals="\n".join((_goals(lines), *_again(folder, few))),
+        whole=_on_all_floors(whole),
         tables="\n\n".join(f"## Teams of {robots}\n\n{_table(_by_policy(lines, robots))}" for robots in SIZES),
         large=_table(_by_policy(lines, LARGE)),
         worlds=_worlds(lines),
-        by_seed=_seed_rows(runs, lessons),
+        by_seed=_seed_rows(few, lessons),
         picture=CURVES_PICTURE,
         curves=in_file(_curve_rows(lessons)),
     )
@@ -491,7 +529,7 @@ def pictures(folder: Path, out: Path) -> None:
     from lidarium.evaluation.analysis.learning_curves import joined
     from lidarium.evaluation.drawing.curves_picture import save_learning_curves
 
-    trained = _trainings(folder)
+    trained = {key: path for key, path in _trainings(folder).items() if _compared(key)}
     curves = [
         joined(team, paths, "step", "coverage")
         for team in TEAMS

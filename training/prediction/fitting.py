@@ -150,6 +150,11 @@ class Fitting:
         """Steps so far."""
         return self._step
 
+    @property
+    def seconds(self) -> float:
+        """Seconds that all calls took so far."""
+        return self._seconds
+
     def weights(self) -> dict[str, NDArray[np.float32]]:
         """Return the running mean of the weights."""
         return {name: array.cpu().numpy().copy() for name, array in self._mean.items()}

@@ -81,12 +81,11 @@ class PredictionTraining:
             for number, result in parts:
                 if isinstance(result, Exception):
                     raise_named(result, f"exploring floor {number} of the training")
-                done += 1
+                done, spent = done + 1, time.monotonic() - began
+                write_json(path, {"seconds": spent})
                 yield Progress("floors", done, total, {"maps": float(result)})
-                spent = time.monotonic() - began
                 if spent >= limit:
                     break
-        write_json(path, {"seconds": spent})
 
     def _fit(self) -> Generator[Progress, None, None]:
         """Fit the network, and write weights and card."""
@@ -103,9 +102,7 @@ class PredictionTraining:
         fitted = [floor for floor, is_out in zip(floors, is_held_out, strict=True) if not is_out]
         others = [floor for floor, is_out in zip(floors, is_held_out, strict=True) if is_out]
         fitting = Fitting(self.settings, self.folder / FIT_FILE, self.device)
-        last = 0.0
         for step in fitting.run(Windows(fitted)):
-            last = step.seconds
             yield Progress("fit", step.step, self.settings.steps, {"loss": step.loss, "minutes": step.seconds / 60.0})
         fitting.network.set_weights(fitting.weights())
         quality = judged(fitting.network, others, self.settings.seed)
@@ -114,7 +111,7 @@ class PredictionTraining:
             "sha256": digest,
             "versions": versions(LIBRARIES),
             "device": self.device,
-            "minutes": last / 60.0,
+            "minutes": fitting.seconds / 60.0,
             "steps": fitting.step,
             "floors": len(fitted),
             "maps": sum(len(floor.levels) for floor in fitted),

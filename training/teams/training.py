@@ -3,6 +3,7 @@
 Checkpoints are on the disk. The same call continues an interrupted training.
 """
 
+import itertools
 import math
 from collections.abc import Generator
 from contextlib import closing
@@ -20,6 +21,7 @@ from lidarium.agents.supervisor.policy import Supervised
 from lidarium.agents.zoo.policy import zoo_files
 from lidarium.envs.faces.makers import sb3_vec_env, vector_env
 from lidarium.envs.floors.catalogue.names import set_floors
+from lidarium.envs.floors.floor_choice import FloorChoice
 from lidarium.mapping.files.output import clear_unfinished, only_writer, remove_unfinished, write_json, write_text
 from lidarium.training.folder import asked_for, begin_folder, versions
 from lidarium.training.progress import Progress
@@ -49,13 +51,14 @@ class TeamTraining:
 
     def run(self) -> Generator[Progress, None, None]:
         """Learn from the last checkpoint on, and yield each step when it is on the disk."""
-        set_floors(self.settings.validation)  # hours of learning are not for floors that are not there
+        set_floors(self.settings.validation)  # floors are looked up before anything is written
+        FloorChoice(self.settings.floors)
         begin_folder(self.folder / TRAINING_FILE, self.settings.as_dict())
         with only_writer(self.folder / TRAINING_FILE):
             checkpoints = self.folder / CHECKPOINTS
-            for folder in (self.folder, checkpoints):
-                clear_unfinished(folder, ".json")
-                remove_unfinished(folder, (".safetensors", ".csv"))
+            for folder, suffix in itertools.product((self.folder, checkpoints), (".json", ".csv")):
+                clear_unfinished(folder, suffix)
+                remove_unfinished(folder, (".safetensors",))
             torch.set_num_threads(1)
             last, total = latest_checkpoint(checkpoints), self.settings.learning.whole_decisions
             done = 0 if last is None else last.decisions

@@ -117,7 +117,7 @@ def _learn_on(
         observations, rewards, _, truncated, infos = environment.step(choices.ravel())
         after = _teams(environment, observations, infos[ACTIVE])
         teams, over = choices.shape, environment.batch.is_over
-        is_cut = truncated.reshape(teams).any(axis=1)
+        is_cut = (truncated & infos[ACTIVE]).reshape(teams).any(axis=1)  # rows of robots that ended before are cut too
         both: dict[Any, Any] = {**before, CHOICE: torch.from_numpy(choices), "next": TensorDict(after)}
         happened = TensorDict(both, [len(began)])
         happened["next", "reward"] = torch.from_numpy(

@@ -73,6 +73,7 @@ def test_a_team_for_another_world_runs_there_beside_others(tmp_path, monkeypatch
     monkeypatch.setattr(zoo, "TEAMS", {"signal-2": 1, "supervised-2": 1})
     monkeypatch.setattr(zoo, "HORIZON_S", 20.0)
     keep_training(tmp_path, "supervised-2", 0, 0.6)
+    keep(tmp_path / zoo.LESSONS_FILE, [{"team": "supervised-2", "seed": 0, "processor_s": 60.0}])
     list(zoo.work(tmp_path, None, 2, 1))
     lines = zoo.kept_lines(tmp_path / zoo.RUNS_FILE)
     assert [(each["policy"], each["world"]) for each in lines] == [
@@ -105,7 +106,7 @@ def zoo_version():
 
 
 def test_the_page_tells_what_is_reached_over_floors_and_seeds(tmp_path):
-    floors = [f"building:{k}" for k in range(8)]
+    floors = zoo.FLOORS[:8]
     lines = [line("nearest_frontier", floor, 100.0 + k) for k, floor in enumerate(floors)]
     lines += [line("tour_frontier", floor, 70.0 + k) for k, floor in enumerate(floors)]
     lines += [line("untrained", floor, None) for floor in floors]
@@ -128,7 +129,7 @@ def test_the_page_tells_what_is_reached_over_floors_and_seeds(tmp_path):
     keep(tmp_path / zoo.RUNS_FILE, lines)
     keep(tmp_path / zoo.LESSONS_FILE, lessons)
     page = zoo.page(tmp_path)
-    assert_published("zoo", page, tmp_path)
+    assert_published("zoo", page, tmp_path, absent=("All floors",))
     shares = [0.78 + 0.01 * seed + 0.01 * (k % 3) for k in range(8) for seed in range(2)]
     ratio = np.exp(np.mean(np.log(shares)))
     assert f"| 2 robots, `zoo:ppo-2` over `nearest_frontier` | at most 0.90, interval below 1 | {ratio:.2f} (" in page
@@ -149,19 +150,53 @@ def test_the_page_tells_what_is_reached_over_floors_and_seeds(tmp_path):
 
 
 def test_a_training_that_was_made_again_is_told_by_itself(tmp_path):
-    floors = [f"building:{k}" for k in range(8)]
+    floors = zoo.FLOORS[:8]
     lines = [line(NEAREST, floor, 100.0) for floor in floors]
     times = {zoo.SHIPPED: 80.0, "0": 80.0, "1": 70.0, "2": 90.0}
     lines += [line("zoo:ppo-2", floor, time_s, training=seed) for floor in floors for seed, time_s in times.items()]
     for seed in times:
         keep_training(tmp_path, "ppo-2", seed, 0.6)
     keep(tmp_path / zoo.RUNS_FILE, lines)
-    keep(tmp_path / zoo.LESSONS_FILE, [])
+    keep(tmp_path / zoo.LESSONS_FILE, [{"team": "ppo-2", "seed": k, "processor_s": None} for k in range(3)])
     page = zoo.page(tmp_path)
     assert "| within 0.70 to 0.90, as other seeds | 0.80, the same weights to the byte | yes |" in page
     assert "| `zoo:ppo-2` | 24 |" in page
     assert f"| {np.exp(np.mean(np.log([0.8, 0.7, 0.9]))):.2f} (" in page
     assert "| `ppo-2` | 0 | 10 | 50.0 % | 60.0 % | 0.80" in page
+
+
+def test_teams_are_compared_on_the_floors_that_all_have(tmp_path):
+    floors, harder = zoo.FLOORS[:8], zoo.MORE_FLOORS[:8]
+    lines = [line(NEAREST, floor, 100.0) for floor in floors] + [line(NEAREST, floor, 300.0) for floor in harder]
+    lines += [line("zoo:ppo-2", floor, 66.0, training=zoo.SHIPPED) for floor in floors]
+    lines += [line("zoo:ppo-2", floor, 240.0, training=zoo.SHIPPED) for floor in harder]
+    lines += [line("zoo:vdn-2", floor, 71.0, training="1") for floor in floors]
+    keep(tmp_path / zoo.RUNS_FILE, lines)
+    keep(tmp_path / zoo.LESSONS_FILE, [])
+    page = zoo.page(tmp_path)
+    assert "| 2 robots, `zoo:ppo-2` over `nearest_frontier` | at most 0.90, interval below 1 | 0.66" in page
+    assert page.index("| `zoo:ppo-2` | 8 |") < page.index("| `zoo:vdn-2` | 8 |")
+    assert "Shipped teams and classic policies on 16 floors." in page
+    assert "| `zoo:ppo-2` | 16 |" in page
+    assert "| `zoo:vdn-2` | 16 |" not in page
+
+
+def test_a_training_that_broke_off_is_none(tmp_path):
+    keep_training(tmp_path, "qmix-2", 0, 0.6)
+    keep(tmp_path / zoo.LESSONS_FILE, [])
+    assert zoo._trainings(tmp_path) == {}
+    keep(tmp_path / zoo.LESSONS_FILE, [{"team": "qmix-2", "seed": 0, "processor_s": 1.0}])
+    assert list(zoo._trainings(tmp_path)) == [("qmix-2", "0")]
+
+
+def test_other_weights_are_another_run(tmp_path):
+    path = tmp_path / "weights.safetensors"
+    path.write_bytes(b"a")
+    first = zoo.Run("zoo:ppo-2", "0", "apartment", 2, path).key
+    other = tmp_path / "other.safetensors"
+    other.write_bytes(b"b")
+    assert zoo.Run("zoo:ppo-2", "0", "apartment", 2, other).key != first
+    assert zoo.Run("nearest_frontier", "", "apartment", 2, None).key.endswith(" | ")
 
 
 def test_floors_count_alike_however_many_trainings_ran_there():

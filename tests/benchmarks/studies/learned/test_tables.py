@@ -71,10 +71,10 @@ def test_kinds_that_did_not_run_are_named():
 def test_what_sends_the_robots_is_summed_over_runs(episodes):
     runs = list(episodes["learned"].values())
     runs[0]["decided_by"] = {"tours": 6, "corrected": 2}
-    runs[1]["decided_by"] = {"tours": 7, "corrected": 3, "nearest": 2}
+    runs[1]["decided_by"] = {"tours": 7, "corrected": 3, "predicted": 4, "nearest": 3}
     lines = learned.senders_table({"test": episodes}).splitlines()
     cells = [cell.strip() for cell in lines[-1].strip("|").split("|")]
-    assert cells == [learned.KINDS["test"], "1", "10.0", "65.0 %", "25.0 %", "10.0 %", "50 %"]
+    assert cells == [learned.KINDS["test"], "1", "12.5", "52.0 %", "20.0 %", "16.0 %", "12.0 %", "50 %"]
     assert learned.senders_table({"kth": {}}) == "No run says."
 
 
