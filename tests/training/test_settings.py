@@ -97,6 +97,11 @@ def test_all_has_defaults():
         ("[validation]\nrobots = [true]", "sizes of teams"),
         ("seed = -1", "seed"),
         ("fit = 3", "fit is 3; want a table"),
+        ("[[rounds]]\nrobots = 2", "robots of a round is 2; want a list"),
+        ("[[rounds]]\nkinds = 'building'", "kinds of a round is 'building'; want a table"),
+        ("[[rounds]]\nkinds = ['building']", "want a table"),
+        ("[validation]\nfloors = 'set:validation:16'", "floors of validation is 'set:validation:16'; want a list"),
+        ("[ppo]\nenvironments = 2\nsteps = 8\nbatch = 15\ncheckpoint = 16", "leave a batch of one"),
         ("x = [", "TOML"),
     ],
 )

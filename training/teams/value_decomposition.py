@@ -117,7 +117,7 @@ def _learn_on(
         observations, rewards, _, truncated, infos = environment.step(choices.ravel())
         after = _teams(environment, observations, infos[ACTIVE])
         teams, over = choices.shape, environment.batch.is_over
-        is_cut = (truncated & infos[ACTIVE]).reshape(teams).any(axis=1)  # rows of robots that ended before are cut too
+        is_cut = _cut_teams(truncated, infos[ACTIVE], teams)
         both: dict[Any, Any] = {**before, CHOICE: torch.from_numpy(choices), "next": TensorDict(after)}
         happened = TensorDict(both, [len(began)])
         happened["next", "reward"] = torch.from_numpy(
@@ -137,6 +137,12 @@ def _learn_on(
         tracking.step()
         losses.append(float(lost.detach()))
     return float(np.mean(losses)) if losses else 0.0
+
+
+def _cut_teams(truncated: NDArray[np.bool_], active: NDArray[np.bool_], shape: tuple[int, int]) -> NDArray[np.bool_]:
+    """Return which teams were cut by time; rows of robots that ended before are truncated whatever ends the team."""
+    cut: NDArray[np.bool_] = (truncated & active).reshape(shape).any(axis=1)
+    return cut
 
 
 def _mixer(settings: TeamSettings, environment: ExplorationVectorEnv) -> nn.Module:

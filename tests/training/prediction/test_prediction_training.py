@@ -40,6 +40,7 @@ def test_a_table_of_predictions_asks_for_this_training(tmp_path):
         ("prediction = 3\n", "want a table"),
         ("[prediction]\nkinds = { castle = 1.0 }\n", "kinds has 'castle'"),
         ("[prediction]\nbatch = 0\n", "batch"),
+        ('[prediction]\nplans = "home:17"\n', "plans of prediction is 'home:17'; want a list"),
         ('[prediction]\nkinds = { plan = 1.0 }\nplans = ["home:01", "home:01"]\n', "want two floors at least"),
         ('[prediction]\nbegin = "nowhere.safetensors"\n', "begin is 'nowhere.safetensors'"),
     ],
@@ -66,6 +67,15 @@ def test_an_interrupted_training_gives_the_same_weights(tmp_path):
     assert card["floors"] + card["held_out_floors"] == 2
     with pytest.raises(ValueError, match="holds a training with steps = 2"):
         list(PredictionTraining(replace(SETTINGS, steps=5), whole).run())
+
+
+def test_the_time_of_exploring_counts_over_interrupted_calls(tmp_path):
+    training = PredictionTraining(replace(SETTINGS, floors=3, floors_minutes=1e-4), tmp_path / "run")
+    steps = training.run()
+    assert next(step.done for step in steps if step.done) == 1
+    steps.close()
+    with pytest.raises(ValueError, match="maps of 1 floors"):
+        list(training.run())
 
 
 def test_maps_are_read_as_they_were_written(tmp_path):

@@ -184,6 +184,9 @@ def test_before_a_training_a_team_does_as_tours_do():
         ("robots = 2", "robots = 2\nsupervisor = { merge_s = 1 }", "supervisor of team cannot be used"),
         ("[ppo]", "[value]", "a training of teams by ppo has no 'value'"),
         ('"validation:2"', '"castle:3"', "castle"),
+        ('"apartment"', '"set:train:0"', "'train:0' wants '0' floors"),
+        ("robots = 2", 'robots = 2\nrealism = "fsat"', "fsat"),
+        ("[ppo]", "[team.ppo]", "team has the table 'ppo'; want [ppo], beside [team]"),
     ],
 )
 def test_bad_settings_are_refused_before_anything_is_written(old, new, words, tmp_path, capsys):
@@ -192,6 +195,18 @@ def test_bad_settings_are_refused_before_anything_is_written(old, new, words, tm
     assert main(["train", str(path), "--out", str(tmp_path / "run")]) == 2
     assert words in capsys.readouterr().err
     assert not (tmp_path / "run").exists()
+
+
+@pytest.mark.parametrize(
+    ("new", "words"),
+    [
+        ("batch = 4\nkept = 3", "kept of value is 3; want at least the batch, 4"),
+        ("batch = 32", "checkpoint of value is 32; want at least batch times robots, 64"),
+    ],
+)
+def test_values_that_would_never_be_learned_are_refused(new, words, tmp_path):
+    with pytest.raises(ValueError, match=words):
+        settings_of(VALUES.replace("batch = 4", new), tmp_path)
 
 
 def test_trainings_that_ship_are_listed_and_can_be_read(capsys):

@@ -13,7 +13,7 @@ from torchrl.objectives import SoftUpdate  # noqa: E402
 
 from lidarium.training.reinforcement.frontier_policy import FrontierRanking  # noqa: E402
 from lidarium.training.settings import TeamSettings, ValueSettings  # noqa: E402
-from lidarium.training.teams.value_decomposition import _choices, _loss, _mixer, _teams  # noqa: E402
+from lidarium.training.teams.value_decomposition import _choices, _cut_teams, _loss, _mixer, _teams  # noqa: E402
 
 
 @pytest.fixture(scope="module")
@@ -76,3 +76,16 @@ def test_robots_that_have_ended_can_only_stay(team):
     assert not allowed[1, :-1].any()
     assert allowed[1, -1]
     np.testing.assert_array_equal(allowed[active], observations["action_mask"][active] > 0)
+
+
+@pytest.mark.parametrize(
+    ("truncated", "active", "is_cut"),
+    [
+        ([True, False], [False, True], False),  # the last robot's battery is empty; the other ended before
+        ([True, True], [True, True], True),
+        ([True, True], [False, True], True),
+        ([False, False], [True, True], False),
+    ],
+)
+def test_a_team_is_cut_by_time_only_if_a_robot_that_moved_is(truncated, active, is_cut):
+    assert _cut_teams(np.array(truncated), np.array(active), (1, 2)).tolist() == [is_cut]
