@@ -271,7 +271,9 @@ def printed_ways(path: Path, names: Sequence[str]) -> dict[str, dict[str, float]
 
 
 def _same_maps(ours: Ways, theirs: Mapping[str, Mapping[str, float]]) -> str:
-    names = list(theirs.get("gt0", {}))
+    names = [name for name in theirs.get("gt0", {}) if all(name in episodes for episodes in ours.values())]
+    if not names:
+        return "| not run | - | - | - | - |"
     rows = []
     for planner, ways in theirs.items():
         values = [ways[name] for name in names]
@@ -302,7 +304,9 @@ def _ratio(
 def _all_maps(ours: Ways) -> str:
     baseline, rows = ours[POLICIES[0]], []
     for policy, episodes in ours.items():
-        names = sorted(episodes)
+        names = sorted(set(episodes) & set(baseline))
+        if len(names) < 2:
+            continue
         ways, others = ([way(found[name], "d99_m") for name in names] for found in (episodes, baseline))
         times, base = (
             [float(found[name]["t99_s"] or SETTINGS["horizon_s"]) for name in names] for found in (episodes, baseline)
@@ -354,13 +358,14 @@ def _by_ariadne(ours: Sequence[Ways]) -> str:
         cells: list[str] = []
         for found in ours:
             episodes, baseline = found.get(policy, {}), found.get(POLICIES[0], {})
-            if not episodes:
+            names = [name for name in episodes if name in baseline]
+            if len(names) < 2:
                 cells += ["-", "-", "-"]
                 continue
-            ways, others = ([sum(each[name]["path_m"]) for name in episodes] for each in (episodes, baseline))
-            ended = sum(STOP_REASON in each["ended_because"].values() for each in episodes.values())
+            ways, others = ([sum(each[name]["path_m"]) for name in names] for each in (episodes, baseline))
+            ended = sum(STOP_REASON in episodes[name]["ended_because"].values() for name in names)
             ratio = "1" if policy == POLICIES[0] else f"{paired_ratio(ways, others):.3f}"
-            cells += [f"{ended} of {len(episodes)}", f"{np.mean(ways):.1f}", ratio]
+            cells += [f"{ended} of {len(names)}", f"{np.mean(ways):.1f}", ratio]
         rows.append(f"| `{policy}` | {' | '.join(cells)} |")
     return "\n".join(rows)
 

@@ -206,7 +206,7 @@ def value_figure(
     return ValueFigure(
         median_interval(values, clusters=clusters),
         mean_interval(values, seed=seed, clusters=clusters, bounds=bounds),
-        interquartile_mean_interval(values, seed=seed),
+        interquartile_mean_interval(values, seed=seed, clusters=clusters, bounds=bounds),
     )
 
 

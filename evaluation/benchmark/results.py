@@ -145,9 +145,12 @@ def collect(
         remarks += wrong
         theirs = [row for row in shipped.get(task.name, ()) if _floor_of(row) in task.floors_of(size)]
         remarks += _repeated(task, rows, theirs)
-        mine = {row["policy"] for row in rows}
-        standings += _standings(task, size, rows, [row for row in theirs if row["policy"] not in mine])
-        everything += [*rows, *(row for row in theirs if row["policy"] not in mine)]
+        own, partial = _instead(task, size, rows, theirs)
+        remarks += partial
+        mine = {row["policy"] for row in own}
+        rest = [row for row in theirs if row["policy"] not in mine]
+        standings += _standings(task, size, own, rest)
+        everything += [*own, *rest]
     remarks += [f"{task}, {policy}: {why}" for (task, policy), why in failures.items()]
     versions = sorted({str(row["version"]) for row in everything})
     if len(versions) > 1:
@@ -222,6 +225,25 @@ def _repeated(task: BenchmarkTask, rows: Sequence[Row], shipped: Sequence[Row]) 
     ]
 
 
+def _instead(
+    task: BenchmarkTask, size: Size, rows: Sequence[Row], shipped: Sequence[Row]
+) -> tuple[list[Row], list[str]]:
+    """Return the rows that are shown instead of shipped ones, and which are not.
+
+    A part of the rows of a reference policy does not replace those that are shipped: all others would be compared on
+    that part.
+    """
+    floors: dict[str, set[str]] = {row["policy"]: set() for row in rows}
+    for row in rows:
+        floors[row["policy"]].add(_floor_of(row))
+    asked, known = set(task.floors_of(size)), {row["policy"] for row in shipped}
+    left = [policy for policy, found in floors.items() if policy in known and found < asked]
+    return [row for row in rows if row["policy"] not in left], [
+        f"{task.name}, {policy}: {len(floors[policy])} of {len(asked)} runs here, so its shipped rows are shown."
+        for policy in left
+    ]
+
+
 def _standings(task: BenchmarkTask, size: Size, own: Sequence[Row], theirs: Sequence[Row]) -> list[Standing]:
     by_policy: dict[str, list[Row]] = {}
     for row in (*own, *theirs):
@@ -266,7 +288,7 @@ def _floor_of(row: Row) -> str:
 def _overall(standings: Sequence[Standing]) -> dict[str, tuple[float, int]]:
     ratios: dict[str, list[float]] = {}
     for each in standings:
-        if each.ratio is not None:
+        if each.ratio is not None and each.runs == each.asked:  # another part of the floors is another task
             ratios.setdefault(each.policy, []).append(each.ratio.estimate)
     means = {policy: (math.exp(sum(map(math.log, found)) / len(found)), len(found)) for policy, found in ratios.items()}
     return dict(sorted(means.items(), key=lambda item: item[1][0]))

@@ -11,7 +11,7 @@ from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 from lidarium.evaluation.analysis.episodes import pair_key_of
-from lidarium.evaluation.analysis.figures import TIMES, Value
+from lidarium.evaluation.analysis.figures import TIMES, Value, clusters_of
 from lidarium.evaluation.analysis.groups import Group, times_to
 from lidarium.evaluation.analysis.records import Entry, Key, coverage_at, record_key
 from lidarium.evaluation.drawing.picture_parts import FAINT, INK
@@ -34,10 +34,12 @@ def coverage_curves(group: Group, records: dict[Key, Entry]) -> Curves:
     times = np.linspace(0.0, group.horizon_s, CURVE_POINTS)
     curves: Curves = {}
     for policy, rows in group.runs.items():
-        entries = [records[record_key(row)] for row in rows if record_key(row) in records]
+        recorded = [row for row in rows if record_key(row) in records]
+        entries = [records[record_key(row)] for row in recorded]
         if not entries:
             continue
-        bands = 100.0 * median_bands(np.array([coverage_at(entry.coverage, times) for entry in entries]))
+        coverages = np.array([coverage_at(entry.coverage, times) for entry in entries])
+        bands = 100.0 * median_bands(coverages, clusters=clusters_of(recorded))
         median, low, high = ([float(value) if np.isfinite(value) else None for value in line] for line in bands)
         curves[policy] = {
             "runs": len(entries),

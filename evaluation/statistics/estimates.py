@@ -23,7 +23,7 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy import stats
+from scipy import sparse, stats
 
 from lidarium.evaluation.statistics.samples import (
     FEWEST_FOR_INTERVAL,
@@ -83,14 +83,14 @@ def median_interval(
     return Interval(median, low, high, confidence, size)
 
 
-def median_bands(values: Values, confidence: float = 0.95) -> Values:
+def median_bands(values: Values, confidence: float = 0.95, clusters: ArrayLike | None = None) -> Values:
     """Return the median of each column and the ends of its interval, (3, k).
 
-    The values (n, k) are finite.
+    The values (n, k) are finite; ``clusters`` (n,) as in `mean_interval`.
 
     For curves over time; the same figures as `median_interval` gives column by column.
     """
-    columns = [median_interval(column, confidence) for column in np.asarray(values, np.float64).T]
+    columns = [median_interval(column, confidence, clusters=clusters) for column in np.asarray(values, np.float64).T]
     # A curve on which all runs agree at some time has a band of no width there.
     ends = [
         (each.low, each.high) if each.is_known or each.size < FEWEST_FOR_INTERVAL else (each.estimate, each.estimate)
@@ -155,26 +155,35 @@ def interquartile_mean(values: ArrayLike) -> float:
 
     Values at its ends count only in part.
     """
-    ordered = np.sort(checked_values(values))
-    return float(_middle_means(np.ones((1, len(ordered)), np.uint16), ordered)[0][0])
+    sample = checked_values(values)
+    size = len(sample)
+    return float(_middle_means(sample, np.arange(size), size)(np.ones((1, size), np.uint16))[0][0])
 
 
 def interquartile_mean_interval(
-    values: ArrayLike, confidence: float = 0.95, resamples: int = RESAMPLES, seed: int = 0
+    values: ArrayLike,
+    confidence: float = 0.95,
+    resamples: int = RESAMPLES,
+    seed: int = 0,
+    clusters: ArrayLike | None = None,
+    bounds: tuple[float, float] = (-math.inf, math.inf),
 ) -> Interval:
     """Return the interquartile mean and its studentised interval.
 
     Parameters as `mean_interval`.
     """
-    ordered = np.sort(checked_values(values))
+    sample = checked_values(values)
+    ordered = np.sort(sample)
+    indices, size = cluster_indices(clusters, len(sample))
     return studentised_interval(
-        in_parts(lambda counts: _middle_means(counts, ordered)),
-        len(ordered),
+        in_parts(_middle_means(sample, indices, size)),
+        size,
         confidence,
         resamples,
         seed,
         scale=float(np.abs(ordered[len(ordered) // 4 : len(ordered) - len(ordered) // 4]).max()),
-        degrees=len(ordered) - 2 * (len(ordered) // 4) - 1,
+        degrees=size - 2 * (size // 4) - 1,
+        bounds=bounds,
     )
 
 
@@ -260,33 +269,31 @@ def _means(sample: Values, clusters: NDArray[np.int64], size: int) -> Replicates
     return replicates
 
 
-def _middle_means(counts: Counts, ordered: Values) -> tuple[Values, Values]:
-    """Return interquartile means and their standard errors of resamples.
+def _middle_means(sample: Values, clusters: NDArray[np.int64], size: int) -> Replicates:
+    """Return the function that gives interquartile means and their standard errors of resamples of clusters."""
+    order = np.argsort(sample, kind="stable")
+    ordered, of = sample[order], clusters[order]
+    centre, numbers = ordered[len(ordered) // 2], np.bincount(of, minlength=size)
+    members = sparse.csr_array((np.ones(len(of)), (of, np.arange(len(of)))), shape=(size, len(of)))
 
-    The resamples (resamples, n) are of a sorted sample.
-    """
-    size = len(ordered)
-    quarter = 0.25 * size
-    cumulated = np.cumsum(counts, axis=1, dtype=np.float64)
-    # How much of each value's stretch of ranks lies in the middle half.
-    inside = np.diff(np.clip(cumulated, quarter, size - quarter), axis=1, prepend=quarter)
-    means = inside @ ordered / (size - 2.0 * quarter)
-    low = ordered[(cumulated <= quarter).sum(axis=1)]
-    high = ordered[(cumulated < size - quarter).sum(axis=1)]
-    centre = ordered[size // 2]
-    winsorised = np.clip(ordered, low[:, np.newaxis], high[:, np.newaxis]) - centre
-    shifts = np.einsum("ij,ij->i", counts, winsorised) / size
-    squares = np.einsum("ij,ij->i", counts, winsorised**2) / size
-    return means, 2.0 * _errors(shifts, squares, size)
+    def replicates(counts: Counts) -> tuple[Values, Values]:
+        cumulated = np.cumsum(counts[:, of], axis=1, dtype=np.float64)
+        drawn = cumulated[:, -1:]
+        first, last = 0.25 * drawn, 0.75 * drawn
+        # How much of each value's stretch of ranks lies in the middle half.
+        inside = np.diff(np.clip(cumulated, first, last), axis=1, prepend=first)
+        low = ordered[(cumulated <= first).sum(axis=1)]
+        high = ordered[(cumulated < last).sum(axis=1)]
+        winsorised = np.clip(ordered, low[:, np.newaxis], high[:, np.newaxis]) - centre
+        sums = np.asarray((members @ winsorised.T).T)
+        means = np.einsum("ij,ij->i", counts, sums)[:, np.newaxis] / drawn
+        squares = np.einsum("ij,ij->i", counts, sums**2)
+        residuals = np.einsum("ij,ij->i", counts, (sums - means * numbers) ** 2)
+        # Equal values have no error; rounding leaves a little.
+        kept = np.where(residuals > 1e-12 * squares, residuals, 0.0)
+        return inside @ ordered / (0.5 * drawn[:, 0]), np.asarray(2.0 * np.sqrt(kept) / drawn[:, 0])
 
-
-def _errors(shifts: Values, squares: Values, size: int) -> Values:
-    """Return standard errors from means and mean squares.
-
-    0 for equal values, of which rounding leaves a little.
-    """
-    variances = squares - shifts**2
-    return np.asarray(np.sqrt(np.where(variances > 1e-12 * squares, variances, 0.0) / size))
+    return replicates
 
 
 def share_interval(successes: int, size: int, confidence: float = 0.95) -> Interval:

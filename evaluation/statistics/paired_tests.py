@@ -16,6 +16,12 @@ from scipy import stats
 
 from lidarium.evaluation.statistics.samples import Values, checked_pairs, checked_values
 
+MOST_EXACT = 50
+"""Wilcoxon's test is exact for so many unequal pairs, and by the normal distribution beyond."""
+
+_ROUNDING = 1e-9
+"""Differences below this share of the values are rounding."""
+
 
 @dataclass(frozen=True, slots=True)
 class PairedTest:
@@ -46,13 +52,30 @@ def wilcoxon_test(a: ArrayLike, b: ArrayLike) -> PairedTest:
     a, b : (n,) array_like
         Values of the two partners of each pair.
     """
-    first, second = checked_pairs(a, b)
-    less, greater, ties = _signs(first, second)
+    differences = _differences(a, b)
+    less, greater, ties = _signs(differences)
     if less + greater == 0:
-        return PairedTest(1.0, len(first), 0, 0, ties)
-    differences = first - second
-    found = stats.wilcoxon(differences[differences != 0.0])
-    return PairedTest(min(float(found.pvalue), 1.0), len(first), less, greater, ties)
+        return PairedTest(1.0, len(differences), 0, 0, ties)
+    unequal = differences[differences != 0.0]
+    p_value = (
+        _exact_p_value(unequal)
+        if len(unequal) <= MOST_EXACT
+        else min(float(stats.wilcoxon(unequal, method="approx").pvalue), 1.0)
+    )
+    return PairedTest(p_value, len(differences), less, greater, ties)
+
+
+def _exact_p_value(differences: Values) -> float:
+    """Return the probability of a smaller sum of signed ranks, or one as small, over all signs; ties share ranks."""
+    doubled = np.round(2.0 * stats.rankdata(np.abs(differences))).astype(np.int64)
+    whole = int(doubled.sum())
+    # Of all 2^n signs, how many give each sum of the ranks of positive differences.
+    numbers = np.zeros(whole + 1)
+    numbers[0] = 1.0
+    for rank in doubled:
+        numbers[rank:] = numbers[rank:] + numbers[: whole + 1 - rank]
+    positive = int(doubled[differences > 0.0].sum())
+    return float(min(2.0 * numbers[: min(positive, whole - positive) + 1].sum() / numbers.sum(), 1.0))
 
 
 def sign_test(a: ArrayLike, b: ArrayLike) -> PairedTest:
@@ -65,10 +88,10 @@ def sign_test(a: ArrayLike, b: ArrayLike) -> PairedTest:
     a, b : (n,) array_like
         Values of the two partners of each pair.
     """
-    first, second = checked_pairs(a, b)
-    less, greater, ties = _signs(first, second)
+    differences = _differences(a, b)
+    less, greater, ties = _signs(differences)
     p_value = float(stats.binomtest(less, less + greater).pvalue) if less + greater else 1.0
-    return PairedTest(p_value, len(first), less, greater, ties)
+    return PairedTest(p_value, len(differences), less, greater, ties)
 
 
 def holm(p_values: ArrayLike) -> Values:
@@ -92,5 +115,12 @@ def holm(p_values: ArrayLike) -> Values:
     return corrected
 
 
-def _signs(first: Values, second: Values) -> tuple[int, int, int]:
-    return int((first < second).sum()), int((first > second).sum()), int((first == second).sum())
+def _differences(a: ArrayLike, b: ArrayLike) -> Values:
+    """Return the differences of pairs in whole steps of rounding: its residue would split ties at random."""
+    first, second = checked_pairs(a, b)
+    step = _ROUNDING * float(max(np.abs(first).max(), np.abs(second).max()))
+    return np.asarray(np.round((first - second) / step) * step if step > 0.0 else first - second)
+
+
+def _signs(differences: Values) -> tuple[int, int, int]:
+    return int((differences < 0.0).sum()), int((differences > 0.0).sum()), int((differences == 0.0).sum())

@@ -270,10 +270,18 @@ def _check_same(episodes: list[dict[str, Any]], suite: Suite, folder: Path) -> N
     for name, options in kept.get("variants", {}).items():
         if name in suite.variants:
             _check_same_options(folder, name, options, suite.as_dict()["variants"][name])
-    for name, options in kept.get("policy_settings", {}).items():
-        if name in suite.policies and suite.as_dict()["policy_settings"].get(name) != options:
+    asked, options = suite.as_dict(), kept.get("policy_settings", {})
+    for name in suite.policies:
+        if name in kept.get("policies", ()) and asked["policy_settings"].get(name, {}) != options.get(name, {}):
             raise ValueError(
-                f"{folder} holds episodes of policy {name!r} with other settings, {options}; choose another folder"
+                f"{folder} holds episodes of policy {name!r} with other settings, {options.get(name, {})}; choose "
+                "another folder"
+            )
+    for name in ("draws_starts", "bounds"):
+        if kept.get(name, asked[name]) != asked[name]:
+            raise ValueError(
+                f"{folder} holds episodes of a suite with {name} = {kept[name]}, this one has {asked[name]}; choose "
+                "another folder"
             )
     if kept and kept.get("stop") != suite.as_dict()["stop"]:
         raise ValueError(

@@ -181,7 +181,8 @@ class _Recorded:
             return run_trial(self._suite, trial), None
         with tempfile.TemporaryDirectory() as folder:
             line = run_trial(self._suite, trial, Path(folder))
-            return line, (Path(folder) / f"{trial.file_name}.npz").read_bytes()
+            record = Path(folder) / f"{trial.file_name}.npz"
+            return line, record.read_bytes() if line["record"] else None
 
 
 def trials_on_ray(

@@ -186,6 +186,7 @@ class Suite:
         made = {name: self.make_policy(name) for name in self.policies}
         for floor in self.floors:
             _check_floor(floor, self.image_resolution)
+        check_members("floors", self._singles)
         for variant in self.variants:
             options = self.run_options(variant)
             level = options.pop("level", None)
@@ -203,6 +204,8 @@ class Suite:
         for floor, given in self.starts.items():
             if floor not in self.floors:
                 raise ValueError(f"the suite has starts on {floor!r}, which is not among its floors")
+            if floor.startswith("set:"):
+                raise ValueError(f"the suite has starts on the set {floor!r}; want them for each of its floors")
             for team in given:
                 if len(team) < max(self.robots) or any(len(start) != 3 for start in team):
                     raise ValueError(
@@ -234,6 +237,12 @@ class Suite:
             if name not in self.policy_settings:
                 raise
             raise ValueError(f"policy {name!r} of the suite cannot be made: {error}") from error
+
+    @property
+    def _singles(self) -> tuple[str, ...]:
+        """Names of the single floors."""
+        sets = (set_floors(floor) if floor.startswith("set:") else (floor,) for floor in self.floors)
+        return tuple(single for each in sets for single in each)
 
     def trials(self) -> Iterator[Trial]:
         """Yield all trials, paired ones one after the other.

@@ -61,9 +61,15 @@ def execute(command: _Benchmark) -> Answer:
     if command.workers < 0:
         raise ValueError(f"--workers is {command.workers}; want 0 for as many as there are cores, or more")
     found = benchmark(command.name)
-    tasks = [found.task(name) for name in dict.fromkeys(command.tasks)] or list(found.tasks.values())
+    asked = dict.fromkeys(found.task(name).name for name in command.tasks)
+    tasks = [found.tasks[name] for name in asked] or list(found.tasks.values())
     known = {name for task in tasks for name in task.policies} if command.reference else set()
     settings = options_by_policy(command.policy_set, tuple({*command.policies, *known}))
+    for name in sorted({name for task in tasks for name in task.policies} & set(settings)):
+        raise ValueError(
+            f"--policy-set sets options of {name}, whose rows are those of its defaults; want another name: "
+            f"--policies mine --policy-set mine.policy={name} mine.KEY=VALUE"
+        )
     folder = command.out or RUNS / command.name
     check_writable(folder)
     shard_of(command.shard)
@@ -99,8 +105,8 @@ def _run(
     for policy in policies:
         try:
             task.suite((policy,), "easy", settings)
-        except (ValueError, ImportError) as error:
-            failures[task.name, policy] = str(error)
+        except Exception as error:  # a policy of the user may fail in any way
+            failures[task.name, policy] = f"{type(error).__name__}: {error}"
         else:
             runnable.append(policy)
     if not runnable:

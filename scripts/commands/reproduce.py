@@ -85,11 +85,11 @@ def execute(command: Reproduce) -> Answer:
         return Answer(_progress_of(campaigns), "interrupted; the same command goes on", INTERRUPTED)
     if study.pictures is not None:
         study.pictures(folder, out)
-    page = out / f"{command.name}.md"
-    words = publish(page, study.page(folder), about(_command_line(command)), PART if every > 1 else "")
     failures = [(trial, error) for campaign in campaigns.values() for trial, error in campaign.failures]
     for trial, error in failures:
         notify(f"{trial.key}: {type(error).__name__}: {error}")
+    page = out / f"{command.name}.md"
+    words = publish(page, study.page(folder), about(_command_line(command)), PART if every > 1 else "")
     return Answer({**_progress_of(campaigns), "page": str(page)}, words, DEFECT if failures else 0)
 
 

@@ -88,5 +88,6 @@ def _files_of(path: Path) -> dict[str, bytes]:
 
 
 def _keys(name: str, content: bytes) -> set[str]:
-    """Return the keys of the lines of a file; other files have none."""
-    return {json.loads(line)[KEY] for line in content.splitlines()} if name.endswith(".jsonl") else set()
+    """Return the keys of the whole lines of a file; a last line without an end was cut off. Other files have none."""
+    whole = content[: content.rfind(b"\n") + 1] if name.endswith(".jsonl") else b""
+    return {json.loads(line)[KEY] for line in whole.splitlines()}

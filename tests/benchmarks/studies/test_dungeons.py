@@ -62,6 +62,17 @@ def test_ways_are_in_the_projects_metres_and_those_that_missed_count_whole(folde
     assert row_of(page, "`nearest_frontier`", 1)[3:] == ["1", "1"]
 
 
+@pytest.mark.parametrize("lost", ["learned", "nearest_frontier"])
+def test_a_failed_episode_leaves_its_map_out(folder, lost):
+    path = folder / "maps" / "episodes.jsonl"
+    kept = [line for line in path.read_text().splitlines(keepends=True) if f"100.png | 1 | seed 0 | {lost}" not in line]
+    path.write_text("".join(kept))
+    assert len(kept) == 7
+    assert "| `learned` | 2 of 3 |" in dungeons.page(folder)
+    (folder / "ways.csv").unlink()
+    assert "nan" not in dungeons.page(folder)
+
+
 def test_ways_by_ariadnes_rule_are_set_beside_the_nearest_frontier(folder):
     assert row_of(dungeons.page(folder), "not run")[1] == "-"
     lines = []

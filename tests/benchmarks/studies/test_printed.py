@@ -18,7 +18,8 @@ def keep(folder, preset, ways):
             "floor": str(floor),
             "starts": [[0.0, 0.0, 0.0]],
             "path_m": [way],
-            "decisions": 128 if floor == 0 else 50,
+            "decisions": 129 if floor < 2 else 50,  # one call more carries out the stop
+            "success": floor != 0,
             "c_valid_final": 0.5,
             "auc": way / 1000.0,
         }
@@ -49,6 +50,21 @@ def test_ratios_are_those_of_pairs(folder):
     assert row_of(page, "ARiADNE", "| `learned`")[1:] == ["0.900 (no interval)"] * 3
     assert row_of(page, "ARiADNE", "| easy | `learned`")[2:] == ["7 of 8", "135.0", "0.900 (no interval)"]
     assert row_of(page, "MapEx", "| `learned`")[1:] == ["0.500", "0.135", "0.900 (no interval)"]
+
+
+def test_starts_on_one_floor_are_not_independent(folder):
+    def lines(share):
+        return [
+            {"policy": policy, "floor": f"f{k // 4}", "starts": [[float(k)]], "key": f"{policy} {k}", **figures}
+            for policy, factor in (("nearest_frontier", 1.0), ("learned", share))
+            for k in range(24)
+            for figures in [{"auc": (1.0 if factor == 1.0 else factor + 0.05 * (k // 4)), "c_valid_final": 0.5}]
+        ]
+
+    (folder / "mapex" / "episodes.jsonl").write_text("".join(json.dumps(each) + "\n" for each in lines(0.8)))
+    ours = printed.by_policy("mapex", folder / "mapex" / "episodes.jsonl")
+    assert len(ours["learned"]) == 24
+    assert printed._over(ours, "learned", printed._area) == "0.921 (0.828 to 1.025)"  # Student, six floors
 
 
 def test_floors_that_a_policy_lacks_count_for_none(folder):

@@ -73,7 +73,7 @@ def test_rows_are_the_shipped_ones_to_the_bit_with_any_number_of_workers(tiny, t
 def test_rows_come_back_as_they_were_packed(tiny):
     before = reference_rows("tiny")
     rows = [dict(row) for kept in before.values() for row in kept]
-    del rows[2]["auc"], rows[5]["given_up"]  # rows of older versions lack what came later
+    del rows[2]["auc"], rows[5]["balance"]  # rows of older versions lack what came later
     (tiny / rows_file("tiny")).write_bytes(packed(reversed(rows)))
     again = [row for kept in reference_rows("tiny").values() for row in kept]
     assert sorted(again, key=lambda row: row["key"]) == sorted(rows, key=lambda row: row["key"])
@@ -125,7 +125,17 @@ def test_rows_of_another_version_are_said_to_be(tiny, tmp_path):
 @pytest.mark.usefixtures("without_page")
 def test_fewer_runs_than_the_size_asks_for_are_said(tiny, tmp_path):
     _, written = answer(tmp_path / "part", "--reference", "--tasks", "Homes-1", "--quick", "--shard", "1/3")
-    assert "Homes-1, nearest_frontier: 2 of 6 runs." in written["remarks"]
+    assert "Homes-1, nearest_frontier: 2 of 6 runs here, so its shipped rows are shown." in written["remarks"]
+    assert by_name(written)["Homes-1", "random_walk"]["runs"] == 6
+    _, written = answer(tmp_path / "mine", "--policies", "srt", "--tasks", "Homes-1", "--quick", "--shard", "1/3")
+    assert "Homes-1, srt: 2 of 6 runs." in written["remarks"]
+    assert set(written["overall"]) == {"random_walk"}
+
+
+@pytest.mark.usefixtures("without_page")
+def test_a_task_counts_once_by_whatever_names(tiny, tmp_path):
+    _, written = answer(tmp_path / "mine", "--tasks", "Homes-1", "lidarium/Homes-1-v1", "--quick")
+    assert written["overall"]["random_walk"][1] == 1
 
 
 @pytest.mark.parametrize(
@@ -134,6 +144,10 @@ def test_fewer_runs_than_the_size_asks_for_are_said(tiny, tmp_path):
         (["--tasks", "Home-1"], "did you mean 'Homes-1'"),
         (["--shard", "3/2", "--policies", "srt"], "--shard is '3/2'"),
         (["--workers", "-1"], "--workers is -1"),
+        (
+            ["--policies", "random_walk", "--policy-set", "random_walk.seed=1"],
+            "--policies mine --policy-set mine.policy=random_walk",
+        ),
     ],
 )
 def test_bad_options_are_answered_in_a_line(tiny, tmp_path, capsys, options, message):

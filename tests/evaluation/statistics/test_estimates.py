@@ -298,3 +298,21 @@ def test_an_interval_that_is_narrower_than_its_digits_has_more():
     values = [1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0002, 1.0, 1.0, 0.99995]
     assert f"{mean_interval(values):.2f}" == "1.0000 (1.0000 to 1.0001)"
     assert f"{mean_interval([1.0] * 10):.2f}" == "1.00 (no interval)"
+
+
+def test_interquartile_means_of_clusters_are_as_wide_as_those_of_their_floors():
+    generator = np.random.default_rng(6)
+    floors = np.repeat(np.arange(30), 3)
+    values = generator.normal(50.0, 10.0, 30)[floors] + generator.normal(0.0, 0.5, 90)
+    alone, clustered = (interquartile_mean_interval(values, clusters=each) for each in (None, floors))
+    of_means = interquartile_mean_interval(values.reshape(30, 3).mean(axis=1))
+    assert clustered.estimate == alone.estimate
+    assert clustered.size == 30
+    width, narrow, wanted = (each.high - each.low for each in (clustered, alone, of_means))
+    assert width > 1.4 * narrow
+    assert width == pytest.approx(wanted, rel=0.25)
+
+
+def test_ends_of_interquartile_means_stay_within_bounds():
+    shares = [60.0, 70.0, 99.5, 99.8, 99.9, 100.0, 100.0, 100.0]
+    assert interquartile_mean_interval(shares, bounds=(0.0, 100.0)).high == 100.0

@@ -63,3 +63,17 @@ def test_bad_pairs_are_refused(test):
         test([1.0, 2.0], [1.0])
     with pytest.raises(ValueError, match="a are empty"):
         test([], [])
+
+
+def test_rounding_is_no_difference_and_ties_share_their_ranks():
+    found = wilcoxon_test([0.1 + 0.2] * 7, [0.3] * 7)
+    assert (found.p_value, found.ties) == (1.0, 7)
+    a = np.array([83.0, 48.2, 119.7, 61.4, 50.1, 70.0])
+    b = a + np.array([1.1, 1.1, 1.1, -24.3, 1.1, -1.1])
+    wanted = stats.wilcoxon([-1.0, -1.0, -1.0, 2.0, -1.0, 1.0], method=stats.PermutationMethod(np.inf)).pvalue
+    assert wilcoxon_test(a, b).p_value == pytest.approx(wanted)
+
+
+def test_many_pairs_are_tested_by_the_normal_distribution():
+    a, b = np.random.default_rng(5).normal(size=(2, 60))
+    assert wilcoxon_test(a, b).p_value == pytest.approx(stats.wilcoxon(a, b, method="approx").pvalue)

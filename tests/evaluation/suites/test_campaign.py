@@ -200,3 +200,21 @@ def test_episodes_are_set_beside_what_a_team_that_knew_the_floor_needs(tmp_path)
     for line in lines:
         assert line["t99_over_bound"] == pytest.approx(line["t99_s"] / line["bound_s"], rel=1e-5)
         assert line["t99_over_bound"] > 1.0
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        (
+            {"policy_settings": {"nearest_frontier": {"minimum_size": 3.0}}},
+            "policy 'nearest_frontier' with other settings",
+        ),
+        ({"policy_settings": {"nearest_frontier": {"policy": "utility_frontier"}}}, "with other settings, {}"),
+        ({"draws_starts": False}, "draws_starts = True, this one has False"),
+        ({"bounds": True}, "bounds = False, this one has True"),
+    ],
+)
+def test_episodes_of_another_request_are_not_taken_for_those_of_this_one(folder, tmp_path, changes, words):
+    shutil.copytree(folder, tmp_path / "copy")
+    with pytest.raises(ValueError, match=words):
+        list(Campaign(suite(**changes), tmp_path / "copy").run())

@@ -11,7 +11,7 @@ from lidarium.benchmarks.studies.machines import local_cluster
 from lidarium.evaluation.suites import on_ray as module
 from lidarium.evaluation.suites.campaign import Campaign
 from lidarium.evaluation.suites.episodes_file import TIMINGS
-from lidarium.evaluation.suites.on_ray import on_ray
+from lidarium.evaluation.suites.on_ray import _Recorded, on_ray
 from lidarium.evaluation.suites.suite import Suite
 from lidarium.evaluation.suites.trial import DEFAULT_VARIANT
 from lidarium.scripts.main import main
@@ -60,6 +60,17 @@ def test_rows_are_those_of_one_machine_though_a_node_is_killed(cluster, tmp_path
     assert lines_in(tmp_path / "there") == lines_in(tmp_path / "here")
     records = sorted(path.name for path in (tmp_path / "there" / "records").iterdir())
     assert records == sorted(path.name for path in (tmp_path / "here" / "records").iterdir())
+
+
+def test_an_episode_without_a_record_comes_back_alone():
+    graph = Suite(
+        policies=("nearest_node",),
+        floors=("srt_l_room",),
+        variants={DEFAULT_VARIANT: {"resolution": 0.1, "horizon_s": 20.0, "level": "graph"}},
+    )
+    line, record = _Recorded(graph, True)(next(graph.trials()))
+    assert line["record"] is None
+    assert record is None
 
 
 def test_what_a_task_raises_is_its_result(cluster):

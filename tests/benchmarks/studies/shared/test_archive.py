@@ -74,3 +74,11 @@ def test_other_archives_are_refused_before_anything_is_written(tmp_path, name):
     with pytest.raises(ValueError, match=r"damaged.zip is not an archive of finished parts"):
         unpack_parts(tmp_path / "damaged.zip", tmp_path / "deep" / "runs")
     assert sorted(each.name for each in tmp_path.iterdir()) == ["damaged.zip", "parts.zip"]
+
+
+def test_a_line_that_was_cut_off_hinders_nobody(tmp_path):
+    write(tmp_path / "runs", "runs.jsonl", lines("a"))
+    pack_parts(tmp_path / "runs", tmp_path / "parts.zip")
+    write(tmp_path / "runs", "runs.jsonl", lines("a") + b'{"key": "b')
+    unpack_parts(tmp_path / "parts.zip", tmp_path / "runs")
+    assert (tmp_path / "runs" / "runs.jsonl").read_bytes() == lines("a") + b'{"key": "b'
