@@ -56,7 +56,7 @@ def run_trial(suite: Suite, trial: Trial, records: Path | None = None) -> dict[s
     from lidarium.evaluation.episodes.history import History
     from lidarium.evaluation.episodes.result import result_of
     from lidarium.evaluation.episodes.runner import run_episode
-    from lidarium.evaluation.episodes.stop_rules import Stopper, stop_rule_of
+    from lidarium.evaluation.episodes.stop_rules import STOP_REASON, Stopper, stop_rule_of
     from lidarium.evaluation.episodes.watching import WatchedExploration
     from lidarium.evaluation.record import Recorder
 
@@ -101,7 +101,8 @@ def run_trial(suite: Suite, trial: Trial, records: Path | None = None) -> dict[s
     return {
         **about,
         **result,
-        "decisions": len(episode.decision_seconds),
+        # The last call only carries out what a stop rule has ordered.
+        "decisions": len(episode.decision_seconds) - (STOP_REASON in result["ended_because"].values()),
         "wall_s": round(time.perf_counter() - began, 4),
     }
 

@@ -30,6 +30,7 @@ def test_a_line_says_what_was_run_from_where(tmp_path):
     assert (line["key"], line["variant"]) == (trial.key, "short")
     assert line["starts"] == [[2.5, 4.0, 0.5]]
     assert line["ended_because"] == {"robot_0": "stop_rule"}
+    assert line["decisions"] == 1
     assert 2.0 <= line["time_s"] < 2.2
     assert line["record"] == f"records/{trial.file_name}.npz"
     (path,) = tmp_path.iterdir()
