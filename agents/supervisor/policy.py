@@ -237,6 +237,10 @@ class Supervised(Policy):
         masks_orders = options.pop("masks_orders", False)
         return _wrapped(policy, lambda level: cls(_Outside(level), settings, **options), masks_orders)
 
+    def __getnewargs__(self) -> tuple[Policy]:
+        """Return what ``__new__`` takes when a copy is made."""
+        return (self.policy,)
+
     def __init__(self, policy: Policy, settings: SupervisorSettings | None = None, **options: Any) -> None:  # noqa: ANN401
         if settings is not None and options:
             raise ValueError(

@@ -63,12 +63,16 @@ class SupervisedTeam(TeamWrapper):
         masks_orders: bool = False,
     ) -> None:
         base = exploration_below(getattr(env, "unwrapped", env), "Supervised")
+        if base.conventions.comm:
+            raise ValueError(
+                f"comm is {base.conventions.comm}; want 0 under a supervisor: robots under orders send no messages"
+            )
         super().__init__(env)
         self.metadata = {**env.metadata, "name": str(env.metadata["name"]).replace("_v1", "_supervised_v1")}
         self.supervisor = make(base.level)
         self._masks = masks_orders
         if masks_orders:
-            check_masks(base.engine.observation_space)
+            check_masks(env.observation_space(env.possible_agents[0]))
         self._free: list[str] = []
 
     def reset(

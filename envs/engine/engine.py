@@ -46,7 +46,7 @@ from lidarium.envs.settings.limits import check_level
 from lidarium.envs.settings.reset_options import Curriculum, ResetOptions
 from lidarium.envs.simulation.endings import HORIZON, REASONS, make_rules, note_endings
 from lidarium.envs.simulation.kernels.arrays import ENDED
-from lidarium.envs.simulation.rewards import TERMS
+from lidarium.envs.simulation.rewards import TERMS, TIME
 from lidarium.mapping.kernels.interrupts import interruptible
 from lidarium.mapping.kernels.views import table_of
 from lidarium.mapping.kernels.work_queue import new_work
@@ -451,6 +451,10 @@ class Engine:
         """
         score = self.score
         rewards = score.rewards
+        if self.level.passed_over is not None:
+            idle = score.reward_weights[TIME] * np.repeat(self.level.passed_over, self.robots)
+            rewards -= idle
+            score.reward_terms[:, TIME] -= idle
         earned: dict[str, NDArray[np.float64]] = {}
         if self._has_extra:
             # Terms may count the steps that they are asked for: a beginning is none.
@@ -483,9 +487,10 @@ class Engine:
             reasons[~acted] = 0
         words: dict[int, str] = {}
         for row in [row for row in stopping if acted[row]]:
-            word = stopping.pop(row)
+            word = stopping.pop(row) or "stopped"
             if reasons[row] in (0, HORIZON):
-                reasons[row] = REASONS.index(word) if word in REASONS else len(REASONS)
+                known = REASONS.index(word) if word in REASONS else HORIZON
+                reasons[row] = len(REASONS) if known == HORIZON else known
                 words[row] = word
         rows = np.flatnonzero(reasons)
         self.has_endings = len(rows) > 0

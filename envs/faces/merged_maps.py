@@ -66,6 +66,13 @@ class MergedMaps(TeamWrapper):
         self._use(base.engine)
         self._index = {agent: row for row, agent in enumerate(self.possible_agents)}
         boxes = team_boxes(len(self.possible_agents), self.settings.map_cells)
+        wanted = {"observation": "dict", "infos": "full", "ended_agents": "leave"}
+        for name, form in wanted.items():
+            if getattr(base.conventions, name) != form:
+                raise ValueError(
+                    f"{name} is {getattr(base.conventions, name)!r}; MergedMaps wants {form!r}, "
+                    "vector_env(merging=...) takes any"
+                )
         self._observation_spaces: dict[str, spaces.Space[Any]] = {
             agent: spaces.Dict({**env.observation_space(agent).spaces, **boxes}) for agent in self.possible_agents
         }

@@ -101,7 +101,8 @@ class MessageBoard:
         episodes, robots = self._heard.shape[:2]
         now = self._perception.world.steps.copy()
         messages = np.clip(sent, -1.0, 1.0).reshape(episodes, 1, robots, -1)
-        self._log.append(_Sent(self._last, now, messages, acted.reshape(episodes, 1, robots)))
+        if (now > self._last).any():  # otherwise episodes have only begun, and messages on the way have to stay
+            self._log.append(_Sent(self._last, now, messages, acted.reshape(episodes, 1, robots)))
         self._last = now.copy()
         arrived = self._arrived(now)
         for entry in self._log:

@@ -315,13 +315,18 @@ class RandomizedRows:
 
     def step(self, actions: Any, beginning: NDArray[np.int64]) -> None:  # noqa: ANN401
         """Run all live episodes for one step or decision, and begin others; see `TeamRows.step`."""
-        begins = set(beginning.tolist())
+        begins, decoded = set(beginning.tolist()), dict[int, Any]()
+        for episode in set(range(self.episodes)) - begins:  # before any of them runs: a bad action changes nothing
+            part, first = self.parts[episode], episode * self.robots
+            try:
+                decoded[episode] = part.read(_of_rows(actions, slice(first, first + part.robots), self.rows))
+            except ValueError as error:
+                raise ValueError(f"in episode {episode}, whose rows begin with {first}: {error}") from error
         for episode in range(self.episodes):
             if episode in begins:
                 self._begin(episode, None, None)
             else:
-                part, first = self.parts[episode], episode * self.robots
-                part.step(_of_rows(actions, slice(first, first + part.robots), self.rows))
+                self.parts[episode].run(decoded[episode])
 
     def step_teams(self, teams: Sequence[Any], beginning: NDArray[np.int64]) -> None:
         """Run all live episodes by the actions of each team, by agent, and begin others."""
@@ -403,7 +408,11 @@ class RandomizedRows:
     def masks(self) -> NDArray[np.bool_] | None:
         """Which actions each row may choose now, (rows, actions); None if the level has no mask."""
         masks = [part.masks for part in self.parts]
-        return None if masks[0] is None else self._together([each for each in masks if each is not None])
+        if masks[0] is None:
+            return None
+        found = self._together([each for each in masks if each is not None])
+        found[~self._exists, -1] = True  # robots that a team lacks can only stay
+        return found
 
     def states(self, episodes: NDArray[np.int64] | None = None) -> NDArray[np.float32]:
         """Return the true state of each team or of some episodes' teams, (episodes, numbers); see `team_state`."""

@@ -133,14 +133,21 @@ class TeamRows:
 
     def step(self, actions: Any, beginning: NDArray[np.int64] = NO_EPISODES) -> None:  # noqa: ANN401
         """Run all live episodes for one step or decision by an array of actions, and begin others."""
-        engine = self.engine
-        acting = engine.live
+        self.run(self.read(actions, beginning), beginning)
+
+    def read(self, actions: Any, beginning: NDArray[np.int64] = NO_EPISODES) -> Any:  # noqa: ANN401
+        """Return what an array of actions means, for `run`; messages are kept to be sent."""
+        acting = self.engine.live
         if len(beginning):
-            acting = engine.live.copy()
+            acting = acting.copy()
             acting.reshape(self.episodes, self.robots)[beginning] = False
         if self._board is not None:
             actions = self._without_messages(actions)
-        decoded = engine.level.read_rows(actions, acting)
+        return self.engine.level.read_rows(actions, acting)
+
+    def run(self, decoded: Any, beginning: NDArray[np.int64] = NO_EPISODES) -> None:  # noqa: ANN401
+        """Run all live episodes by actions that were read, and begin others."""
+        engine = self.engine
         masked = self._nobody if engine.is_whole else ~engine.live
         if len(beginning):
             masked = masked & ~np.repeat(engine.is_over, self.robots)
@@ -287,6 +294,8 @@ class TeamRows:
             arrays = {name: array.copy() for name, array in arrays.items()}
             for array in arrays.values():
                 array[self._kept] = 0
+            if MASK in arrays:
+                arrays[MASK][self._kept, -1] = 1  # to stay is always allowed
         return self._form.of(arrays, (self.rows,))
 
     def observation(self, row: int) -> Any:  # noqa: ANN401
@@ -295,6 +304,8 @@ class TeamRows:
         if self._keeps and self._kept[row]:
             for array in arrays.values():
                 array[...] = 0
+            if MASK in arrays:
+                arrays[MASK][-1] = 1
         return self._form.of(arrays)
 
     def _with_more(self) -> Mapping[str, NDArray[Any]]:

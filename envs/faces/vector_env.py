@@ -203,7 +203,13 @@ class ExplorationVectorEnv(BatchFace, VectorEnv[Any, NDArray[Any], NDArray[Any]]
             last[row] = batch.observation(row)
         batch.begin(over, is_same_step=True)
         masked = {name: values & rows if name.startswith("_") else values for name, values in final.items()}
-        return {**self._infos(), "final_obs": last, "_final_obs": rows, "final_info": masked, "_final_info": rows}
+        return {
+            **_of_both(final, self._infos(), rows),
+            "final_obs": last,
+            "_final_obs": rows,
+            "final_info": masked,
+            "_final_info": rows,
+        }
 
     def _infos(self) -> dict[str, Any]:
         return {**self.batch.infos, ACTIVE: self.batch.active, f"_{ACTIVE}": np.ones(self.num_envs, np.bool_)}
@@ -229,6 +235,22 @@ class ExplorationVectorEnv(BatchFace, VectorEnv[Any, NDArray[Any], NDArray[Any]]
     def close_extras(self, **kwargs: Any) -> None:  # noqa: ANN401
         """Release everything that the worlds hold beyond arrays."""
         self.batch.close()
+
+
+def _of_both(before: Mapping[str, Any], now: Mapping[str, Any], rows: NDArray[np.bool_]) -> dict[str, Any]:
+    """Return infos of which some rows are new, those whose episodes have begun again."""
+    found: dict[str, Any] = {}
+    for name in {**before, **now}:
+        old, new = before.get(name), now.get(name)
+        if isinstance(old, Mapping) or isinstance(new, Mapping):
+            found[name] = _of_both(old or {}, new or {}, rows)
+            continue
+        like = old if new is None else new
+        assert like is not None
+        absent = np.full(like.shape, None if like.dtype == object else 0, like.dtype)
+        is_new = rows.reshape(-1, *(1,) * (like.ndim - 1))
+        found[name] = np.where(is_new, absent if new is None else new, absent if old is None else old)
+    return found
 
 
 def _mode(mode: AutoresetMode | str) -> AutoresetMode:

@@ -88,6 +88,7 @@ class GraphLevel(Level):
     takes_none = True
     carries = frozenset({"waypoint"})
     driver: TeamDriver
+    passed_over: NDArray[np.int64]
 
     def __init__(
         self,
@@ -114,6 +115,7 @@ class GraphLevel(Level):
         self._offered: dict[int, NDArray[np.int64]] = {}
         self.period_s = settings.decision_period_s if decision_period_s is None else decision_period_s
         self._wait = max(round(self.period_s / settings.time_step), 1)
+        self.passed_over = np.zeros(perception.world.episodes, np.int64)
 
     def start(self, episode: int) -> None:
         """Begin an episode: no node is known."""
@@ -165,6 +167,7 @@ class GraphLevel(Level):
     def carry_out(self, decoded: Ways, turn: Turn) -> None:
         """Put robots on the next nodes of their ways; end teams for which no node has utility."""
         give_ways(self.driver, decoded, turn)
+        self.passed_over[:] = 0
         for episode in np.flatnonzero(turn.modes == STEPS).tolist():
             rows = self._rows_of(episode)
             turn.commands[rows] = 0.0
@@ -197,6 +200,7 @@ class GraphLevel(Level):
             self.drives.states[row] = ARRIVED if len(ways[row]) == 1 else DRIVING
         # The step that follows is counted by itself.
         taken[episode] += steps - 1
+        self.passed_over[episode] = steps - 1
 
     def _way(self, row: int, graph: NodeGraph) -> list[int]:
         """Return the nodes on a robot's way to the one that its target stands for, and note it as its path."""

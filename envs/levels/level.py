@@ -92,6 +92,9 @@ class Level(ABC):
     observes: ClassVar[bool] = True
     """Whether `observe` does anything."""
 
+    passed_over: NDArray[np.int64] | None = None
+    """Steps of time that each episode has passed over in the last decision, if the level may do that."""
+
     action_space: spaces.Space[Any]
     driver: TeamDriver | None = None
     drives: Drives

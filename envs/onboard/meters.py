@@ -63,19 +63,20 @@ class Meters:
         is_new = steps != self._taken_in
         if not is_new.any():
             return
+        elapsed_s = self._time_step * np.maximum(steps - self._taken_in, 0)
         self._taken_in = steps
         rows = np.flatnonzero(np.repeat(is_new, self._robots))
         if self._measures_path:
             self._path[rows] += np.abs(self._world.sensors["velocity"][rows, 0]) * self._time_step
         if self._measures_energy:
-            self._use_energy(rows)
+            self._use_energy(rows, np.repeat(elapsed_s, self._robots)[rows])
 
-    def _use_energy(self, rows: NDArray[np.int64]) -> None:
+    def _use_energy(self, rows: NDArray[np.int64], elapsed_s: NDArray[np.float64]) -> None:
         world, battery = self._world, self._battery
         headings, travelled = world.poses[rows, 2], world.travelled[rows]
         turning = np.abs((headings - self._headings[rows] + math.pi) % (2.0 * math.pi) - math.pi)
         driven = travelled - self._travelled[rows]
-        used = battery.idle_w * self._time_step + battery.per_metre_j * driven + battery.per_radian_j * turning
+        used = battery.idle_w * elapsed_s + battery.per_metre_j * driven + battery.per_radian_j * turning
         # Robots that have ended are switched off.
         self.used_j[rows] += np.where(world.flags[rows] & ENDED, 0.0, used)
         self._headings[rows], self._travelled[rows] = headings, travelled

@@ -123,6 +123,8 @@ def make_settings(settings: ExplorationSettings | None = None, **options: Any) -
     realism = options.pop("realism", None)
     if realism is not None:
         options = {**REALISM[realism], **options}
+    for name in options:
+        _check_kinds(name, options.get("kinds", base.kinds))
     options = {name: _part(name, value) for name, value in options.items()}
     options |= _lasers(options, base)
     resolution = options.pop("resolution", None)
@@ -143,6 +145,12 @@ def make_settings(settings: ExplorationSettings | None = None, **options: Any) -
         chosen = options.get("localization", base.localization)
         options["localizer"] = localizer_settings(chosen, options["localizer"])
     return assign(replace(base, **options), assigned)
+
+
+def _check_kinds(name: str, kinds: Any) -> None:  # noqa: ANN401
+    """Check that the robot of a team is not set if its kinds make it."""
+    if name == "robot" and kinds:
+        raise ValueError(f"robot is set, and kinds is {shown(kinds)}; want one of them: the robots are those of kinds")
 
 
 def makers_settings(settings: ExplorationSettings | None, options: Mapping[str, Any]) -> ExplorationSettings:
@@ -227,6 +235,8 @@ def _replaced(part: Any, path: list[str], value: Any, name: str) -> Any:  # noqa
     if path[0] not in known:
         said = unknown("setting", path[0], known, MOST_LISTED)
         raise ValueError(f"{name!r} is no setting: {said}")
+    if isinstance(part, ExplorationSettings):
+        _check_kinds(path[0], part.kinds)
     if isinstance(part, ExplorationSettings) and path[0] == "lidar" and len(path) > 1 and part.lidars:
         # The laser of each robot: the one of the team is made from them.
         return make_settings(part, lidar=[_replaced(each, path[1:], value, name) for each in part.lidars])

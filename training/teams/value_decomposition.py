@@ -141,8 +141,7 @@ def _learn_on(
 
 def _cut_teams(truncated: NDArray[np.bool_], active: NDArray[np.bool_], shape: tuple[int, int]) -> NDArray[np.bool_]:
     """Return which teams were cut by time; rows of robots that ended before are truncated whatever ends the team."""
-    cut: NDArray[np.bool_] = (truncated & active).reshape(shape).any(axis=1)
-    return cut
+    return np.asarray((truncated & active).reshape(shape).any(axis=1), np.bool_)
 
 
 def _mixer(settings: TeamSettings, environment: ExplorationVectorEnv) -> nn.Module:

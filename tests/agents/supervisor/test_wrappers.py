@@ -181,3 +181,25 @@ def test_what_cannot_be_supervised_is_refused():
         lidarium.Supervised(lidarium.parallel_env("apartment", **UNKNOWN), {"period_s": 5})
     with pytest.raises(ValueError, match="Supervised is put around int"):
         lidarium.Supervised(3)
+
+
+@pytest.mark.parametrize("form", [{"action_mask": "infos"}, {"observation": "flat"}])
+def test_forms_without_masks_in_observations_are_refused_at_once(form):
+    env = lidarium.parallel_env("apartment", level="frontier", **UNKNOWN, **form)
+    with pytest.raises(ValueError, match="masks_orders is set, but there are no masks"):
+        lidarium.Supervised(env, masks_orders=True)
+
+
+def test_talking_robots_are_not_supervised():
+    with pytest.raises(ValueError, match="comm is 2; want 0 under a supervisor"):
+        lidarium.Supervised(lidarium.parallel_env("apartment", comm=2, **UNKNOWN))
+
+
+def test_a_supervised_policy_can_be_copied():
+    import copy
+    import pickle
+
+    policy = lidarium.Supervised(lidarium.policy("nearest_frontier"), period_s=4.0)
+    for copied in (copy.deepcopy(policy), pickle.loads(pickle.dumps(policy))):
+        assert copied.settings == policy.settings
+        assert copied.level == policy.level

@@ -139,3 +139,10 @@ def test_bad_wrappings_are_refused():
         MergedMaps(team(), can_talk=np.ones((3, 3), bool))
     with pytest.raises(ValueError, match="period_s"):
         MergingSettings(period_s=0.0)
+
+
+@pytest.mark.parametrize("form", [{"observation": "flat"}, {"infos": "none"}, {"ended_agents": "zeros"}])
+def test_forms_that_it_cannot_add_to_are_refused_at_once(form):
+    (name,) = form
+    with pytest.raises(ValueError, match=f"{name} is .*; MergedMaps wants"):
+        MergedMaps(lidarium.parallel_env("apartment", robots=2, **form))

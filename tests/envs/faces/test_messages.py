@@ -70,3 +70,22 @@ def test_a_robot_alone_has_nobody_to_talk_to():
         lidarium.parallel_env("apartment", comm=2, robots=1)
     with pytest.raises(ValueError, match="comm is -1"):
         lidarium.parallel_env("apartment", comm=-1)
+
+
+def test_messages_on_the_way_outlast_the_beginning_of_other_episodes():
+    radio = {"kind": "all", "latency_s": 0.5}
+    env = lidarium.vector_env(2, "apartment", comm=1, radio=radio, **OPTIONS, starts="fixed")
+    heard = []
+    for resets in (False, True):
+        env.reset(seed=[0, 0])
+        rows = []
+        for step in range(12):
+            sent = np.zeros((env.num_envs, 3), np.float32)
+            sent[:, 2] = 0.05 * step
+            observations = env.step(sent)[0]
+            rows.append(observations["messages"][0].copy())
+            if resets:
+                env.reset(options={"episodes": np.array([False, True])})
+        heard.append(np.array(rows))
+    assert heard[0][:, 0, 2].tolist() == [0.0] * 5 + [1.0] * 7
+    np.testing.assert_array_equal(heard[1], heard[0])

@@ -420,3 +420,13 @@ def test_default_settings_are_a_team_of_three_for_ten_minutes():
     assert len(env.possible_agents) == 3
     env.reset(seed=0)
     assert env.floor.name == "apartment"
+
+
+def test_any_word_of_a_policy_ends_a_robot_for_good():
+    env = lidarium.parallel_env("apartment", robots=2, resolution=0.1)
+    env.reset(seed=0)
+    _, _, terminated, truncated, infos = env.step({"robot_0": lidarium.Stop(""), "robot_1": lidarium.Stop("horizon")})
+    assert terminated == {"robot_0": True, "robot_1": True}
+    assert truncated == {"robot_0": False, "robot_1": False}
+    assert [infos[agent]["ended_because"] for agent in ("robot_0", "robot_1")] == ["stopped", "horizon"]
+    assert not env.agents

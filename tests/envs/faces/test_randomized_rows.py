@@ -65,3 +65,34 @@ def test_what_cannot_be_drawn_in_batches_is_refused():
         make(2, horizon=3)
     with pytest.raises(ValueError, match="the number of episodes is 0; want"):
         make(0)
+
+
+def test_a_bad_action_is_named_and_changes_nothing():
+    rows = make(2)
+    rows.reset(seed=1)
+    actions = np.full((4, 2), 0.3, np.float32)
+    actions[3] = np.nan
+    before = [part.engine.world.steps.copy() for part in rows.batch.parts]
+    with pytest.raises(ValueError, match=r"in episode 1, whose rows begin with 2: .*row 1"):
+        rows.step(actions)
+    for part, steps in zip(rows.batch.parts, before, strict=True):
+        assert np.array_equal(part.engine.world.steps, steps)
+    rows.close()
+
+
+def test_robots_that_a_team_lacks_can_only_stay():
+    envs = lidarium.vector_env(2, "scene_room", level="frontier", randomize={"robots": [1, 2]}, horizon_s=5.0)
+    envs.reset(seed=0)
+    masks = envs.batch.masks
+    assert masks.any(axis=1).all()
+    lacking = [part.robots == 1 for part in envs.batch.parts]
+    for episode in np.flatnonzero(lacking):
+        assert masks[2 * episode + 1].tolist() == [False] * (masks.shape[1] - 1) + [True]
+    envs.close()
+
+
+def test_a_robot_besides_kinds_is_refused():
+    with pytest.raises(ValueError, match="robot is set, and kinds is"):
+        lidarium.make_settings(kinds=["kobuki"], robot="pioneer")
+    with pytest.raises(ValueError, match="robot is set, and kinds is"):
+        lidarium.parallel_env("scene_room", kinds=["kobuki"], randomize={"robot.max_speed": [0.4]})

@@ -66,3 +66,25 @@ def test_an_array_is_a_floor():
         lidarium.load_floor(solid, 0.0)
     with pytest.raises(ValueError, match="want rows and columns of numbers"):
         lidarium.load_floor(np.zeros((2, 3, 4)), 0.05)
+
+
+def test_infos_of_episodes_that_go_on_are_those_of_the_step():
+    options = {**OPTIONS, "horizon_s": 60.0, "starts": "fixed"}
+    same = lidarium.vector_env(2, "scene_room", autoreset_mode=AutoresetMode.SAME_STEP, **options)
+    later = lidarium.vector_env(2, "scene_room", **options)
+    infos = []
+    for env in (same, later):
+        env.reset(seed=1)
+        for episode, agent, reason in ((0, "robot_0", "first"), (0, "robot_1", "second"), (1, "robot_0", "third")):
+            env.team(episode).stop(agent, reason)
+        *_, terminated, _, found = env.step(np.full((4, 2), 0.3, np.float32))
+        assert terminated.tolist() == [True, True, True, False]
+        infos.append(found)
+    now, wanted = infos
+    assert list(now["ended_because"]) == [None, None, "third", None]
+    assert now["_ended_because"].tolist() == [False, False, True, False]
+    assert list(now["final_info"]["ended_because"][:2]) == ["first", "second"]
+    for name, values in wanted["reward_terms"].items():
+        np.testing.assert_array_equal(now["reward_terms"][name][2:], values[2:])
+    assert now["reward_terms"]["time"].tolist() == [0.0, 0.0, -0.001, -0.001]
+    np.testing.assert_array_equal(now["truth"]["coverage"][2:], wanted["truth"]["coverage"][2:])

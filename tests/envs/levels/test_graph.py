@@ -152,3 +152,17 @@ def test_an_evaluation_keeps_no_records_of_moves_along_edges(tmp_path, capsys):
     assert '"record":null' in (tmp_path / "out" / "episodes.jsonl").read_text()
     assert not list(tmp_path.rglob("*.npz"))
     capsys.readouterr()
+
+
+def test_time_and_idle_energy_are_those_of_the_whole_decision():
+    options = {**OPTIONS, "graph": {"spacing": 1.0, "least_utility": 0}, "battery": "kobuki", "odometry": "ideal"}
+    env = lidarium.parallel_env("apartment", level="graph", **options)
+    env.reset(seed=0)
+    *_, infos = env.step({"robot_0": 0})
+    taken_s = env.unwrapped.scorer.time
+    assert taken_s > 0.5
+    assert infos["robot_0"]["reward_terms"]["time"] == pytest.approx(-0.01 * taken_s)
+    settings, meters = env.unwrapped.settings, env.unwrapped.engine._meters
+    driven = float(env.unwrapped.world.travelled[0])
+    idle = meters.used_j[0] - settings.battery.per_metre_j * driven
+    assert settings.battery.idle_w * taken_s <= idle <= settings.battery.idle_w * taken_s + 4.0  # and the turn
