@@ -294,8 +294,6 @@ class TeamRows:
             arrays = {name: array.copy() for name, array in arrays.items()}
             for array in arrays.values():
                 array[self._kept] = 0
-            if MASK in arrays:
-                arrays[MASK][self._kept, -1] = 1  # to stay is always allowed
         return self._form.of(arrays, (self.rows,))
 
     def observation(self, row: int) -> Any:  # noqa: ANN401
@@ -304,8 +302,6 @@ class TeamRows:
         if self._keeps and self._kept[row]:
             for array in arrays.values():
                 array[...] = 0
-            if MASK in arrays:
-                arrays[MASK][-1] = 1
         return self._form.of(arrays)
 
     def _with_more(self) -> Mapping[str, NDArray[Any]]:
