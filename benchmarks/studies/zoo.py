@@ -166,11 +166,6 @@ def _curve(path: Path) -> list[list[float]]:
     return [[int(step), float(coverage)] for step, coverage in (line.split(",") for line in lines)]
 
 
-def _compared(key: tuple[str, str]) -> bool:
-    """Whether a training stands for a seed of its own; that which was made again does not."""
-    return key != AGAIN
-
-
 def _trainings(folder: Path) -> dict[tuple[str, str], Path]:
     """Return the folders of finished trainings by team and seed, in the order of the teams."""
     lines = kept_lines(folder / LESSONS_FILE) if (folder / LESSONS_FILE).exists() else []
@@ -490,7 +485,7 @@ def _lessons(folder: Path) -> list[dict[str, Any]]:
 def _curve_rows(lessons: Sequence[Line]) -> str:
     """Return the mean curve of each team at a few points."""
     rows = ["| decisions | " + " | ".join(f"`{team}`" for team in TEAMS) + " |", "|---:|" + "---:|" * len(TEAMS)]
-    own = [line for line in lessons if _compared((line["team"], line["seed"]))]
+    own = [line for line in lessons if (line["team"], line["seed"]) != AGAIN]
     curves = {team: [dict(map(tuple, line["curve"])) for line in own if line["team"] == team] for team in TEAMS}
     for step in sorted({step for found in curves.values() for each in found for step in each}):
         cells = [
@@ -507,7 +502,7 @@ def page(folder: Path) -> str:
     """Return the results as markdown."""
     runs, lessons = kept_lines(folder / RUNS_FILE), _lessons(folder)
     few = [line for line in runs if line["floor"] in FLOORS]
-    lines = [line for line in few if _compared((line["policy"].removeprefix("zoo:"), line["training"]))]
+    lines = [line for line in few if (line["policy"].removeprefix("zoo:"), line["training"]) != AGAIN]
     whole = [line for line in runs if line["training"] in ("", SHIPPED)] if len(few) < len(runs) else []
     return PAGE.format(
         floors=len({line["floor"] for line in lines}),
@@ -529,7 +524,7 @@ def pictures(folder: Path, out: Path) -> None:
     from lidarium.evaluation.analysis.learning_curves import joined
     from lidarium.evaluation.drawing.curves_picture import save_learning_curves
 
-    trained = {key: path for key, path in _trainings(folder).items() if _compared(key)}
+    trained = {key: path for key, path in _trainings(folder).items() if key != AGAIN}
     curves = [
         joined(team, paths, "step", "coverage")
         for team in TEAMS

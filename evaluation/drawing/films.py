@@ -271,7 +271,7 @@ FILMS: Registry[FramesMaker] = Registry("film")
 FILMS.register(
     "maps",
     "lidarium.evaluation.drawing.map_film:MapFrames",
-    "for robots that do not know their starts: what each knows and how maps are joined",
+    "what each robot knows and how maps are joined, if starts are unknown",
 )
 FILMS.register(
     "prediction",
