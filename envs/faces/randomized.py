@@ -315,29 +315,41 @@ class RandomizedRows:
 
     def step(self, actions: Any, beginning: NDArray[np.int64]) -> None:  # noqa: ANN401
         """Run all live episodes for one step or decision, and begin others; see `TeamRows.step`."""
-        begins, decoded = set(beginning.tolist()), dict[int, Any]()
-        for episode in set(range(self.episodes)) - begins:  # before any of them runs: a bad action changes nothing
-            part, first = self.parts[episode], episode * self.robots
-            try:
-                decoded[episode] = part.read(_of_rows(actions, slice(first, first + part.robots), self.rows))
-            except ValueError as error:
-                raise ValueError(f"in episode {episode}, whose rows begin with {first}: {error}") from error
-        for episode in range(self.episodes):
-            if episode in begins:
-                self._begin(episode, None, None)
-            else:
-                self.parts[episode].run(decoded[episode])
+        rows = self.robots
+        self._step(
+            beginning,
+            lambda episode, part: part.read(
+                _of_rows(actions, slice(episode * rows, episode * rows + part.robots), self.rows)
+            ),
+            TeamRows.run,
+        )
 
     def step_teams(self, teams: Sequence[Any], beginning: NDArray[np.int64]) -> None:
         """Run all live episodes by the actions of each team, by agent, and begin others."""
         if len(teams) != self.episodes:
             raise ValueError(f"actions are of {len(teams)} teams; want a dict for each of {self.episodes} episodes")
-        begins = set(beginning.tolist())
-        for episode, actions in enumerate(teams):
+        self._step(beginning, lambda episode, part: part.read_each(part.by_row(teams[episode])), TeamRows.run_each)
+
+    def _step(
+        self,
+        beginning: NDArray[np.int64],
+        read: Callable[[int, TeamRows], Any],
+        run: Callable[[TeamRows, Any], None],
+    ) -> None:
+        """Read the actions of all live episodes before any of them runs: a bad action changes nothing."""
+        begins, actions = set(beginning.tolist()), dict[int, Any]()
+        for episode in set(range(self.episodes)) - begins:
+            try:
+                actions[episode] = read(episode, self.parts[episode])
+            except ValueError as error:
+                raise ValueError(
+                    f"in episode {episode}, whose rows begin with {episode * self.robots}: {error}"
+                ) from error
+        for episode in range(self.episodes):
             if episode in begins:
                 self._begin(episode, None, None)
             else:
-                self.parts[episode].step_teams([actions])
+                run(self.parts[episode], actions[episode])
 
     @property
     def rewards(self) -> NDArray[np.float64]:

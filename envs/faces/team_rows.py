@@ -32,6 +32,9 @@ ACTIVE = "active"
 
 _TOLD = {Stop, Order}
 
+EachAction = tuple[Any, Mapping[int, Any], Collection[int]]
+"""Actions that a level has read; orders and stops by row; rows that have an action."""
+
 
 class TeamRows:
     """Begins and steps the episodes of an engine; results are arrays over rows in the forms of conventions.
@@ -161,6 +164,10 @@ class TeamRows:
         after_step: AfterStep | None = None,
     ) -> None:
         """Run all live episodes by actions of rows, and begin others; see `by_row`."""
+        self.run_each(self.read_each(actions), beginning, after_step)
+
+    def read_each(self, actions: Mapping[int, Any]) -> EachAction:
+        """Return the meaning of actions by row, for `run_each`; messages are kept to be sent."""
         engine, names = self.engine, self._names
         told: Mapping[int, Any] = {}
         if not _TOLD.isdisjoint(map(type, actions.values())):
@@ -175,16 +182,23 @@ class TeamRows:
                     action, self.conventions.comm, has_vectors, names[row % self.robots]
                 )
             actions = rest
-        decoded = engine.level.read(actions, names)
+        return engine.level.read(actions, names), told, actions.keys()
+
+    def run_each(
+        self, read: EachAction, beginning: NDArray[np.int64] = NO_EPISODES, after_step: AfterStep | None = None
+    ) -> None:
+        """Run all live episodes by actions of rows that were read, and begin others."""
+        engine = self.engine
+        decoded, told, acting = read
         for row, action in told.items():
             if isinstance(action, Stop):
                 engine.operating.stopping[row] = action.reason
             else:
                 engine.operating.order(row, action)
         given = None
-        if len(actions) < self.rows:
+        if len(acting) < self.rows:
             given = np.zeros(self.rows, np.bool_)
-            given[[*actions, *engine.operating.stopping]] = True
+            given[[*acting, *engine.operating.stopping]] = True
         masked = self._nobody if engine.is_whole else ~engine.live
         if len(beginning):
             masked = masked & ~np.repeat(engine.is_over, self.robots)

@@ -75,6 +75,9 @@ def test_a_bad_action_is_named_and_changes_nothing():
     before = [part.engine.world.steps.copy() for part in rows.batch.parts]
     with pytest.raises(ValueError, match=r"in episode 1, whose rows begin with 2: .*row 1"):
         rows.step(actions)
+    by_agent = [{"robot_0": actions[row], "robot_1": actions[row + 1]} for row in (0, 2)]
+    with pytest.raises(ValueError, match=r"in episode 1, whose rows begin with 2: .*robot_1"):
+        rows.batch.step_teams(by_agent, np.empty(0, np.int64))
     for part, steps in zip(rows.batch.parts, before, strict=True):
         assert np.array_equal(part.engine.world.steps, steps)
     rows.close()
