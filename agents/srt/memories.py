@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from lidarium.agents.srt.tree import Node
 from lidarium.envs.onboard.driving.path_planner import footprint_of
 from lidarium.envs.onboard.navigation import NavigationMap
+from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.planning.frontiers.approach import approach, default_reach
 from lidarium.mapping.planning.frontiers.frontier_map import FRONTIER
 from lidarium.mapping.planning.grid_planning import Cell, Until, centres_of, plan, search
@@ -130,13 +131,10 @@ class MapMemory:
 
     def is_clear(self, start: Place, end: Place) -> bool:
         """Whether all cells on a way are free, with room for the robot."""
-        count = max(math.ceil(math.dist(start, end) / (0.5 * self._map.resolution)), 1)
-        rows, columns, is_inside = self._cells(start + (end - start) * np.linspace(0.0, 1.0, count + 1)[:, None])
-        clearance = self._clearance(rows, columns)
-        # Where the robot starts it may stand nearer to a wall than it would go.
-        is_near_start = np.arange(count + 1) * 0.5 * self._map.resolution < self._body
-        is_free = (self._map.log_odds[rows, columns] < 0) & ((clearance >= self._body) | is_near_start)
-        return bool((is_inside & is_free).all())
+        field, resolution = self._map.clearance, self._map.resolution
+        count = max(math.ceil(math.dist(start, end) / (0.5 * resolution)), 1)
+        distance = (field.closeness, field.limit, field.resolution)
+        return bool(_is_clear(self._map.log_odds, distance, resolution, start, end, count, self._body))
 
     def way(self, start: Place, end: Place) -> Legs | None:
         """Return the path that the onboard planning finds across the map.
@@ -256,6 +254,35 @@ class MapMemory:
         rows, columns = self._map.log_odds.shape
         row, column = np.clip(cells[..., 1], 0, rows - 1), np.clip(cells[..., 0], 0, columns - 1)
         return row, column, (row == cells[..., 1]) & (column == cells[..., 0])
+
+
+@kernel(nrt=False)
+def _is_clear(
+    log_odds: Array,
+    distance: tuple[Array, int, float],
+    resolution: float,
+    start: Array,
+    end: Array,
+    count: int,
+    body: float,
+) -> bool:
+    """Whether all cells are free at points of a way that divide it into ``count`` parts (kernel).
+
+    A body has room at each, but for those nearer to the start than its radius: where a robot starts it may be
+    nearer to a wall than it would go.
+    """
+    closeness, limit, side = distance
+    rows, columns = log_odds.shape
+    for k in range(count + 1):
+        share = k * (1.0 / count) if k < count else 1.0
+        column = math.floor((start[0] + (end[0] - start[0]) * share) / resolution)
+        row = math.floor((start[1] + (end[1] - start[1]) * share) / resolution)
+        if not (0 <= row < rows and 0 <= column < columns) or log_odds[row, column] >= 0:
+            return False
+        clearance = math.sqrt(limit - float(closeness[row, column])) * 0.5 * side
+        if clearance < body and k * 0.5 * resolution >= body:
+            return False
+    return True
 
 
 class RegionMemory:

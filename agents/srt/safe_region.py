@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from lidarium.agents.srt.settings import SHAPES
 from lidarium.mapping.grids.scan_geometry import ScanGeometry
+from lidarium.mapping.kernels.compilation import Array, kernel
 
 DIRECTIONS = 1080
 """Directions of a view: a third of a degree each, about a beam of the URG-04LX."""
@@ -214,16 +215,25 @@ def _radial(ranges: NDArray[np.float64], body: float) -> NDArray[np.float64]:
     if not reach > 0.0 or not nearest > 0.0:
         return np.zeros(DIRECTIONS)
     widest = int(math.ceil(math.asin(min(body / nearest, 1.0)) / STEP))
-    for shift in range(1, widest + 1):
-        sine, cosine = math.sin(shift * STEP), math.cos(shift * STEP)
-        for side in (shift, -shift):
-            other = np.roll(ranges, side)
-            with np.errstate(invalid="ignore"):
-                across = other * sine
-                is_met = across < body
-                limit = other * cosine - np.sqrt(np.maximum(body * body - across * across, 0.0))
-                radii = np.where(is_met, np.minimum(radii, np.maximum(limit, 0.0)), radii)
+    angles = [shift * STEP for shift in range(1, widest + 1)]
+    sines, cosines = (np.array([function(angle) for angle in angles]) for function in (math.sin, math.cos))
+    _shorten(ranges, sines, cosines, body, radii)
     return radii
+
+
+@kernel(nrt=False)
+def _shorten(ranges: Array, sines: Array, cosines: Array, body: float, radii: Array) -> None:
+    """Shorten radii (directions,) to where a disc meets the end of a ray at one of the angles off (kernel)."""
+    count = len(ranges)
+    for k in range(len(sines)):
+        shift = k + 1
+        for met in range(count):
+            across = ranges[met] * sines[k]
+            if across < body:  # nan is not
+                limit = max(ranges[met] * cosines[k] - math.sqrt(body * body - across * across), 0.0)
+                left, right = (met + shift) % count, (met - shift) % count
+                radii[left] = min(radii[left], limit)
+                radii[right] = min(radii[right], limit)
 
 
 SPACING = 0.1

@@ -1,6 +1,7 @@
 """A memory that relies on the robot's map."""
 
 import functools
+import math
 from itertools import pairwise
 
 import numpy as np
@@ -42,6 +43,24 @@ def test_a_straight_way_is_clear_over_free_cells_with_room_for_the_body():
     assert not memory_of_hall().is_clear(here, np.array([4.5, 5.5]))
     # A robot may begin nearer to a wall than it would go.
     assert memory_of_hall().is_clear(np.array([2.0, 1.15]), np.array([2.0, 3.0]))
+
+
+def is_clear_by_points(memory, start, end):
+    """Whether a way is clear, by all points on it at once."""
+    resolution = memory._map.resolution
+    count = max(math.ceil(math.dist(start, end) / (0.5 * resolution)), 1)
+    rows, columns, is_inside = memory._cells(start + (end - start) * np.linspace(0.0, 1.0, count + 1)[:, None])
+    has_room = memory._clearance(rows, columns) >= memory._body
+    is_near_start = np.arange(count + 1) * 0.5 * resolution < memory._body
+    return bool((is_inside & (memory._map.log_odds[rows, columns] < 0) & (has_room | is_near_start)).all())
+
+
+def test_ways_are_clear_as_all_their_points_are():
+    generator = np.random.default_rng(3)
+    ways = generator.uniform((-0.5, -0.5), (14.0, 6.0), (400, 2, 2))
+    found = [memory_of_hall().is_clear(start, end) for start, end in ways]
+    assert found == [is_clear_by_points(memory_of_hall(), start, end) for start, end in ways]
+    assert 40 < sum(found) < 360
 
 
 def test_a_way_goes_round_what_is_in_between_in_clear_legs():

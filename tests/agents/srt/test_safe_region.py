@@ -56,6 +56,29 @@ def test_no_end_of_a_ray_comes_within_the_body_on_the_way_through_a_region(seed)
             assert gaps.min() >= BODY - 0.01
 
 
+def radial_by_rays(ranges, body):
+    """Return the radii of a radial region as its definition has them: each ray against all others."""
+    radii = np.where(np.isnan(ranges), 0.0, np.maximum(ranges - body, 0.0))
+    widest = math.ceil(math.asin(min(body / np.nanmin(ranges), 1.0)) / STEP)
+    for shift in (*range(-widest, 0), *range(1, widest + 1)):
+        other = np.roll(ranges, shift)
+        across = other * math.sin(abs(shift) * STEP)
+        with np.errstate(invalid="ignore"):
+            limit = other * math.cos(shift * STEP) - np.sqrt(np.maximum(body * body - across * across, 0.0))
+        radii = np.where(across < body, np.minimum(radii, np.maximum(limit, 0.0)), radii)
+    return radii
+
+
+@settings(max_examples=20)
+@given(st.integers(0, 2**31))
+def test_a_radial_region_is_to_the_bit_that_of_its_definition(seed):
+    generator = np.random.default_rng(seed)
+    view = np.repeat(generator.uniform(0.1, 5.0, DIRECTIONS // 12), 12)
+    view[generator.integers(DIRECTIONS, size=80)] = np.nan
+    expected = radial_by_rays(np.minimum(view, PERCEPTION), BODY)
+    assert np.array_equal(region(view, "radial").radii, expected)
+
+
 def test_points_within_a_region_are_told():
     square = region(box_view(), place=np.array([1.0, 1.0]))
     points = np.array([[1.0, 1.0], [2.7, 1.0], [2.9, 1.0], [1.0, -0.7], [4.0, 4.0]])
