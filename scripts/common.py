@@ -12,6 +12,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
+from tyro.conf import Suppress
+
 from lidarium.registry import registry
 
 if TYPE_CHECKING:
@@ -36,6 +38,8 @@ class Command:
     """folder for the files that the command writes"""
     json: bool = False
     """print the result as JSON on standard output, and nothing else there"""
+    given: Suppress[frozenset[str]] = frozenset()
+    """Names of the options that the command line has, also of those that it sets to their default."""
 
     compiles: ClassVar[bool] = False
     """Whether the command calls kernels, which the first start compiles."""

@@ -6,6 +6,7 @@ import sys
 import traceback
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from dataclasses import fields, replace
 from typing import Any, TextIO, get_origin, get_type_hints
 
 import lidarium
@@ -151,11 +152,17 @@ def _options(execute: Callable[[Any], Answer], name: str, words: list[str]) -> C
     options: type[Command] = get_type_hints(execute)[parameter]
     hints = get_type_hints(options, include_extras=True)
     lists = {f"--{key.replace('_', '-')}" for key, hint in hints.items() if get_origin(hint) is tuple}
+    words = gathered(words, lists)
     try:
-        return tyro.cli(options, prog=f"lidarium {name}", args=gathered(words, lists), config=config)
+        command = tyro.cli(options, prog=f"lidarium {name}", args=words, config=config)
     except BrokenPipeError as error:  # the reader of the help has ended
         _silence(sys.stdout)
         raise SystemExit(DONE) from error
+    names = {word.partition("=")[0].removeprefix("--").replace("-", "_") for word in words if word.startswith("--")}
+    if not isinstance(command, Command):  # one that has others below it
+        return command
+    given = (each.name for each in fields(command) if not names.isdisjoint({each.name, f"no_{each.name}"}))
+    return replace(command, given=frozenset(given))
 
 
 def _message(error: Exception) -> str:

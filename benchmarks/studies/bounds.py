@@ -4,7 +4,6 @@ import math
 import statistics
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -76,9 +75,10 @@ with {horizon:.0f} s.
 
 @dataclass(frozen=True, slots=True)
 class Small(Task):
-    """A small floor."""
+    """A small floor, and the part of the time that its bound may take: 1 over this number."""
 
     floor: str
+    part: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,12 +94,12 @@ def settings_of(robots: int) -> ExplorationSettings:
     return make_settings(robots=robots, starts="drawn", resolution=0.05, stop_coverage=GOAL, horizon_s=HORIZON_S)
 
 
-def measure_small(every: int, small: Small) -> dict[str, Any]:
-    """Plan on a small floor, and bound the plan's length, in an N-th of the time."""
+def measure_small(small: Small) -> dict[str, Any]:
+    """Plan on a small floor, and bound the plan's length, in a part of the time."""
     settings = settings_of(1)
     graph = graph_of(load_floor(small.floor), settings, starts_in(small.floor, settings, 0), SPACING)
     plan = min(float(plan_tours(graph, GOAL, PLAN_ROUNDS, seed).lengths[0]) for seed in range(4))
-    found = relax(graph, GOAL, exact_s=EXACT_S / every, limit_s=RELAX_S / every)
+    found = relax(graph, GOAL, exact_s=EXACT_S / small.part, limit_s=RELAX_S / small.part)
     optimum = found.optimum_m if math.isfinite(found.optimum_m) else None
     return {
         "floor": small.floor,
@@ -126,8 +126,8 @@ def measure_team(team: Team) -> dict[str, Any]:
 
 def work(folder: Path, _data: Path | None, every: int, workers: int) -> Progress:
     """Do the small floors, then the set `validation`."""
-    small = [Small(floor) for floor in SMALL_FLOORS[::every]]
-    yield from do_missing(folder / TIGHT_FILE, "small floors", small, partial(measure_small, every), workers)
+    small = [Small(floor, every) for floor in SMALL_FLOORS[::every]]
+    yield from do_missing(folder / TIGHT_FILE, "small floors", small, measure_small, workers)
     floors = set_floors("validation")[:: FLOORS_EVERY * every]
     teams = [Team(floor, robots) for floor in floors for robots in TEAMS]
     yield from do_missing(folder / FLOORS_FILE, "teams", teams, measure_team, workers)

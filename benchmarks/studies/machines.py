@@ -37,7 +37,7 @@ def memory_mb(kind: str = "VmRSS", process: str = "self") -> float:
 
 
 def run_short(folder: Path, first: int, last: int, workers: int) -> dict[str, Any]:
-    """Run the short episodes of some seeds into a folder; return what each took.
+    """Run the short episodes of some seeds that a folder lacks; return their number and what they took.
 
     They have settings of a name of their own: a report compares within settings.
     """
@@ -48,10 +48,10 @@ def run_short(folder: Path, first: int, last: int, workers: int) -> dict[str, An
         variants={f"from {first}": SHORT},
     )
     began, path = time.perf_counter(), folder / EPISODES_FILE
-    for _ in Campaign(suite, folder, workers, records=False).run():
-        pass
+    ran = sum(1 for _ in Campaign(suite, folder, workers, records=False).run())
     return {
         "episodes": last - first,
+        "ran": ran,
         "seconds": time.perf_counter() - began,
         "memory_mb": memory_mb(),
         "file_bytes": path.stat().st_size,
@@ -284,8 +284,9 @@ def _kill(part: Part) -> dict[str, Any]:
 
 
 def _row(episodes: int, line: Mapping[str, Any]) -> str:
-    each = 1e3 * line["seconds"] / line["episodes"]
-    return f"| {episodes:,} | {each:.1f} | {line['memory_mb']:.0f} | {line['file_bytes'] / 1e6:.0f} |"
+    # An interrupted piece is timed by the episodes that ran after it.
+    each = f"{1e3 * line['seconds'] / line['ran']:.1f}" if line["ran"] else "-"
+    return f"| {episodes:,} | {each} | {line['memory_mb']:.0f} | {line['file_bytes'] / 1e6:.0f} |"
 
 
 def _gain_row(episodes: int, compared: Sequence[Mapping[str, Any]]) -> str:

@@ -78,7 +78,7 @@ PAGE = """# The zoo
 [Teams of the zoo](../reference/learned.md#teams-of-the-zoo) choose among frontiers, `tours-2` among the stops of its
 tours, in the ideal world. The best network of each training by the validation floors runs here. The untrained network
 ranks frontiers as explore_lite does; before its training `tours-2` does as `tour_frontier`. All run on the same
-{floors} floors of the set `test` from the same drawn starts, and shipped teams and classic policies on {all_floors},
+{floors} floors of the set `test` from the starts of the floors, and shipped teams and classic policies on {all_floors},
 until 99 % is seen or {horizon:.0f} s are over, which then count. Classic policies decide at their own level. Ratios
 are geometric means of times over floors, with 95 % intervals; a floor counts by the geometric mean of its trainings.
 

@@ -224,7 +224,7 @@ class RobotLink:
         ranges, self._native = beams
         reach = max(float(scan.range_min), 0.0), min(_reach(scan), MOST_RANGE_M)
         try:
-            _, self.geometry, self._axis = symmetric_scans(ranges[None], *self._native[:2], reach)
+            _, self.geometry, self._axis, *_ = symmetric_scans(ranges[None], *self._native[:2], reach)
         except ValueError:  # looks backwards, for instance
             count = min(round(WHOLE_TURN / self._native.increment), MAX_BEAMS)
             self.geometry = ScanGeometry(beams=count, field_of_view=WHOLE_TURN, range_min=reach[0], range_max=reach[1])

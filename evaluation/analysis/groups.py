@@ -3,6 +3,7 @@
 The figures of the episodes in a group may be compared side by side.
 """
 
+import hashlib
 import json
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -53,11 +54,12 @@ class Group:
 
     @property
     def slug(self) -> str:
-        """Part of names of files."""
-        settings = "" if self.variant in ("", DEFAULT_VARIANT) else f"{self.variant}_"
-        return "".join(letter if letter.isalnum() else "_" for letter in f"{settings}{self.robots}_{self.floor_set}")[
-            -100:
-        ]
+        """Part of names of files, no other group's."""
+        settings = ""
+        if self.variant not in ("", DEFAULT_VARIANT):
+            digest = hashlib.sha256(self.variant.encode("utf-8", "replace")).hexdigest()
+            settings = f"{self.variant[:60]}_{digest[:8]}_"
+        return "".join(letter if letter.isalnum() else "_" for letter in f"{settings}{self.robots}_{self.floor_set}")
 
     @property
     def floors(self) -> list[str]:

@@ -72,8 +72,12 @@ def choose_episodes(directory: Path, wanted: Wanted) -> Chosen:
     for row in _matching(recorded, wanted):
         groups.setdefault(pair_key_of(row), {}).setdefault(str(row["policy"]), row)
     group = max(groups.values(), key=len)
-    names = list(wanted.policies) or sorted(group)
-    shown = [name for name in names if name in group]
+    shown = list(wanted.policies) or sorted(group)
+    if missing := [name for name in shown if name not in group]:
+        raise ValueError(
+            f"--film-policies has {missing[0]!r}, which has no recorded episode from the same start as "
+            f"{', '.join(sorted(group))}; want policies that explored a floor from the same start and seed"
+        )
     return Chosen(
         _title_of(next(iter(group.values()))),
         {name: records[record_key(group[name])].path for name in shown[:MOST_SIDE_BY_SIDE]},

@@ -80,6 +80,8 @@ def describe_group(
     """Return the section of a group and write its plots."""
     section = Section(group, values)
     section.numbers = {
+        "title": group.title,
+        "variant": group.variant,
         "robots": group.robots,
         "floor_set": group.floor_set,
         "floors": group.floors,
@@ -236,7 +238,7 @@ def _draw_floors(section: Section, records: dict[Key, Entry], out: Path) -> None
     for floor in recorded[:PICTURED_FLOORS]:
         name = _file_stem(floor, group.floors)
         save_paths(
-            _picture(section, out, f"paths_{name}_{group.robots}.png", f"Paths on {plain(floor)}"),
+            _picture(section, out, f"paths_{name}_{group.slug}.png", f"Paths on {plain(floor)}"),
             group,
             floor,
             records,
@@ -247,7 +249,7 @@ def _draw_floors(section: Section, records: dict[Key, Entry], out: Path) -> None
             for policy, each in visits.items()
         }
         save_visits(
-            _picture(section, out, f"visits_{name}_{group.robots}.png", f"Visits on {plain(floor)}"),
+            _picture(section, out, f"visits_{name}_{group.slug}.png", f"Visits on {plain(floor)}"),
             group,
             floor,
             visits,

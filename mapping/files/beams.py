@@ -137,13 +137,35 @@ def resampled(ranges: NDArray[np.float32], beams: Beams, wanted: Beams, count: i
     return np.where(is_seen, found, np.nan).astype(np.float32)
 
 
+class SymmetricScans(NamedTuple):
+    """Scans symmetric about the laser's axis.
+
+    Attributes
+    ----------
+    ranges : (scans, beams) float32
+        The scans [m].
+    geometry : ScanGeometry
+        Their beams.
+    axis : float
+        Direction of the axis against the heading, within half a beam of it: it belongs to the laser's pose on the
+        robot [rad].
+    behind : int
+        Number of beams behind the last one that the laser took; -1 if that one is left out.
+    is_rolled : bool
+        Whether the beams of a full circle begin with another one than the laser began with.
+    """
+
+    ranges: NDArray[np.float32]
+    geometry: ScanGeometry
+    axis: float
+    behind: int = 0
+    is_rolled: bool = False
+
+
 def symmetric_scans(
     ranges: NDArray[np.float32], angle_min: float, increment: float, reach: tuple[float, float]
-) -> tuple[NDArray[np.float32], ScanGeometry, float]:
-    """Return scans symmetric about the laser's axis, their geometry, and that axis.
-
-    Invalid beams are added on one side. The axis is within half a beam of the heading, by which beams that are not
-    symmetric about the heading are turned: it belongs to the laser's pose on the robot.
+) -> SymmetricScans:
+    """Return scans symmetric about the laser's axis; invalid beams are added on one side.
 
     Parameters
     ----------
@@ -154,7 +176,7 @@ def symmetric_scans(
     reach : (float, float)
         Shortest and longest measured range [m].
     """
-    beams = ranges.shape[1]
+    beams, behind = ranges.shape[1], 0
     if not (increment > 0.0 and beams * increment < 2.0 * math.pi + 1.5 * increment and math.isfinite(angle_min)):
         raise ValueError(
             f"{beams} beams from {angle_min} rad in steps of {increment} rad; want steps of more than 0 within a circle"
@@ -166,15 +188,17 @@ def symmetric_scans(
         )
     if abs((beams - 1) * increment - WHOLE_TURN) < _CIRCLE_BEAMS * increment:
         # The last beam repeats the first.
-        ranges, beams = ranges[:, :-1], beams - 1
+        ranges, beams, behind = ranges[:, :-1], beams - 1, -1
     if abs(beams * increment - WHOLE_TURN) < _CIRCLE_BEAMS * increment:
         increment = WHOLE_TURN / beams
         turned = round((angle_min + math.pi) / increment)
         geometry = ScanGeometry(beams=beams, field_of_view=WHOLE_TURN, range_min=reach[0], range_max=reach[1])
-        return (
+        return SymmetricScans(
             np.roll(ranges, turned, axis=1),
             geometry,
             _axis(angle_min + math.pi - turned * increment, increment),
+            behind,
+            turned % beams != 0,
         )
     missing = round((2.0 * angle_min + (beams - 1) * increment) / increment)
     added = np.full((len(ranges), abs(missing)), np.nan, np.float32)
@@ -186,7 +210,7 @@ def symmetric_scans(
         beams=wide.shape[1], field_of_view=view or WHOLE_TURN, range_min=reach[0], range_max=reach[1]
     )
     first = angle_min - max(missing, 0) * increment
-    return wide, geometry, _axis(first + 0.5 * view, increment)
+    return SymmetricScans(wide, geometry, _axis(first + 0.5 * view, increment), behind + max(-missing, 0))
 
 
 def _axis(angle: float, increment: float) -> float:

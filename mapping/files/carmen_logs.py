@@ -14,7 +14,7 @@ import math
 import zlib
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
 
@@ -138,13 +138,14 @@ class _Scan:
 class _Content:
     """The content of the lines of a log.
 
-    A scan comes with the number of ODOM lines before it.
+    A scan comes with the number of ODOM lines before it. `is_in_time`: whether beams are in the order of time.
     """
 
     scans: list[tuple[_Scan, int]] = field(default_factory=list)
     odometry: list[tuple[list[float], float]] = field(default_factory=list)
     parameters: dict[str, str] = field(default_factory=dict)
     is_corrected: bool = False
+    is_in_time: bool = True
     skipped: Counter[str] = field(default_factory=Counter)
     remarks: Counter[str] = field(default_factory=Counter)
 
@@ -163,7 +164,7 @@ def _read_line(line: str, content: _Content) -> None:
             case "LASER_READING":
                 content.scans.append((_laser_reading(words), len(content.odometry)))
             case "ODOM":
-                content.odometry.append((_numbers(words[1:4], 3), float(words[9] if len(words) > 9 else words[-1])))
+                content.odometry.append((_numbers(words[1:4], 3), float(words[7] if len(words) > 9 else words[-1])))
             case "PARAM" if len(words) > 2:
                 content.parameters[words[1]] = words[2]
             case "NEFF":
@@ -254,12 +255,12 @@ SICK_MAX_M = 80.0
 
 def _drop_repeated(content: _Content) -> None:
     """Leave out lines without directions that repeat a ROBOTLASER1 line: a logger wrote each scan both ways."""
-    told = {round(scan.stamp / SAME_STAMP_S) for scan, _ in content.scans if scan.has_angles}
-    kept = [
-        (scan, before)
-        for scan, before in content.scans
-        if scan.has_angles or round(scan.stamp / SAME_STAMP_S) not in told
-    ]
+
+    def told_at(scan: _Scan) -> int | None:
+        return round(scan.stamp / SAME_STAMP_S) if math.isfinite(scan.stamp) else None
+
+    told = {told_at(scan) for scan, _ in content.scans if scan.has_angles} - {None}
+    kept = [(scan, before) for scan, before in content.scans if scan.has_angles or told_at(scan) not in told]
     if len(kept) < len(content.scans):
         content.skipped["FLASER lines that repeat ROBOTLASER1 lines"] = len(content.scans) - len(kept)
         content.scans = kept
@@ -277,6 +278,7 @@ def _give_directions(content: _Content, field_of_view: float | None) -> None:
     for scan, _ in content.scans:
         stated = scan.beams or assumed(len(scan.ranges))
         ranges, beams = from_right_to_left(np.array(scan.ranges, np.float32), stated)
+        content.is_in_time &= stated.increment > 0.0
         scan.ranges, scan.beams = ranges, beams._replace(remark="")
         for remark in {stated.remark, beams.remark} - {""}:
             content.remarks[remark] += 1
@@ -296,6 +298,7 @@ def _on_one_grid(content: _Content) -> tuple[list[tuple[_Scan, int]], Beams, NDA
     scans = [marked(np.array(scan.ranges, np.float32), 0.0, highest) for scan, _ in kept]
     ranges, beams, others = on_one_grid(scans, [scan.beams for scan, _ in kept if scan.beams is not None])
     if others:
+        content.is_in_time = False
         content.remarks[f"scans whose beams are not {ranges.shape[1]} as of most are resampled"] = others
     return kept, beams, ranges, highest
 
@@ -353,53 +356,38 @@ def _lines(path: Path, skipped: Counter[str]) -> Iterator[str]:
 def _log(path: Path, content: _Content) -> LaserLog:
     kept, beams, ranges, highest = _on_one_grid(content)
     try:
-        wide, geometry, axis = symmetric_scans(ranges, beams.angle_min, beams.increment, (0.0, highest))
+        sweep = symmetric_scans(ranges, beams.angle_min, beams.increment, (0.0, highest))
     except ValueError as error:
         raise ValueError(f"{path}: {error}") from error
-    laser_pose = _mounting(content, kept[0][0]) + np.array([0.0, 0.0, axis])
+    laser_pose = _mounting(content, kept[0][0]) + np.array([0.0, 0.0, sweep.axis])
     stamps = np.array([scan.stamp for scan, _ in kept], np.float64)
     robot_poses = np.array([scan.robot_pose for scan, _ in kept], np.float64)
     readings_stamps = np.array([stamp for _, stamp in content.odometry], np.float64)
     readings = np.array([pose for pose, _ in content.odometry], np.float64).reshape(-1, 3)
     before = np.array([before for _, before in kept], np.int64)
-    remarks = tuple(f"{number} x {what}" for what, number in content.remarks.items())
+    log = LaserLog(
+        stamps,
+        sweep.ranges,
+        sweep.geometry,
+        robot_poses,
+        laser_pose,
+        beams_behind=sweep.behind,
+        is_in_time=content.is_in_time and not sweep.is_rolled,
+        skipped=dict(content.skipped),
+        remarks=tuple(f"{number} x {what}" for what, number in content.remarks.items()),
+    )
     if not content.is_corrected or kept[0][0].is_raw:
-        return LaserLog(
-            stamps,
-            wide,
-            geometry,
-            robot_poses,
-            laser_pose,
-            readings_stamps=readings_stamps,
-            readings=readings,
-            reading_of_scan=before - 1,
-            skipped=dict(content.skipped),
-            remarks=remarks,
-        )
+        return replace(log, readings_stamps=readings_stamps, readings=readings, reading_of_scan=before - 1)
+    log = replace(log, odometry=None, corrected=robot_poses)
     chained, is_own = _chained(readings, content.scans)
     if not _has_odometry(before, is_own):
-        return LaserLog(
-            stamps,
-            wide,
-            geometry,
-            None,
-            laser_pose,
-            corrected=robot_poses,
-            skipped=dict(content.skipped),
-            remarks=remarks,
-        )
-    return LaserLog(
-        stamps,
-        wide,
-        geometry,
-        _at_scans(stamps, before, readings_stamps, chained, is_own),
-        laser_pose,
-        corrected=robot_poses,
+        return log
+    return replace(
+        log,
+        odometry=_at_scans(stamps, before, readings_stamps, chained, is_own),
         readings_stamps=readings_stamps[is_own],
         readings=chained[is_own],
         reading_of_scan=np.cumsum(np.append(0, is_own))[before] - 1,
-        skipped=dict(content.skipped),
-        remarks=remarks,
     )
 
 

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.mapping.files.odometry_faults import mended
+from lidarium.mapping.files.trajectories import interpolated
 from lidarium.mapping.grids.scan_geometry import ScanGeometry
 
 FEW = 5
@@ -108,6 +109,8 @@ def _displaced(stamps: NDArray[np.float64]) -> int:
     return len(stamps) - len(ends)
 
 
+NOT_IN_TIME = "motion within scans is not undone: their beams are not in the order of time from behind"
+
 MAX_POSE_M = 1e8
 """Farthest that a log may lead [m]."""
 
@@ -130,6 +133,10 @@ class LaserLog:
         x, y, theta of the laser on the robot [m, rad].
     beam_interval_s : float
         Time from beam to beam; 0 for a scan taken at once [s].
+    beams_behind : int
+        Number of invalid beams behind the last one that was taken; `swept` shifts the stamps by their time.
+    is_in_time : bool
+        Whether the beams are in the order in which they were taken; otherwise they have no interval.
     corrected : (scans, 3) float64 or None
         Poses that another program found, for comparison only [m, rad].
     readings_stamps, readings : (readings,) and (readings, 3) float64
@@ -150,6 +157,8 @@ class LaserLog:
     odometry: NDArray[np.float64] | None
     laser_pose: NDArray[np.float64] = field(default_factory=lambda: np.zeros(3))
     beam_interval_s: float = 0.0
+    beams_behind: int = 0
+    is_in_time: bool = True
     corrected: NDArray[np.float64] | None = None
     readings_stamps: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
     readings: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 3)))
@@ -167,6 +176,20 @@ class LaserLog:
             ranges[ranges > reach] = np.inf
         geometry = replace(self.geometry, range_max=reach, range_min=min(self.geometry.range_min, 0.5 * reach))
         return replace(self, ranges=ranges, geometry=geometry)
+
+    def swept(self, beam_interval_s: float) -> "LaserLog":
+        """Return the log with a time from beam to beam [s], and with the stamps of the last beams of its scans.
+
+        Motion within scans whose beams are not in the order of time cannot be undone: a remark says so.
+        """
+        if beam_interval_s <= 0.0:
+            return self
+        if not self.is_in_time:
+            return replace(self, beam_interval_s=0.0, remarks=(*self.remarks, NOT_IN_TIME))
+        stamps, odometry = self.stamps + self.beams_behind * beam_interval_s, self.odometry
+        if odometry is not None and self.beams_behind:
+            odometry = interpolated(self.stamps, odometry, stamps)
+        return replace(self, stamps=stamps, odometry=odometry, beam_interval_s=beam_interval_s, beams_behind=0)
 
 
 def made_usable(log: LaserLog, where: str) -> LaserLog:
@@ -202,13 +225,19 @@ def made_usable(log: LaserLog, where: str) -> LaserLog:
         remarks.append(f"the clock restarts {clock.restarts} times; stamps are continued")
         log = _without_readings(log)
     log = _at(log, clock.kept)
-    odometry, ranges = log.odometry, log.ranges
+    log = replace(log, stamps=clock.stamps, skipped=skipped)
+    odometry = log.odometry
     if odometry is not None and not _moves(odometry):
-        odometry = None
-    if odometry is not None:
-        odometry, ranges, found = mended(odometry, ranges, log.geometry, clock.stamps)
+        log = replace(log, odometry=None)
+    elif odometry is not None:
+        better, ranges, found = mended(odometry, log.ranges, log.geometry, log.stamps)
         remarks += found
-    return replace(log, stamps=clock.stamps, ranges=ranges, odometry=odometry, skipped=skipped, remarks=tuple(remarks))
+        if np.nan_to_num(better - odometry).any():
+            log = _without_readings(log)  # they have the same faults
+        if ranges is not log.ranges:  # their beams are reversed
+            log = replace(log, ranges=ranges, is_in_time=False)
+        log = replace(log, odometry=better)
+    return replace(log, remarks=tuple(remarks)).swept(log.beam_interval_s)
 
 
 def _at(log: LaserLog, numbers: NDArray[np.int64]) -> LaserLog:

@@ -57,7 +57,7 @@ def read_mines_log(path: Path) -> LaserLog:
 def _log(table: NDArray[np.float64], damaged: int) -> LaserLog:
     ranges = marked((1e-3 * table[:, _BEFORE_RANGES : _BEFORE_RANGES + _BEAMS]).astype(np.float32), _LEAST_M, _MOST_M)
     increment = _FIELD_OF_VIEW / (_BEAMS - 1)
-    wide, geometry, axis = symmetric_scans(ranges, -0.5 * _FIELD_OF_VIEW, increment, (_LEAST_M, _MOST_M))
+    wide, geometry, axis, *_ = symmetric_scans(ranges, -0.5 * _FIELD_OF_VIEW, increment, (_LEAST_M, _MOST_M))
     stamps = 1e-6 * table[:, 0]
     return LaserLog(
         stamps,

@@ -58,7 +58,7 @@ def _from_arrays(path: Path, arrays: Mapping[str, NDArray[Any]]) -> LaserLog:
         _number(path, arrays, "angle_increment", math.nan),
     )
     try:
-        wide, geometry, axis = symmetric_scans(marked(ranges, least, highest), first, increment, (least, highest))
+        sweep = symmetric_scans(marked(ranges, least, highest), first, increment, (least, highest))
     except ValueError as error:
         raise ValueError(f"{path}: {error}") from error
     stamps = _table(path, arrays, "stamp", (scans,))
@@ -67,11 +67,13 @@ def _from_arrays(path: Path, arrays: Mapping[str, NDArray[Any]]) -> LaserLog:
     laser_pose = _table(path, arrays, "laser_pose", (3,))
     return LaserLog(
         stamps=np.arange(scans, dtype=np.float64) if stamps is None else stamps,
-        ranges=wide,
-        geometry=geometry,
+        ranges=sweep.ranges,
+        geometry=sweep.geometry,
         odometry=_table(path, arrays, "pose_odom", (scans, 3)),
-        laser_pose=(np.zeros(3) if laser_pose is None else laser_pose) + np.array([0.0, 0.0, axis]),
+        laser_pose=(np.zeros(3) if laser_pose is None else laser_pose) + np.array([0.0, 0.0, sweep.axis]),
         beam_interval_s=_number(path, arrays, "beam_interval", 0.0),
+        beams_behind=sweep.behind,
+        is_in_time=not sweep.is_rolled,
         corrected=_table(path, arrays, "pose_corrected", (scans, 3)),
         readings_stamps=readings_stamps if readings is not None else np.zeros(0),
         readings=readings if readings is not None else np.zeros((0, 3)),

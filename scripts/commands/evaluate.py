@@ -173,7 +173,8 @@ def _check_options(command: _Evaluate, taken: Container[str], by: str) -> None:
     """Check that no option is given that a suite or a preset sets itself."""
     for each in fields(command):
         value = getattr(command, each.name)
-        if each.name not in _OF_RUNS and each.name not in taken and value != each.default:
+        is_given = each.name in command.given or value != each.default
+        if is_given and each.name not in {*_OF_RUNS, "given"} and each.name not in taken:
             option = f"--{each.name.replace('_', '-')}"
             raise ValueError(f"{option} is {shown(value)}, and {by} sets it; leave it out, or write your own suite")
 

@@ -83,9 +83,10 @@ def _film(command: _Report, chosen: "Chosen") -> None:
 
 def _summary(result: dict[str, Any], out: Path) -> str:
     """Tell the most important figures of each group."""
+    from lidarium.mapping.files.guarded_reading import printable
+
     lines = [f"{result['episodes']} episodes, {result['records']} recorded; compared with {result['baseline']}"]
     for group in result["groups"]:
-        robots = f"{group['robots']} robot{'s' if group['robots'] != 1 else ''}"
         rows = [
             (
                 policy,
@@ -97,7 +98,7 @@ def _summary(result: dict[str, Any], out: Path) -> str:
         ]
         lines += [
             "",
-            f"{robots}, {group['floor_set']}",
+            printable(group["title"]),
             table(rows, ("policy", "runs", "reached 99 %", "median s")),
         ]
     lines += [

@@ -116,6 +116,9 @@ def execute(command: _Slam) -> Answer:
         raise ValueError(f"--start-map is {command.start_map} and the localizer slam; want --localizer splines")
     if command.ignore_odometry and command.localizer != "slam":
         raise ValueError(f"--ignore-odometry is set and the localizer {command.localizer}; want --localizer slam")
+    if (ignored := command.given & {"match_distance", "match_angle"}) and command.localizer != "slam":
+        option = f"--{min(ignored).replace('_', '-')}"
+        raise ValueError(f"{option} is set and the localizer {command.localizer}; want --localizer slam")
     out = command.out or DEFAULT_FOLDER
     check_writable(out)
     log = _log(command)
@@ -172,7 +175,7 @@ def _on_splines(command: _Slam, log: "LaserLog") -> "SplineTracker":
 
 def _tracking(command: _Slam, log: "LaserLog", tracking: "TrackingSettings") -> "TrackingSettings":
     """Return the settings of tracking on splines that a command asks for."""
-    points = replace(tracking.splines.points, beam_interval_s=log.beam_interval_s or command.beam_interval)
+    points = replace(tracking.splines.points, beam_interval_s=log.beam_interval_s)
     return replace(
         tracking,
         splines=replace(tracking.splines, points=points),
@@ -204,7 +207,6 @@ def _settings_of(command: _Slam) -> "SlamSettings":
         LOG_SETTINGS.matching,
         distance_m=command.match_distance,
         angle=math.radians(command.match_angle),
-        beam_interval_s=command.beam_interval,
     )
     submaps = replace(LOG_SETTINGS.submaps, resolution=command.resolution)
     return replace(LOG_SETTINGS, uses_odometry=not command.ignore_odometry, matching=matching, submaps=submaps)
@@ -220,6 +222,8 @@ def _read(command: _Slam) -> "LaserLog":
 def _log(command: _Slam) -> "LaserLog":
     """Read the log and print the parts left out."""
     log = _read(command)
+    if not log.beam_interval_s:
+        log = log.swept(command.beam_interval)
     for reason, count in log.skipped.items():
         notify(f"{command.log}: left out: {count} {reason}")
     for remark in log.remarks:

@@ -26,7 +26,7 @@ EPISODES_PER_FLOOR = 4
 """So many episodes follow each other on the same floor, from the same starts."""
 
 SLOWEST, SLOWEST_S = 2.0, 20.0
-"""Episodes are given up at the first times the time of classic tours, plus the second [s]."""
+"""Episodes are truncated at the first times the time of classic tours, plus the second [s]."""
 
 
 class ChoiceEnv(gymnasium.Env[Observation, np.int64]):
@@ -100,7 +100,8 @@ class ChoiceEnv(gymnasium.Env[Observation, np.int64]):
             return _row(self._asked.decision), reward, False, False, {}
         self._episode = None
         info = {"ratio": self._asked.time_s / self._pace.time_s, "coverage": self._asked.coverage}
-        return _row(before.decision), reward, True, False, info
+        is_cut = self._asked.is_cut
+        return _row(before.decision), reward, not is_cut, is_cut, info
 
     def close(self) -> None:
         """End the episode that runs."""

@@ -32,11 +32,14 @@ class Asked:
         Time since its start [s].
     coverage : float
         Share of the floor that is seen.
+    is_cut : bool
+        Whether the horizon has ended the episode.
     """
 
     decision: Decision | None
     time_s: float
     coverage: float
+    is_cut: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,4 +138,6 @@ class AskedEpisode:
         return answer
 
     def _asked(self, decision: Decision | None) -> Asked:
-        return Asked(decision, self._env.scorer.time, self._env.scorer.coverage)
+        scorer = self._env.scorer
+        is_cut = decision is None and "horizon" in scorer.ended_because.values()
+        return Asked(decision, scorer.time, scorer.coverage, is_cut)

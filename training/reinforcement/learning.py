@@ -152,6 +152,7 @@ def model_of(policy: type[RankingPolicy], settings: PpoSettings, environment: Ve
             clip_range=settings.clip,
             ent_coef=settings.entropy,
             seed=seed,
+            stats_window_size=settings.checkpoint,  # a checkpoint's curve is the mean of all its episodes
             device="cpu",
         )
 

@@ -64,14 +64,22 @@ class Frames:
         """Return the frame to which a frame is fixed at last: that of the robot's body, if all is told."""
         return next(name for name in reversed(self._above(frame)) if self._is_fixed(frame, name))
 
+    def is_connected(self, base: str, laser: str) -> bool:
+        """Whether a chain of transforms that does not pass odometry leads from a frame to another."""
+        joint = self._joint(base, laser)
+        return joint is not None and not joint.endswith("odom")
+
+    def _joint(self, base: str, laser: str) -> str | None:
+        above = self._above(laser)
+        return next((name for name in self._above(base) if name in above), None)
+
     def mounting(self, base: str, laser: str) -> Mounting | None:
         """Return where a laser is on a robot's body; None if no chain of transforms leads there.
 
         Raises ValueError if the laser moves on the body, or leans.
         """
-        up, down = self._above(base), self._above(laser)
-        joint = next((name for name in up if name in down), None)
-        if joint is None or joint.endswith("odom"):
+        up, down, joint = self._above(base), self._above(laser), self._joint(base, laser)
+        if joint is None or not self.is_connected(base, laser):
             return None
         to_base, to_laser = self._chained(up[: up.index(joint)]), self._chained(down[: down.index(joint)])
         pose = np.linalg.inv(to_base) @ to_laser

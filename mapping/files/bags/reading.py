@@ -1,8 +1,11 @@
 """Reads the scans of bags of ROS, with their odometry, as a log."""
 
 import math
-from collections.abc import Iterable, Iterator
+from collections import Counter
+from collections.abc import Iterable
 from dataclasses import dataclass, field
+from functools import partial
+from itertools import takewhile
 from pathlib import Path
 from typing import Any
 
@@ -34,22 +37,34 @@ class _Messages:
     ----------
     scans : list
         Messages of the chosen topic.
-    odometry_stamps, odometry : list
-        Stamps of the odometry [s], and its poses x, y, theta [m, rad].
-    base : str
-        Frame of the robot's body as the odometry names it; empty if there is none.
+    topic : str
+        Their topic.
+    odometry, moving : dict
+        Odometry by topic; by parent and child frame, that of the transforms from a frame that ends with ``odom``.
     frames : Frames
         Where frames are on each other.
-    moving : dict
-        Stamps and poses of frames in a frame that ends with ``odom``, by parent and child.
     """
 
+    topic: str
     scans: list[Any] = field(default_factory=list)
-    odometry_stamps: list[float] = field(default_factory=list)
-    odometry: list[tuple[float, float, float]] = field(default_factory=list)
-    base: str = ""
+    odometry: dict[str, "_Odometry"] = field(default_factory=dict)
+    moving: dict[tuple[str, str], "_Odometry"] = field(default_factory=dict)
     frames: Frames = field(default_factory=Frames)
-    moving: dict[tuple[str, str], list[tuple[float, tuple[float, float, float]]]] = field(default_factory=dict)
+
+
+@dataclass(slots=True)
+class _Odometry:
+    """Poses x, y, theta [m, rad] of a frame with their stamps [s]; the frame is empty if nothing names it."""
+
+    base: str
+    readings: list[tuple[float, tuple[float, float, float]]] = field(default_factory=list)
+
+    def arrays(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return the stamps, ascending, and the poses (n, 3)."""
+        readings = sorted(self.readings, key=lambda reading: reading[0])
+        poses = np.array([pose for _, pose in readings], np.float64).reshape(-1, 3)
+        poses[:, 2] = np.unwrap(poses[:, 2])
+        return np.array([stamp for stamp, _ in readings]), poses
 
 
 def is_bag(path: Path) -> bool:
@@ -85,16 +100,16 @@ def read_bag_log(path: Path, topic: str | None = None) -> LaserLog:
 def _messages(path: Path, topic: str | None) -> _Messages:
     from lidarium.mapping.files.bags.storages import open_storages
 
-    found = _Messages()
     with open_storages(path) as storages:
         types = {name: kind for storage in storages for name, kind in storage.types.items()}
         scans = _chosen(path, [name for name, kind in types.items() if kind == LASER_SCAN], topic)
-        odometry = _most_alike(scans, [name for name, kind in types.items() if kind == ODOMETRY])
+        found = _Messages(scans)
+        odometry = [name for name, kind in types.items() if kind == ODOMETRY]
         transforms = [name for name, kind in types.items() if kind == TRANSFORMS]
         moving, static = (
             _most_alike(scans, [name for name in transforms if name.endswith(end)]) for end in ("/tf", "/tf_static")
         )
-        wanted = [name for name in (scans, odometry, moving, static) if name is not None]
+        wanted = [name for name in (scans, *odometry, moving, static) if name is not None]
         messages = [
             (time, name, content, decoder(storage.is_ros1))
             for storage in storages
@@ -105,11 +120,10 @@ def _messages(path: Path, topic: str | None) -> _Messages:
         content = decode(raw, types[name])
         if name == scans:
             found.scans.append(content)
-        elif name == odometry:
-            found.odometry_stamps.append(seconds_of(content.header.stamp))
+        elif name in odometry:
             pose = content.pose.pose
-            found.odometry.append(in_plane(pose.position, pose.orientation))
-            found.base = frame_of(content.child_frame_id)
+            own = found.odometry.setdefault(name, _Odometry(frame_of(content.child_frame_id)))
+            own.readings.append((seconds_of(content.header.stamp), in_plane(pose.position, pose.orientation)))
         else:
             _note_transforms(found, content, is_static=name == static)
     return found
@@ -130,18 +144,14 @@ def _chosen(path: Path, topics: Iterable[str], topic: str | None) -> str:
 
 def _most_alike(scans: str, topics: Iterable[str]) -> str | None:
     """Return the topic that shares the most of its name's beginning with that of the scans."""
-
-    def shared(name: str) -> int:
-        return sum(1 for _ in _same_beginning(scans.split("/"), name.split("/")))
-
-    return max(sorted(topics, key=lambda name: (not name.endswith("odom"), name)), key=shared, default=None)
+    in_order = sorted(topics, key=lambda name: (not name.endswith("odom"), name.count("/"), name))
+    return max(in_order, key=partial(_shared, scans), default=None)
 
 
-def _same_beginning(a: Iterable[str], b: Iterable[str]) -> Iterator[str]:
-    for left, right in zip(a, b, strict=False):
-        if left != right:
-            return
-        yield left
+def _shared(scans: str, name: str) -> int:
+    """Return how many parts at the beginning of two names are the same."""
+    both = zip(scans.split("/"), name.split("/"), strict=False)
+    return sum(1 for _ in takewhile(lambda parts: parts[0] == parts[1], both))
 
 
 def _note_transforms(found: _Messages, content: Any, *, is_static: bool) -> None:  # noqa: ANN401
@@ -149,24 +159,32 @@ def _note_transforms(found: _Messages, content: Any, *, is_static: bool) -> None
         parent, child = frame_of(each.header.frame_id), frame_of(each.child_frame_id)
         if parent.rstrip("/").endswith("odom") and not is_static:
             pose = in_plane(each.transform.translation, each.transform.rotation)
-            found.moving.setdefault((parent, child), []).append((seconds_of(each.header.stamp), pose))
+            own = found.moving.setdefault((parent, child), _Odometry(child))
+            own.readings.append((seconds_of(each.header.stamp), pose))
         found.frames.note(parent, child, each.transform, is_static=is_static)
 
 
 def _log(path: Path, messages: _Messages) -> LaserLog:
     skipped, remarks = dict[str, int](), list[str]()
-    readings_stamps, readings = _odometry(messages)
-    laser_pose, is_hanging = _mounted(messages, remarks)
+    frames_of_scans = Counter(frame_of(scan.header.frame_id) for scan in messages.scans)
+    laser = next((frame for frame, _ in frames_of_scans.most_common(1)), "")
+    of_laser = [scan for scan in messages.scans if frame_of(scan.header.frame_id) == laser]
+    for frame, count in frames_of_scans.items():
+        if frame != laser:
+            skipped[f"scans in the frame {printable(frame)}, not {printable(laser)} as most"] = count
+    odometry = _odometry(messages, laser, remarks)
+    readings_stamps, readings = odometry.arrays()
+    laser_pose, is_hanging = _mounted(messages, odometry.base, laser, remarks)
     kept, ranges, beams = list[Any](), list[NDArray[np.float32]](), list[Beams]()
-    for scan in messages.scans:
+    for scan in of_laser:
         directions = directions_of(scan, is_hanging=is_hanging)
         if directions is not None:
             kept.append(scan)
             own, directions = from_right_to_left(np.array(scan.ranges, np.float32), directions)
             ranges.append(own)
             beams.append(directions)
-    if len(kept) < len(messages.scans):
-        skipped["scans without beams, or whose header has no directions"] = len(messages.scans) - len(kept)
+    if len(kept) < len(of_laser):
+        skipped["scans without beams, or whose header has no directions"] = len(of_laser) - len(kept)
     if not kept:
         raise ValueError(f"{path} holds no scans; want messages of {LASER_SCAN}")
     check_metres(np.concatenate(ranges), str(path))
@@ -175,22 +193,21 @@ def _log(path: Path, messages: _Messages) -> LaserLog:
     table, directions, others = on_one_grid(scans, beams)
     if others:
         remarks.append(f"{others} x scans whose beams are not as those of most are resampled")
-    wide, geometry, axis = symmetric_scans(table, *directions[:2], (max(least, 0.0), max(most)))
-    interval = np.array([max(float(scan.time_increment), 0.0) for scan in kept])
-    stamps = np.array([seconds_of(scan.header.stamp) for scan in kept]) + interval * [len(own) - 1 for own in ranges]
-    is_turned = abs(geometry.angle_first + axis - directions.angle_min) > 0.5 * directions.increment
+    sweep = symmetric_scans(table, *directions[:2], (max(least, 0.0), max(most)))
     is_reversed = (float(kept[0].angle_increment) < 0.0) != is_hanging
-    if interval.any() and (others or is_reversed or (is_turned and geometry.is_full_circle)):
-        remarks.append("motion within scans is not undone: their beams are not in the order of time from behind")
-        interval[:] = 0.0
+    is_in_time = not (others or is_reversed or sweep.is_rolled)
+    interval = np.array([max(float(scan.time_increment), 0.0) for scan in kept])
+    last = np.array([len(own) - 1 for own in ranges]) + (sweep.behind if is_in_time else 0)
+    stamps = np.array([seconds_of(scan.header.stamp) for scan in kept]) + interval * last
     has_readings = len(readings_stamps) > 0
     return LaserLog(
         stamps=stamps,
-        ranges=wide,
-        geometry=geometry,
+        ranges=sweep.ranges,
+        geometry=sweep.geometry,
         odometry=odometry_at(readings_stamps, readings, stamps) if has_readings else None,
-        laser_pose=laser_pose + np.array([0.0, 0.0, axis]),
-        beam_interval_s=float(interval[0]),
+        laser_pose=laser_pose + np.array([0.0, 0.0, sweep.axis]),
+        beam_interval_s=float(np.median(interval)),
+        is_in_time=is_in_time,
         readings_stamps=readings_stamps,
         readings=readings,
         reading_of_scan=(
@@ -201,14 +218,11 @@ def _log(path: Path, messages: _Messages) -> LaserLog:
     )
 
 
-def _mounted(messages: _Messages, remarks: list[str]) -> Mounting:
+def _mounted(messages: _Messages, body: str, laser: str, remarks: list[str]) -> Mounting:
     """Return where the laser is on the robot; without odometry the body is the frame to which the laser is fixed."""
-    if not messages.scans:
-        return Mounting(np.zeros(3), is_hanging=False)
-    laser = frame_of(messages.scans[0].header.frame_id)
-    base = messages.base or messages.frames.body(laser)
+    base = body or messages.frames.body(laser)
     found = messages.frames.mounting(base, laser)
-    if found is None or (base == laser and not messages.base):
+    if found is None or (base == laser and not body):
         remarks.append(
             f"no transforms say where the laser ({printable(laser)}) is on the robot ({printable(base)}): it is taken "
             "as upright, in the robot's middle, looking ahead"
@@ -243,22 +257,23 @@ def _reach(scans: list[Any], ranges: list[NDArray[np.float32]], remarks: list[st
     return [value if 0.0 < value < math.inf else 1.01 * highest for value in stated]
 
 
-def _odometry(messages: _Messages) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the stamps of the odometry, ascending, and its poses (n, 3)."""
-    stamps, poses = messages.odometry_stamps, messages.odometry
-    if not stamps:
-        for (parent, child), moves in messages.moving.items():
-            if parent.rstrip("/").endswith("odom"):
-                stamps, poses = [when for when, _ in moves], [pose for _, pose in moves]
-                messages.base = child
-                break
-    if not stamps:
-        return np.zeros(0), np.zeros((0, 3))
-    times, table = np.array(stamps), np.array(poses)
-    order = np.argsort(times, kind="stable")
-    table = table[order]
-    table[:, 2] = np.unwrap(table[:, 2])
-    return times[order], table
+def _odometry(messages: _Messages, laser: str, remarks: list[str]) -> _Odometry:
+    """Return the odometry of the robot that has the laser: of a topic, or else of the transforms.
+
+    It is that of a body to which transforms lead from the laser, if there is one, and whose topic's name (or frame)
+    begins most like that of the scans (or laser).
+    """
+    like, sources = messages.topic, messages.odometry
+    if not sources:
+        like, sources = laser, {child: odometry for (_, child), odometry in reversed(messages.moving.items())}
+    near = {name: each for name, each in sources.items() if messages.frames.is_connected(each.base, laser)} or sources
+    chosen = _most_alike(like, near)
+    if chosen is None:
+        return _Odometry("")
+    others = [name for name in near if name != chosen and _shared(like, name) == _shared(like, chosen)]
+    if others:
+        remarks.append(f"odometry is that of {printable(chosen)}, not of {', '.join(map(printable, others))}")
+    return near[chosen]
 
 
 def frame_of(name: str) -> str:

@@ -124,7 +124,8 @@ def follow(
     clock : callable
         CPU time [s].
     """
-    matching = replace(settings.matching, beam_interval_s=log.beam_interval_s or settings.matching.beam_interval_s)
+    interval = (log.beam_interval_s or settings.matching.beam_interval_s) if log.is_in_time else 0.0
+    matching = replace(settings.matching, beam_interval_s=interval)
     slam = Slam(
         replace(settings, matching=matching, uses_odometry=settings.uses_odometry and log.odometry is not None),
         log.geometry,

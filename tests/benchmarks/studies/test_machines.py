@@ -12,9 +12,10 @@ def test_pieces_add_to_one_file_that_is_read_again(tmp_path):
     first = machines.run_short(tmp_path, 0, 3, 1)
     second = machines.run_short(tmp_path, 3, 5, 1)
     assert (first["episodes"], second["episodes"]) == (3, 2)
+    assert (first["ran"], machines.run_short(tmp_path, 0, 4, 1)["ran"]) == (3, 1)
     assert second["file_bytes"] > first["file_bytes"] > 1000
     again = machines.read_again(tmp_path)
-    assert again["episodes"] == 5
+    assert again["episodes"] == 6
     assert again["report_mb"] > 50
     assert again["page_bytes"] > 50_000
 
@@ -29,7 +30,7 @@ def test_what_was_under_way_at_a_kill_is_asked_for_too(tmp_path):
 
 def test_the_page_tells_what_breaks_first(tmp_path, monkeypatch):
     figures = {
-        "_run_piece": {"episodes": 5000, "seconds": 20.0, "memory_mb": 200.0, "file_bytes": 8_000_000},
+        "_run_piece": {"episodes": 5000, "ran": 5000, "seconds": 20.0, "memory_mb": 200.0, "file_bytes": 8_000_000},
         "_again": {
             "episodes": 10_000,
             "opened_s": 0.5,

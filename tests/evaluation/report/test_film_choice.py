@@ -39,6 +39,12 @@ def test_policies_stand_as_they_are_asked_for(folder):
     assert list(choose_episodes(folder, wanted).records) == ["utility_frontier", "nearest_frontier"]
 
 
+def test_policies_without_a_start_in_common_are_refused(folder):
+    keep(folder, lambda row: (row["policy"] == "random_walk") == (row["seed"] == 1))
+    with pytest.raises(ValueError, match="--film-policies has 'random_walk', which has no recorded episode from the"):
+        choose_episodes(folder, Wanted(policies=("nearest_frontier", "random_walk")))
+
+
 def test_there_is_room_for_nine(folder, monkeypatch):
     monkeypatch.setattr("lidarium.evaluation.report.film_choice.MOST_SIDE_BY_SIDE", 2)
     chosen = choose_episodes(folder, Wanted())

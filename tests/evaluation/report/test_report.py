@@ -1,4 +1,5 @@
 import json
+import shutil
 
 import cv2
 import numpy as np
@@ -55,6 +56,18 @@ def test_a_report_has_tables_plots_and_all_their_numbers(episodes_folder, tmp_pa
     assert any("fewer than 50 independent runs" in warning for warning in result["warnings"])
     assert any("fewer than 50 pairs" in warning for warning in result["warnings"])
     assert any("repeat another one" in warning for warning in result["warnings"])
+
+
+def test_pictures_of_different_settings_have_different_names(episodes_folder, tmp_path):
+    folder = tmp_path / "episodes"
+    shutil.copytree(episodes_folder, folder)
+    rows = [json.loads(line) for line in (folder / "episodes.jsonl").read_text().splitlines()]
+    lines = [json.dumps({**row, "variant": variant}) for variant in ("noise 1", "noise-1") for row in rows]
+    (folder / "episodes.jsonl").write_text("\n".join(lines) + "\n")
+    first, second = write_report(folder, tmp_path / "out")["groups"]
+    assert [first["title"], second["title"]] == ["noise 1: 2 robots, drawn floors", "noise-1: 2 robots, drawn floors"]
+    assert any(name.startswith("visits") for name in first["pictures"])
+    assert set(first["pictures"]).isdisjoint(second["pictures"])
 
 
 def test_without_records_their_plots_are_left_out_and_that_is_told(rows, directory_of, tmp_path):

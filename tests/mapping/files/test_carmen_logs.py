@@ -58,9 +58,9 @@ def test_a_circle_with_six_decimals_is_a_circle_whose_beams_stay_where_they_are(
 
 def test_beams_that_are_not_symmetric_turn_the_laser_by_less_than_a_beam():
     ranges = np.arange(1.0, 6.0, dtype=np.float32)[None]
-    _, geometry, axis = symmetric_scans(ranges, -math.pi, TURN / 5, (0.0, 9.0))
+    _, geometry, axis, *_ = symmetric_scans(ranges, -math.pi, TURN / 5, (0.0, 9.0))
     assert geometry.angles[0] + axis == pytest.approx(-math.pi)
-    wide, geometry, axis = symmetric_scans(ranges, -0.45, 0.2, (0.0, 9.0))
+    wide, geometry, axis, *_ = symmetric_scans(ranges, -0.45, 0.2, (0.0, 9.0))
     first = int(np.flatnonzero(np.isfinite(wide[0]))[0])
     assert geometry.angles[first] + axis == pytest.approx(-0.45)
     assert abs(axis) <= 0.1
@@ -154,9 +154,18 @@ def test_a_new_scan_says_its_directions_and_longest_range():
     assert scan.has_angles
 
 
-def test_odometry_is_stamped_by_the_logger_or_else_by_the_last_word():
+def test_odometry_is_stamped_as_scans_are_or_else_by_the_last_word():
     content = said("ODOM 1 2 0.5 0.1 0.2 0.3 7.5 host 7.6", "ODOM 1 2 0.5 8.5")
-    assert content.odometry == [([1.0, 2.0, 0.5], 7.6), ([1.0, 2.0, 0.5], 8.5)]
+    assert content.odometry == [([1.0, 2.0, 0.5], 7.5), ([1.0, 2.0, 0.5], 8.5)]
+
+
+@pytest.mark.parametrize("stamp", ["nan", "inf"])
+def test_a_scan_without_a_stamp_is_left_out_alone(tmp_path, stamp):
+    lines = [f"FLASER 2 3.0 2.0 {k} 0 0 {k} 0 0 {stamp if k == 7 else k} host {k}" for k in range(20)]
+    (tmp_path / "run.log").write_text("\n".join(lines))
+    log = read_carmen_log(tmp_path / "run.log")
+    assert log.stamps.tolist() == [float(k) for k in range(20) if k != 7]
+    assert log.skipped == {"scans back in time": 1}
 
 
 def test_parameters_are_numbers_or_none():

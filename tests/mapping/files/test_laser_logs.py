@@ -112,17 +112,17 @@ def test_files_that_are_not_there_are_named(tmp_path):
 
 def test_scans_that_look_to_one_side_gain_invalid_beams_on_the_other():
     ranges = np.array([[1.0, 2.0, 3.0]], np.float32)
-    wide, geometry, axis = symmetric_scans(ranges, -math.pi / 2, math.pi / 3, (0.0, 5.0))
+    wide, geometry, axis, *_ = symmetric_scans(ranges, -math.pi / 2, math.pi / 3, (0.0, 5.0))
     np.testing.assert_array_equal(wide, [[1.0, 2.0, 3.0, np.nan]])
     assert geometry.angles == pytest.approx([-math.pi / 2, -math.pi / 6, math.pi / 6, math.pi / 2])
     assert axis == 0.0
-    wide, _, _ = symmetric_scans(ranges, -math.pi / 6, math.pi / 3, (0.0, 5.0))
+    wide, *_ = symmetric_scans(ranges, -math.pi / 6, math.pi / 3, (0.0, 5.0))
     np.testing.assert_array_equal(wide, [[np.nan, 1.0, 2.0, 3.0]])
 
 
 def test_a_full_circle_is_turned_so_that_it_begins_behind():
     ranges = np.arange(1.0, 5.0, dtype=np.float32)[None]
-    wide, geometry, axis = symmetric_scans(ranges, 0.0, math.pi / 2, (0.0, 9.0))
+    wide, geometry, axis, *_ = symmetric_scans(ranges, 0.0, math.pi / 2, (0.0, 9.0))
     assert axis == 0.0
     assert geometry.is_full_circle
     assert wide[0].tolist() == [3.0, 4.0, 1.0, 2.0]

@@ -70,6 +70,8 @@ def test_a_file_says_what_to_run(tmp_path, capsys):
         (["none.toml"], "no suite none.toml"),
         (["--preset", "ir2", "--robots", "3"], "--robots is (3,), and the preset ir2 sets it; leave it out"),
         (["none.toml", "--seeds", "5"], "--seeds is 5, and the suite sets it"),
+        (["none.toml", "--seeds", "3"], "--seeds is 3, and the suite sets it"),
+        (["none.toml", "--horizon-s=1800"], "--horizon-s is 1800.0, and the suite sets it"),
         (["none.toml", "--policy-set", "learned.weights=x"], "--policy-set is ('learned.weights=x',), and the suite"),
         (["--preset", "dare", "--bounds"], "--bounds is True, and the preset dare sets it"),
         (["--noise", "loud"], "loud"),

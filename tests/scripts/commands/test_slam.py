@@ -254,6 +254,7 @@ def test_a_log_begins_with_the_spline_map_of_another_run(log, tmp_path, capsys):
     [
         (["--start-map", "a.npz"], "--start-map is a.npz and the localizer slam; want --localizer splines"),
         (["--localizer", "splines", "--ignore-odometry"], "want --localizer slam"),
+        (["--localizer", "splines", "--match-angle", "1"], "--match-angle is set and the localizer splines; want"),
         (["--localizer", "splines", "--start-map", "missing.npz"], "there is no file missing.npz"),
     ],
 )

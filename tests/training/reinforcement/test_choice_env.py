@@ -56,6 +56,17 @@ def test_rewards_add_up_to_the_time_that_is_saved(env):
     assert total == pytest.approx(left - env._pace.left(info["coverage"]) - rest)
 
 
+def test_an_episode_that_the_horizon_ends_is_truncated(env, monkeypatch):
+    monkeypatch.setattr("lidarium.training.reinforcement.choice_env.SLOWEST", 0.5)
+    monkeypatch.setattr("lidarium.training.reinforcement.choice_env.SLOWEST_S", 0.0)
+    observation, _ = env.reset()
+    is_over = is_cut = False
+    while not (is_over or is_cut):
+        observation, _, is_over, is_cut, info = env.step(classic(observation))
+    assert (is_over, is_cut) == (False, True)
+    assert info["coverage"] < 0.99
+
+
 def test_several_episodes_follow_on_the_same_floor(env):
     places = []
     for _ in range(EPISODES_PER_FLOOR + 1):

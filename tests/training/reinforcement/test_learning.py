@@ -10,8 +10,10 @@ from stable_baselines3.common.vec_env import SubprocVecEnv
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
 from lidarium.agents.learned.network import load_weights, save_weights
+from lidarium.training.reinforcement import learning
 from lidarium.training.reinforcement.checkpoints import latest_checkpoint, weights_of
 from lidarium.training.reinforcement.learning import learn
+from lidarium.training.reinforcement.masked_ppo import ExplorerPolicy
 from lidarium.training.settings import training_of
 from lidarium.training.torch_network import ExplorerNetwork
 
@@ -131,3 +133,11 @@ def test_a_damaged_checkpoint_is_named_and_the_one_before_goes_on(whole, tmp_pat
     learned(tmp_path, 24)
     for name, array in weights_in(whole[0]).items():
         np.testing.assert_array_equal(weights_in(tmp_path)[name], array)
+
+
+def test_the_reward_of_a_checkpoint_is_the_mean_of_all_its_episodes():
+    settings = training(600, checkpoint=600, steps=300)
+    environment = learning.environments_of(settings, 1)
+    model = learning.model_of(ExplorerPolicy, settings.ppo, environment, 0)
+    assert model._stats_window_size == 600
+    environment.close()

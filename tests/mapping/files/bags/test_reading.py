@@ -407,3 +407,58 @@ def test_sqlite_files_without_their_last_messages_are_refused(log, tmp_path):
         shutil.copy(tmp_path / "a.db3-wal", tmp_path / "b.db3-wal")
     with pytest.raises(ValueError, match=r"b.db3 was not closed, its last messages are in b.db3-wal; want"):
         read_bag_log(tmp_path / "b.db3")
+
+
+WIDE = ScanGeometry(beams=91, field_of_view=math.pi, range_min=0.1, range_max=20.0)
+
+
+def driven(path, topic=None, transforms=(), odometry=(), moving=(), frames=("laser",)):
+    """Return the log of a bag of ten scans in turn from frames, besides bodies that move by a direction each."""
+    with bag(path) as writer:
+        for parent, child, pose in transforms:
+            writer.transform(parent, child, 0.0, pose, is_static=True)
+        for k in range(10):
+            for name, parent, child, way in odometry:
+                writer.odometry(name, parent, child, 0.1 * k, 0.05 * k * np.array(way))
+            for parent, child, way in moving:
+                writer.transform(parent, child, 0.1 * k, 0.05 * k * np.array(way))
+            for robot in ("r1", "r2") if topic else ("",):
+                frame = frames[k % len(frames)]
+                name, frame = (f"/{robot}/scan", f"{robot}/{frame}") if topic else ("/scan", frame)
+                writer.scan(name, frame, 0.1 * k, np.full(91, 3.0, np.float32), WIDE)
+    return read_bag_log(path, topic)
+
+
+ALONG_X, ALONG_Y = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)
+
+
+def test_of_two_robots_on_one_topic_of_transforms_each_has_its_own_odometry(tmp_path):
+    mounted = [("r1/base", "r1/laser", (0.2, 0.0, 0.0)), ("r2/base", "r2/laser", (-0.3, 0.0, 0.0))]
+    moving = [("r1/odom", "r1/base", ALONG_Y), ("r2/odom", "r2/base", ALONG_X)]
+    for robot, last, ahead in (("r1", [0.0, 0.45, 0.0], 0.2), ("r2", [0.45, 0.0, 0.0], -0.3)):
+        log = driven(tmp_path / f"{robot}.mcap", f"/{robot}/scan", mounted, moving=moving)
+        assert log.odometry[-1] == pytest.approx(last)
+        assert log.laser_pose == pytest.approx([ahead, 0.0, 0.0])
+        assert not log.remarks
+
+
+def test_odometry_is_that_of_the_body_with_the_laser_and_what_else_could_be_it_is_told(tmp_path):
+    mounted = [("base_link", "laser", (0.2, 0.0, 0.0))]
+    odometry = [("/camera/odom", "camera_odom", "camera_link", ALONG_Y), ("/wheel", "odom", "base_link", ALONG_X)]
+    log = driven(tmp_path / "camera.mcap", None, mounted, odometry)
+    assert log.odometry[-1] == pytest.approx([0.45, 0.0, 0.0])
+    assert log.laser_pose == pytest.approx([0.2, 0.0, 0.0])
+    assert not log.remarks
+    odometry = [("/ground_truth/odom", "world", "base_link", ALONG_Y), ("/odom", "odom", "base_link", ALONG_X)]
+    log = driven(tmp_path / "truth.mcap", None, mounted, odometry)
+    assert log.odometry[-1] == pytest.approx([0.45, 0.0, 0.0])
+    assert log.remarks == ("odometry is that of /odom, not of /ground_truth/odom",)
+
+
+def test_scans_of_a_second_laser_on_the_same_topic_are_left_out(tmp_path):
+    mounted = [("base", "front", (0.2, 0.0, 0.0)), ("base", "rear", (-0.2, 0.0, math.pi))]
+    odometry = [("/odom", "odom", "base", ALONG_X)]
+    log = driven(tmp_path / "two.mcap", None, mounted, odometry, frames=("front", "front", "rear"))
+    assert len(log.stamps) == 7
+    assert log.laser_pose == pytest.approx([0.2, 0.0, 0.0])
+    assert log.skipped == {"scans in the frame rear, not front as most": 3}
