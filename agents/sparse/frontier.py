@@ -259,7 +259,7 @@ class SparseFrontier(Policy):
                 longest = max(cut_off, key=len, default=np.empty((0, 2)))
                 if len(longest) * known.cell_m < LAST_M:
                     return
-                view, work.is_last = known.nearest_view(belief.pose, longest), True
+                view, work.is_last = known.nearest_view(belief.pose, longest, self._sight), True
             if not self._plan(agent, view):
                 work.begin(view, self.team.time_s, belief.pose)
                 return

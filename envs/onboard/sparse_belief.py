@@ -100,9 +100,9 @@ class SparseBelief:
         view = self.navigation.best_view(self._own_pose(pose), self._own(frontier), sight)
         return None if view is None else self._out(view)
 
-    def nearest_view(self, pose: NDArray[np.float64], points: NDArray[np.float64]) -> View:
+    def nearest_view(self, pose: NDArray[np.float64], points: NDArray[np.float64], sight: Sight) -> View:
         """Return the view towards points (F, 2) from as near as a robot at x, y, theta (3,) can come."""
-        return self._out(self.navigation.nearest_view(self._own_pose(pose), self._own(points)))
+        return self._out(self.navigation.nearest_view(self._own_pose(pose), self._own(points), sight))
 
     def are_cut_off(self, pose: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Return which points (N, 2) a robot at x, y, theta (3,) could stand next to but cannot reach."""

@@ -239,8 +239,8 @@ def integrate_one(
     is_hit = np.empty(beams, np.bool_)
     for beam in range(beams):
         value = float(ranges[beam])
-        is_hit[beam] = math.isfinite(value) and value * scale <= reach
-        lengths[beam] = 0.0 if math.isnan(value) else min(value * scale, reach)
+        is_hit[beam] = 0.0 < value < math.inf and value * scale <= reach
+        lengths[beam] = min(value * scale, reach) if value > 0.0 else 0.0
     if noise[0] > 0.0 or noise[1] > 0.0:
         in_cells = (noise[0] * scale, noise[1])
         settle_returns(log_odds, x, y, lengths, directions, is_hit, in_cells, increments[0])

@@ -214,7 +214,7 @@ class ValidationSettings:
     disc_radius_cells : int, default 25
         Radius of the discs [cells].
     disc_agreement : float, default 0.9
-        Least share of cells in the discs that are the same in both maps.
+        More than this share of the cells in the discs must be the same in both maps.
     """
 
     test: str = "walls"

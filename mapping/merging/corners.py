@@ -124,6 +124,7 @@ class CornerSettings:
         is_list = isinstance(self.neighbours, tuple | list) and len(self.neighbours) > 0
         if not is_list or not all(each in (4, 5, 6, 7) for each in self.neighbours):
             raise ValueError(f"neighbours of corners are {shown(self.neighbours)}; want some of 4, 5, 6 and 7")
+        object.__setattr__(self, "neighbours", tuple(self.neighbours))
         if self.rule not in RULES:
             raise ValueError(f"rule of corners is {self.rule!r}; want one of {', '.join(RULES)}")
         if not self.occupied_below <= self.free_above:

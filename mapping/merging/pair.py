@@ -451,7 +451,7 @@ def _merge_by_discs(a: DescribedMap, b: DescribedMap, matches: Matches, settings
         is_accepted=is_accepted,
         reason="accepted"
         if is_accepted
-        else f"contradiction: {100.0 * score:.1f} % of the cells in discs agree, want {percent:g} %",
+        else f"contradiction: {100.0 * score:.1f} % of the cells in discs agree, want more than {percent:g} %",
         a_from_b=candidate.a_from_b,
         inliers=len(candidate.inliers),
         score=score,

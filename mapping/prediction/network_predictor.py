@@ -1,5 +1,6 @@
 """The predictor that the package has: a trained network on windows of a map."""
 
+import itertools
 from pathlib import Path
 from typing import Any
 
@@ -48,8 +49,13 @@ def _resampled(levels: NDArray[np.int8], shape: tuple[int, int]) -> NDArray[np.i
     """Return levels as squares of another size: those with a part of a wall are occupied."""
     resampled = levels[np.ix_(_centres(shape[0], levels.shape[0]), _centres(shape[1], levels.shape[1]))]
     # Walls that are in the middle of no square must not be lost.
-    rows, columns = np.nonzero(levels == OCCUPIED)
-    resampled[rows * shape[0] // levels.shape[0], columns * shape[1] // levels.shape[1]] = OCCUPIED
+    ranges = []
+    for index, count, size in zip(np.nonzero(levels == OCCUPIED), shape, levels.shape, strict=True):
+        first, last = index * count // size, ((index + 1) * count - 1) // size
+        most = int((last - first).max(initial=0))
+        ranges.append([np.minimum(first + k, last) for k in range(most + 1)])
+    for rows, columns in itertools.product(*ranges):
+        resampled[rows, columns] = OCCUPIED
     return resampled
 
 

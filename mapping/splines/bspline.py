@@ -303,18 +303,57 @@ def _ray_crossing(knots: Array, control_points: Array, x: float, y: float, cosin
         if lowest > 0.0 or highest < 0.0 or farthest < 0.0:
             continue
         step = (knots[span + 1] - knots[span]) / PIECES
-        ahead_before, aside_before = 0.0, 0.0
-        for i in range(PIECES + 1):
-            px, py = point_at(knots, control_points, knots[span] + i * step, 0, values)
-            ahead, aside = cosine * (px - x) + sine * (py - y), cosine * (py - y) - sine * (px - x)
-            if i > 0 and aside_before * aside <= 0.0 and max(ahead_before, ahead) >= 0.0:
-                low, high = knots[span] + (i - 1) * step, knots[span] + i * step
-                ray = _Ray(x, y, cosine, sine)
-                met = _crossing(knots, control_points, low, high, ray, values)
-                if 0.0 <= met < nearest:
-                    nearest = met
-            ahead_before, aside_before = ahead, aside
+        ray = _Ray(x, y, cosine, sine)
+        low, before = knots[span], _beside(knots, control_points, knots[span], ray, values)
+        for i in range(1, PIECES + 1):
+            high = knots[span] + i * step
+            after = _beside(knots, control_points, high, ray, values)
+            for ahead, aside, _ in (before, after):
+                if aside == 0.0 and 0.0 <= ahead < nearest:
+                    nearest = ahead
+            if before[1] * after[1] < 0.0:
+                nearest = _nearer(nearest, _crossing(knots, control_points, low, high, ray, values))
+            elif before[1] * before[2] < 0.0 and after[1] * after[2] > 0.0:
+                # The curve comes nearer and goes away again: it may cross twice.
+                turn = _turn(knots, control_points, low, high, ray, values)
+                if _beside(knots, control_points, turn, ray, values)[1] * before[1] <= 0.0:
+                    nearest = _nearer(nearest, _crossing(knots, control_points, low, turn, ray, values))
+                    nearest = _nearer(nearest, _crossing(knots, control_points, turn, high, ray, values))
+            low, before = high, after
     return nearest
+
+
+@kernel
+def _nearer(nearest: float, met: float) -> float:
+    return met if 0.0 <= met < nearest else nearest
+
+
+@kernel
+def _beside(
+    knots: Array, control_points: Array, parameter: float, ray: _Ray, values: Array
+) -> tuple[float, float, float]:
+    """Return how far a point of the curve is ahead and aside of a ray, and the change of the latter."""
+    px, py = point_at(knots, control_points, parameter, 0, values)
+    dx, dy = point_at(knots, control_points, parameter, 1, values)
+    px, py = px - ray.x, py - ray.y
+    return (
+        ray.cosine * px + ray.sine * py,
+        ray.cosine * py - ray.sine * px,
+        ray.cosine * dy - ray.sine * dx,
+    )
+
+
+@kernel
+def _turn(knots: Array, control_points: Array, low: float, high: float, ray: _Ray, values: Array) -> float:
+    """Return the parameter between two at which the curve is along the ray, by bisection."""
+    first = _beside(knots, control_points, low, ray, values)[2]
+    for _ in range(50):
+        middle = 0.5 * (low + high)
+        if _beside(knots, control_points, middle, ray, values)[2] * first > 0.0:
+            low = middle
+        else:
+            high = middle
+    return 0.5 * (low + high)
 
 
 @kernel

@@ -42,6 +42,8 @@ class _ScanPoints:
         The whole scan [m]; inf for no return, nan if invalid or out of the laser's reach.
     geometry : ScanGeometry
         Directions of the beams.
+    laser_x : float
+        How far the laser is before the robot's middle [m].
     """
 
     points: NDArray[np.float64]
@@ -50,6 +52,7 @@ class _ScanPoints:
     sigmas: NDArray[np.float64]
     scan: NDArray[np.float64]
     geometry: ScanGeometry
+    laser_x: float
 
 
 def scan_points(
@@ -95,7 +98,7 @@ def scan_points(
         back = motion.inverse()
         _undo_motion(points, shares, back.x, back.y, back.theta)
     sigmas = np.maximum(settings.noise_floor, settings.noise_share * hits)
-    return _ScanPoints(points, beams.astype(np.int64), hits, sigmas, scan, geometry)
+    return _ScanPoints(points, beams.astype(np.int64), hits, sigmas, scan, geometry, settings.laser_x)
 
 
 @kernel
@@ -345,15 +348,16 @@ def _is_peak(points: _ScanPoints, end: int, step: int) -> bool:
     beyond, distance = float(points.scan[beam]), float(points.ranges[end])
     if math.isnan(beyond) or beyond < distance + PEAK_JUMP or distance > geometry.range_max - PEAK_JUMP:
         return False
-    return bool(_incidence(points.points, end, -step) >= PEAK_INCIDENCE)
+    return bool(_incidence(points.points, end, -step, points.laser_x) >= PEAK_INCIDENCE)
 
 
 @kernel
-def _incidence(points: Array, end: int, step: int) -> float:
+def _incidence(points: Array, end: int, step: int, laser_x: float) -> float:
     """Return the angle between the beam at an end and the wall behind it [rad].
 
     Estimated from the four points there.
     """
     x, y = points[end, 0], points[end, 1]
     dx, dy = points[end + 3 * step, 0] - x, points[end + 3 * step, 1] - y
+    x -= laser_x  # from the laser on
     return abs(math.atan2(abs(x * dy - y * dx), abs(x * dx + y * dy)))

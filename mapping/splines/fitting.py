@@ -194,8 +194,10 @@ def _fit_curve(
             if (rms <= wanted and bias <= MAX_BIAS) or count >= most:
                 return control_points, knots, normal, rms
             count = min(2 * count - ORDER + 1, most)
+        elif count > ORDER:
+            most = count = count - 1
         else:
-            most = count = max(count - 1, ORDER)
+            return control_points, knots, normal, math.inf
 
 
 @kernel
@@ -364,7 +366,7 @@ def fit_bspline(points: ArrayLike, settings: FitSettings | None = None, sigmas: 
     Raises
     ------
     ValueError
-        If there are fewer than 4 points, or all are the same.
+        If there are fewer than 4 points, all are the same, or they do not determine a curve without stiffness.
     """
     settings = settings or FitSettings()
     positions = np.ascontiguousarray(points, np.float64)
@@ -392,6 +394,8 @@ def fit_bspline(points: ArrayLike, settings: FitSettings | None = None, sigmas: 
         _Closeness(wanted, scales, window),
         _ControlRule(settings.spacing, settings.finest_spacing, settings.is_sparse, settings.stiffness),
     )
+    if rms == math.inf:
+        raise ValueError("the points do not determine a curve; want 4 that differ, or stiffness above 0")
     # The way through the points is longer than the curve; another scale of the parameter leaves the curve as
     # it is.
     curve = curve_length(knots, control_points)

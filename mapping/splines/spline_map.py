@@ -129,7 +129,9 @@ class SplineMap:
         while (best := self._best_match(way, control_points)) is not None:
             known = self.curves.pop(best[0])
             way, extends = join(way, known.way, best[1], settings)
-            count += known.count
+            # Pieces of a curve that was cut have the count of the whole, and may be joined again.
+            most = max(self.updates, settings.trusted_count, count, known.count)
+            count = min(count + known.count, most)
             pieces = self._cut_at_corners(way) if extends else [way]
             if len(pieces) > 1:
                 longest = max(pieces, key=lambda piece: piece.length)

@@ -161,11 +161,17 @@ def _followed(command: _Slam, log: "LaserLog", watch: "Callable[[Iterable[int]],
 
 def _on_splines(command: _Slam, log: "LaserLog") -> "SplineTracker":
     """Return the localizer on splines that a command asks for."""
+    import numpy as np
+
     from lidarium.mapping.localization.on_splines.spline_ekf import SplineEkf
     from lidarium.mapping.localization.on_splines.spline_filter import SplineFilter
 
     if log.odometry is None:
         raise ValueError(f"{command.log} has no odometry, which {command.localizer} needs; want --localizer slam")
+    if unknown := int((~np.isfinite(log.odometry).all(axis=1)).sum()):
+        raise ValueError(
+            f"{command.log} has no odometry at {unknown} scans, which {command.localizer} needs; want --localizer slam"
+        )
     if command.localizer == "splines":
         of_filter = SplineFilter.Settings()
         return SplineFilter(replace(of_filter, tracking=_tracking(command, log, of_filter.tracking)), log.geometry)

@@ -245,10 +245,13 @@ def optimised(
     pull = _squares(best, edges)[len(edges.a) - newest :]
     scale = max(robust_scale, math.sqrt(float(pull.max())) if len(pull) else 0.0)
     while True:
-        best = _settled(best, edges, scale, iterations, places, factor)
+        best, is_current = _settled(best, edges, scale, iterations, places, factor)
         if scale <= robust_scale:
             break
         scale = max(0.2 * scale, robust_scale)
+    if not is_current:
+        _normal_equations(best, edges, robust_scale, places, factor)
+        _factorise(places, factor)
     best[:, 2] = math.pi - (math.pi - best[:, 2]) % (2.0 * math.pi)
     return best, _last_covariance(places, factor)
 
@@ -294,10 +297,11 @@ def _cost(poses: Array, edges: Edges, robust_scale: float) -> float:
 @kernel
 def _settled(
     poses: Array, edges: Edges, robust_scale: float, iterations: int, places: _Elimination, factor: Array
-) -> Array:
+) -> tuple[Array, bool]:
     """Return the poses of least cost near given ones.
 
-    By Levenberg and Marquardt's method. The factor of the last Hessian is written.
+    By Levenberg and Marquardt's method. The factor of the last Hessian is written; False is returned with them if it
+    is that of a step that was rejected, and so much damped.
     """
     best, cost = poses, _cost(poses, edges, robust_scale)
     damping, step = 1e-9, 0
@@ -319,7 +323,7 @@ def _settled(
             damping = max(100.0 * damping, 1e-4)
             is_over = damping > 1e6
         if is_over or step >= iterations:
-            return best
+            return best, damping < 1e-4
 
 
 @kernel

@@ -80,12 +80,12 @@ class SplineTracker(ABC):
         self._begin(np.zeros(3), seed)
 
     def localize(self, sensing: Sensing) -> NDArray[np.float64]:
-        """Take in sensor readings, later than all before.
+        """Take in sensor readings, none earlier than those before.
 
         Return x, y, theta of the robot, shape (3,) [m, rad].
         """
-        if not sensing.time_s > self._time_s:
-            raise ValueError(f"sensed at {sensing.time_s} s, not later than the last at {self._time_s} s")
+        if not sensing.time_s >= self._time_s:
+            raise ValueError(f"sensed at {sensing.time_s} s, earlier than the last at {self._time_s} s")
         if not np.isfinite(sensing.odometry).all():
             raise ValueError(f"odometry is {sensing.odometry}; want x, y, theta, all finite")
         odometry = Transform(*(float(value) for value in sensing.odometry))

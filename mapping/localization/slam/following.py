@@ -86,7 +86,8 @@ class Followed(Generic[LocalizerOfLog]):
     slam : Slam or SplineTracker
         The localizer at the end: its map, its graph, its counts.
     poses : (scans, 3) float64
-        Pose of the robot at each scan, as believed at the end; the first is (0, 0, 0) [m, rad].
+        Pose of the robot at each scan, as believed at the end, in the frame of the map [m, rad]. The first was
+        (0, 0, 0) at its time; matched again with the map around it, it may be some millimetres off.
     online : (scans, 3) float64
         The same as was believed at that time.
     scan_s : (scans,) float64

@@ -238,14 +238,11 @@ class Clusters:
         counts = np.diff(np.concatenate([[0], np.cumsum(is_kept)])[self.starts])
         is_large = counts >= max(minimum_cells, 1)
         cells = self.cells[is_kept & np.repeat(is_large, self.counts)]
+        starts = np.concatenate([[0], np.cumsum(counts[is_large])]).astype(np.int64)
         resolution = self.sizes[is_large] / np.maximum(self.counts[is_large], 1)
-        return Clusters(
-            cells,
-            np.concatenate([[0], np.cumsum(counts[is_large])]).astype(np.int64),
-            self.centroids[is_large],
-            self.representatives[is_large],
-            counts[is_large] * resolution,
-        )
+        (before, _), (means, representatives) = _centres(self.cells, self.starts), _centres(cells, starts)
+        moved = (means - before[is_large])[:, ::-1] * resolution[:, None]
+        return Clusters(cells, starts, self.centroids[is_large] + moved, representatives, counts[is_large] * resolution)
 
 
 class FrontierMap:

@@ -313,7 +313,7 @@ def spread(terrain: Terrain, state: SearchState, task: Task, lookout: Lookout) -
         sizes[slot] = 0
         if task.goal_row >= 0:
             left = remaining[task.goal_row, task.goal_column]
-            if (task.budget - left) >> BUCKET_SHIFT <= band:
+            if left != NO_ENTRY and (task.budget - left) >> BUCKET_SHIFT <= band:
                 break
         if 0 < wanted <= counts[HITS]:
             last = band + 1 + (task.beyond >> BUCKET_SHIFT) if task.beyond > 0 else band

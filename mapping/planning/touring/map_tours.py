@@ -388,7 +388,9 @@ def _look(
                     length = min(length, _from_robot(open_cells, from_robots, starts, k, cell))
                 if length == FAR:
                     continue
-                place_row, place_column = at_row * factor + factor // 2, at_column * factor + factor // 2
+                # The last coarse row or column may be a part of one.
+                place_row = min(at_row * factor + factor // 2, kept.log_odds.shape[0] - 1)
+                place_column = min(at_column * factor + factor // 2, kept.log_odds.shape[1] - 1)
                 if not line_is_open(kept.log_odds, place_row, place_column, row, column):
                     continue
                 kept.tried[at_row, at_column] = turn

@@ -356,13 +356,13 @@ class SparseNavigation:
         unknown = Unknown(on_ground(frontier), cell_m, on_ground(self.unknown_samples()), area)
         return best_view(self.index, self._places(pose), unknown, sight)
 
-    def nearest_view(self, pose: NDArray[np.float64], points: NDArray[np.float64]) -> View:
+    def nearest_view(self, pose: NDArray[np.float64], points: NDArray[np.float64], sight: Sight) -> View:
         """Return the view towards points (F, 2) [m] from as near as a robot at x, y, theta (3,) can come."""
         places = self._places(pose)
         gaps = points[None] - places.points[:, None, :2]
         place, point = np.unravel_index(int(np.argmin(np.hypot(*gaps.transpose(2, 0, 1)))), gaps.shape[:2])
         run, rise = gaps[place, point]
-        heading = math.atan2(rise, run)
+        heading = math.atan2(rise, run) - sight.bearing
         return View(places.points[place], heading, float(places.costs[place]), on_ground(points))
 
     def are_cut_off(self, pose: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.bool_]:

@@ -54,6 +54,12 @@ class SeenPoints:
         self._known = np.unique(np.concatenate([self._known, *self._added]))
         self._added = []
 
+    def drop(self, gone: NDArray[np.float64], left: NDArray[np.float64]) -> None:
+        """Forget the cells in some boxes (M, 2, 3) [m], but for those in boxes that are left (K, 2, 3)."""
+        middles = self.middles
+        half = np.array([[-0.5], [0.5]]) * CELL_M
+        self._known = self._known[~are_covered(middles, gone + half) | are_covered(middles, left + half)]
+
     @property
     def middles(self) -> NDArray[np.float64]:
         """Middles of the cells (N, 3) [m]."""

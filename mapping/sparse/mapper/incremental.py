@@ -128,8 +128,11 @@ class IncrementalMapper:
         self._floor_points, self._cells = None, None
 
     def forget(self, gone: NDArray[np.bool_]) -> None:
-        """Leave out occupied codes of the map that are no longer there, (M,) bool."""
-        self._map = replace(self.map, occupied=self.map.occupied.taken(~gone))
+        """Leave out occupied codes of the map that are no longer there, (M,) bool, and the points in them."""
+        known = self.map
+        self._map = replace(known, occupied=known.occupied.taken(~gone))
+        if self._cells is not None:
+            self._cells.drop(known.boxes[gone], self._map.boxes)
 
     def _coded_frame(
         self, cloud: NDArray[np.float64], known: SparseMap, floor: FloorPlane

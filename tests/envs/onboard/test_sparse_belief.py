@@ -78,7 +78,7 @@ def test_views_look_at_unknown_ground_from_places_that_can_be_come_to(belief):
     assert view.points == pytest.approx(out(own.points))
     assert view.cost == pytest.approx(own.cost)
     assert belief.best_view(pose, border[:0], SIGHT) is None
-    nearest = belief.nearest_view(pose, out([[5.0, 3.5]]))
+    nearest = belief.nearest_view(pose, out([[5.0, 3.5]]), SIGHT)
     aim = out([5.0, 3.5]) - nearest.place
     assert math.remainder(nearest.heading - math.atan2(aim[1], aim[0]), math.tau) == pytest.approx(0.0)
 

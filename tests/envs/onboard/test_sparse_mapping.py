@@ -13,6 +13,7 @@ from lidarium.envs.settings.making import make_settings
 from lidarium.mapping.geometry.rigid import Transform, composed, relative
 from lidarium.mapping.localization.localizer import KeyScans
 from lidarium.mapping.sparse.exploring.ground import BLOCKED, SEEN, UNKNOWN
+from lidarium.mapping.sparse.exploring.views import Sight
 from tests.ground_views import depth_image
 
 NOBODY = np.empty((0, 3))
@@ -214,7 +215,7 @@ def test_what_a_robot_is_asked_and_answers_is_in_its_map_frame():
     assert borders
     for border in borders:
         assert known.are_unknown(border).all()
-    view = known.nearest_view(belief.pose, borders[0])
+    view = known.nearest_view(belief.pose, borders[0], Sight(0.3, 2.0, 3.0, 0.5, 0.0, 0.1, 0.5, 0.2, 0.3, 4.0, 0.3))
     assert math.dist(view.place, belief.pose[:2]) < 8.0
     assert view.points == pytest.approx(borders[0])
     assert known.are_unknown(known.unknown_samples()).all()

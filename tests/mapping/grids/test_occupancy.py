@@ -168,10 +168,11 @@ def test_no_return_frees_up_to_the_range_and_occupies_nothing():
     assert (levels == FREE).sum() * RESOLUTION**2 == pytest.approx(math.pi, rel=0.02)
 
 
-def test_an_invalid_scan_changes_nothing():
+@pytest.mark.parametrize("value", [np.nan, 0.0, -2.0, -1e6, -np.inf])
+def test_an_invalid_scan_changes_nothing(value):
     grid = OccupancyGrid(OccupancySettings(resolution=RESOLUTION))
     geometry = ScanGeometry(beams=300, field_of_view=2.0 * math.pi, range_max=1.0)
-    grid.integrate((0.0, 0.0, 0.0), np.full(300, np.nan), geometry)
+    grid.integrate((0.0, 0.0, 0.0), np.full(300, value), geometry)
     assert not grid.log_odds.any()
 
 

@@ -146,3 +146,17 @@ def test_bad_input_is_named():
         Footprint(penalty=-1.0)
     with pytest.raises(ValueError, match="shape"):
         SearchSpace((0, 5), RESOLUTION)
+
+
+@given(seed=SEEDS)
+def test_a_goal_that_cannot_be_reached_in_a_blocked_disc_ends_no_search(seed):
+    belief = random_belief(seed, shape=(60, 70), walls=4)
+    footprint = Footprint(0.05, 0.15, 3.0)
+    start = open_start(belief, footprint, seed)
+    if start is None or max(abs(start[0] - 30), abs(start[1] - 30)) < 5:
+        return
+    space, field = made(belief)
+    blocked = [(30, 30, 3)]
+    full = search(space, belief, field, start, footprint, blocked=blocked).costs()
+    towards = search(space, belief, field, start, footprint, blocked=blocked, until=Until(goal=(30, 30))).costs()
+    np.testing.assert_array_equal(towards, full)

@@ -11,7 +11,7 @@ from safetensors.numpy import save_file
 
 from lidarium.mapping.prediction.levels import FREE, OCCUPIED, UNKNOWN, free_squares, levels_of, shares_unknown
 from lidarium.mapping.prediction.network import FILES, WINDOW, MapNetwork, shapes
-from lidarium.mapping.prediction.network_predictor import NetworkPredictor
+from lidarium.mapping.prediction.network_predictor import NetworkPredictor, _resampled
 from lidarium.mapping.prediction.predictors import PREDICTORS, PartialMap, make_predictor, predicted
 from lidarium.mapping.prediction.windows import STRIDE, WindowedPrediction
 
@@ -189,3 +189,15 @@ def test_weights_of_another_version_or_with_nan_are_refused(weights):
         FILES.check({name: array for name, array in weights.items() if name != "out.bias"}, "a file")
     with pytest.raises(ValueError, match="not finite"):
         FILES.check({**weights, "out.bias": np.full(4, np.nan, np.float32)}, "a file")
+
+
+@pytest.mark.parametrize("scale", [0.4, 0.75, 1.25, 1.5])
+def test_resampled_squares_with_a_part_of_a_wall_are_occupied_in_either_direction(scale):
+    levels = np.full((40, 1), FREE, np.int8)
+    levels[[3, 17, 18, 31]] = OCCUPIED
+    count = round(40 * scale)
+    found = _resampled(levels, (count, 1))[:, 0]
+    walls = [(row * count, (row + 1) * count) for row in np.flatnonzero(levels[:, 0] == OCCUPIED)]
+    expected = [any(40 * k < high and low < 40 * (k + 1) for low, high in walls) for k in range(count)]
+    assert (found == OCCUPIED).tolist() == expected
+    np.testing.assert_array_equal(_resampled(levels[::-1], (count, 1))[::-1, 0], found)

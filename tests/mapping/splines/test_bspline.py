@@ -132,3 +132,30 @@ def test_a_ray_away_from_the_curve_meets_nothing():
     assert straight().ray([1.0, 1.0], -math.pi / 2.0) == pytest.approx(1.0)
     assert straight().ray([1.0, 1.0], math.pi / 2.0) == math.inf
     assert straight().ray([3.0, 1.0], -math.pi / 2.0) == math.inf
+
+
+LINE = Spline(np.array([0.0] * 4 + [1.0] * 4), np.stack([np.linspace(1.0, 2.0, 4), np.zeros(4)], axis=1))
+
+
+def test_a_ray_along_a_straight_wall_meets_its_nearer_end():
+    assert LINE.ray((0.0, 0.0), 0.0) == 1.0
+
+
+@given(st.integers(0, 2**31))
+def test_a_shallow_ray_meets_the_nearest_of_all_crossings(seed):
+    draws = np.random.default_rng(seed)
+    count = int(draws.integers(4, 6))
+    control_points = np.stack([np.linspace(0.0, 6.0, count), draws.uniform(-0.3, 0.3, count)], axis=1)
+    spline = Spline(np.array([0.0] * 4 + [3.0] * (count - 4) + [6.0] * 4), control_points)
+    x, y, direction = -1.0, draws.uniform(-0.3, 0.3), draws.uniform(-0.05, 0.05)
+    gaps = spline.evaluate(np.linspace(0.0, 6.0, 6001)) - (x, y)
+    ahead = math.cos(direction) * gaps[:, 0] + math.sin(direction) * gaps[:, 1]
+    aside = math.cos(direction) * gaps[:, 1] - math.sin(direction) * gaps[:, 0]
+    crossings = np.flatnonzero(aside[:-1] * aside[1:] < 0.0)
+    found = spline.ray((x, y), direction)
+    if len(crossings):
+        first = crossings[np.argmin(ahead[crossings])]
+        low, high = sorted(ahead[first : first + 2])
+        assert low - 1e-6 <= found <= high + 1e-6
+    elif np.abs(aside).min() > 1e-6:
+        assert found == math.inf

@@ -115,3 +115,9 @@ def test_maps_of_both_ends_of_a_wall_become_one_wall():
     right = taken(wall, [(1.0 + 0.2 * k, 0.0, math.pi / 2.0) for k in range(4)])
     left.absorb(right, Transform())
     assert len(left.curves) == 1
+
+
+def test_a_curve_counts_no_more_scans_than_there_were():
+    """Pieces of a curve that was cut at a corner inherit its count, and are joined again."""
+    spline_map = taken(poses=ROUND * 6)
+    assert 3 <= max(curve.count for curve in spline_map.curves) <= spline_map.updates

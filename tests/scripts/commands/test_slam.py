@@ -289,3 +289,10 @@ def test_scans_too_far_apart_for_splines_make_the_result_doubtful(log, tmp_path,
 
 def _every_tenth(array, count):
     return array[::10] if array.shape[:1] == (count,) else array
+
+
+def test_a_localizer_on_splines_refuses_odometry_that_stops(shared_cases, tmp_path, capsys):
+    log = shared_cases / "odometry-stops" / "stops_at_half.log.gz"
+    assert main(["slam", str(log), "--localizer", "splines", "--out", str(tmp_path / "out")]) == 2
+    assert f"{log} has no odometry at" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()

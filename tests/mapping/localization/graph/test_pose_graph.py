@@ -181,3 +181,15 @@ def test_a_matrix_that_is_not_positive_definite_has_no_factor():
     places = _elimination(2, pairs[:, 0], pairs[:, 1])
     assert not _factorise(places, blocks_of(np.eye(6) - 2.0 * np.eye(6)[:, ::-1], places))
     assert not _factorise(places, blocks_of(np.full((6, 6), np.nan), places))
+
+
+def test_the_covariance_is_that_of_the_result_also_where_nothing_is_left_to_gain():
+    """Where closures agree exactly, steps are rejected and ever more damped; the covariance must not be so."""
+    truth = square()[: 2 * SIDE]
+    pairs = [*((k, k + 1) for k in range(len(truth) - 1)), (0, len(truth) - 1), (3, len(truth) - 2)]
+    measured = [relative(truth[a], truth[b]) for a, b in pairs]
+    edges = edges_of(pairs, measured, [False] * len(pairs))
+    poses, covariance = optimised(truth, edges, 5.0, 20, 1)
+    for _ in range(3):
+        poses, again = optimised(poses, edges, 5.0, 20, 1)
+        np.testing.assert_allclose(again, covariance, rtol=1e-3)

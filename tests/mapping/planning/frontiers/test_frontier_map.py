@@ -96,3 +96,22 @@ def test_clusters_are_the_8_connected_components(seed, minimum):
         assert distances[chosen[0]] == pytest.approx(distances.min())
         assert clusters.sizes[k] == pytest.approx(len(expected) * RESOLUTION)
     np.testing.assert_array_equal(frontiers.flags, by_definition(belief))  # marks are taken back
+
+
+@settings(max_examples=40)
+@given(seed=SEEDS)
+def test_clusters_without_some_cells_are_those_of_the_others(seed):
+    belief = random_belief(seed)
+    _, frontiers = made(belief)
+    clusters = frontiers.clusters()
+    left_out = np.random.default_rng(seed).random(belief.shape) < 0.4
+    found = clusters.without(left_out, 2)
+    kept = [cells[~left_out[cells[:, 0], cells[:, 1]]] for cells in map(clusters.of, range(len(clusters)))]
+    kept = [cells for cells in kept if len(cells) >= 2]
+    assert len(found) == len(kept)
+    for k, cells in enumerate(kept):
+        np.testing.assert_array_equal(found.of(k), cells)
+        np.testing.assert_allclose(found.centroids[k], (cells.mean(axis=0)[::-1] + 0.5) * RESOLUTION)
+        distances = np.hypot(*(cells - cells.mean(axis=0)).T)
+        chosen = (cells == found.representatives[k]).all(axis=1)
+        assert distances[chosen] == pytest.approx(distances.min())

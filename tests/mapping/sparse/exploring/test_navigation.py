@@ -8,6 +8,7 @@ import pytest
 from routed_floors import BODY, MARGIN_M, TABLE, WALL, floor_codes, known, seen_cells
 
 from lidarium.mapping.sparse.exploring.navigation import _is_route_free, _path_to_stand
+from lidarium.mapping.sparse.exploring.views import Sight
 from lidarium.mapping.sparse.swept_body import is_free
 
 
@@ -172,11 +173,12 @@ def test_places_behind_a_wall_without_end_are_cut_off():
 def test_the_nearest_view_looks_at_its_points_from_as_near_as_the_robot_can_come():
     wall = np.array([[[2.9, -1.0, 0.0], [3.1, 6.0, 2.0]]])
     navigation = known(wall, floor_codes((0.0, 0.0), (7.0, 5.0)), [[0.5, 0.5, 0.0]])
-    view = navigation.nearest_view(np.array([0.5, 0.5, 0.0]), np.array([[5.0, 3.0], [5.5, 3.0]]))
+    sight = Sight(0.3, 2.0, 3.0, 0.5, 0.5, 0.1, 0.5, 0.2, 0.3, 4.0, 0.3)
+    view = navigation.nearest_view(np.array([0.5, 0.5, 0.0]), np.array([[5.0, 3.0], [5.5, 3.0]]), sight)
     assert 2.0 < view.place[0] < 2.7
     assert view.place[1] == pytest.approx(3.0, abs=0.4)
     aim = np.array([5.0, 3.0]) - view.place[:2]
-    assert view.heading == pytest.approx(math.atan2(aim[1], aim[0]))
+    assert view.heading + sight.bearing == pytest.approx(math.atan2(aim[1], aim[0]))
 
 
 def test_samples_are_of_unknown_ground_alone():

@@ -129,3 +129,16 @@ def test_free_codes_of_different_frames_keep_apart(grown):
     gaps = np.linalg.norm(found.free[:, None] - found.free[None], axis=2)
     of_others = found.ground.frames[:, None] != found.ground.frames[None]
     assert gaps[of_others].min() > found.settings.merge_radius_m
+
+
+def test_what_is_forgotten_does_not_come_back_with_the_next_frame():
+    x, y = np.meshgrid(np.arange(-2.0, 2.0, 0.05), np.arange(-2.0, 2.0, 0.05))
+    floor = np.stack([x.ravel(), y.ravel(), np.zeros(x.size)], axis=1)
+    inside = np.random.default_rng(0).uniform((1.0, -0.2, 0.0), (1.4, 0.2, 0.6), (2000, 3))
+    mapper = IncrementalMapper(128, MapperSettings(range_m=4.0), floor=FloorPlane())
+    mapper.add(np.concatenate([floor, inside]), np.eye(4))
+    gone = np.ones(len(mapper.map.boxes), np.bool_)
+    assert gone.any()
+    mapper.forget(gone)
+    mapper.add(floor, pose_at(0.6, 0.0, 0.0, 0.0, 0.0))
+    assert len(mapper.map.boxes) == 0
