@@ -9,7 +9,7 @@ from lidarium.mapping.prediction.levels import UNKNOWN
 
 STRIDE, SNAP, MARGIN = 80, 16, 30
 """Squares from one window to the next; windows begin at multiples of the second; so far beyond what is known squares
-are predicted, if the map is larger than a window."""
+are predicted, if that takes several windows."""
 
 LEAST_WEIGHT = 0.02
 """Weight of a window at its rim; it is 1 in its middle, where most around a square is seen."""
@@ -42,7 +42,7 @@ class WindowedPrediction:
         self.predicted = 0
 
     def __call__(self, levels: NDArray[np.int8]) -> NDArray[np.float32]:
-        """Return the probability that each square is free, (rows, columns) float32; 0 in those far from any known one.
+        """Return the probability that each square is free, (rows, columns) float32; 0 where none is predicted.
 
         Windows overlap by half, and squares in several have the mean of theirs, weighted by how central they are.
         """
@@ -66,7 +66,7 @@ class WindowedPrediction:
         return np.divide(total, weights, out=np.zeros_like(total), where=weights > 0.0)
 
     def _begins(self, levels: NDArray[np.int8]) -> list[tuple[int, int]]:
-        """Return where windows begin so that they cover all that is known, and a margin around it."""
+        """Return where windows begin so that they cover what is known, and a margin around it; see `_along`."""
         is_known = levels != UNKNOWN
         if not is_known.any():
             return []
@@ -79,7 +79,11 @@ class WindowedPrediction:
 
 
 def _along(low: int, high: int, size: int, side: int) -> list[int]:
-    """Return where windows begin along an axis of which [low, high) is known: one window if it is enough."""
+    """Return where windows begin along an axis of which [low, high) is known: one window if it is enough.
+
+    Beside that of almost a window, the squares next to what is known may be beyond the window, on the side of high
+    numbers by up to 7 squares of it. Several windows there, with the whole margin, made tours longer (docs/results).
+    """
     if high - low <= side - SNAP:
         # Where the map is no larger, the window does not move with what is known.
         middle = size if size <= side - SNAP else low + high
