@@ -78,6 +78,9 @@ class _Merge(Command):
         factor = self.factor
         if self.scale != "fixed" and len(self.maps) != 2:
             raise ValueError(f"a scale is of two maps; {len(self.maps)} are given")
+        ignored = self.given & ({"tolerance"} if self.structure == "corners" else {"tolerance", "structure"})
+        if ignored and self.mode != "default":
+            raise ValueError(f"--{min(ignored)} is set and the mode {self.mode}; want --mode default")
         if factor is None and (self.guess is not None or self.force or self.mode != "default"):
             raise ValueError("--scale auto goes without --guess, --force and --mode; give the scale as a number")
 

@@ -185,7 +185,8 @@ def _completed(command: Run) -> Run:
     if command.robots == 1 or FloorChoice(command.floor, command.resolution).has_goal:
         return replace(command, policy=LONE_POLICY)
     team = replace(command, policy=TEAM_POLICY, unknown_starts=True)
-    is_world_given = command.realism != "ideal" or any(getattr(command, name) is not None for name in TEAM_WORLD)
+    is_realism_given = command.realism != "ideal" or "realism" in command.given
+    is_world_given = is_realism_given or any(getattr(command, name) is not None for name in TEAM_WORLD)
     return team if is_world_given else replace(team, **TEAM_WORLD)
 
 

@@ -476,3 +476,11 @@ def test_regions_are_drawn_of_each_map(merged, tmp_path):
     assert picture.std() > 5.0
     # Panels for three maps beside each other.
     assert picture.shape[1] > 2 * picture.shape[0]
+
+
+@pytest.mark.parametrize("option", [["--tolerance", "normal"], ["--structure", "all"]])
+def test_options_that_the_thesis_has_not_are_refused(maps, tmp_path, option, capsys):
+    paths, _ = maps
+    assert main(["merge", *paths, "--mode", "thesis", *option, "--out", str(tmp_path / "out")]) == 2
+    assert f"{option[0]} is set and the mode thesis; want --mode default" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()

@@ -24,6 +24,7 @@ def test_a_team_is_supervised_in_a_world_in_which_robots_need_each_other():
     assert given.chosen_policy == TEAM_POLICY
     assert (given.noise, given.odometry) == ("none", None)
     assert _completed(Run(robots=2, realism="lab")).localization is None
+    assert _completed(Run(robots=2, given=frozenset({"realism"}))).localization is None  # --realism ideal
 
 
 def test_one_robot_and_robots_with_a_goal_drive_to_the_nearest_frontier():

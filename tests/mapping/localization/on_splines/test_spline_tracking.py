@@ -97,7 +97,7 @@ def test_what_cannot_be_sensed_is_refused(kind):
     localizer.reset(np.zeros(3), 0)
     localizer.localize(Sensing(1.0, np.zeros(3), SCANS[0]))
     localizer.localize(Sensing(1.0, np.zeros(3), SCANS[0]))  # logs have equal stamps
-    with pytest.raises(ValueError, match="sensed at 0.5 s, earlier than the last at 1.0 s"):
+    with pytest.raises(ValueError, match=r"sensed at 0\.5 s, earlier than the last at 1\.0 s"):
         localizer.localize(Sensing(0.5, np.zeros(3), SCANS[0]))
     with pytest.raises(ValueError, match="odometry"):
         localizer.localize(Sensing(2.0, np.array([0.0, np.nan, 0.0]), SCANS[0]))
