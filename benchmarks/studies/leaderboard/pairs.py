@@ -60,10 +60,12 @@ def _ratio(first: Times, second: Times, keys: Sequence[tuple[str, int]]) -> str:
 
 
 def merges_text(episodes: Iterable[Episode]) -> str:
-    """Return how many joins of maps were accepted, and how many of them joined wrong places."""
+    """Return how many joins of maps were accepted, and how many of them joined wrong places; empty without episodes."""
     merges = [episode["merges"] for episode in episodes]
+    if not merges:
+        return ""
     accepted, wrong = (sum(each[name] for each in merges) for name in ("accepted", "wrong"))
-    return f"Teams with unknown starts joined maps {accepted:,} times, {wrong:,} of them in a wrong place."
+    return f" Teams with unknown starts joined maps {accepted:,} times, {wrong:,} of them in a wrong place."
 
 
 def _times(episodes: Iterable[Episode], policy: str) -> dict[tuple[str, int], float]:

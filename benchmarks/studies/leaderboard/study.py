@@ -60,7 +60,7 @@ pairs or more; they are bold if both Wilcoxon's signed rank test (5 %, Holm) and
 ## Pairs
 
 On floors of the set `test`: geometric means of ratios of times to 99 %, with their 95 % interval. Below 1 is
-less time; runs that did not get there count as the whole time. {merges}
+less time; runs that did not get there count as the whole time.{merges}
 
 {pairs}
 

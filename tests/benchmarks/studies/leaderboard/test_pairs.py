@@ -31,4 +31,5 @@ def test_pairs_of_floors_are_compared_and_lone_ones_left_out(episodes):
 
 
 def test_joins_in_wrong_places_are_told(episodes):
+    assert merges_text([]) == ""
     assert merges_text(episodes["unknown"]).endswith("joined maps 12 times, 1 of them in a wrong place.")
