@@ -1,8 +1,8 @@
 """Exact drawing of polygons and thin walls into grids of cells.
 
-A shape is a set of closed rings; a cell belongs to it if its centre is inside by the even-odd rule. A centre
-that lies exactly on an edge belongs to the shape on its right and above, so that two shapes that share an
-edge share no cell.
+A shape is a set of closed rings; a cell belongs to it if its centre is inside, by default by the even-odd rule. A
+centre that lies exactly on an edge belongs to the shape on its right and above, so that two shapes that share an edge
+share no cell.
 """
 
 import math
@@ -45,8 +45,10 @@ def fill_shapes(
     resolution: float,
     shapes: Sequence[NDArray[np.float64]] | NDArray[np.float64],
     value: int,
+    *,
+    is_nonzero: bool = False,
 ) -> None:
-    """Set the cells whose centre is inside a shape (even-odd), in place.
+    """Set the cells whose centre is inside a shape, in place.
 
     Parameters
     ----------
@@ -56,12 +58,15 @@ def fill_shapes(
         Lower left corner of cell (0, 0) and side of a cell [m].
     shapes : sequence of (E, 4) float64
         Edges x1, y1, x2, y2 of each shape [m]; together they close its rings.
+    is_nonzero : bool, optional
+        Whether what is inside several rings of a shape that run in the same direction is inside it. By default the
+        even-odd rule counts, by which it is outside if they are two.
     """
     if not len(shapes):
         return
     edges = (np.concatenate(shapes) - np.tile(origin, 2)) / resolution - 0.5
     ends = np.cumsum([len(shape) for shape in shapes], dtype=np.int64)
-    _fill(cells, np.rint(edges * _SNAP) / _SNAP, ends, np.uint8(value))
+    _fill(cells, np.rint(edges * _SNAP) / _SNAP, ends, np.uint8(value), is_nonzero)
 
 
 def draw_segments(
@@ -110,7 +115,9 @@ def strip(segment: NDArray[np.float64], thickness: float, overhang: float = 0.0)
 
 
 def strip_edges(
-    segments: NDArray[np.float64], thickness: float | NDArray[np.float64], overhang_share: float = 0.0
+    segments: NDArray[np.float64],
+    thickness: float | NDArray[np.float64],
+    overhang_share: float | NDArray[np.float64] = 0.0,
 ) -> NDArray[np.float64]:
     """Return the edges of the rectangles around many segments, as `fill_shapes` wants them.
 
@@ -120,6 +127,8 @@ def strip_edges(
         x1, y1, x2, y2 [m].
     thickness : float or (N,) float64
         Width of the rectangles [m].
+    overhang_share : float or (N, 2) float64, optional
+        Length beyond the start and the end of each, as a share of its width; none by default.
 
     Returns
     -------
@@ -133,13 +142,20 @@ def strip_edges(
     widths = np.broadcast_to(thickness, len(segments))[:, None]
     along = np.where(is_point, (1.0, 0.0), steps / np.where(is_point, 1.0, lengths)) * widths
     across = np.stack([-along[:, 1], along[:, 0]], axis=1) / 2.0
-    start, end = start - along * overhang_share, end + along * overhang_share
+    shares = np.broadcast_to(overhang_share, (len(segments), 2))
+    start, end = start - along * shares[:, :1], end + along * shares[:, 1:]
     corners = np.stack([start - across, end - across, end + across, start + across], axis=1)
     return np.concatenate([corners, np.roll(corners, -1, axis=1)], axis=2)
 
 
 @kernel
-def _fill(cells: NDArray[np.uint8], edges: NDArray[np.float64], ends: NDArray[np.int64], value: np.uint8) -> None:
+def _fill(
+    cells: NDArray[np.uint8],
+    edges: NDArray[np.float64],
+    ends: NDArray[np.int64],
+    value: np.uint8,
+    is_nonzero: bool,
+) -> None:
     rows, columns = cells.shape
     first = 0
     for last in ends:
@@ -157,7 +173,7 @@ def _fill(cells: NDArray[np.uint8], edges: NDArray[np.float64], ends: NDArray[np
                     offsets[i - low + 1] += 1
             for i in range(1, len(offsets)):
                 offsets[i] += offsets[i - 1]
-            crossings = np.empty(offsets[-1], np.float64)
+            crossings, turns = np.empty(offsets[-1], np.float64), np.empty(offsets[-1], np.int64)
             position = offsets[:-1].copy()
             for k in range(first, last):
                 x, y = edges[k, 0], edges[k, 1]
@@ -165,29 +181,36 @@ def _fill(cells: NDArray[np.uint8], edges: NDArray[np.float64], ends: NDArray[np
                 top = min(math.ceil(max(y, edges[k, 3])) - 1, high)
                 for i in range(bottom, top + 1):
                     crossings[position[i - low]] = x + (i - y) * (edges[k, 2] - x) / (edges[k, 3] - y)
+                    turns[position[i - low]] = 1 if edges[k, 3] > y else -1
                     position[i - low] += 1
             for i in range(low, high + 1):
                 row = crossings[offsets[i - low] : offsets[i - low + 1]]
-                _sort(row)
-                for k in range(0, len(row) - 1, 2):
-                    left = min(max(math.ceil(row[k]), 0), columns)
-                    right = min(max(math.ceil(row[k + 1]), 0), columns)
-                    cells[i, left:right] = value
+                turn = turns[offsets[i - low] : offsets[i - low + 1]]
+                _sort(row, turn)
+                winding = 0
+                for k in range(len(row) - 1):
+                    winding += turn[k]
+                    is_inside = winding != 0 if is_nonzero else k % 2 == 0
+                    if is_inside:
+                        left = min(max(math.ceil(row[k]), 0), columns)
+                        right = min(max(math.ceil(row[k + 1]), 0), columns)
+                        cells[i, left:right] = value
         first = last
 
 
 @kernel
-def _sort(values: NDArray[np.float64]) -> None:
-    """Sort in place; rows of most shapes have two values."""
+def _sort(values: NDArray[np.float64], turns: NDArray[np.int64]) -> None:
+    """Sort values in place, and turns in their order; rows of most shapes have two values."""
     if len(values) > _FEW:
-        values[:] = values[stable_order(values)]
+        order = stable_order(values)
+        values[:], turns[:] = values[order], turns[order]
         return
     for k in range(1, len(values)):
-        value, place = values[k], k
+        value, turn, place = values[k], turns[k], k
         while place > 0 and values[place - 1] > value:
-            values[place] = values[place - 1]
+            values[place], turns[place] = values[place - 1], turns[place - 1]
             place -= 1
-        values[place] = value
+        values[place], turns[place] = value, turn
 
 
 @kernel

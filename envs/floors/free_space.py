@@ -273,7 +273,7 @@ def measure_building(floor: Floor) -> _BuildingMeasures:
     """Measure a floor at a resolution of 0.05 m."""
     walls = floor
     if floor.solids:
-        walls = Floor(floor.name, floor.bounds, tuple(solid for solid in floor.solids if solid.z_high == np.inf))
+        walls = Floor(floor.name, floor.bounds, tuple(solid for solid in floor.solids if solid.z_high >= floor.ceiling))
     empty = walls.raster(_RESOLUTION, 0.0, _BODY_HEIGHT)
     full = floor.raster(_RESOLUTION, 0.0, _BODY_HEIGHT)
     space = configuration_space(empty, MEASURED_RADIUS)

@@ -235,6 +235,8 @@ def load(path: Path, resolution: float | None, *, layers: Sequence[str] = ()) ->
     if not len(segments):
         where = f"on {', '.join(map(repr, layers))}; it has {shows.named()}" if layers else "in model space"
         raise ValueError(f"{path} has no lines {where}; want a plan of {', '.join(sorted(KINDS))}")
+    if (name := shows.missing()) is not None:
+        raise ValueError(f"{path} has no layer {name!r}; want some of {shows.named()}")
     if not np.isfinite(segments).all():
         raise ValueError(f"{path} has lines that lead nowhere; want finite coordinates")
     wide, high = np.ptp(segments.reshape(-1, 2), axis=0).tolist()
@@ -309,12 +311,14 @@ def _walls(
 
     hidden = {layer for layer in {layer for layer, _ in sifted.walls} if not shows.hold(layer)}
     yield from (wall for layer, wall in sifted.walls if layer not in hidden)
-    for entity in _entities(path, document, maximum, shows):
+    for entity, matrix in _entities(path, document, maximum, shows):
         if entity.dxftype() == "LINE":  # paths of them cost ten times as much
-            start, end = entity.dxf.start, entity.dxf.end
+            ends = entity.dxf.start, entity.dxf.end
+            start, end = ends if matrix is None else map(matrix.transform, ends)
             yield np.array([(start.x, start.y), (end.x, end.y)])
             continue
-        for part in make_path(entity).sub_paths():
+        drawn = make_path(entity)
+        for part in (drawn if matrix is None else drawn.transform(matrix)).sub_paths():
             line = _flattened(path, part, error)
             if len(line) > 1:
                 yield line
@@ -332,14 +336,15 @@ def _flattened(path: Path, part: Any, error: float) -> NDArray[np.float64]:  # n
     return np.array([(point.x, point.y) for point in points]).reshape(-1, 2)
 
 
-def _entities(path: Path, document: Any, maximum: int, shows: "_Layers") -> Iterator[Any]:  # noqa: ANN401
-    """Yield walls, with blocks taken apart.
+def _entities(path: Path, document: Any, maximum: int, shows: "_Layers") -> Iterator[tuple[Any, Any]]:  # noqa: ANN401
+    """Yield walls with the matrix of the blocks that they are in, None if they are in none.
 
     A few blocks that hold each other a few times make more entities than there is time for; all are counted.
     """
-    waiting, count = [("0", iter(document.modelspace()))], 0
+    waiting: list[tuple[str, Iterator[Any], Any]] = [("0", iter(document.modelspace()), None)]
+    count = 0
     while waiting:
-        around, entities = waiting[-1]
+        around, entities, matrix = waiting[-1]
         entity = next(entities, None)
         if entity is None:
             waiting.pop()
@@ -347,6 +352,8 @@ def _entities(path: Path, document: Any, maximum: int, shows: "_Layers") -> Iter
         count += len(waiting) > 1
         if count > maximum:
             raise ValueError(f"{path} has blocks of more than {maximum:,} entities; want a plan")
+        if entity.dxf.get("invisible", 0):  # other states of a dynamic block
+            continue
         kind = entity.dxftype()
         # What a block has on layer 0 is on the layer that the block is inserted on.
         layer = around if entity.dxf.layer == "0" else entity.dxf.layer
@@ -355,10 +362,17 @@ def _entities(path: Path, document: Any, maximum: int, shows: "_Layers") -> Iter
         if kind in COMPOUND:
             if len(waiting) > _DEEPEST:
                 raise ValueError(f"{path} has blocks nested more than {_DEEPEST} deep; want a plan")
-            has_rows = kind == "INSERT" and entity.mcount > 1
-            waiting.append((layer, iter(entity.multi_insert() if has_rows else entity.virtual_entities())))
+            if kind == "MLINE" or entity.mcount > 1:
+                parts = entity.virtual_entities() if kind == "MLINE" else entity.multi_insert()
+                waiting.append((layer, iter(parts), matrix))
+            else:
+                if (block := entity.block()) is None:
+                    raise ValueError(f"{path} is not a DXF drawing: there is no block {entity.dxf.name!r}")
+                # ezdxf moves inserts within blocks that are scaled unevenly to wrong places.
+                own = entity.matrix44()
+                waiting.append((layer, iter(block), own if matrix is None else own @ matrix))
         elif kind in KINDS:
-            yield entity
+            yield entity, matrix
 
 
 class _Layers:
@@ -367,9 +381,11 @@ class _Layers:
     def __init__(self, document: Any, chosen: Sequence[str]) -> None:  # noqa: ANN401
         self._layers = document.layers
         self._chosen = {name.lower() for name in chosen}
+        self._met: set[str] = set()
 
     def hold(self, name: str, *, is_insert: bool = False) -> bool:
         """Return whether the entities of a layer count; entities of a block have layers of their own."""
+        self._met.add(name.lower())
         if self._chosen and (name.lower() in self._chosen or is_insert):
             return True
         if self._chosen or name not in self._layers:
@@ -377,6 +393,11 @@ class _Layers:
         layer = self._layers.get(name)
         is_off = not is_insert and layer.is_off()
         return not (is_off or layer.is_frozen())
+
+    def missing(self) -> str | None:
+        """Return a chosen layer that the drawing has not."""
+        known = {layer.dxf.name.lower() for layer in self._layers} | self._met
+        return min(self._chosen - known, default=None)
 
     def named(self) -> str:
         """Return the names of all layers."""

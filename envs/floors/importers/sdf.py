@@ -10,7 +10,7 @@ import math
 import os
 import re
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from xml.etree.ElementTree import Element
@@ -335,16 +335,20 @@ def _add_shape(found: _Found, path: Path, name: str, geometry: Element, pose: Po
         corners = _mesh_box(path, mesh, uri)
         if corners is None:
             found.unread.append(what)
-        elif (solid := _solid(geometry, corners @ pose[:3, :3].T + pose[:3, 3], pose)) is not None:
+        elif (solid := _solid(corners @ pose[:3, :3].T + pose[:3, 3])) is not None:
             found.boxed.append(what)
             found.boxes.append(solid)
         return
+    lines = [_prism(path, name, shape) for shape in geometry.findall("polyline")]
+    if lines and abs(pose[2, 2]) > 1.0 - 1e-9:
+        found.solids += _prisms([points @ pose[:3, :3].T + pose[:3, 3] for points in lines])
+        return
     try:
-        points = _points(path, name, geometry)
+        points = np.concatenate(lines) if lines else _points(path, name, geometry)
     except LookupError as error:
         found.unread.append(str(error.args[0]))
         return
-    if (solid := _solid(geometry, points @ pose[:3, :3].T + pose[:3, 3], pose)) is not None:
+    if (solid := _solid(points @ pose[:3, :3].T + pose[:3, 3])) is not None:
         found.solids.append(solid)
 
 
@@ -362,17 +366,47 @@ def _mesh_box(path: Path, mesh: Element, uri: str) -> NDArray[np.float64] | None
     return np.stack(np.meshgrid(*zip(low, high, strict=True)), axis=-1).reshape(-1, 3)
 
 
-def _solid(geometry: Element, points: NDArray[np.float64], pose: Pose) -> Solid | None:
-    """Return the prism around the points of a shape in the world, (n, 3); None if it is below the ground."""
+def _solid(
+    points: NDArray[np.float64],
+    ring: NDArray[np.float64] | None = None,
+    holes: tuple[NDArray[np.float64], ...] = (),
+) -> Solid | None:
+    """Return the prism of a ring, or around the points of a shape in the world, (n, 3); None if below the ground."""
     z_low, z_high = float(points[:, 2].min()), float(points[:, 2].max())
     if z_high <= GROUND_M:
         return None
-    is_upright = abs(pose[2, 2]) > 1.0 - 1e-9
-    if geometry.find("polyline") is not None and is_upright:
-        ring = points[: len(points) // 2, :2]
-    else:
+    if ring is None:
         ring = np.asarray(cv2.convexHull(points[:, :2].astype(np.float32))[:, 0, :], np.float64)
-    return Solid(ring, max(z_low, 0.0), max(z_high, max(z_low, 0.0) + 1e-3))
+    return Solid(ring, max(z_low, 0.0), max(z_high, max(z_low, 0.0) + 1e-3), holes)
+
+
+def _prism(path: Path, name: str, line: Element) -> NDArray[np.float64]:
+    """Return the ring of a polyline at the ground and at its height, (2 n, 3), in the shape's frame [m]."""
+    ring = np.array([_numbers(path, each.text or "", 2, "point") for each in line.findall("point")])
+    height = _numbers(path, line.findtext("height") or "1", 1, "height")[0]
+    if len(ring) < 3:
+        raise ValueError(f"{path}: {name} has a polyline of {len(ring)} points; want at least 3")
+    return _between(ring, 0.0, height)
+
+
+def _prisms(shapes: list[NDArray[np.float64]]) -> Iterator[Solid]:
+    """Yield the solids of upright polylines in the world: those within another one are holes, and so on."""
+    rings = [points[: len(points) // 2, :2] for points in shapes]
+    contours = [ring.astype(np.float32) for ring in rings]
+    around = [
+        [
+            k
+            for k, contour in enumerate(contours)
+            if k != number and cv2.pointPolygonTest(contour, ring[0].tolist(), measureDist=False) > 0
+        ]
+        for number, ring in enumerate(contours)
+    ]
+    for number, (points, ring) in enumerate(zip(shapes, rings, strict=True)):
+        if len(around[number]) % 2 == 0:
+            within = len(around[number]) + 1
+            holes = [rings[k] for k, outer in enumerate(around) if number in outer and len(outer) == within]
+            if (solid := _solid(points, ring, tuple(holes))) is not None:
+                yield solid
 
 
 def _points(path: Path, name: str, geometry: Element) -> NDArray[np.float64]:
@@ -393,12 +427,6 @@ def _points(path: Path, name: str, geometry: Element) -> NDArray[np.float64]:
             levels = np.linspace(-1.0, 1.0, _ROUND_PARTS // 2 + 1)
             rings = [_between(_circle(math.sqrt(1.0 - level * level)), level, level) for level in levels]
             return np.asarray(np.concatenate(rings) * radii)
-        if shape.tag == "polyline":
-            ring = np.array([_numbers(path, each.text or "", 2, "point") for each in shape.findall("point")])
-            height = _numbers(path, shape.findtext("height") or "1", 1, "height")[0]
-            if len(ring) < 3:
-                raise ValueError(f"{path}: {name} has a polyline of {len(ring)} points; want at least 3")
-            return _between(ring, 0.0, height)
     kinds = ", ".join(printable(str(shape.tag)) for shape in geometry) or "nothing"
     raise LookupError(f"{name} ({kinds})")
 

@@ -71,7 +71,8 @@ def _map_of(path: Path, model: _Model) -> MapImage:
     if not os.path.isfile(picture):
         picture = path.parent / PureWindowsPath(name).name
     pixels = read_image(picture)
-    first = pixels if pixels.ndim == 2 else pixels[..., 0]
+    # Stage looks at the first channel of RGB, which is the last one here.
+    first = pixels if pixels.ndim == 2 else pixels[..., min(pixels.shape[2] - 1, 2)]
     is_solid = first < (_SOLID_BELOW if first.dtype == np.uint8 else _SOLID_BELOW * 257)
     rows, columns = np.flatnonzero(is_solid.any(axis=1)), np.flatnonzero(is_solid.any(axis=0))
     if not len(rows):

@@ -243,6 +243,8 @@ _OF_STYLE = (
     "opacity",
     "fill-opacity",
     "stroke-opacity",
+    "fill-rule",
+    "stroke-linecap",
 )
 _HAS_STYLE = frozenset(("class", "style", *_OF_STYLE))
 _DEFAULTS = {
@@ -255,13 +257,15 @@ _DEFAULTS = {
     "opacity": "1",
     "fill-opacity": "1",
     "stroke-opacity": "1",
+    "fill-rule": "nonzero",
+    "stroke-linecap": "butt",
 }
 
 Style = dict[str, str]
 
 
-_Layer = tuple[int, NDArray[np.float64] | None, NDArray[np.float64], float]
-"""Paint: 1 for solid, 0 for free; edges of an inside; lines (N, 4) with their width [m]."""
+_Layer = tuple[int, NDArray[np.float64] | None, bool, NDArray[np.float64]]
+"""Paint: 1 for solid, 0 for free; edges of an inside, and whether its rings add up; edges of lines (N, 4, 4)."""
 
 _VALUE: Callable[[_Layer], int] = operator.itemgetter(0)
 
@@ -274,6 +278,8 @@ class _Shape:
     is_solid_inside: bool | None
     is_solid_line: bool | None
     width: float
+    is_nonzero: bool
+    has_caps: bool
 
 
 def has_scale(path: Path) -> bool:
@@ -313,11 +319,11 @@ def load(path: Path, resolution: float | None) -> Floor:
     solid, origin = np.zeros((rows, columns), np.uint8), (float(low[0]), float(low[1]))
     # One over the other, in the order of painting; those of one colour at once.
     for value, layers in itertools.groupby(itertools.chain.from_iterable(map(_layers, shapes)), _VALUE):
-        _, insides, lines, widths = zip(*layers, strict=True)
-        fill_shapes(solid, origin, RESOLUTION, [each for each in insides if each is not None], value)
-        segments = np.concatenate(lines)
-        of_segments = np.repeat(widths, [len(each) for each in lines])
-        fill_shapes(solid, origin, RESOLUTION, strip_edges(segments, of_segments, 0.5), value)
+        _, insides, rules, lines = zip(*layers, strict=True)
+        for rule in (False, True):
+            filled = [each for each, own in zip(insides, rules, strict=True) if each is not None and own == rule]
+            fill_shapes(solid, origin, RESOLUTION, filled, value, is_nonzero=rule)
+        fill_shapes(solid, origin, RESOLUTION, np.concatenate(lines), value)
     floor = floor_of_cells(path, solid == 0, origin, RESOLUTION)
     remarks = [each for each in (floor.remark, *drawing.remarks()) if each]
     return replace(floor, remark="; ".join(remarks))
@@ -328,11 +334,23 @@ def _layers(shape: _Shape) -> Iterator[_Layer]:
     if shape.is_solid_inside is not None:
         rings = [ring_edges(outline) for outline in shape.outlines if len(outline) > 2]
         if rings:
-            yield int(shape.is_solid_inside), np.concatenate(rings), np.zeros((0, 4)), 0.0
+            yield int(shape.is_solid_inside), np.concatenate(rings), shape.is_nonzero, np.zeros((0, 4, 4))
     if shape.is_solid_line is not None:
         width = max(shape.width, MIN_WIDTH) if shape.is_solid_line else shape.width
-        segments = [np.hstack([line[:-1], line[1:]]) for line in shape.outlines]
-        yield int(shape.is_solid_line), None, np.concatenate(segments), width
+        segments = np.concatenate([np.hstack([line[:-1], line[1:]]) for line in shape.outlines])
+        shares = np.concatenate([_beyond_ends(line, shape, width) for line in shape.outlines])
+        yield int(shape.is_solid_line), None, False, strip_edges(segments, width, shares)
+
+
+def _beyond_ends(line: Polyline, shape: _Shape, width: float) -> NDArray[np.float64]:
+    """Return how far each segment of a line goes beyond its ends, (N, 2), as a share of the width.
+
+    That is to its corners, and at free ends as far as the line has caps, or is drawn wider than it is.
+    """
+    shares = np.full((len(line) - 1, 2), 0.5)
+    if not (shape.has_caps or np.array_equal(line[0], line[-1])):
+        shares[0, 0] = shares[-1, 1] = 0.5 * (width - min(shape.width, width)) / width if width > 0.0 else 0.0
+    return shares
 
 
 class _Drawing:
@@ -393,7 +411,14 @@ class _Drawing:
             scale = math.sqrt(abs(a * d - b * c))
             width = _length(style["stroke-width"], 1.0, math.hypot(*view) / math.sqrt(2.0)) * scale
             inside, line = self._paints(style)
-            shape = _Shape(placed, None if kind == "line" else inside, line, width)
+            shape = _Shape(
+                placed,
+                None if kind == "line" else inside,
+                line,
+                width,
+                style["fill-rule"].strip() != "evenodd",
+                style["stroke-linecap"].strip() != "butt",
+            )
             if math.isfinite(width + sum(outline.sum() for outline in placed)):
                 yield shape
             elif shape.is_solid_inside or shape.is_solid_line:
@@ -488,10 +513,18 @@ def _placed(use: Element, used: Element, view: _View) -> NDArray[np.float64]:
     if not (_kind(used) == "symbol" or use is used) or len(box) != 4 or not (box[2] > 0.0 and box[3] > 0.0):
         return matrix
     wide, high = (
-        _length(use.get(name) or used.get(name), size, whole)
+        _length(use.get(name) or used.get(name), whole if math.isfinite(whole) else size, whole)
         for name, size, whole in zip(("width", "height"), box[2:], view, strict=True)
     )
-    scale = min(wide / box[2], high / box[3])
-    # The middle of the view box is in the middle of the size.
-    shift_x, shift_y = 0.5 * wide - scale * (box[0] + 0.5 * box[2]), 0.5 * high - scale * (box[1] + 0.5 * box[3])
-    return np.asarray(matrix @ np.array([[scale, 0.0, shift_x], [0.0, scale, shift_y], [0.0, 0.0, 1.0]]), np.float64)
+    # SVG 2, section 8.6: by default the middle of the view box is in the middle of the size.
+    align, *how = used.get("preserveAspectRatio", "xMidYMid").split() or ["xMidYMid"]
+    scales = np.array([wide / box[2], high / box[3]])
+    if align != "none":
+        scales[:] = scales.max() if how == ["slice"] else scales.min()
+    shares = [{"Min": 0.0, "Max": 1.0}.get(align[k : k + 3], 0.5) for k in (1, 5)]
+    shift_x, shift_y = (
+        share * (size - scale * length) - scale * low
+        for share, size, scale, length, low in zip(shares, (wide, high), scales, box[2:], box[:2], strict=True)
+    )
+    inner = np.array([[scales[0], 0.0, shift_x], [0.0, scales[1], shift_y], [0.0, 0.0, 1.0]])
+    return np.asarray(matrix @ inner, np.float64)

@@ -348,3 +348,32 @@ def test_curves_that_are_too_far_away_are_refused(drawing, tmp_path, height):
     drawing.modelspace().add_open_spline([(x, 0, height), (x, 100, -height), (x, 200, 0), (x, 900, 0)])
     with pytest.raises(ValueError, match=r"plan.dxf has a curve that reaches beyond 100,000,000 m"):
         load_file(saved(drawing, tmp_path))
+
+
+@pytest.mark.parametrize(
+    ("scale", "turn", "size"), [((1, 2), 90, (6, 20)), ((2, 2), 90, (12, 20)), ((-1, 2), 0, (10, 12))]
+)
+def test_a_turned_block_in_a_block_that_is_scaled_unevenly_is_scaled_after_its_turn(tmp_path, scale, turn, size):
+    made = ezdxf.new("R2010", units=6)
+    made.blocks.new("HALL").add_lwpolyline([(0, 0), (10, 0), (10, 6), (0, 6)], close=True)
+    made.blocks.new("PART").add_blockref("HALL", (1, 2), {"rotation": turn})
+    made.modelspace().add_blockref("PART", (20, 0), {"xscale": scale[0], "yscale": scale[1]})
+    made.saveas(tmp_path / "plan.dxf")
+    x_low, y_low, x_high, y_high = load_file(tmp_path / "plan.dxf").bounds
+    assert (x_high - x_low, y_high - y_low) == pytest.approx(size, abs=0.15)
+
+
+def test_invisible_entities_are_no_walls(tmp_path):
+    made = ezdxf.new("R2010", units=6)
+    made.modelspace().add_lwpolyline([(0, 0), (10, 0), (10, 6), (0, 6)], close=True)
+    made.blocks.new("DOOR").add_line((0, 0), (0, 6), {"invisible": 1})
+    made.modelspace().add_blockref("DOOR", (5, 0))
+    made.modelspace().add_line((3, 0), (3, 6), {"invisible": 1})
+    made.saveas(tmp_path / "plan.dxf")
+    assert describe_floor(load_file(tmp_path / "plan.dxf"))["rooms"] == 1
+
+
+def test_of_several_layers_none_may_be_missing(shared_cases):
+    path = shared_cases / "dxf-layers-and-doors" / "flat.dxf"
+    with pytest.raises(ValueError, match=r"has no layer 'a-furm'; want some of '0', .*'A-WALL'.*'A-FURN'"):
+        load_file(path, layers=("A-WALL", "A-FURM"))

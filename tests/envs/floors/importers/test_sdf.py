@@ -305,3 +305,22 @@ def test_another_document_is_refused(tmp_path):
         load_file(tmp_path / "robot.sdf")
     with pytest.raises(ValueError, match=r"has its own scale"):
         load_file(world(tmp_path, model(WALLS)), 0.1)
+
+
+def ring(*points):
+    inside = "".join(f"<point>{x} {y}</point>" for x, y in points)
+    return f"<polyline>{inside}<height>1</height></polyline>"
+
+
+def test_polylines_within_others_are_their_holes_and_others_are_solids_of_their_own(tmp_path):
+    outer, inner = ring((2, 1), (4, 1), (4, 3), (2, 3)), ring((2.5, 1.5), (3.5, 1.5), (3.5, 2.5), (2.5, 2.5))
+    core, other = ring((2.9, 1.9), (3.1, 1.9), (3.1, 2.1), (2.9, 2.1)), ring((0.5, 0.5), (1, 0.5), (1, 1), (0.5, 1))
+    floor = load_file(world(tmp_path, model(WALLS) + shape(outer + inner + core + other)))
+    assert free_area(floor) == pytest.approx(5.8 * 3.8 - (4.0 - 1.0 + 0.04 + 0.25), rel=0.01)
+
+
+def test_walls_of_a_height_are_walls_where_rooms_and_furniture_are_counted(tmp_path):
+    wall = box("middle", 3.0, 1.3, 0.1, 2.4) + box("rest", 3.0, 3.5, 0.1, 0.9) + box("table", 1.0, 1.0, 1.0, 1.0, 0.75)
+    found = describe_floor(load_file(world(tmp_path, model(WALLS + wall))))
+    assert found["rooms"] == 2
+    assert found["clutter"] == pytest.approx(1.0 / (5.8 * 3.8 - 0.33), rel=0.1)

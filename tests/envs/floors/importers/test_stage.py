@@ -77,3 +77,12 @@ def test_an_endless_name_of_the_picture_is_refused(tmp_path):
     (tmp_path / "a.world").write_text(text)
     with pytest.raises(FileNotFoundError, match="its name is too long"):
         load_file(tmp_path / "a.world")
+
+
+@pytest.mark.parametrize(("colour", "is_wall"), [((255, 0, 0), True), ((0, 0, 255), False)])
+def test_a_coloured_wall_is_one_if_it_has_no_red(tmp_path, colour, is_wall):
+    path = hall(tmp_path)
+    pixels = cv2.cvtColor(cv2.imread(str(tmp_path / "hall.png"), cv2.IMREAD_GRAYSCALE), cv2.COLOR_GRAY2BGR)
+    pixels[MARGIN + 2 : MARGIN + 78, MARGIN + 60 : MARGIN + 62] = colour
+    cv2.imwrite(str(tmp_path / "hall.png"), pixels)
+    assert is_free(load_file(path), 1.03, 1.0) == (not is_wall)

@@ -249,3 +249,60 @@ def test_dark_shares_of_a_drawing_without_a_size_are_refused(tmp_path):
     (tmp_path / "a.svg").write_text("<svg><rect width='50%' height='9'/></svg>")
     with pytest.raises(ValueError, match=r"a.svg .*a share of the drawing, which has no viewBox"):
         load_file(tmp_path / "a.svg", 1.0)
+
+
+def area(tmp_path, inside, root='viewBox="0 0 1000 600"'):
+    """Return the reachable area of a drawing in centimetres [m2]."""
+    (tmp_path / "plan.svg").write_text(f'<svg xmlns="http://www.w3.org/2000/svg" {root}>{inside}</svg>')
+    return describe_floor(load_file(tmp_path / "plan.svg", 0.01))["reachable_m2"]
+
+
+HALL = '<path fill-rule="evenodd" d="M0 0h1000v600h-1000z M20 20v560h960v-560z"/>'
+
+
+def test_parts_of_a_path_that_overlap_are_one_wall_unless_the_rule_is_even_odd(tmp_path):
+    """A partition in two parts that overlap by a metre: by the even-odd rule, it has a door there."""
+    parts = "M490 0h20v350h-20z M490 250h20v350h-20z"
+    assert area(tmp_path, f'{HALL}<path d="{parts}"/>') == pytest.approx(26.3, abs=0.3)
+    assert area(tmp_path, f'{HALL}<path d="{parts}" style="fill-rule: evenodd"/>') == pytest.approx(52.8, abs=0.5)
+    # Parts that run against each other are holes by either rule.
+    hole = "M200 200h400v200h-400z M300 250v100h200v-100z"
+    assert area(tmp_path, f'{HALL}<path d="{hole}"/>') == pytest.approx(9.6 * 5.6 - 8.0, abs=0.5)
+
+
+@pytest.mark.parametrize("width", [10, 30, 50])
+@pytest.mark.parametrize(("cap", "longer"), [("butt", 0.0), ("square", 1.0)])
+def test_a_door_between_ends_of_lines_is_as_wide_as_it_is_drawn(tmp_path, width, cap, longer):
+    lines = f'<path d="M500 0v255 M500 345v255" stroke="black" stroke-width="{width}" stroke-linecap="{cap}"/>'
+    (tmp_path / "plan.svg").write_text(f'<svg viewBox="0 0 1000 600">{HALL}{lines}</svg>')
+    raster = load_file(tmp_path / "plan.svg", 0.01).raster(0.025, 0.3, 0.3)
+    column = raster.solid[:, math.floor((5.0 - raster.origin[0]) / 0.025)]
+    inside = column[math.floor((-5.7 - raster.origin[1]) / 0.025) : math.floor((-0.3 - raster.origin[1]) / 0.025)]
+    assert 0.025 * (inside == 0).sum() == pytest.approx(0.9 - longer * width / 100, abs=0.03)
+
+
+SMALL = '<path fill-rule="evenodd" d="M0 0h100v60h-100z M2 2v56h96v-56z"/>'
+
+
+@pytest.mark.parametrize(
+    "inside",
+    [
+        f'<svg viewBox="0 0 100 60">{SMALL}</svg>',
+        f'<svg viewBox="0 0 100 60" width="100%" height="100%">{SMALL}</svg>',
+        f'<symbol id="a" viewBox="0 0 100 60">{SMALL}</symbol><use href="#a"/>',
+        '<svg viewBox="0 0 100 100" preserveAspectRatio="none">'
+        '<path fill-rule="evenodd" d="M0 0h100v100h-100z M2 3.333v93.333h96v-93.333z"/></svg>',
+    ],
+)
+def test_a_drawing_within_a_drawing_fills_it_by_default(tmp_path, inside):
+    assert area(tmp_path, inside) == pytest.approx(9.6 * 5.6, abs=0.5)
+
+
+@pytest.mark.parametrize(("align", "left"), [("xMinYMid", 0.0), ("xMidYMid", 2.0), ("xMaxYMax", 4.0)])
+def test_a_drawing_within_a_drawing_is_aligned_as_it_says(tmp_path, align, left):
+    square = '<path fill-rule="evenodd" d="M0 0h100v100h-100z M2 2v96h96v-96z"/>'
+    inside = f'<svg viewBox="0 0 100 100" preserveAspectRatio="{align}">{square}</svg>'
+    (tmp_path / "plan.svg").write_text(f'<svg viewBox="0 0 1000 600">{inside}</svg>')
+    floor = load_file(tmp_path / "plan.svg", 0.01)
+    assert floor.bounds[0] == pytest.approx(left + 0.12, abs=0.05)
+    assert floor.bounds[2] == pytest.approx(left + 5.88, abs=0.05)
