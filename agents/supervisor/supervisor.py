@@ -69,7 +69,7 @@ class _Judge:
     def __init__(self, station: MergeStation, standing_by: AbstractSet[str]) -> None:
         self._station, self._standing_by, self._settings = station, standing_by, station.settings
         self._tree = decision_tree(station.settings)
-        self._full_j: dict[str, float] = {}
+        self._first: dict[str, tuple[float, float]] = {}
 
     def judge_alone(self, agent: str) -> _Judged:
         """Put a robot before the tree of which nothing but its last report is known."""
@@ -168,15 +168,15 @@ class _Judge:
     def _is_battery_low(self, agent: str, survey: Survey) -> bool:
         """Whether the battery left would soon not bring a robot home.
 
-        The estimate uses the robot's cost per metre until now.
+        The estimate uses the robot's cost per metre since its first report.
         """
         report = self._station.reports[agent]
         if report.energy_left_j is None:
             return False
-        full = self._full_j.setdefault(agent, report.energy_left_j)
-        if report.travelled_m < MIN_WAY_M:
+        energy_j, travelled_m = self._first.setdefault(agent, (report.energy_left_j, report.travelled_m))
+        if report.travelled_m - travelled_m < MIN_WAY_M:
             return False
-        metre = (full - report.energy_left_j) / report.travelled_m
+        metre = (energy_j - report.energy_left_j) / (report.travelled_m - travelled_m)
         way = survey.way_home_m(agent, report.start)
         # Where the merged map knows no path, the one that it came is one.
         return report.energy_left_j < self._settings.battery_margin * metre * min(way, report.travelled_m)

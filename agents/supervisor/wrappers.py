@@ -124,6 +124,7 @@ class Supervisors:
         level = env.team(0).level
         self.each = [make(level) for _ in range(env.batch.episodes)]
         self._free: list[list[str]] = [[] for _ in self.each]
+        self._directed: NDArray[np.bool_] = np.zeros(env.batch.rows, np.bool_)
 
     def actions(self, actions: Any) -> list[dict[str, Action]]:  # noqa: ANN401
         """Return the actions of each team by agent: those of rows without orders, and orders for the others."""
@@ -136,17 +137,22 @@ class Supervisors:
             for episode, (supervisor, free) in enumerate(zip(self.each, self._free, strict=True))
         ]
 
-    def direct(self) -> NDArray[np.bool_]:
-        """Let the stations decide after a step; return which rows are under an order, (rows,)."""
-        directed: NDArray[np.bool_] = np.zeros(self._rows.rows, np.bool_)
+    def direct(self, *, is_step: bool = True) -> NDArray[np.bool_]:
+        """Let the stations decide after a step; return which rows are under an order, (rows,).
+
+        After a reset only those of episodes that begin decide: orders of the others still wait to be sent.
+        """
+        directed = self._directed.reshape(len(self.each), -1)
         for episode, supervisor in enumerate(self.each):
             team = self._rows.team(episode)
             if team.time_s == 0.0:
                 supervisor.reset(team)
+            elif not is_step:
+                continue
             self._free[episode] = supervisor.direct(team.agents)
-            for agent in set(team.agents).difference(self._free[episode]):
-                directed[episode * self._rows.robots + self._agents.index(agent)] = True
-        return directed
+            under_order = set(team.agents).difference(self._free[episode])
+            directed[episode] = [agent in under_order for agent in self._agents]
+        return self._directed.copy()
 
 
 class SupervisedBatch(_BatchWrapper):
@@ -182,16 +188,16 @@ class SupervisedBatch(_BatchWrapper):
 
     def reset(self, *, seed: Any = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:  # noqa: ANN401
         """Begin episodes; see ``ExplorationVectorEnv.reset``."""
-        return self._direct(*self.env.reset(seed=seed, options=options))
+        return self._direct(*self.env.reset(seed=seed, options=options), is_step=False)
 
     def step(self, actions: Any) -> Step:  # noqa: ANN401
         """Run all episodes by the actions of robots without orders, and the orders of the others."""
         observations, rewards, terminated, truncated, infos = self.env.step(self._stations.actions(actions))
-        observations, infos = self._direct(observations, infos)
+        observations, infos = self._direct(observations, infos, is_step=True)
         return observations, rewards, terminated, truncated, infos
 
-    def _direct(self, observations: Any, infos: dict[str, Any]) -> tuple[Any, dict[str, Any]]:  # noqa: ANN401
-        directed = self._stations.direct()
+    def _direct(self, observations: Any, infos: dict[str, Any], *, is_step: bool) -> tuple[Any, dict[str, Any]]:  # noqa: ANN401
+        directed = self._stations.direct(is_step=is_step)
         if self._masks:
             observations = {**observations, MASK: with_orders(observations[MASK], directed)}
         return observations, {**infos, DIRECTED: directed, f"_{DIRECTED}": np.ones(self.num_envs, np.bool_)}

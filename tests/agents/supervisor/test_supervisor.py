@@ -172,13 +172,14 @@ def test_robots_that_are_about_to_meet_are_separated_where_that_is_asked_for():
     assert commands["b"].target.x < 1.0
 
 
-@pytest.mark.parametrize(("left", "rule"), [(900.0, 0), (105.0, 9)])
-def test_a_robot_turns_back_before_its_battery_is_too_low_to_bring_it_home(left, rule):
+@pytest.mark.parametrize(("first_way", "left", "rule"), [(0.5, 900.0, 0), (0.5, 105.0, 9), (30.0, 240.0, 9)])
+def test_a_robot_turns_back_before_its_battery_is_too_low_to_bring_it_home(first_way, left, rule):
+    """Its first report may come late: the cost of a metre is that since then."""
     levels = hall(openings=(EAST,))
     settings = SupervisorSettings(trusts_starts=True, battery_margin=1.5)
     station = MergeStation(["a"], RESOLUTION, RADIUS, settings)
     supervisor = Supervisor(station, footprint_of(RADIUS))
-    for time_s, way, energy in ((10.0, 0.5, 1000.0), (20.0, 50.0, left)):
+    for time_s, way, energy in ((10.0, first_way, 1000.0), (20.0, 50.0, left)):
         station.receive(
             "a",
             report(levels, 6.5, 2.0, (7.7, 2.0), travelled_m=way, energy_left_j=energy, time_s=time_s),

@@ -6,6 +6,9 @@ from gymnasium.vector import SyncVectorEnv
 from pettingzoo.test import parallel_api_test
 
 import lidarium
+from lidarium.agents.supervisor.supervisor import Command
+from lidarium.agents.supervisor.wrappers import DIRECTED
+from lidarium.envs.onboard.radio.messages import OrderKind
 
 UNKNOWN = {"robots": 2, "resolution": 0.1, "known_starts": False, "map_cells": 64}
 
@@ -203,3 +206,23 @@ def test_a_supervised_policy_can_be_copied():
     for copied in (copy.deepcopy(policy), pickle.loads(pickle.dumps(policy))):
         assert copied.settings == policy.settings
         assert copied.level == policy.level
+
+
+@pytest.mark.parametrize("begins_another", [False, True])
+def test_an_order_is_sent_although_another_episode_begins_meanwhile(begins_another):
+    env = lidarium.Supervised(
+        lidarium.vector_env(2, "srt_corridor", level="frontier", robots=1, known_starts=False, reports=True),
+        period_s=4.0,
+    )
+    env.reset(seed=0)
+    stop = Command("robot_0", OrderKind.STOP, 5, "done")
+    env.supervisors[1]._supervisor.decide = lambda time_s, given_up: [stop] if time_s < 4.5 else []
+    stay = np.full(2, env.single_action_space.n - 1)
+    infos = {DIRECTED: [False, False]}
+    while not infos[DIRECTED][1]:
+        infos = env.step(stay)[-1]
+    if begins_another:
+        _, infos = env.reset(options={"episodes": np.array([True, False])})
+        assert infos[DIRECTED].tolist() == [False, True]
+    assert env.step(stay)[-1]["state"][1] == "stopped"
+    env.close()
