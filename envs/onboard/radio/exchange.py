@@ -17,13 +17,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from lidarium.envs.floors.drawing import draw_segments
+from lidarium.envs.floors.raster import Raster
 from lidarium.envs.onboard.radio.messages import Status
 from lidarium.envs.onboard.sparse_shares import SparseShare, bytes_to_send
 from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.simulation.backend import World
 from lidarium.envs.simulation.disturbances.faults import DEAD_RADIO, has_fault
-from lidarium.envs.simulation.disturbances.radio import RADIO_STREAM, links, links_to
+from lidarium.envs.simulation.disturbances.radio import RADIO_STREAM, asks_for_walls, links, links_to
 from lidarium.envs.simulation.kernels.arrays import ENDED
+from lidarium.envs.simulation.people.crowd import crowd_of
 from lidarium.envs.simulation.simulation import Simulation
 from lidarium.mapping.kernels.compilation import Array, kernel
 
@@ -76,9 +79,8 @@ class RadioLinks:
         if draws and self._is_shadowed:
             self._chance = self._generator.standard_normal(self._chance.shape)
         world, team = self._world, slice(self._rows.start, self._rows.stop)
-        floor = world.floors[self._episode]
-        assert floor is not None
-        self.links = links(self._settings, world.poses[team], floor.laser, self._chance if self._is_shadowed else None)
+        chance = self._chance if self._is_shadowed else None
+        self.links = links(self._settings, world.poses[team], self._barriers(), chance)
         works = self._works(step)
         self.links &= works[:, None] & works[None, :]
 
@@ -87,16 +89,25 @@ class RadioLinks:
         if draws and self._is_shadowed:
             self._station_chance = self._station_generator.standard_normal(len(self.station_links))
         world, team = self._world, slice(self._rows.start, self._rows.stop)
-        floor = world.floors[self._episode]
-        assert floor is not None
         is_linked = links_to(
             self._settings,
             world.poses[team],
             world.starts[self._rows.start],
-            floor.laser,
+            self._barriers(),
             self._station_chance if self._is_shadowed else None,
         )
         self.station_links = is_linked & self._works(int(world.steps[self._episode]))
+
+    def _barriers(self) -> Raster:
+        """Return what is solid in the laser's plane now: the floor, with the leaves of doors that are not open."""
+        floor = self._world.floors[self._episode]
+        assert floor is not None
+        crowd = crowd_of(self._world.population, self._episode) if asks_for_walls(self._settings) else None
+        if crowd is None or not (crowd.opened < 1.0).any():
+            return floor.laser
+        solid = floor.laser.solid.copy()
+        draw_segments(solid, floor.laser.origin, floor.laser.resolution, crowd.leaves[crowd.opened < 1.0], 1)
+        return Raster(solid, floor.laser.origin, floor.laser.resolution)
 
     def reached(self) -> NDArray[np.bool_]:
         """Return whom the station reaches, from robot to robot, (robots,)."""

@@ -125,7 +125,8 @@ def _reached(
     return np.asarray(settings.power - loss > settings.threshold)
 
 
-def _asks_for_walls(settings: RadioSettings) -> bool:
+def asks_for_walls(settings: RadioSettings) -> bool:
+    """Whether links depend on what is between robots."""
     return settings.kind in ("line_of_sight", "signal")
 
 
@@ -147,7 +148,7 @@ def links(
     robots = len(places)
     distance = np.hypot(places[:, None, 0] - places[None, :, 0], places[:, None, 1] - places[None, :, 1])
     walls = np.zeros((robots, robots))
-    if _asks_for_walls(settings):
+    if asks_for_walls(settings):
         _wall_lengths(raster.solid, (places[:, :2] - raster.origin) / raster.resolution, walls)
         walls *= raster.resolution
     above = None if chance is None else np.triu(chance, 1)
@@ -175,7 +176,7 @@ def links_to(
     """
     distance = np.hypot(places[:, 0] - place[0], places[:, 1] - place[1])
     walls = np.zeros(len(places))
-    if _asks_for_walls(settings):
+    if asks_for_walls(settings):
         ends = (np.vstack([places[:, :2], place[None, :2]]) - raster.origin) / raster.resolution
         x, y = ends[-1].tolist()
         walls[:] = [solid_length(raster.solid, from_x, from_y, x, y) for from_x, from_y in ends[:-1].tolist()]

@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 from seen_truth import begun
 
+import lidarium
 from lidarium.envs.onboard.radio.exchange import RadioLinks
+from lidarium.envs.simulation.kernels.arrays import DOOR_KIND, DOOR_OPEN, STAYS_SHUT
 
 NEAR_AND_FAR = np.array([(2.0, 4.0, 0.0), (3.0, 4.0, 0.0), (8.4, 6.3, 0.0)])
 
@@ -63,3 +65,21 @@ def test_messages_are_lost_as_often_as_the_settings_say_and_from_the_seed():
     assert [made.is_lost(is_of_station=False) for _ in range(2000)] == lost
     safe, _ = links_of(kind="all")
     assert not any(safe.is_lost(is_of_station=False) for _ in range(100))
+
+
+@pytest.mark.parametrize("radio", ["line_of_sight", lidarium.RadioSettings(kind="signal", wall_loss=200.0)])
+def test_a_door_that_is_shut_is_between_robots_and_an_open_one_is_not(radio):
+    env = lidarium.parallel_env("apartment", robots=2, radio=radio, doors=1.0, known_starts=False)
+    env.reset(seed=1)
+    world = env.unwrapped.world
+    number, (x, y, to_x, to_y) = next(
+        (k, door[:4]) for k, door in enumerate(world.population.doors_of(0)) if door[DOOR_KIND] == STAYS_SHUT
+    )
+    across = 0.6 * np.array([y - to_y, to_x - x]) / np.hypot(to_x - x, to_y - y)
+    world.poses[:2, :2] = np.array([0.5 * (x + to_x), 0.5 * (y + to_y)]) + np.array([across, -across])
+    links = RadioLinks(world, env.unwrapped.settings, 0)
+    for opened, is_linked in ((0.0, False), (1.0, True)):
+        world.population.doors_of(0)[number, DOOR_OPEN] = opened
+        links.find(0, draws=True)
+        assert links.links[0, 1] == is_linked
+    env.close()
