@@ -102,7 +102,8 @@ class RadioLinks:
         """Return what is solid in the laser's plane now: the floor, with the leaves of doors that are not open."""
         floor = self._world.floors[self._episode]
         assert floor is not None
-        crowd = crowd_of(self._world.population, self._episode) if asks_for_walls(self._settings) else None
+        population = getattr(self._world, "population", None)  # which worlds of users need not have
+        crowd = crowd_of(population, self._episode) if asks_for_walls(self._settings) else None
         if crowd is None or not (crowd.opened < 1.0).any():
             return floor.laser
         solid = floor.laser.solid.copy()
