@@ -264,10 +264,13 @@ _DEFAULTS = {
 Style = dict[str, str]
 
 
-_Layer = tuple[int, NDArray[np.float64] | None, bool, NDArray[np.float64]]
-"""Paint: 1 for solid, 0 for free; edges of an inside, and whether its rings add up; edges of lines (N, 4, 4)."""
+_Layer = tuple[int, NDArray[np.float64] | None, bool, NDArray[np.float64], NDArray[np.float64], float]
+"""Paint: 1 for solid, 0 for free; edges of an inside, and whether its rings add up; lines (N, 4), how far each goes
+beyond its ends, (N, 2), as a share of their width, and that [m]."""
 
 _VALUE: Callable[[_Layer], int] = operator.itemgetter(0)
+
+_NO_LINES = np.zeros((0, 4)), np.zeros((0, 2)), 0.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -319,11 +322,13 @@ def load(path: Path, resolution: float | None) -> Floor:
     solid, origin = np.zeros((rows, columns), np.uint8), (float(low[0]), float(low[1]))
     # One over the other, in the order of painting; those of one colour at once.
     for value, layers in itertools.groupby(itertools.chain.from_iterable(map(_layers, shapes)), _VALUE):
-        _, insides, rules, lines = zip(*layers, strict=True)
+        _, insides, rules, lines, shares, widths = zip(*layers, strict=True)
         for rule in (False, True):
             filled = [each for each, own in zip(insides, rules, strict=True) if each is not None and own == rule]
             fill_shapes(solid, origin, RESOLUTION, filled, value, is_nonzero=rule)
-        fill_shapes(solid, origin, RESOLUTION, np.concatenate(lines), value)
+        of_segments = np.repeat(widths, [len(each) for each in lines])
+        strips = strip_edges(np.concatenate(lines), of_segments, np.concatenate(shares))
+        fill_shapes(solid, origin, RESOLUTION, strips, value)
     floor = floor_of_cells(path, solid == 0, origin, RESOLUTION)
     remarks = [each for each in (floor.remark, *drawing.remarks()) if each]
     return replace(floor, remark="; ".join(remarks))
@@ -334,12 +339,12 @@ def _layers(shape: _Shape) -> Iterator[_Layer]:
     if shape.is_solid_inside is not None:
         rings = [ring_edges(outline) for outline in shape.outlines if len(outline) > 2]
         if rings:
-            yield int(shape.is_solid_inside), np.concatenate(rings), shape.is_nonzero, np.zeros((0, 4, 4))
+            yield int(shape.is_solid_inside), np.concatenate(rings), shape.is_nonzero, *_NO_LINES
     if shape.is_solid_line is not None:
         width = max(shape.width, MIN_WIDTH) if shape.is_solid_line else shape.width
         segments = np.concatenate([np.hstack([line[:-1], line[1:]]) for line in shape.outlines])
         shares = np.concatenate([_beyond_ends(line, shape, width) for line in shape.outlines])
-        yield int(shape.is_solid_line), None, False, strip_edges(segments, width, shares)
+        yield int(shape.is_solid_line), None, False, segments, shares, width
 
 
 def _beyond_ends(line: Polyline, shape: _Shape, width: float) -> NDArray[np.float64]:
@@ -348,7 +353,7 @@ def _beyond_ends(line: Polyline, shape: _Shape, width: float) -> NDArray[np.floa
     That is to its corners, and at free ends as far as the line has caps, or is drawn wider than it is.
     """
     shares = np.full((len(line) - 1, 2), 0.5)
-    if not (shape.has_caps or np.array_equal(line[0], line[-1])):
+    if not (shape.has_caps or (line[0] == line[-1]).all()):
         shares[0, 0] = shares[-1, 1] = 0.5 * (width - min(shape.width, width)) / width if width > 0.0 else 0.0
     return shares
 
