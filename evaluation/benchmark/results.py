@@ -125,7 +125,8 @@ def packed(rows: Iterable[Row]) -> bytes:
         values = [kept[number][column] for number in numbers]
         line = (column, None if len(numbers) == len(kept) else numbers, values)
         lines.append(json.dumps(line, sort_keys=True, separators=(",", ":")))
-    return lzma.compress("\n".join(lines).encode("utf-8"), preset=9 | lzma.PRESET_EXTREME)
+    filters = [{"id": lzma.FILTER_LZMA2, "preset": 9 | lzma.PRESET_EXTREME, "lc": 4, "lp": 0, "pb": 0}]
+    return lzma.compress("\n".join(lines).encode("utf-8"), filters=filters)
 
 
 def collect(
