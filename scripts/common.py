@@ -39,7 +39,7 @@ class Command:
     json: bool = False
     """print the result as JSON on standard output, and nothing else there"""
     given: Suppress[frozenset[str]] = frozenset()
-    """Names of the options that the command line has, also of those that it sets to their default."""
+    """Names of the options given on the command line, including those set to their default."""
 
     compiles: ClassVar[bool] = False
     """Whether the command calls kernels, which the first start compiles."""

@@ -75,7 +75,7 @@ with {horizon:.0f} s.
 
 @dataclass(frozen=True, slots=True)
 class Small(Task):
-    """A small floor, and the part of the time that its bound may take: 1 over this number."""
+    """A small floor; its bound may take the whole time divided by ``part``."""
 
     floor: str
     part: int

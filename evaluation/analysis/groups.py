@@ -54,7 +54,7 @@ class Group:
 
     @property
     def slug(self) -> str:
-        """Part of names of files, no other group's."""
+        """Part of file names, unique to the group."""
         settings = ""
         if self.variant not in ("", DEFAULT_VARIANT):
             digest = hashlib.sha256(self.variant.encode("utf-8", "replace")).hexdigest()

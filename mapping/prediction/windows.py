@@ -81,8 +81,8 @@ class WindowedPrediction:
 def _along(low: int, high: int, size: int, side: int) -> list[int]:
     """Return where windows begin along an axis of which [low, high) is known: one window if it is enough.
 
-    Beside that of almost a window, the squares next to what is known may be beyond the window, on the side of high
-    numbers by up to 7 squares of it. Several windows there, with the whole margin, made tours longer (docs/results).
+    If almost a whole window is known, squares next to it may lie beyond the window, and so may up to 7 known ones at
+    the high end. Several windows there, with the whole margin, made tours longer (docs/results/prediction.md).
     """
     if high - low <= side - SNAP:
         # Where the map is no larger, the window does not move with what is known.

@@ -395,7 +395,7 @@ class _Layers:
         return not (is_off or layer.is_frozen())
 
     def missing(self) -> str | None:
-        """Return a chosen layer that the drawing has not."""
+        """Return a chosen layer that is not in the drawing; None if all are."""
         known = {layer.dxf.name.lower() for layer in self._layers} | self._met
         return min(self._chosen - known, default=None)
 
