@@ -160,7 +160,7 @@ generated floors of the set `validation`. Ratios of times to 99 % with one robot
 [ARiADNE](https://github.com/marmotlab/ARiADNE) sees 80 pixels around and ends when 250 free ones are left
 unseen; so does the preset [`ariadne`](../reference/presets.md), with pixels of 0.1 m. Robots drive here, and see while
 they drive; by its other rules they run on the page of [printed tables](printed.md). *Others*: four of its larger maps,
-and maps of two projects beside it. Ratios are path lengths over that of `nearest_frontier`.
+and maps of two other projects. Ratios are path lengths over that of `nearest_frontier`.
 
 | policy | test: ended so | way [m] | over `nearest_frontier` | others: ended so | way [m] | over `nearest_frontier` |
 |---|---:|---:|---:|---:|---:|---:|

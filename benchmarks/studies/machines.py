@@ -37,7 +37,7 @@ def memory_mb(kind: str = "VmRSS", process: str = "self") -> float:
 
 
 def run_short(folder: Path, first: int, last: int, workers: int) -> dict[str, Any]:
-    """Run the short episodes of some seeds that a folder lacks; return their number and what they took.
+    """Run the missing short episodes of some seeds; return how many ran, with their time and memory.
 
     They have settings of a name of their own: a report compares within settings.
     """

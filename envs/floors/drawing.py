@@ -59,8 +59,8 @@ def fill_shapes(
     shapes : sequence of (E, 4) float64
         Edges x1, y1, x2, y2 of each shape [m]; together they close its rings.
     is_nonzero : bool, optional
-        Whether what is inside several rings of a shape that run in the same direction is inside it. By default the
-        even-odd rule counts, by which it is outside if they are two.
+        Whether to use the nonzero rule: overlaps of rings with the same direction are inside. False by default, which
+        is the even-odd rule: where two rings overlap is outside.
     """
     if not len(shapes):
         return

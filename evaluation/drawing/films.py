@@ -271,7 +271,7 @@ FILMS: Registry[FramesMaker] = Registry("film")
 FILMS.register(
     "maps",
     "lidarium.evaluation.drawing.map_film:MapFrames",
-    "what each robot knows and how maps are joined, if starts are unknown",
+    "the map of each robot, and how maps are joined if starts are unknown",
 )
 FILMS.register(
     "prediction",

@@ -180,7 +180,8 @@ class LaserLog:
     def swept(self, beam_interval_s: float) -> "LaserLog":
         """Return the log with a time from beam to beam [s], and with the stamps of the last beams of its scans.
 
-        Motion within scans whose beams are not in the order of time cannot be undone: a remark says so.
+        If beams are not in the order of time, the interval stays 0 and a remark is added: motion within these scans
+        cannot be corrected.
         """
         if beam_interval_s <= 0.0:
             return self

@@ -42,7 +42,7 @@ class WindowedPrediction:
         self.predicted = 0
 
     def __call__(self, levels: NDArray[np.int8]) -> NDArray[np.float32]:
-        """Return the probability that each square is free, (rows, columns) float32; 0 where none is predicted.
+        """Return the probability that each square is free, (rows, columns) float32; 0 outside all windows.
 
         Windows overlap by half, and squares in several have the mean of theirs, weighted by how central they are.
         """
@@ -66,7 +66,7 @@ class WindowedPrediction:
         return np.divide(total, weights, out=np.zeros_like(total), where=weights > 0.0)
 
     def _begins(self, levels: NDArray[np.int8]) -> list[tuple[int, int]]:
-        """Return where windows begin so that they cover what is known, and a margin around it; see `_along`."""
+        """Return the first square of each window; windows cover the known squares and a margin (see `_along`)."""
         is_known = levels != UNKNOWN
         if not is_known.any():
             return []

@@ -367,7 +367,9 @@ def _entities(path: Path, document: Any, maximum: int, shows: "_Layers") -> Iter
                 waiting.append((layer, iter(parts), matrix))
             else:
                 if (block := entity.block()) is None:
-                    raise ValueError(f"{path} is not a DXF drawing: there is no block {entity.dxf.name!r}")
+                    raise ValueError(
+                        f"{path} is not a DXF drawing: it inserts block {entity.dxf.name!r}, which is missing"
+                    )
                 # ezdxf moves inserts within blocks that are scaled unevenly to wrong places.
                 own = entity.matrix44()
                 waiting.append((layer, iter(block), own if matrix is None else own @ matrix))

@@ -99,7 +99,7 @@ class RadioLinks:
         self.station_links = is_linked & self._works(int(world.steps[self._episode]))
 
     def _barriers(self) -> Raster:
-        """Return what is solid in the laser's plane now: the floor, with the leaves of doors that are not open."""
+        """Return the solid cells of the floor in the laser's plane, including doors that are not fully open."""
         floor = self._world.floors[self._episode]
         assert floor is not None
         population = getattr(self._world, "population", None)  # which worlds of users need not have

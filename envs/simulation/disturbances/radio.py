@@ -126,7 +126,7 @@ def _reached(
 
 
 def asks_for_walls(settings: RadioSettings) -> bool:
-    """Whether links depend on what is between robots."""
+    """Whether walls between robots affect links."""
     return settings.kind in ("line_of_sight", "signal")
 
 

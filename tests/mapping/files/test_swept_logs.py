@@ -1,4 +1,4 @@
-"""Motion within scans is undone from where each beam was taken, or a remark says that it is not."""
+"""Motion within scans is corrected beam by beam; if it cannot be, a remark says so."""
 
 import math
 
