@@ -3,8 +3,6 @@
 Nothing is done in a step if wheels measure exactly and batteries have no limit.
 """
 
-import math
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -42,7 +40,6 @@ class Meters:
         rows = settings.robots * world.episodes
         self.used_j = np.zeros(rows)
         self._path = np.zeros(rows)
-        self._headings = np.zeros(rows)
         self._travelled = np.zeros(rows)
         self._taken_in = np.zeros(world.episodes, np.int64)
 
@@ -52,7 +49,6 @@ class Meters:
         self.used_j[rows] = 0.0
         self._path[rows] = 0.0
         self._taken_in[episode] = 0
-        self._headings[rows] = self._world.poses[rows, 2]
         self._travelled[rows] = self._world.travelled[rows]
 
     def advance(self) -> None:
@@ -73,13 +69,14 @@ class Meters:
 
     def _use_energy(self, rows: NDArray[np.int64], elapsed_s: NDArray[np.float64]) -> None:
         world, battery = self._world, self._battery
-        headings, travelled = world.poses[rows, 2], world.travelled[rows]
-        turning = np.abs((headings - self._headings[rows] + math.pi) % (2.0 * math.pi) - math.pi)
+        travelled = world.travelled[rows]
+        # Not by headings: a robot that is put elsewhere has not turned.
+        turning = np.abs(world.velocities[rows, 1]) * self._time_step
         driven = travelled - self._travelled[rows]
         used = battery.idle_w * elapsed_s + battery.per_metre_j * driven + battery.per_radian_j * turning
         # Robots that have ended are switched off.
         self.used_j[rows] += np.where(world.flags[rows] & ENDED, 0.0, used)
-        self._headings[rows], self._travelled[rows] = headings, travelled
+        self._travelled[rows] = travelled
 
     def travelled_m(self, row: int) -> float:
         """Return the length of a robot's path as its wheels measure it [m]."""

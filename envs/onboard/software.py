@@ -14,6 +14,7 @@ from lidarium.envs.onboard.radio.exchange import CONTACT_S, NEVER
 from lidarium.envs.settings.exploration import KERNEL_LOCALIZATIONS, ExplorationSettings
 from lidarium.envs.simulation.kernels.arrays import ENDED
 from lidarium.envs.simulation.kernels.stepping import ranges_without_teammates
+from lidarium.mapping.geometry.rigid import composed, relative
 from lidarium.mapping.localization.localizer import Sensing
 from lidarium.mapping.localization.registry import make_localizer
 
@@ -41,6 +42,7 @@ class Software:
         self._perception, self._settings = perception, settings
         self._localizes = settings.localization not in KERNEL_LOCALIZATIONS
         self._beams = np.empty(settings.lidar.beams, np.float32)
+        self._reckoned = np.zeros((perception.simulation.episodes * settings.robots, 3))
         has_camera = perception.simulation.camera is not None
         is_fused = perception.simulation.is_fused and not has_camera
         self.is_staged = self._localizes or bool(perception.exchanges) or not is_fused
@@ -52,6 +54,8 @@ class Software:
         """
         robots = self._settings.robots
         if self._localizes:
+            rows = slice(episode * robots, (episode + 1) * robots)
+            self._reckoned[rows] = self._perception.simulation.odometry[rows]
             for robot, lidar in enumerate(self._settings.team_lidars):
                 row = episode * robots + robot
                 localizer = make_localizer(self._settings.localization, lidar, self._settings.localizer)
@@ -89,14 +93,17 @@ class Software:
         simulation, robots = self._perception.simulation, self._settings.robots
         world = simulation.world
         time_s = float(world.steps[episode]) * self._settings.time_step
-        for row in range(episode * robots, (episode + 1) * robots):
-            localizer = self._perception.poses.localizers[row]
-            if localizer is None or world.flags[row] & ENDED:
-                continue
+        localizers, believed = self._perception.poses.localizers, simulation.beliefs.believed
+        rows = range(episode * robots, (episode + 1) * robots)
+        live = [row for row in rows if localizers[row] is not None and not world.flags[row] & ENDED]
+        # Teammates are sought in the scans from where the wheels say that the robots are now.
+        moved = relative(self._reckoned[live], simulation.odometry[live])
+        believed[live], self._reckoned[live] = composed(believed[live], moved), simulation.odometry[live]
+        for row in live:
+            localizer = localizers[row]
+            assert localizer is not None
             ranges_without_teammates(simulation.table, row, robots, self._beams)
-            simulation.beliefs.believed[row] = localizer.localize(
-                Sensing(time_s, simulation.odometry[row].copy(), self._beams.copy())
-            )
+            believed[row] = localizer.localize(Sensing(time_s, simulation.odometry[row].copy(), self._beams.copy()))
             correction = localizer.take_correction()
             if correction is not None:
                 simulation.render_again(row, correction.poses, correction.ranges)

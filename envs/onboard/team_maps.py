@@ -38,7 +38,6 @@ def _sum_maps(beliefs: Array, window: Window, total: Array) -> Array:
     """
     columns, width = total.shape[1], window[3] - window[2]
     changed, count = room_for_cells(), 0
-    nothing = np.zeros(BLOCK, np.int8)
     for row in range(window[0], window[1]):
         if width < BLOCK:
             word = np.uint64(0)
@@ -49,7 +48,7 @@ def _sum_maps(beliefs: Array, window: Window, total: Array) -> Array:
         for block in range(window[2], window[3], BLOCK):
             # The last block may overlap the one before, whose cells it sums again.
             column = min(block, window[3] - BLOCK)
-            word = _sum_block(beliefs, row * columns + column, total, nothing)
+            word = _sum_block(beliefs, row * columns + column, total)
             if word != np.uint64(0):
                 changed, count = list_cells(changed, count, word, row, column)
     cells: Array = changed[:count]
@@ -57,20 +56,14 @@ def _sum_maps(beliefs: Array, window: Window, total: Array) -> Array:
 
 
 @kernel(forceinline=True)
-def _sum_block(beliefs: Array, place: int, total: Array, nothing: Array) -> np.uint64:
+def _sum_block(beliefs: Array, place: int, total: Array) -> np.uint64:
     """Sum a block of the maps.
 
     Tell which of its cells became occupied or ceased to be.
     """
     target = total.ctypes.data + place
     before = positive_cells(target)
-    sum_blocks(
-        beliefs[0, MAP] + place,
-        beliefs[1, MAP] + place if beliefs.shape[0] > 1 else nothing.ctypes.data,
-        target,
-    )
-    for k in range(2, beliefs.shape[0]):
-        sum_blocks(target, beliefs[k, MAP] + place, target)
+    sum_blocks(beliefs[0, MAP:].ctypes.data, beliefs.strides[0], beliefs.shape[0], place, target)
     changed: np.uint64 = before ^ positive_cells(target)
     return changed
 
@@ -80,9 +73,9 @@ def _sum_cell(beliefs: Array, place: int, total: Array) -> bool:
     """Sum a cell of the maps; return whether it became occupied or ceased to be."""
     value = int(vector_at(beliefs[0, MAP] + place, 1, np.int8)[0])
     for k in range(1, beliefs.shape[0]):
-        value = min(max(value + int(vector_at(beliefs[k, MAP] + place, 1, np.int8)[0]), -127), 127)
+        value += int(vector_at(beliefs[k, MAP] + place, 1, np.int8)[0])
     cell = total.reshape(-1)
-    was_occupied, cell[place] = cell[place] > 0, np.int8(value)
+    was_occupied, cell[place] = cell[place] > 0, np.int8(min(max(value, -127), 127))
     return bool(was_occupied != (value > 0))
 
 

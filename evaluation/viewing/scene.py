@@ -16,7 +16,7 @@ from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.floors.faces import GROUND, section_of
 from lidarium.envs.floors.floor import Floor
 from lidarium.envs.settings.robots import Robot
-from lidarium.envs.simulation.depth.frames import LEAF_HEIGHT_M, PERSON_HEIGHT_M
+from lidarium.envs.simulation.kernels.arrays import LEAF_HEIGHT_M, PERSON_HEIGHT_M
 from lidarium.envs.simulation.people.crowd import Crowd
 from lidarium.evaluation.drawing.joined_maps import overlaid, shades_of
 from lidarium.evaluation.report.map_layers import FREE, OCCUPIED, UNKNOWN, coarse, grid_around

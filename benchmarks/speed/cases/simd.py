@@ -45,9 +45,11 @@ def _arrays() -> dict[str, NDArray[Any]]:
     grids = np.stack([draw.integers(2378, 9000, kinds.shape) for _ in range(3)]).astype(np.int32)
     grids[0] *= 5
     table = np.sort(draw.integers(2378, 9000, 4096).astype(np.int32))
+    own, others = (draw.integers(-20, 30, (BLOCKS, BLOCK)).astype(np.int8) for _ in range(2))
     return {
-        "cells": draw.integers(-20, 30, (BLOCKS, BLOCK)).astype(np.int8),
-        "others": draw.integers(-20, 30, (BLOCKS, BLOCK)).astype(np.int8),
+        "cells": own,
+        "others": others,
+        "grid_addresses": np.array([own.ctypes.data, others.ctypes.data]),
         "results": np.zeros((BLOCKS, BLOCK), np.int8),
         "numbers": draw.integers(0, 90, (BLOCKS, BLOCK)).astype(np.uint16),
         "costs": draw.integers(0, 900, (BLOCKS, BLOCK)).astype(np.uint16),
@@ -102,11 +104,13 @@ def _update_block(
 
 
 @_inlined
-def _sum_blocks(first: int, second: int, result: int) -> None:
-    one, other = vector_at(first, BLOCK, np.int8), vector_at(second, BLOCK, np.int8)
+def _sum_blocks(grids: int, stride: int, count: int, place: int, result: int) -> None:
     total = vector_at(result, BLOCK, np.int8)
     for k in range(BLOCK):
-        total[k] = max(min(int(one[k]) + int(other[k]), 127), -127)
+        value = 0
+        for grid in range(count):
+            value += int(vector_at(vector_at(grids + grid * stride, 1, np.int64)[0] + place, BLOCK, np.int8)[k])
+        total[k] = max(min(value, 127), -127)
 
 
 @_inlined
@@ -369,7 +373,7 @@ def _calls() -> dict[str, tuple[Any, Any, Callable[[Any], Any]]]:
             lambda op: (lambda d, k: int(op(d.cells + 64 * k, d.words[k], d.words[k] >> np.uint64(3), 9, 4,
                 -20, 30)))),
         "sum_blocks": (cells.sum_blocks, _sum_blocks,
-            lambda op: (lambda d, k: op(d.cells + 64 * k, d.others + 64 * k, d.results + 64 * k))),
+            lambda op: (lambda d, k: op(d.grid_addresses, 8, 2, 64 * k, d.results + 64 * k))),
         "max_of_groups": (cells.max_of_groups, _max_of_groups,
             lambda op: (lambda d, k: op(d.cells + 64 * (k & ~3), 64, 4, -128, 2, d.results + 64 * k))),
         "half_block_of_levels": (cells.half_block_of_levels, _half_block_of_levels,

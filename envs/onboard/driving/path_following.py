@@ -99,7 +99,8 @@ class Courses(NamedTuple):
     headings : (robots,) float64
         Wanted heading at the end [rad], nan for any.
     states, stood : (robots,) int64
-        State of the drive, and steps for which the robot has stood although it wanted to drive.
+        State of the drive, and steps for which the robot has stood although it wanted to drive; below 0 if it was told
+        to drive and pushes against something that its laser does not see.
     backing : (robots,) int64
         Steps for which the robot still backs out.
     """
@@ -159,12 +160,13 @@ def _drive_on(sensed: Sensed, courses: Courses, bodies: Bodies, robot: int, comm
     speed = yielding_speed(sensed.safety[robot], speed, min(speed, safe_speed(sensed, bodies, robot)))
     commands[robot, 0] = speed
     if speed < STANDING_SPEED:
-        courses.stood[robot] += 1
-        if courses.stood[robot] * bodies.limits[TIME_STEP] >= BLOCKED_S - ROUNDING_S:
-            courses.states[robot] = BLOCKED
+        courses.stood[robot] = max(courses.stood[robot], 0) + 1
     else:
-        courses.stood[robot] = 0
+        is_pushing = abs(sensed.velocities[robot, 0]) < STANDING_SPEED
+        courses.stood[robot] = min(courses.stood[robot], 0) - 1 if is_pushing else 0
         courses.states[robot] = DRIVING
+    if abs(courses.stood[robot]) * bodies.limits[TIME_STEP] >= BLOCKED_S - ROUNDING_S:
+        courses.states[robot] = BLOCKED
 
 
 @kernel(forceinline=True, nrt=False)

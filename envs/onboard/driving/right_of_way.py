@@ -98,8 +98,8 @@ DETOUR = 4.0
 NEAR = 0.6
 """Maximum gap to a teammate that may block a robot [m]."""
 
-BACKING_STEPS = 10
-"""Number of steps that a robot backs out if a wall blocks it."""
+BACKING_S = 1.0
+"""Time for which a robot backs out if a wall blocks it [s]."""
 
 REFUGE_STAY_S = 15.0
 """Longest time that a robot waits aside [s]."""
@@ -218,12 +218,15 @@ class RightOfWay:
             # A wall, not a robot: back out a little along the path by which it came, and plan again.
             if not drives.is_given[row]:
                 self._planner.drive_to(row, goal, [], heading)
-            drives.backing[row] = BACKING_STEPS
+            drives.backing[row] = max(round(BACKING_S / self._settings.time_step), 1)
             return
         is_planned = not drives.is_given[row]
         if is_planned and self._planner.drive_to(row, goal, near, heading, 1.5 * length + DETOUR):
             return
         movable = [other for other in near if other in live]
+        if is_planned and not movable:
+            # Nobody near will ever move: no detour is too long.
+            self._planner.drive_to(row, goal, near, heading)
         for other in sorted(
             movable,
             key=lambda teammate: (drives.states[teammate] not in (IDLE, ARRIVED), -self._rank(teammate)),

@@ -33,6 +33,7 @@ from lidarium.envs.onboard.radio.messages import DriveState, Orders, Route, Targ
 from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.simulation.kernels.arrays import ENDED
 from lidarium.mapping.kernels.work_queue import new_work
+from lidarium.mapping.planning.search.path_search import check_shape
 
 
 class TeamDriver:
@@ -96,9 +97,10 @@ class TeamDriver:
         """Begin an episode: no robot has a target."""
         robots, drives = self._settings.robots, self.drives
         rows = slice(episode * robots, (episode + 1) * robots)
-        self._perception.memory.fit(
-            max(grid.size for grid in self._perception.beliefs.log_odds[rows]), self.planner.passage.slots
-        )
+        grids = self._perception.beliefs.log_odds[rows]
+        for grid in grids:
+            check_shape(grid.shape)
+        self._perception.memory.fit(max(grid.size for grid in grids), self.planner.passage.slots)
         drives.is_ordered[rows], drives.passing[rows], drives.has_path[rows] = False, -1, False
         drives.is_given[rows] = False
         drives.states[rows], drives.stood[rows], drives.counts[rows], drives.backing[rows] = IDLE, 0, 0, 0

@@ -13,6 +13,7 @@ robots that hold copies.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -279,6 +280,10 @@ class Exchange:
         self._radio = RadioLinks(simulation.world, settings, episode)
         self.report_of: Callable[[int], Status] | None = None
         self.start(0)
+
+    def __getstate__(self) -> dict[str, Any]:
+        # The station of a copy answers anew.
+        return {**self.__dict__, "report_of": None}
 
     @property
     def links(self) -> NDArray[np.bool_]:

@@ -220,3 +220,10 @@ class Orders(NamedTuple):
         headings = [math.nan if target is None or target.heading is None else target.heading for target in targets]
         is_ordered = np.array([target is not None for target in targets])
         return cls(is_ordered, np.array(places, np.float64).reshape(-1, 2), np.array(headings, np.float64))
+
+    def overlaid(self, others: "Orders", rows: list[int]) -> "Orders":
+        """Return these orders with those of others for some rows."""
+        merged = Orders(self.is_ordered.copy(), self.targets.copy(), self.headings.copy())
+        for part, other in zip(merged, others, strict=True):
+            part[rows] = other[rows]
+        return merged

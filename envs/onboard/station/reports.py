@@ -7,6 +7,7 @@ robot and has only received data (`Exchange`); its orders reach a robot as long 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
 from functools import partial
+from typing import Any
 from weakref import WeakMethod
 
 import numpy as np
@@ -100,10 +101,18 @@ class Station:
         self._episode = episode
         self._first = episode * perception.settings.robots
         self._received: dict[int, Report] = {}
+        self._answer()
+        self.start()
+
+    def _answer(self) -> None:
+        """Let the robots' radios ask for the status of their robots here."""
         if self._exchange is not None:
             # A weak reference: otherwise the maps of a discarded environment stay until garbage is collected.
             self._exchange.report_of = partial(_call, WeakMethod(self._status))
-        self.start()
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        self._answer()
 
     @property
     def _exchange(self) -> Exchange | None:

@@ -14,7 +14,7 @@ from lidarium.envs.floors.raster import Raster, rectangles_of
 from lidarium.envs.settings.robots import Robot
 from lidarium.envs.simulation.bullet.client import Client
 from lidarium.envs.simulation.bullet.robot_text import LEFT, RIGHT, urdf_of
-from lidarium.envs.simulation.depth.frames import LEAF_HEIGHT_M, PERSON_HEIGHT_M
+from lidarium.envs.simulation.kernels.arrays import LEAF_HEIGHT_M, PERSON_HEIGHT_M
 from lidarium.envs.simulation.kernels.contact import LEAF
 from lidarium.envs.simulation.people.crowd import Crowd
 

@@ -22,6 +22,8 @@ from lidarium.envs.simulation.disturbances.noise import GAUSSIAN_TABLE, gaussian
 from lidarium.envs.simulation.disturbances.odometry import HEIGHT, RADIUS
 from lidarium.envs.simulation.kernels.arrays import (
     DOOR_NUMBERS,
+    LEAF_HEIGHT_M,
+    PERSON_HEIGHT_M,
     WALKER_NUMBERS,
     WALKER_RADIUS,
     WALKER_X,
@@ -34,9 +36,6 @@ from lidarium.mapping.kernels.views import grid_at, scratch_grid, scratch_vector
 
 DEPTH_STREAM = 0x64657074
 """Sets the draws of cameras apart from those of the laser."""
-
-PERSON_HEIGHT_M, LEAF_HEIGHT_M = 1.7, 2.0
-"""Heights of people and of leaves of doors [m]."""
 
 FORWARD, LEFT, UP, PITCH, PAN = range(5)
 """Places in the numbers of a mount."""

@@ -10,7 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.envs.settings.faults import KINDS, MOST_DRAWN, Fault, FaultSettings
-from lidarium.envs.simulation.disturbances.odometry import RADIUS
+from lidarium.envs.simulation.disturbances.odometry import (
+    MAX_ACCELERATION,
+    MAX_SPEED,
+    MAX_TURN_ACCELERATION,
+    MAX_TURN_RATE,
+    RADIUS,
+    WHEEL_BASE,
+)
 from lidarium.mapping.kernels.compilation import Array, kernel
 
 NO_FAULT, LASER_DROPOUT, BLIND_SECTOR, STUCK_WHEEL, KIDNAPPING, DEAD_ROBOT, DEAD_RADIO = range(7)
@@ -85,8 +92,8 @@ def _drawn(settings: FaultSettings, robot: int, longest: float, generator: np.ra
     """Draw the faults that rates bring a robot, in the order of time."""
     faults: list[Fault] = []
     for kind, rate in zip(KINDS[1:], settings.rates, strict=True):
-        time = 0.0
-        while rate > 0.0 and len(faults) < 4 * MOST_DRAWN:
+        time, before = 0.0, len(faults)
+        while rate > 0.0 and len(faults) - before < 4 * MOST_DRAWN:
             time += generator.exponential(3600.0 / rate)
             if time > longest:
                 break
@@ -132,17 +139,24 @@ def has_fault(faults: Array, kind: int, step: int) -> bool:
 
 
 @kernel(nrt=False)
-def stick_wheels(faults: Array, step: int, wheel_base: float, command: Array) -> None:
+def stick_wheels(faults: Array, step: int, body: Array, duration: float, velocity: Array, command: Array) -> None:
     """Reduce a robot's speed and turn rate (2,) if a wheel does not turn.
 
-    The command is replaced by the part that remains.
+    What remains of ``velocity`` and ``command`` is the motion of the other wheel, and within a step of ``duration`` [s]
+    the drive can get from one to the other.
     """
+    base = body[WHEEL_BASE]
     for k in range(0, faults.shape[0], FAULT_NUMBERS):
         if _is_active(faults, k, STUCK_WHEEL, step):
-            side = 0.5 * command[1] * wheel_base
-            turning = command[0] - side if faults[k + WHEEL] != 0.0 else command[0] + side
-            command[0] = 0.5 * turning
-            command[1] = (-turning if faults[k + WHEEL] != 0.0 else turning) / wheel_base
+            side = -1.0 if faults[k + WHEEL] != 0.0 else 1.0
+            now = velocity[0] + side * 0.5 * base * velocity[1]
+            fastest = min(2.0 * body[MAX_SPEED], base * body[MAX_TURN_RATE])
+            gain = min(2.0 * body[MAX_ACCELERATION], base * body[MAX_TURN_ACCELERATION]) * duration
+            now = min(max(now, -fastest), fastest)
+            wanted = min(max(command[0] + side * 0.5 * base * command[1], -fastest), fastest)
+            wanted = now + min(max(wanted - now, -gain), gain)
+            velocity[0], velocity[1] = 0.5 * now, side * now / base
+            command[0], command[1] = 0.5 * wanted, side * wanted / base
 
 
 @kernel(nrt=False)

@@ -129,6 +129,9 @@ nearest person that the laser sees [m]; whether the robot drove into a person in
 PERSON_BEAM, DOOR_BEAM = 1, 2
 """Values of ``recognised``."""
 
+PERSON_HEIGHT_M, LEAF_HEIGHT_M = 1.7, 2.0
+"""Heights of people and of leaves of doors [m]."""
+
 NEAR_M = 0.5
 """A gap to a person below this is a near miss [m]."""
 

@@ -15,6 +15,7 @@ from lidarium.envs.simulation.kernels.arrays import (
     MASK_ROWS,
     MASK_WORDS,
     OWN_MASK,
+    PERSON_GAP,
     RANGE_MAX,
     SCAN_STEPS,
     WorldArrays,
@@ -120,7 +121,14 @@ def footprint(
     sensor, beams = world.sensor[row - first], world.ranges.shape[1]
     directions, lengths, ends = np.empty((4, beams)), np.empty(beams), np.empty((2, beams))
     if is_noisy(sensor) or world.sensor[0, SCAN_STEPS] > 1.0:
+        # What the robot has recognised stays what it saw in its last scan.
+        marks, gap = world.recognised[row : row + 1].copy(), np.inf
+        if world.walkers.shape[0] > 0:
+            gap = world.safety[row, PERSON_GAP]
         measure(world, row, first, robots, directions, np.empty(beams, np.float32), lengths)
+        world.recognised[row : row + 1] = marks
+        if world.walkers.shape[0] > 0:
+            world.safety[row, PERSON_GAP] = gap
     else:
         # The sensor measured the true ranges from here: nothing has to be cast again.
         beam_directions(world.poses[row, 2], beams_of(world, row - first), directions)

@@ -17,12 +17,14 @@ from lidarium.envs.simulation.kernels.arrays import (
     FRAME_X,
     FRAME_Y,
     LASER_HEIGHT,
+    LEAF_HEIGHT_M,
     MAP_RESOLUTION,
     NOISE_FLOOR,
     NOISE_SHARE,
     OPENS,
     PERSON_BEAM,
     PERSON_GAP,
+    PERSON_HEIGHT_M,
     RANGE_MAX,
     RANGE_MIN,
     WALKER_RADIUS,
@@ -98,7 +100,8 @@ def _meet_people(world: WorldArrays, row: int, episode: int, beams: Beams, lengt
     scale, robots = 1.0 / frame[FRAME_RESOLUTION], world.poses.shape[0] // world.steps.shape[0]
     marks, own = world.recognised[row], world.bodies[row - episode * robots, RADIUS]
     nearest = np.inf
-    for person in range(walkers.shape[0]):
+    is_above = world.sensor[row - episode * robots, LASER_HEIGHT] >= PERSON_HEIGHT_M
+    for person in range(0 if is_above else walkers.shape[0]):
         x = (walkers[person, WALKER_X] - frame[FRAME_X]) * scale
         y = (walkers[person, WALKER_Y] - frame[FRAME_Y]) * scale
         radius = walkers[person, WALKER_RADIUS]
@@ -139,10 +142,13 @@ def measure(
             cut_by_disc(beams, other_x, other_y, radius, lengths)
     if world.recognised.shape[0] > 0:
         world.recognised[row, :] = 0
+        # Beams that are blind recognise nobody.
+        blind_beams(world.faults[row], world.steps[episode], angle_first, increment, ranges, lengths)
+    # Doors first: people behind one are not seen.
+    if world.doors.shape[0] > 0 and sensor[LASER_HEIGHT] < LEAF_HEIGHT_M:
+        _meet_doors(world, row, episode, beams, lengths)
     if world.walkers.shape[0] > 0:
         _meet_people(world, row, episode, beams, lengths)
-    if world.doors.shape[0] > 0:
-        _meet_doors(world, row, episode, beams, lengths)
     scale = 1.0 / sensor[MAP_RESOLUTION]
     longest = sensor[RANGE_MAX]
     for beam in range(lengths.shape[0]):
@@ -150,7 +156,17 @@ def measure(
         true_range = np.float32(lengths[beam] * resolution * ROUND_UP)
         ranges[beam] = true_range if met else np.float32(np.inf)
         lengths[beam] = min(true_range, longest) * scale if met else longest * scale
+    _lose_near(sensor[RANGE_MIN], ranges, lengths)
     blind_beams(world.faults[row], world.steps[episode], angle_first, increment, ranges, lengths)
+
+
+@kernel(forceinline=True, nrt=False)
+def _lose_near(range_min: float, ranges: Array, lengths: Array) -> None:
+    """Make beams invalid whose range is too short to be measured: ``ranges`` nan, ``lengths`` 0."""
+    low = np.float32(range_min)
+    for beam in range(ranges.shape[0]):
+        if ranges[beam] < low:
+            ranges[beam], lengths[beam] = np.float32(np.nan), 0.0
 
 
 @kernel(nrt=False)
@@ -193,6 +209,7 @@ def disturb_robot(world: WorldArrays, row: int, first: int, robots: int, scratch
     """Disturb true ranges of one robot that are not of ``measure`` as the sensor does."""
     sensor, faults = world.sensor[row - first], world.faults[row]
     step, ranges = world.steps[first // robots], world.true_ranges[row]
+    _lose_near(sensor[RANGE_MIN], ranges, scratch.lengths)
     blind_beams(faults, step, sensor[ANGLE_FIRST], sensor[ANGLE_INCREMENT], ranges, scratch.lengths)
     world.ranges[row, :] = ranges
     if is_noisy(sensor):

@@ -14,7 +14,6 @@ from lidarium.envs.simulation.coverage import share_new_cells
 from lidarium.envs.simulation.disturbances.faults import DEAD_ROBOT, has_fault, kidnap, stick_wheels
 from lidarium.envs.simulation.disturbances.noise import stream_key
 from lidarium.envs.simulation.disturbances.odometry import (
-    WHEEL_BASE,
     Encoders,
     disturb_commands,
     read_encoders,
@@ -93,7 +92,14 @@ def _drive(world: WorldArrays, episode: int, robots: int, commands: Array) -> No
         disturb_commands(world.odometry_model, world.noise_table, world.seeds[episode], step, world.driven[first:last])
     for row in range(first, last):
         faults = world.faults[row]
-        stick_wheels(faults, step, world.bodies[row - first, WHEEL_BASE], world.driven[row])
+        stick_wheels(
+            faults,
+            step,
+            world.bodies[row - first],
+            world.sensor[0, TIME_STEP],
+            world.velocities[row],
+            world.driven[row],
+        )
         if has_fault(faults, DEAD_ROBOT, step) and world.failed[row] == 0:
             world.moves[row], world.failed[row] = 0, 1
         if kidnap(faults, step, row - first, world.bodies, world.poses[first:last]):

@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 
 from lidarium.envs.floors.floor import Floor
 from lidarium.envs.floors.raster import Raster
-from lidarium.envs.simulation.depth.frames import PERSON_HEIGHT_M
 from lidarium.envs.simulation.disturbances.odometry import RADIUS
 from lidarium.envs.simulation.kernels.arrays import (
     CLOSEST,
@@ -17,6 +16,7 @@ from lidarium.envs.simulation.kernels.arrays import (
     DOOR_OPEN,
     OPENS,
     PERSON_GAP,
+    PERSON_HEIGHT_M,
     SAFETY_NUMBERS,
     STAYS_SHUT,
     WALKER_NUMBERS,

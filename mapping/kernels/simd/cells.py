@@ -98,17 +98,28 @@ def _(builder: Builder, address: Value) -> Value:
     call(builder, "llvm.prefetch.p0", ir.VoidType(), pointer, for_writing, near, data)
 
 
-def sum_blocks(first: int, second: int, result: int) -> None:
-    """Write the sum of two blocks, clipped to [-127, 127], into a third, which may be one of the two."""
-    one, other = (vector_at(address, BLOCK, np.int8) for address in (first, second))
-    vector_at(result, BLOCK, np.int8)[:] = np.clip(one.astype(int) + other, -127, 127)
+def sum_blocks(grids: int, stride: int, count: int, place: int, result: int) -> None:
+    """Write the sum of the blocks at a place in up to 255 grids, clipped to [-127, 127].
+
+    The addresses of the grids lie from ``grids`` on, ``stride`` bytes apart.
+    """
+    starts = [int(vector_at(grids + k * stride, 1, np.int64)[0]) for k in range(count)]
+    total = sum(vector_at(start + place, BLOCK, np.int8).astype(int) for start in starts)
+    vector_at(result, BLOCK, np.int8)[:] = np.clip(total, -127, 127)
 
 
-@llvm_overload(sum_blocks, types.void, *(types.int64,) * 3)
-def _(builder: Builder, first: Value, second: Value, result: Value) -> Value:
-    one, other, old = (load_at(builder, address, BYTES) for address in (first, second, result))
-    total = lanewise(builder, "smax", lanewise(builder, "sadd.sat", one, other), constant(BYTES, -127))
-    with if_any(builder, builder.icmp_signed("!=", total, old)):
+@llvm_overload(sum_blocks, types.void, *(types.int64,) * 5)
+def _(builder: Builder, grids: Value, stride: Value, count: Value, place: Value, result: Value) -> Value:
+    none, one = ir.Constant(LONG, 0), ir.Constant(LONG, 1)
+    sums = stack_slot(builder, NO_SHORTS)
+    with cgutils.for_range_slice(builder, none, count, one, intp=LONG) as (k, _):
+        start = load_at(builder, builder.add(grids, builder.mul(k, stride)), LONG)
+        block = builder.sext(load_at(builder, builder.add(start, place), BYTES), SHORTS)
+        # Clipped once, at the end: the order of the grids does not matter.
+        builder.store(builder.add(builder.load(sums), block), sums)
+    clipped = lanewise(builder, "smin", builder.load(sums), constant(SHORTS, 127))
+    total = builder.trunc(lanewise(builder, "smax", clipped, constant(SHORTS, -127)), BYTES)
+    with if_any(builder, builder.icmp_signed("!=", total, load_at(builder, result, BYTES))):
         store_at(builder, total, result)
 
 

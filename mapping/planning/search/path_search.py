@@ -241,6 +241,16 @@ MAX_CELLS_A_SIDE = 2**15 - 1
 """Maximum number of cells per side of a grid: a row and a column fit into 32 bits."""
 
 
+def check_shape(shape: tuple[int, ...]) -> None:
+    """Raise ValueError if a map of ``shape`` (rows, columns) cannot be searched."""
+    if not all(0 < side <= MAX_CELLS_A_SIDE for side in shape):
+        rows, columns = shape
+        raise ValueError(
+            f"a map of {rows} rows and {columns} columns cannot be searched; want 1 to {MAX_CELLS_A_SIDE} cells a "
+            "side, so take larger cells (map_resolution)"
+        )
+
+
 class SearchSpace:
     """Scratch memory of the searches over one grid; each search forgets the previous one.
 
@@ -253,8 +263,7 @@ class SearchSpace:
     """
 
     def __init__(self, shape: tuple[int, int], resolution: float) -> None:
-        if not (0 < shape[0] <= MAX_CELLS_A_SIDE and 0 < shape[1] <= MAX_CELLS_A_SIDE):
-            raise ValueError(f"shape is {tuple(shape)}; want 1 to {MAX_CELLS_A_SIDE} cells a side")
+        check_shape(shape)
         if not resolution > 0.0:
             raise ValueError(f"resolution is {resolution} m; want a positive side of a cell")
         cells = shape[0] * shape[1]

@@ -8,6 +8,7 @@ import pytest
 import lidarium
 from lidarium.envs.floors.floor import Floor
 from lidarium.envs.settings.battery import BATTERIES, Battery
+from lidarium.envs.settings.faults import Fault, FaultSettings
 
 HALL = Floor("hall", (0.0, 0.0, 20.0, 12.0))
 SIMPLE = Battery(capacity_j=1000.0, idle_w=2.0, per_metre_j=5.0, per_radian_j=3.0)
@@ -136,3 +137,11 @@ def test_the_odometer_tells_what_wheels_tell_not_the_truth():
 def test_batteries_that_cannot_be_are_refused(values, message):
     with pytest.raises(ValueError, match=message):
         Battery(**values)
+
+
+def test_a_robot_that_is_put_elsewhere_has_not_turned():
+    away = Fault(kind="kidnapping", robot=0, at_s=1.0, place=(5.0, 3.0, 3.0))
+    env = hall(battery=SIMPLE, faults=FaultSettings(schedule=(away,)))
+    infos = drive(env, 20, (0.0, 0.0))[4]
+    assert env.world.poses[0, 2] == 3.0
+    assert infos["robot_0"]["energy_j"] == pytest.approx(2.0 * 2.0)

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import lidarium
+from lidarium.envs.floors.floor import Floor
 from lidarium.envs.settings.making import REALISM, make_settings
 from lidarium.evaluation.episodes.runner import run_episode
 from lidarium.mapping.geometry.rigid import Transform
@@ -170,3 +171,21 @@ def test_unknown_names_are_refused_with_those_that_are_known():
     with pytest.raises(ValueError, match="localization is 'gps'; want one of truth, odometry"):
         make_settings(localization="gps")
     assert set(REALISM) == {"ideal", "lab", "field", "fast"}
+
+
+@pytest.mark.parametrize("turn_rate", [0.0, 0.5, 2.0])
+def test_localizers_do_not_see_teammates_also_while_their_robot_turns(localizers, turn_rate):
+    env = lidarium.parallel_env(
+        Floor("room", (0.0, 0.0, 10.0, 6.0)), robots=2, localization="reckoner", stop_coverage=None
+    )
+    env.reset(seed=0, options={"starts": [(3.0, 3.0, 0.2), (6.0, 3.0, 0.0)]})
+    share = np.float32(turn_rate / env.settings.robot.max_turn_rate)
+    nearer = 0
+    for _ in range(8):
+        env.step({"robot_0": np.array([0.0, share], np.float32), "robot_1": np.zeros(2, np.float32)})
+        seen = env.perception.poses.localizers[0].keys[-1][1]
+        angles = env.settings.lidar.angles + env.world.poses[0, 2]
+        towards = np.abs((angles + math.pi) % (2.0 * math.pi) - math.pi) < 0.05
+        nearer += int((env.simulation.ranges[0][towards] < 3.0).sum())
+        assert np.isnan(seen[towards]).all()
+    assert nearer > 50

@@ -17,7 +17,7 @@ from lidarium.envs.floors.catalogue.names import load_floor
 from lidarium.envs.floors.floor import Solid
 from lidarium.envs.settings.making import make_settings
 from lidarium.envs.settings.robots import ROBOTS
-from lidarium.envs.simulation.depth.frames import LEAF_HEIGHT_M
+from lidarium.envs.simulation.kernels.arrays import LEAF_HEIGHT_M
 from lidarium.envs.simulation.people.crowd import Crowd
 from lidarium.evaluation.episodes.runner import run_episode
 from lidarium.evaluation.episodes.watching import WatchedExploration

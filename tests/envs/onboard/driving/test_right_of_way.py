@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from driven_teams import CORRIDOR, Teams
 
-from lidarium.envs.floors.floor import Floor
+from lidarium.envs.floors.floor import Floor, Solid
 from lidarium.envs.onboard.driving.path_following import ARRIVED, BLOCKED, DRIVING
-from lidarium.envs.onboard.driving.right_of_way import BACKING_STEPS, REFUGE_STAY_S, RightOfWay, obstructing
+from lidarium.envs.onboard.driving.right_of_way import BACKING_S, REFUGE_STAY_S, RightOfWay, obstructing
 from lidarium.envs.onboard.radio.messages import Orders, Target
 from lidarium.envs.simulation.kernels.arrays import ENDED
 
@@ -31,9 +31,9 @@ def met(floor=CORRIDOR, starts=MET, targets=((5.2, 1.5), (1.9, 1.5))):
 
 
 def test_what_blocks_a_robot_far_from_all_others_is_a_wall():
-    _, drives, right_of_way = met(OPEN, [[1.0, 2.0, 0.0], [4.0, 2.0, 0.0]], ((2.5, 2.0), None))
+    teams, drives, right_of_way = met(OPEN, [[1.0, 2.0, 0.0], [4.0, 2.0, 0.0]], ((2.5, 2.0), None))
     right_of_way.settle_team(0)
-    assert drives.backing.tolist() == [BACKING_STEPS, 0]
+    assert drives.backing.tolist() == [round(BACKING_S / teams.settings.time_step), 0]
     assert drives.states[0] == DRIVING
     assert drives.passing.tolist() == [-1, -1]
 
@@ -103,3 +103,22 @@ def test_who_gave_way_goes_on_when_the_other_has_passed_ended_or_takes_too_long(
         assert drives.has_path[1] == (happens is not end)
         if drives.has_path[1]:
             assert teams.driver.planner.remaining(1)[-1] == pytest.approx([1.9, 1.5], abs=0.05)
+
+
+def test_no_way_round_a_robot_that_has_ended_is_too_long():
+    block = Solid(np.array([(1.5, 0.6), (6.5, 0.6), (6.5, 5.0), (1.5, 5.0)]))
+    loop = Floor("loop", (0.0, 0.0, 8.0, 6.0), (block,))
+    starts, targets = [[2.0, 0.3, 0.0], [2.6, 0.3, 0.0]], ((5.0, 0.3), None)
+    teams, drives, right_of_way = met(loop, starts, targets)
+    for row, log_odds in enumerate(teams.perception.beliefs.log_odds):
+        y, x = (np.indices(log_odds.shape) + 0.5) * 0.05 + np.reshape(teams.driver.planner.origin(row)[::-1], (2, 1, 1))
+        log_odds[:] = -40
+        log_odds[(x < 0) | (x > 8) | (y < 0) | (y > 6) | (x > 1.5) & (x < 6.5) & (y > 0.6) & (y < 5.0)] = 70
+        teams.perception.beliefs.windows[row] = 0, log_odds.shape[0], 0, log_odds.shape[1]
+    teams.perception.world.steps += 1
+    teams.perception.world.flags[1] |= ENDED
+    right_of_way.settle_team(0)
+    left = teams.driver.planner.remaining(0)
+    assert drives.states[0] == DRIVING
+    assert np.hypot(*np.diff(left, axis=0).T).sum() > 14.0
+    assert not obstructing(np.array([2.6, 0.3]), left, APART)

@@ -1,15 +1,18 @@
 """Orders become paths, and paths are kept until orders change."""
 
 import numpy as np
+import pytest
 from driven_teams import FLOORS, HALL, ROBOTS, SEEDS, Teams
 
+import lidarium
+from lidarium.envs.floors.floor import Floor, Solid
 from lidarium.envs.onboard.driving.drives import (
     any_newly_done,
     is_done,
     mark_waiting,
 )
 from lidarium.envs.onboard.navigation import FLAGS
-from lidarium.envs.onboard.radio.messages import Orders, Target
+from lidarium.envs.onboard.radio.messages import DriveState, Orders, Target
 from lidarium.envs.simulation.kernels.arrays import ENDED
 
 
@@ -57,3 +60,18 @@ def test_robots_that_have_ended_are_not_planned_for():
     teams.driver.assign(teams.every, Orders.of([Target(1.0, 0.0)] * ROBOTS))
     teams.driver.prepare()
     assert teams.driver.drives.has_path.tolist() == [False, True]
+
+
+def test_a_robot_that_pushes_against_what_its_laser_does_not_see_backs_out():
+    low = Solid(np.array([(3.0, 1.0), (3.4, 1.0), (3.4, 2.0), (3.0, 2.0)]), 0.0, 0.2)
+    floor, options = Floor("low", (0.0, 0.0, 6.0, 3.0), (low,)), {"stop_coverage": None, "horizon_s": 15.0}
+    env = lidarium.parallel_env(floor, robots=1, level="waypoint", decision_period_s=0.5, **options)
+    env.reset(seed=0, options={"starts": [(1.0, 1.5, 0.0)]})
+    target = Target(*(np.array([5.0, 1.5]) - env.belief("robot_0").frame))
+    places, states = [], []
+    while env.agents:
+        states.append(env.step({"robot_0": target})[4]["robot_0"]["drive"])
+        places.append(env.world.poses[0, 0])
+    assert DriveState.BLOCKED in states
+    assert max(places) == pytest.approx(3.0 - env.settings.robot.radius, abs=0.01)
+    assert np.diff(places).min() < -0.02

@@ -71,11 +71,21 @@ def test_a_stuck_wheel_lets_the_robot_turn_about_it(wheel, sign):
     env, _ = run(Fault(kind="stuck_wheel", wheel=wheel, at_s=0.0, lasts_s=2.0), steps=20)
     world, base = env.world, env.settings.robot.wheel_base
     assert sign * world.poses[0, 2] > 0.3
-    # The wheel that sticks stays where it is, but for the first steps in which the drive still picks up
-    # speed.
     radius = world.velocities[0, 0] / world.velocities[0, 1]
-    assert abs(radius) == pytest.approx(base / 2.0, rel=0.05)
+    assert abs(radius) == pytest.approx(base / 2.0)
+    # The wheel that sticks stays where it was.
+    x, y, heading = world.poses[0]
+    assert x - sign * base / 2.0 * math.sin(heading) == pytest.approx(4.0)
+    assert y + sign * base / 2.0 * math.cos(heading) == pytest.approx(4.0 + sign * base / 2.0)
     assert world.poses[1, 2] == 0.0
+
+
+def test_a_wheel_that_gets_stuck_at_full_speed_stops_at_once():
+    env, _ = run(Fault(kind="stuck_wheel", wheel="left", at_s=2.0), steps=40, action=(5.0, 0.0))
+    speed, turn_rate = env.world.velocities[0]
+    # The other wheel cannot turn the robot faster than it may turn.
+    assert turn_rate == pytest.approx(env.settings.robot.max_turn_rate)
+    assert speed == pytest.approx(turn_rate * env.settings.robot.wheel_base / 2.0)
 
 
 def test_a_kidnapped_robot_is_elsewhere_and_what_it_knows_is_not_told():
@@ -145,6 +155,14 @@ def test_rates_draw_as_many_faults_as_they_say():
     assert (kinds == KINDS.index("laser_dropout")).sum() / 160 == pytest.approx(6.0, rel=0.1)
     assert (kinds == KINDS.index("stuck_wheel")).sum() / 160 == pytest.approx(3.0, rel=0.15)
     assert kinds.shape[2] == MOST_DRAWN
+
+
+def test_a_frequent_kind_of_fault_leaves_room_for_the_others():
+    # The first of all kinds are kept, even where one alone would fill the table many times over.
+    settings = FaultSettings(laser_dropout=300.0, stuck_wheel=300.0)
+    kinds = plan_faults(settings, 40, 0, 0.1, 1800.0, PLACES).reshape(40, -1, FAULT_NUMBERS)[..., 0]
+    for kind in ("laser_dropout", "stuck_wheel"):
+        assert (kinds == KINDS.index(kind)).mean() == pytest.approx(0.5, abs=0.05)
 
 
 def test_the_same_seed_draws_the_same_faults():

@@ -107,3 +107,12 @@ def test_beams_that_a_fault_takes_are_invalid_also_in_ranges_of_other_worlds():
     disturb_scan(world._table, 0, 1)
     assert world.ranges[0, :2].tolist() == [0.5, 0.75]
     assert np.isnan(world.ranges[0, 2])
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.001])
+def test_ranges_below_the_least_that_is_measured_are_invalid(noise):
+    near = replace(LIDAR, range_min=1.5, noise_floor=noise)
+    world = scanned([[1.0, 1.5, 0.0]], near)
+    assert math.isnan(world.ranges[0, 0])
+    assert world.ranges[0, 1] == math.inf
+    assert world.ranges[0, 2] == pytest.approx(2.475, abs=0.01)

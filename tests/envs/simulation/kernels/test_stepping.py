@@ -126,6 +126,7 @@ def test_drives_are_disturbed_stuck_dead_or_put_elsewhere():
     simulation = team(faults=FaultSettings(schedule=schedule))
     world = simulation.world
     world.steps[:] = 0
+    world.velocities[0] = 0.2, 0.0
     drive(simulation.table, 2, AHEAD, FIRST)
     # The right wheel alone: half the speed, turning to the left about the left wheel.
     assert world.driven[0] == pytest.approx([0.1, 0.2 / KOBUKI.wheel_base])

@@ -6,6 +6,7 @@ from doored_rooms import robot_at_door
 
 from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.floors.floor import Floor
+from lidarium.envs.settings.faults import Fault, FaultSettings
 from lidarium.envs.settings.making import make_settings
 from lidarium.envs.simulation.kernels.arrays import (
     BY_ROBOT,
@@ -15,15 +16,25 @@ from lidarium.envs.simulation.kernels.arrays import (
     DOOR_OPEN,
     DOOR_X,
     DOOR_Y,
+    MAP_RESOLUTION,
     OPENS,
+    PERSON_BEAM,
+    PERSON_GAP,
+    RANGE_MAX,
     STAYS_SHUT,
     WALKER_RADIUS,
+    WALKER_VX,
+    WALKER_VY,
     WALKER_WAIT,
     WALKER_X,
     WALKER_Y,
+    world_at,
 )
+from lidarium.envs.simulation.kernels.masks import footprint
 from lidarium.envs.simulation.people.crowd import crowd_of
 from lidarium.mapping.geometry.rigid import Transform
+from lidarium.mapping.grids.scan_polygon import window_rows, window_words
+from lidarium.mapping.kernels.compilation import kernel
 
 HALL = Floor("hall", (0.0, 0.0, 8.0, 6.0))
 START = {"starts": [(2.0, 3.0, 0.0)]}
@@ -116,3 +127,39 @@ def test_in_pybullet_a_shut_door_stops_a_robot():
     leaf = 0.5 * (door[[DOOR_X, DOOR_Y]] + door[[DOOR_END_X, DOOR_END_Y]])
     assert env.world.poses[0, 0] < leaf[0] - 0.15
     env.close()
+
+
+@pytest.mark.parametrize("hidden_by", ["a door", "a dropout", "its height", None])
+def test_robots_recognise_only_people_of_whom_their_laser_sees_a_part(hidden_by):
+    dropout = FaultSettings(schedule=(Fault(kind="laser_dropout", at_s=0.0),))
+    options = {
+        "a dropout": {"faults": dropout},
+        "its height": {"robot": {"height": 2.2}, "lidar": {"height": 1.9}},
+    }
+    env, door = robot_at_door(STAYS_SHUT, people=1, **options.get(hidden_by, {}))
+    door[DOOR_OPEN] = 0.0 if hidden_by == "a door" else 1.0
+    population = env.simulation.population
+    walker = population.people_of(0)[0]
+    walker[[WALKER_X, WALKER_Y, WALKER_VX, WALKER_VY, WALKER_WAIT]] = 4.5, 1.95, 0.0, 0.0, 1000.0
+    env.step({"robot_0": np.zeros(2, np.float32)})
+    gap = 3.5 - walker[WALKER_RADIUS] - env.settings.robot.radius
+    assert population.safety[0, PERSON_GAP] == (pytest.approx(gap) if hidden_by is None else np.inf)
+    assert (population.recognised[0] == PERSON_BEAM).any() == (hidden_by is None)
+
+
+def test_looking_where_a_robot_would_see_does_not_change_whom_it_has_seen():
+    env = begun(people=3, scan_period_s=0.4, noise="datasheet")
+    population, sensor = env.simulation.population, env.simulation.sensor[0]
+    reach = sensor[RANGE_MAX] / sensor[MAP_RESOLUTION]
+    for _ in range(10):
+        env.step({"robot_0": np.array([0.3, 0.5], np.float32)})
+        before = population.recognised.copy(), population.safety.copy()
+        look(env.simulation.table, np.zeros((window_rows(reach), window_words(reach)), np.uint64))
+        assert np.array_equal(population.recognised, before[0])
+        assert np.array_equal(population.safety, before[1])
+    assert before[0].any()
+
+
+@kernel
+def look(table, bits):
+    footprint(world_at(table), 0, 0, 1, bits)

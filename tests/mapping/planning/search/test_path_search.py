@@ -16,6 +16,7 @@ from lidarium.mapping.planning.search.path_search import (
     SearchMemory,
     SearchSpace,
     budget_of,
+    check_shape,
     clear_memory,
     find_path,
     search_all,
@@ -148,3 +149,10 @@ def test_the_reached_cells_are_those_with_finite_costs():
     mask = np.zeros(belief.shape, bool)
     mask[tuple(found.reached().T)] = True
     np.testing.assert_array_equal(mask, np.isfinite(found.costs()))
+
+
+@pytest.mark.parametrize("shape", [(32_768, 2), (2, 32_768), (0, 5)])
+def test_maps_whose_cells_have_no_number_are_refused(shape):
+    rows, columns = shape
+    with pytest.raises(ValueError, match=f"a map of {rows} rows and {columns} columns cannot be searched; want 1 to"):
+        check_shape(shape)
