@@ -189,7 +189,7 @@ class Engine:
         self._all_step = bytes([STEPS]) * self.episodes
         order = np.arange(self.episodes)
         self._orders = [order, order[::-1].copy()]
-        self._copies = copy
+        self.copies = copy
         self._calibration = self._calibration_rows()
         self.use_level(level)
 
@@ -198,6 +198,10 @@ class Engine:
 
         ``shares_map`` and ``decision_period_s`` are those of `Level`.
         """
+        self.take_level(name, self.made_level(name, shares_map, decision_period_s))
+
+    def made_level(self, name: str, shares_map: bool = True, decision_period_s: float | None = None) -> Level:
+        """Return a level of this engine, which does not use it yet."""
         check_level(self.settings.observe, name)
         level = LEVELS[name](self.perception, self.settings, shares_map, decision_period_s)
         period = self.settings.scan_period_s
@@ -206,11 +210,20 @@ class Engine:
                 f"scan_period_s is {period} s, longer than a decision of {level.period_s} s at "
                 f"level {name!r}; want at most that"
             )
+        return level
+
+    def space_at(self, level: Level) -> spaces.Dict:
+        """Return the space of the observations of a row at a level."""
+        return spaces.Dict({**observation_space(self.settings, self.has_goal).spaces, **level.boxes})
+
+    def take_level(self, name: str, level: Level) -> None:
+        """Let actions be those of a level; episodes have to begin anew."""
         self.level: Level = level
         self.level_name = name
         self.operating.attach(self.level.driver, self.level.make_driver)
-        known = observation_space(self.settings, self.has_goal).spaces
-        self.observation_space = spaces.Dict({**known, **self.level.boxes})
+        self.floors[:] = [None] * self.episodes
+        self.live[:], self.is_whole = False, False
+        self.observation_space = self.space_at(level)
         self.action_space = self.level.action_space
         self._boxes = {**self._computed.boxes, **self.level.boxes}
         self._written = self._writer.kinds
@@ -557,7 +570,7 @@ class Engine:
         }
 
     def _new_buffers(self) -> Arrays:
-        arrays: Arrays = {name: np.empty(shape, dtype) for name, (shape, dtype) in self._written.items()}
+        arrays: Arrays = {name: np.zeros(shape, dtype) for name, (shape, dtype) in self._written.items()}
         for name, box in self._boxes.items():
             arrays[name] = np.zeros((self.rows, *(box.shape or ())), box.dtype)
         return arrays
@@ -568,9 +581,7 @@ class Engine:
         By default (None) all rows are seen.
         """
         before = self.observations
-        if self._copies:
-            self.observations = self._new_buffers()
-        elif not is_same_step:
+        if not is_same_step:
             self._buffers.reverse()
             self.observations = self._buffers[0]
         if seen is not None and self.observations is not before and not seen.all():

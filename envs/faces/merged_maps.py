@@ -65,7 +65,8 @@ class MergedMaps(TeamWrapper):
         self._can_talk = can_talk
         self._use(base.engine)
         self._index = {agent: row for row, agent in enumerate(self.possible_agents)}
-        boxes = team_boxes(len(self.possible_agents), self.settings.map_cells)
+        if len(self.possible_agents) > 1 and getattr(env, "minimum_robots", 2) < 2:
+            raise ValueError("teams of one robot are drawn; want two robots or more, as they merge their maps")
         wanted = {"observation": "dict", "infos": "full", "ended_agents": "leave"}
         for name, form in wanted.items():
             if getattr(base.conventions, name) != form:
@@ -73,9 +74,18 @@ class MergedMaps(TeamWrapper):
                     f"{name} is {getattr(base.conventions, name)!r}; MergedMaps wants {form!r}, "
                     "vector_env(merging=...) takes any"
                 )
+        self._note_spaces()
+
+    def _note_spaces(self) -> None:
+        boxes = team_boxes(len(self.possible_agents), self.settings.map_cells)
         self._observation_spaces: dict[str, spaces.Space[Any]] = {
-            agent: spaces.Dict({**env.observation_space(agent).spaces, **boxes}) for agent in self.possible_agents
+            agent: spaces.Dict({**self.env.observation_space(agent).spaces, **boxes}) for agent in self.possible_agents
         }
+
+    def use_level(self, name: str, shares_map: bool = True, decision_period_s: float | None = None) -> None:
+        """Let actions be those of another action level; see ``ExplorationEnv.use_level``."""
+        super().use_level(name, shares_map, decision_period_s)
+        self._note_spaces()
 
     def _use(self, engine: Engine) -> None:
         self._engine, self._merged = engine, MergedRows(engine, self.merging, self._can_talk)

@@ -150,8 +150,16 @@ def talking_space(space: spaces.Space[Any], floats: int) -> spaces.Space[Any]:
     return _TalkingSpace({ACTION: space, MESSAGE: message})
 
 
-def split_action(action: Any, floats: int, has_vectors: bool, whose: str) -> tuple[Any, NDArray[np.float64]]:  # noqa: ANN401
+def split_action(
+    action: Any,  # noqa: ANN401
+    floats: int,
+    has_vectors: bool,
+    whose: str,
+    acting: NDArray[np.bool_] | None = None,
+) -> tuple[Any, NDArray[np.float64]]:
     """Return an action, or those of many rows, without the message, and the message.
+
+    Of many rows those that are ``acting`` (rows,) have to have messages; by default all have.
 
     Raises
     ------
@@ -167,7 +175,8 @@ def split_action(action: Any, floats: int, has_vectors: bool, whose: str) -> tup
             rest, message = action[ACTION], np.asarray(action[MESSAGE], np.float64)
     except (TypeError, ValueError, KeyError, IndexError):
         pass
-    if message.shape[-1:] != (floats,) or not np.isfinite(message).all():
+    is_of_rows = acting is not None and message.shape[:1] == acting.shape
+    if message.shape[-1:] != (floats,) or not np.isfinite(message[acting] if is_of_rows else message).all():
         form = (
             f"the action with {floats} numbers behind it"
             if has_vectors

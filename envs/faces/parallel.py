@@ -132,7 +132,7 @@ class ExplorationEnv(ParallelEnv[str, Any, Any]):
         self._note_level()
 
     def use_level(self, name: str, shares_map: bool = True, decision_period_s: float | None = None) -> None:
-        """Let actions be those of another action level, from the next reset on.
+        """Let actions be those of another action level; the episode is over, and the next begins with ``reset``.
 
         Parameters
         ----------
@@ -143,8 +143,8 @@ class ExplorationEnv(ParallelEnv[str, Any, Any]):
         decision_period_s : float, optional
             Longest time of a decision at the level of waypoints [s]. That of the settings by default.
         """
-        self.engine.use_level(name, shares_map, decision_period_s)
-        self._rows.use_forms()
+        self._rows.use_level(name, shares_map, decision_period_s)
+        self.floor, self.agents = None, []
         self._note_level()
 
     def _note_level(self) -> None:
@@ -333,8 +333,9 @@ class ExplorationEnv(ParallelEnv[str, Any, Any]):
 
     def stop(self, agent: str, reason: str) -> None:
         """End an agent at its next step, with a reason of its policy, such as ``no_frontier``."""
-        if agent not in self.agents:
-            raise ValueError(f"{agent} is not among the live agents {self.agents}")
+        live = [each for each in self.agents if self.engine.live[self._index[each]]]
+        if agent not in live:
+            raise ValueError(f"{agent} is not among the live agents {live}")
         self.operating.stopping[self._index[agent]] = reason
 
     @property

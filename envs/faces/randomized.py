@@ -1,6 +1,8 @@
 """Settings that are drawn for each episode (domain randomisation), alone and in batches."""
 
+import copy
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import fields, is_dataclass
 from typing import Any
 
 import numpy as np
@@ -14,7 +16,7 @@ from lidarium.envs.faces.wrapper import TeamWrapper
 from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.settings.making import set_values
 from lidarium.envs.settings.reset_options import ResetOptions, checked_seed
-from lidarium.mapping.geometry.bounds import shown
+from lidarium.mapping.geometry.bounds import rules_of, shown
 
 Distribution = Callable[[np.random.Generator], Any] | tuple[float, float] | list[Any]
 """Distribution of a setting: a callable of a generator; (low, high) for a uniform one; a list of equally likely
@@ -66,8 +68,8 @@ class Draws:
         self._distributions: Distributions = dict(distributions)
 
     @property
-    def max_robots(self) -> int | None:
-        """The largest number of robots that is drawn; None if the size of teams is not drawn.
+    def sizes(self) -> tuple[int, int] | None:
+        """The smallest and the largest number of robots that are drawn; None if the size of teams is not drawn.
 
         Raises
         ------
@@ -78,7 +80,7 @@ class Draws:
         if sizes is None:
             return None
         if isinstance(sizes, tuple | list) and all(_is_size(each) for each in sizes):
-            return int(max(sizes))
+            return int(min(sizes)), int(max(sizes))
         raise ValueError(
             f"the distribution of robots is {shown(sizes)}; want (least, most) or a list of whole "
             "numbers of 1 or more, so that the largest team is known"
@@ -86,22 +88,47 @@ class Draws:
 
     def draw(self, generator: np.random.Generator) -> dict[str, Any]:
         """Return a value for each setting that is drawn, by name."""
-        return {name: _draw(each, generator) for name, each in self._distributions.items()}
+        return {name: self._value(name, each, generator) for name, each in self._distributions.items()}
+
+    def _value(self, name: str, distribution: Distribution, generator: np.random.Generator) -> Any:  # noqa: ANN401
+        """Return a value; between the ends of a setting that is a whole number it is one, both ends included."""
+        if isinstance(distribution, list):
+            return distribution[int(generator.integers(len(distribution)))]
+        if isinstance(distribution, tuple):
+            low, high = distribution
+            kind, is_whole = _kind_of(self._settings, name), isinstance(low, int) and isinstance(high, int)
+            if kind is int or (kind is not float and is_whole):
+                return int(generator.integers(int(low), int(high) + 1))
+            return float(generator.uniform(low, high))
+        return distribution(generator)
 
     def settings_of(self, drawn: Mapping[str, Any]) -> ExplorationSettings:
         """Return the settings with values that were drawn."""
         return set_values(self._settings, drawn)
 
+    def smallest(self, make: Callable[[ExplorationSettings, int], Any], drawn: Mapping[str, Any]) -> None:
+        """Check that an environment of the smallest team can be made, before one is drawn.
 
-def _draw(distribution: Distribution, generator: np.random.Generator) -> Any:  # noqa: ANN401
-    """Return a value; between whole numbers it is one, both ends included."""
-    if isinstance(distribution, list):
-        return distribution[int(generator.integers(len(distribution)))]
-    if isinstance(distribution, tuple):
-        low, high = distribution
-        is_whole = isinstance(low, int) and isinstance(high, int)
-        return int(generator.integers(int(low), int(high) + 1)) if is_whole else float(generator.uniform(low, high))
-    return distribution(generator)
+        Raises
+        ------
+        ValueError
+            If it cannot.
+        """
+        if self.sizes is None:
+            return
+        try:
+            made = make(self.settings_of({**drawn, ROBOTS: self.sizes[0]}), 0)
+        except ValueError as error:
+            raise ValueError(f"teams of {self.sizes[0]} to {self.sizes[1]} robots are drawn: {error}") from error
+        made.close()
+
+
+def _kind_of(settings: Any, name: str) -> type:  # noqa: ANN401
+    """Return the type of a setting by its dotted name; ``object`` if there is none, which is found out as it is set."""
+    first, _, rest = name.partition(".")
+    if not is_dataclass(settings) or first not in {each.name for each in fields(settings)}:
+        return object
+    return _kind_of(getattr(settings, first), rest) if rest else rules_of(type(settings))[first].kind
 
 
 class RandomizedTeam(TeamWrapper):
@@ -141,26 +168,44 @@ class RandomizedTeam(TeamWrapper):
         self._make = make
         self._generator = np.random.default_rng(0)
         self._episode = 0
-        maximum = self._draws.max_robots
-        first = self._next(0)
-        super().__init__(first)
-        largest = first
-        self._pads = maximum is not None
-        if maximum is not None:
-            self.drawn[ROBOTS] = maximum
-            largest = self._make(self._draws.settings_of(self.drawn), 0)
-            self.possible_agents = largest.possible_agents
+        self._has_begun = self._is_closed = False
+        self._level: tuple[Any, ...] | None = None
+        self.drawn = self._draws.draw(self._generator)
+        self._draws.smallest(make, self.drawn)
+        super().__init__(make(self._draws.settings_of(self.drawn), 0))
+        self._pads = self._draws.sizes is not None
+        self._note_largest()
+
+    def _note_largest(self) -> None:
+        """Take the agents and spaces of the largest team."""
+        largest = self.env
+        if self._draws.sizes is not None:
+            self.drawn[ROBOTS] = self._draws.sizes[1]
+            largest = self._made(self.drawn)
+        self.possible_agents = largest.possible_agents
         agent = self.possible_agents[0]
         self._spaces: tuple[spaces.Space[Any], spaces.Space[Any]] = (
             largest.observation_space(agent),
             largest.action_space(agent),
         )
         self._state_space = largest.state_space
-        self._has_begun = False
 
-    def _next(self, episode: int) -> Any:  # noqa: ANN401
-        self.drawn = self._draws.draw(self._generator)
-        return self._make(self._draws.settings_of(self.drawn), episode)
+    def _made(self, drawn: Mapping[str, Any]) -> Any:  # noqa: ANN401
+        made = self._make(self._draws.settings_of(drawn), self._episode)
+        if self._level is not None:
+            made.use_level(*self._level)
+        return made
+
+    def use_level(self, name: str, shares_map: bool = True, decision_period_s: float | None = None) -> None:
+        """Let actions be those of another action level; see ``ExplorationEnv.use_level``."""
+        super().use_level(name, shares_map, decision_period_s)
+        self._level = name, shares_map, decision_period_s
+        self._note_largest()
+
+    @property
+    def minimum_robots(self) -> int:
+        """The number of robots of the smallest team that is drawn."""
+        return self.settings.robots if self._draws.sizes is None else self._draws.sizes[0]
 
     def observation_space(self, agent: str) -> spaces.Space[Any]:
         """Return the space of an agent's observations, that of the largest team."""
@@ -180,20 +225,30 @@ class RandomizedTeam(TeamWrapper):
         self, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
         """Start an episode of newly drawn settings; see ``ExplorationEnv.reset``."""
+        if self._is_closed:
+            raise RuntimeError("the environment is closed; make a new one")
         seed = checked_seed(seed)
+        generator = copy.deepcopy(self._generator)
         if seed is not None:
-            self._generator = np.random.default_rng((seed, SETTINGS_STREAM))
+            generator = np.random.default_rng((seed, SETTINGS_STREAM))
         elif not self._has_begun:
-            self._generator = np.random.default_rng()
-        made = self._next(self._episode)
-        agent = self.possible_agents[0]
-        _check_spaces(self.drawn, (made.observation_space(agent), made.action_space(agent)), self._spaces)
+            generator = np.random.default_rng()
+        drawn = self._draws.draw(generator)
+        made, agent = self._made(drawn), self.possible_agents[0]
+        _check_spaces(drawn, (made.observation_space(agent), made.action_space(agent)), self._spaces)
+        own = int(generator.integers(2**31)) if seed is None else seed
+        observations, infos = made.reset(own, options)
+        # Until here a bad option leaves the episode before as it is.
         self.env.close()
-        self.env, self.settings, self._has_begun = made, made.settings, True
-        own = int(self._generator.integers(2**31)) if seed is None else seed
-        observations, infos = super().reset(own, options)
+        self.env, self.agents, self.settings = made, made.agents, made.settings
+        self.drawn, self._generator, self._has_begun = drawn, generator, True
         self._episode += 1
         return self._padded(observations), infos
+
+    def close(self) -> None:
+        """Close the environment of the episode; none is made any more."""
+        self._is_closed = True
+        super().close()
 
     def step(self, actions: Any) -> Any:  # noqa: ANN401
         """Take a step or a decision."""
@@ -254,16 +309,17 @@ class RandomizedRows:
         self._draws = Draws(settings, distributions)
         self._make = make
         self.episodes = int(episodes)
-        maximum = self._draws.max_robots
-        self._pads = maximum is not None
-        self.robots = settings.robots if maximum is None else maximum
+        sizes = self._draws.sizes
+        self._pads = sizes is not None
+        self.robots = settings.robots if sizes is None else sizes[1]
         self.rows = self.episodes * self.robots
         generator = np.random.default_rng(0)
         self.drawn = [self._draws.draw(generator) for _ in range(self.episodes)]
+        self._draws.smallest(make, self.drawn[0])
         self.parts = [make(self._draws.settings_of(drawn), 0) for drawn in self.drawn]
         largest = self.parts[0]
-        if maximum is not None:
-            largest = make(self._draws.settings_of({**self.drawn[0], ROBOTS: maximum}), 0)
+        if self._pads:
+            largest = make(self._draws.settings_of({**self.drawn[0], ROBOTS: self.robots}), 0)
         self.settings = largest.engine.settings
         self.space, self.action_space, self.columns = largest.space, largest.action_space, largest.columns
         self._generators: list[np.random.Generator | None] = [None] * self.episodes
@@ -294,24 +350,32 @@ class RandomizedRows:
     ) -> None:
         """Begin episodes with newly drawn settings; see `TeamRows.begin`."""
         del is_same_step
-        for k, episode in enumerate(chosen.tolist()):
-            self._begin(episode, None if seeds is None else seeds[k], (options or {}).get(episode))
+        begun = [
+            self._begun_part(episode, None if seeds is None else seeds[k], (options or {}).get(episode), k)
+            for k, episode in enumerate(chosen.tolist())
+        ]
+        # Until here a bad option leaves all episodes as they are.
+        for episode, (part, drawn, generator) in zip(chosen.tolist(), begun, strict=True):
+            self.parts[episode].engine.simulation.close()
+            self.parts[episode], self.drawn[episode], self._generators[episode] = part, drawn, generator
+            self._is_ready[episode] = True
+        self._begun += len(begun)
 
-    def _begin(self, episode: int, seed: int | None, options: ResetOptions | None) -> None:
-        generator = self._generators[episode]
+    def _begun_part(
+        self, episode: int, seed: int | None, options: ResetOptions | None, before: int
+    ) -> tuple[TeamRows, dict[str, Any], np.random.Generator]:
+        """Return new rows of an episode that have begun, after ``before`` others, with what was drawn for it."""
+        generator = copy.deepcopy(self._generators[episode])
         if seed is not None:
             generator = np.random.default_rng((seed, SETTINGS_STREAM))
         elif generator is None:
             generator = np.random.default_rng()
         drawn = self._draws.draw(generator)
-        part = self._make(self._draws.settings_of(drawn), self._begun)
+        part = self._make(self._draws.settings_of(drawn), self._begun + before)
         _check_spaces(drawn, (part.space, part.action_space), (self.space, self.action_space))
         own = int(generator.integers(2**31)) if seed is None else seed
         part.begin(np.zeros(1, np.int64), [own], None if options is None else {0: options})
-        self.parts[episode].engine.simulation.close()
-        self.parts[episode], self.drawn[episode], self._generators[episode] = part, drawn, generator
-        self._is_ready[episode] = True
-        self._begun += 1
+        return part, drawn, generator
 
     def step(self, actions: Any, beginning: NDArray[np.int64]) -> None:  # noqa: ANN401
         """Run all live episodes for one step or decision, and begin others; see `TeamRows.step`."""
@@ -347,7 +411,7 @@ class RandomizedRows:
                 ) from error
         for episode in range(self.episodes):
             if episode in begins:
-                self._begin(episode, None, None)
+                self.begin(np.array([episode]))
             else:
                 run(self.parts[episode], actions[episode])
 

@@ -104,10 +104,12 @@ def _entry(name: str, value: Any, episode: int, episodes: int) -> Any:  # noqa: 
 def _is_for_all(name: str, value: Any) -> bool:  # noqa: ANN401
     """Whether an option's value is that of all episodes.
 
-    Otherwise it is a sequence with an entry, or None, for each.
+    Otherwise it is a sequence with an entry, such as a word or None, for each.
     """
-    names_none = isinstance(value, Sequence) and any(entry is None for entry in value)
-    return _depth(value) <= _KNOWN[name] and not names_none
+    has_words = isinstance(value, Sequence) and any(
+        entry is None or (isinstance(entry, str) and not isinstance(value, str)) for entry in value
+    )
+    return _depth(value) <= _KNOWN[name] and not has_words
 
 
 def _depth(value: Any) -> int:  # noqa: ANN401

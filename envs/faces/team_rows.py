@@ -23,6 +23,7 @@ from lidarium.envs.faces.sparse_routes import SparseRouter
 from lidarium.envs.faces.team import EpisodeTeam
 from lidarium.envs.faces.team_exchange import CanTalk, MergedRows, MergingSettings
 from lidarium.envs.onboard.radio.messages import Order, Route, Stop, Target
+from lidarium.envs.onboard.station.operating import frozen
 from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.settings.reset_options import ResetOptions
 from lidarium.registry import unknown
@@ -98,24 +99,39 @@ class TeamRows:
         self._endings = np.full(self.rows, None, object)
         self._numbers: dict[str, NDArray[np.float64]] = {}
         self.rewards = np.zeros(self.rows)
-        self._nobody = np.zeros(self.rows, np.bool_)
-        self.terminated = self.truncated = self._nobody
+        self._nobody = frozen(np.zeros(self.rows, np.bool_))
+        self.terminated, self.truncated = np.zeros(self.rows, np.bool_), np.zeros(self.rows, np.bool_)
         self.active = np.zeros(self.rows, np.bool_)
-        self.use_forms()
+        if conventions.comm:
+            self._board = MessageBoard(engine.perception, engine.settings, conventions.comm)
+        self._use(self._form_of(engine.observation_space))
 
-    def use_forms(self) -> None:
-        """Take the spaces of the engine's level into the forms."""
-        engine, floats = self.engine, self.conventions.comm
-        space, self.action_space = engine.observation_space, engine.action_space
-        if self._merged is not None:
-            space = spaces.Dict({**space.spaces, **self._merged.boxes})
-        if floats:
-            self._board = MessageBoard(engine.perception, engine.settings, floats)
-            space = spaces.Dict({**space.spaces, MESSAGES: self._board.box})
-            self.action_space = talking_space(engine.action_space, floats)
+    def use_level(self, name: str, shares_map: bool, decision_period_s: float | None) -> None:
+        """Let actions be those of another action level; if observations cannot take the form there, nothing changes.
+
+        Parameters are those of `Engine.use_level`.
+        """
+        level = self.engine.made_level(name, shares_map, decision_period_s)
+        form = self._form_of(self.engine.space_at(level))
+        self.engine.take_level(name, level)
+        self._use(form)
+
+    def _form_of(self, space: spaces.Dict) -> ObservationForm:
+        """Return the form of the observations of a level, with what is exchanged."""
+        boxes = {} if self._merged is None else self._merged.boxes
+        if self._board is not None:
+            boxes = {**boxes, MESSAGES: self._board.box}
+        return ObservationForm(spaces.Dict({**space.spaces, **boxes}), self.conventions)
+
+    def _use(self, form: ObservationForm) -> None:
+        """Take the spaces of the engine's level, in their form."""
+        floats = self.conventions.comm
+        self.action_space = self.engine.action_space
+        if self._board is not None:
+            self.action_space = talking_space(self.action_space, floats)
             self._sent = np.zeros((self.rows, floats))
             self._messages = self._board.table()
-        self._form = ObservationForm(space, self.conventions)
+        self._form = form
         self.space = self._form.space
         self._is_plain = self._form.is_plain and not (self._keeps or floats or self._merged is not None)
         self.columns = self._form.columns
@@ -145,7 +161,7 @@ class TeamRows:
             acting = acting.copy()
             acting.reshape(self.episodes, self.robots)[beginning] = False
         if self._board is not None:
-            actions = self._without_messages(actions)
+            actions = self._without_messages(actions, acting)
         return self.engine.level.read_rows(actions, acting)
 
     def run(self, decoded: Any, beginning: NDArray[np.int64] = NO_EPISODES) -> None:  # noqa: ANN401
@@ -229,7 +245,7 @@ class TeamRows:
         if type(actions) is not dict or not actions.keys() <= self._robot_of.keys():
             _check_agents(actions, self._robot_of)
         engine, first = self.engine, episode * self.robots
-        live, operating, takes_none = engine.live, engine.operating, engine.level.takes_none
+        live, operating, takes_none = engine.live, engine.operating, engine.level.may_rest(episode)
         given = {}
         for agent, robot in self._robot_of.items():
             row = first + robot
@@ -254,7 +270,7 @@ class TeamRows:
             self._router.start(np.flatnonzero(np.repeat(engine.world.steps <= 0, self.robots)))
         if self._board is not None or self._merged is not None:
             self.exchange(spoke)
-        self.terminated = self.truncated = self._nobody
+        self.terminated, self.truncated = np.zeros(self.rows, np.bool_), np.zeros(self.rows, np.bool_)
         if engine.has_endings or (is_step and not engine.is_whole):
             self.terminated, self.truncated = engine.terminated, engine.truncated
             is_over = np.repeat(engine.is_over, self.robots)
@@ -274,16 +290,16 @@ class TeamRows:
             self.rewards = mixed
             self._infos = {**engine.infos, "reward_terms": terms}
 
-    def _without_messages(self, actions: Any) -> Any:  # noqa: ANN401
-        """Return actions without their messages, which are kept to be sent."""
+    def _without_messages(self, actions: Any, acting: NDArray[np.bool_]) -> Any:  # noqa: ANN401
+        """Return actions without their messages, which are kept to be sent; only those of ``acting`` rows are read."""
         has_vectors = isinstance(self.engine.action_space, spaces.Box)
-        rest, message = split_action(actions, self.conventions.comm, has_vectors, "all rows")
+        rest, message = split_action(actions, self.conventions.comm, has_vectors, "all rows", acting)
         if message.shape != self._sent.shape:
             raise ValueError(
                 f"messages have shape {message.shape}; want {self._sent.shape}: one for each row = episode * "
                 "robots + robot"
             )
-        self._sent = message
+        self._sent = np.where(acting[:, None], message, 0.0)
         return rest
 
     def exchange(self, spoke: NDArray[np.bool_] | None = None) -> None:
@@ -300,15 +316,15 @@ class TeamRows:
 
     @property
     def observations(self) -> Any:  # noqa: ANN401
-        """The observations of all rows."""
-        if self._is_plain:
-            return self.engine.observations
+        """The observations of all rows: new arrays, or views of the engine's if it copies nothing."""
         arrays = self._with_more()
-        if self._keeps and self._kept.any():
+        blanks = self._keeps and bool(self._kept.any())
+        if self.engine.copies or blanks:
             arrays = {name: array.copy() for name, array in arrays.items()}
+        if blanks:
             for array in arrays.values():
                 array[self._kept] = 0
-        return self._form.of(arrays, (self.rows,))
+        return dict(arrays) if self._is_plain else self._form.of(arrays, (self.rows,))
 
     def observation(self, row: int) -> Any:  # noqa: ANN401
         """Return the observation of one row, its own arrays."""

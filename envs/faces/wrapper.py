@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from pettingzoo import ParallelEnv
 
 from lidarium.envs.faces.parallel import ExplorationEnv, Observation, Outcome
+from lidarium.envs.onboard.belief import Belief
 from lidarium.envs.onboard.radio.messages import Order
 
 
@@ -59,6 +60,32 @@ class TeamWrapper(ParallelEnv[str, Any, Any]):
         outcome: Outcome = self.env.step(actions)
         self.agents = self.env.agents
         return outcome
+
+    def use_level(self, name: str, shares_map: bool = True, decision_period_s: float | None = None) -> None:
+        """Let actions be those of another action level; see ``ExplorationEnv.use_level``."""
+        self.env.use_level(name, shares_map, decision_period_s)
+        self.agents = self.env.agents
+
+    @property
+    def time_s(self) -> float:
+        """Simulated time [s]."""
+        time: float = self.env.time_s
+        return time
+
+    def columns(self, agent: str) -> tuple[tuple[str, int, int], ...]:
+        """Return the columns of each key of an agent's observation in the flat form; see `flat_columns`."""
+        columns: tuple[tuple[str, int, int], ...] = self.env.columns(agent)
+        return columns
+
+    def action_masks(self, agent: str) -> NDArray[np.bool_]:
+        """Return which actions an agent may choose now, (actions,)."""
+        masks: NDArray[np.bool_] = self.env.action_masks(agent)
+        return masks
+
+    def belief(self, agent: str) -> Belief:
+        """Return the handle on the belief of an agent's onboard software."""
+        belief: Belief = self.env.belief(agent)
+        return belief
 
     def stop(self, agent: str, reason: str) -> None:
         """End an agent at its next step, with a reason."""

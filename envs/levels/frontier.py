@@ -19,7 +19,7 @@ from lidarium.envs.levels.frontier_choices import (
     ray_directions,
     renew_teams,
 )
-from lidarium.envs.levels.level import STEPS, Mask, Turn, add_info, check_rows
+from lidarium.envs.levels.level import STEPS, Level, Mask, Turn, add_info, check_rows
 from lidarium.envs.levels.waypoint import WaypointLevel, Ways, is_way, read_ways
 from lidarium.envs.onboard.driving.drives import Drives
 from lidarium.envs.onboard.driving.planning import Planning
@@ -238,9 +238,10 @@ class OffersLevel(WaypointLevel):
         """Return the numbers that are chosen (rows,), and targets."""
         numbers = np.full(self.rows, self._stay)
         ways = {row: action for row, action in actions.items() if is_way(action)}
-        for row, action in actions.items():
-            if row in ways:
-                continue
+        chosen = {row: action for row, action in actions.items() if row not in ways}
+        if not self.reads_rows_as(OffersLevel):
+            numbers, chosen = Level.read(self, chosen, names), {}
+        for row, action in chosen.items():
             number = _whole_number(action, self._stay)
             if number is None:
                 raise ValueError(

@@ -133,6 +133,11 @@ class Level(ABC):
     def start(self, episode: int) -> None:  # noqa: B027
         """Begin an episode."""
 
+    def may_rest(self, episode: int) -> bool:
+        """Whether None is now an action of the robots of an episode."""
+        del episode
+        return self.takes_none
+
     def read(self, actions: Mapping[int, Any], names: list[str]) -> Any:  # noqa: ANN401
         """Decode actions by row; ``names`` are the agents of a team, for messages.
 
@@ -141,11 +146,15 @@ class Level(ABC):
         space, chosen = self.action_space, np.zeros(self.rows, np.bool_)
         values = np.zeros((self.rows, *(space.shape or ())), space.dtype)
         for row, action in actions.items():
-            if not space.contains(action) and not space.contains(np.asarray(action, space.dtype)):
+            if not space.contains(action) and not _is_same_in(space, action):
                 raise ValueError(f"action of {names[row % len(names)]} is {shown(action)}; want one of {space}")
             values[row] = action
             chosen[row] = True
         return self.read_rows(values, chosen)
+
+    def reads_rows_as(self, kind: type["Level"]) -> bool:
+        """Whether actions are read as by a class; otherwise a subclass reads them, all as its `read_rows` does."""
+        return type(self).read_rows is kind.read_rows
 
     @abstractmethod
     def read_rows(self, actions: Any, live: Mask) -> Any:  # noqa: ANN401
@@ -163,6 +172,19 @@ class Level(ABC):
         ``acted`` took part in the step, ``live`` are those of ``seen`` that have not ended, ``seen`` are the rows
         that are observed.
         """
+
+
+def _is_same_in(space: spaces.Space[Any], action: Any) -> bool:  # noqa: ANN401
+    """Whether an action of another type of number, such as a list of float64, is in a space."""
+    try:
+        given = np.asarray(action)
+    except ValueError:  # rows of different lengths
+        return False
+    if given.dtype.kind not in "iuf":
+        return False
+    cast = given.astype(space.dtype)
+    is_whole = np.issubdtype(space.dtype, np.integer)
+    return bool((not is_whole or np.array_equal(cast, given)) and space.contains(cast))
 
 
 def check_rows(actions: Any, shape: tuple[int, ...], live: Mask, wanted: str) -> NDArray[Any]:  # noqa: ANN401

@@ -81,11 +81,17 @@ class VelocityLevel(Level):
         self._shares_map = shares_map
         self._plan_steps = max(round(settings.decision_period_s / settings.time_step), 1)
         self._steps_left = np.zeros(self.rows // settings.robots, np.int64)
+        self._has_targets = np.zeros(self.rows // settings.robots, np.bool_)
 
     def start(self, episode: int) -> None:
         """Begin an episode: no robot has a target."""
+        self._steps_left[episode], self._has_targets[episode] = 0, False
         if self.driver is not None:
             self.driver.start(episode)
+
+    def may_rest(self, episode: int) -> bool:
+        """Whether None is an action: since the first target of the episode."""
+        return bool(self._has_targets[episode])
 
     def read(self, actions: Mapping[int, Any], names: list[str]) -> NDArray[np.float64] | _Mixed:
         """Return speeds and turn rates (rows, 2) [m/s, rad/s], zero for rows without an action, and targets."""
@@ -101,6 +107,9 @@ class VelocityLevel(Level):
         return _Mixed(self._speeds(speeds, names), has_speeds, read_ways(ways, self.rows))
 
     def _speeds(self, actions: Mapping[int, Any], names: list[str]) -> NDArray[np.float64]:
+        if not self.reads_rows_as(VelocityLevel):
+            speeds: NDArray[np.float64] = super().read(actions, names)
+            return speeds
         commands = np.zeros((self.rows, 2))
         for row, action in actions.items():
             shares = action if isinstance(action, np.ndarray) else numbers_of(action)
@@ -140,6 +149,7 @@ class VelocityLevel(Level):
         give_ways(driver, decoded.ways, turn)
         # Paths are planned as often as at the level of waypoints: at new targets, and once in a decision period.
         drives, left = driver.drives, self._steps_left
+        self._has_targets |= drives.is_ordered.reshape(len(left), -1).any(axis=1)
         is_new = drives.is_ordered & ~drives.has_path & (drives.states == IDLE)
         left[is_new.reshape(len(left), -1).any(axis=1)] = 0
         is_due = (turn.modes == STEPS) & (left <= 0)
@@ -147,12 +157,12 @@ class VelocityLevel(Level):
         left[is_due] = self._plan_steps - 1
         driver.prepare(np.flatnonzero(is_due))
         turn.commands[:] = np.where((turn.given & decoded.has_speeds)[:, None], decoded.commands, driver.commands())
-        turn.commands[list(turn.operating.stopping)] = 0.0
+        robots = self.settings.robots
+        turn.commands[[row for row in turn.operating.stopping if self._has_targets[row // robots]]] = 0.0
 
     def make_driver(self) -> TeamDriver:
         """Return a driver for robots with targets, from now on the driver of the level."""
         self.driver = driver = TeamDriver(self.perception, self.settings, self._shares_map)
         for episode in range(self.perception.world.episodes):
             driver.start(episode)
-        self.takes_none = True
         return driver

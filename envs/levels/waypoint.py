@@ -109,9 +109,14 @@ class WaypointLevel(Level):
 
     def read(self, actions: Mapping[int, Any], names: list[str]) -> Ways:
         """Return targets and routes of rows."""
-        if self.action_space is not self._points:  # a level of a user's own, which decodes arrays
-            ways: Ways = super().read(actions, names)
-            return ways
+        if self.action_space is not self._points or not self.reads_rows_as(WaypointLevel):
+            # A level of a user's own, which decodes arrays; targets are the same there.
+            numbers = {row: action for row, action in actions.items() if not is_way(action)}
+            ways: Ways = super().read(numbers, names)
+            if len(numbers) == len(actions):
+                return ways
+            given = read_ways({row: action for row, action in actions.items() if is_way(action)}, self.rows)
+            return Ways(given.orders.overlaid(ways.orders, list(numbers)), {**ways.routes, **given.routes})
         return read_ways(
             {
                 row: action if is_way(action) else self._target(row, action, names[row % len(names)])
@@ -155,6 +160,8 @@ class WaypointLevel(Level):
         self.driver.prepare(np.flatnonzero(running))
         modes[running] = DECIDES
         for row in operating.stopping:
+            if not turn.acting[row]:
+                continue
             episode = row // self.settings.robots
             if running[episode]:
                 modes[episode] = STEPS

@@ -89,3 +89,26 @@ def test_messages_on_the_way_outlast_the_beginning_of_other_episodes():
         heard.append(np.array(rows))
     assert heard[0][:, 0, 2].tolist() == [0.0] * 5 + [1.0] * 7
     np.testing.assert_array_equal(heard[1], heard[0])
+
+
+def test_messages_that_were_sent_are_not_written_over():
+    env = lidarium.vector_env(2, "apartment", robots=2, comm=2, observe=["velocity"], lidar={"beams": 40})
+    env.reset(seed=0)
+    actions = np.ones((4, 4))
+    actions.flags.writeable = False
+    env.step(actions)
+    team = {f"robot_{k}": np.array([0.0, 0.0, 0.5, 0.5]) for k in range(2)}
+    env.step([team, team])
+
+
+def test_messages_of_rows_that_do_not_act_are_not_read():
+    env = lidarium.vector_env(2, "apartment", robots=2, comm=2, observe=["velocity"], lidar={"beams": 40})
+    env.reset(seed=0)
+    env.team(0).stop("robot_0", "done")
+    env.step(np.zeros((4, 4)))
+    actions = np.zeros((4, 4))
+    actions[0] = np.nan
+    env.step(actions)
+    actions[1, 3] = np.nan
+    with pytest.raises(ValueError, match="want the action with 2 numbers behind it, all finite"):
+        env.step(actions)

@@ -1,5 +1,6 @@
 """The environment: what reset and step take, give and refuse, and every way in which an episode ends."""
 
+import copy
 import math
 
 import numpy as np
@@ -430,3 +431,68 @@ def test_any_word_of_a_policy_ends_a_robot_for_good():
     assert truncated == {"robot_0": False, "robot_1": False}
     assert [infos[agent]["ended_because"] for agent in ("robot_0", "robot_1")] == ["stopped", "horizon"]
     assert not env.agents
+
+
+@pytest.mark.parametrize("level", ["frontier", "tour", "waypoint", "graph"])
+def test_after_another_level_is_chosen_an_episode_has_to_begin(level):
+    env = lidarium.parallel_env("apartment", robots=2, lidar={"beams": 40})
+    env.reset(seed=0)
+    env.use_level(level)
+    assert env.agents == []
+    with pytest.raises(RuntimeError, match="call reset"):
+        env.step({agent: env.action_space(agent).sample() for agent in env.possible_agents})
+    env.reset(seed=0)
+    env.step({agent: lidarium.Target(0.0, 0.0) for agent in env.agents})
+
+
+def test_a_level_without_the_form_that_is_asked_for_changes_nothing():
+    env = lidarium.parallel_env("apartment", robots=1, level="frontier", lidar={"beams": 40}, action_mask="beside")
+    env.reset(seed=0)
+    with pytest.raises(ValueError, match="action_mask"):
+        env.use_level("velocity")
+    assert env.level == "frontier"
+    env.step({"robot_0": 0})
+    env.reset(seed=0)
+
+
+def test_an_agent_that_has_ended_cannot_be_stopped_again():
+    env = make(level="waypoint", ended_agents="zeros", horizon_s=60.0)
+    env.reset(seed=0)
+    env.stop("robot_0", "done")
+    step_all(env)
+    with pytest.raises(ValueError, match=r"robot_0 is not among the live agents \['robot_1'\]"):
+        env.stop("robot_0", "done")
+    before = env.time_s
+    env.step(dict.fromkeys(env.agents, np.array([0.3, 0.3], np.float32)))
+    assert env.time_s > before + 0.5
+
+
+def test_targets_of_an_earlier_episode_do_not_change_a_later_one():
+    def episode(env):
+        env.reset(seed=3)
+        ahead = dict.fromkeys(env.agents, np.array([1.0, 0.2], np.float32))
+        for _ in range(3):
+            env.step(ahead)
+        env.stop("robot_0", "done")
+        env.step(ahead)
+        with pytest.raises(ValueError, match="no action for robot_1"):
+            env.step({"robot_1": None})
+        return env.world.poses.copy()
+
+    fresh, used = make(), make()
+    used.reset(seed=0)
+    used.step(dict.fromkeys(used.agents, lidarium.Target(0.0, 0.0)))
+    assert np.array_equal(episode(fresh), episode(used))
+
+
+def test_an_environment_whose_station_hears_by_radio_can_be_copied():
+    env = make(radio={"kind": "range", "reach": 20.0})
+    env.reset(seed=0)
+    step_all(env, AHEAD)
+    other = copy.deepcopy(env)
+    for each in (env, other):
+        for _ in range(15):
+            step_all(each, AHEAD)
+    assert other.report("robot_0").time_s == env.report("robot_0").time_s == 1.0
+    assert np.array_equal(other.world.poses, env.world.poses)
+    assert other.station is not env.station

@@ -99,3 +99,12 @@ def test_a_robot_besides_kinds_is_refused():
         lidarium.make_settings(kinds=["kobuki"], robot="pioneer")
     with pytest.raises(ValueError, match="robot is set, and kinds is"):
         lidarium.parallel_env("scene_room", kinds=["kobuki"], randomize={"robot.max_speed": [0.4]})
+
+
+def test_a_reset_that_fails_begins_no_episode():
+    env = lidarium.vector_env(2, "apartment", robots=1, randomize={"odometry.drift": (0.0, 0.1)}, lidar={"beams": 20})
+    starts = [None, np.full((1, 3), 1e5)]
+    with pytest.raises(ValueError, match="is inside a wall"):
+        env.reset(seed=0, options={"starts": starts})
+    with pytest.raises(RuntimeError, match="reset"):
+        env.step(np.zeros((2, 2)))

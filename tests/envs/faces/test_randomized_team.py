@@ -30,7 +30,7 @@ def test_each_episode_has_settings_of_its_own():
         }
         assert 0.0 <= noise <= 0.05
         assert period in (1.0, 2.0)
-        assert price in (1, 2, 3)
+        assert 1.0 <= price <= 3.0
         drawn.add((noise, period, price))
     assert len(drawn) == 12
     assert len({period for _, period, _ in drawn}) == 2
@@ -158,3 +158,51 @@ def test_flat_observations_of_teammates_want_teams_of_one_size():
     )
     with pytest.raises(ValueError, match="want some that leave the spaces"):
         [env.reset(seed=seed) for seed in range(20)]
+
+
+def test_between_whole_numbers_a_setting_that_is_no_whole_number_is_drawn_from_all():
+    env = lidarium.parallel_env(
+        "apartment", randomize={"odometry.drift": (0, 1), "robots": (1, 3)}, lidar={"beams": 20}
+    )
+    drawn = []
+    for seed in range(8):
+        env.reset(seed=seed)
+        drawn.append(env.drawn["odometry.drift"])
+        assert isinstance(env.drawn["robots"], int)
+    assert all(0.0 < each < 1.0 for each in drawn)
+
+
+def test_a_team_that_is_too_small_is_refused_before_it_is_drawn():
+    with pytest.raises(ValueError, match="teams of 1 to 3 robots are drawn: comm is 2 and robots is 1"):
+        lidarium.parallel_env("apartment", randomize={"robots": (1, 3)}, comm=2)
+    with pytest.raises(ValueError, match="teams of one robot are drawn; want two robots or more"):
+        lidarium.MergedMaps(lidarium.parallel_env("apartment", randomize={"robots": (1, 3)}, known_starts=False))
+
+
+def test_a_reset_that_fails_leaves_the_episode_as_it_is():
+    env, same = (
+        lidarium.parallel_env("apartment", robots=1, randomize={"odometry.drift": (0.0, 0.1)}, lidar={"beams": 20})
+        for _ in range(2)
+    )
+    for each in (env, same):
+        each.reset(seed=1)
+    with pytest.raises(ValueError, match="is inside a wall"):
+        env.reset(options={"starts": np.full((1, 3), 1e5)})
+    env.step({"robot_0": np.zeros(2, np.float32)})
+    for each in (env, same):
+        each.reset()
+    assert env.drawn == same.drawn
+
+
+def test_it_has_the_face_of_an_environment():
+    env = lidarium.parallel_env("apartment", randomize={"robots": (1, 2)}, lidar={"beams": 20})
+    env.reset(seed=0)
+    assert env.time_s == 0.0
+    env.use_level("frontier")
+    env.reset(seed=0)
+    assert env.action_masks("robot_0").shape == (env.action_space("robot_0").n,)
+    assert env.belief("robot_0").pose.shape == (3,)
+    env.step(dict.fromkeys(env.agents, 0))
+    env.close()
+    with pytest.raises(RuntimeError, match="closed"):
+        env.reset(seed=0)

@@ -51,3 +51,11 @@ def test_options_are_for_all_or_for_each():
 def test_as_many_entries_as_there_are_not_episodes_are_refused():
     with pytest.raises(ValueError, match="option floor has 2 entries; want one for all, or one for each of the 3"):
         options_of({"floor": ["a", "b"]}, np.array([0]), 3, 2)
+
+
+def test_words_and_poses_may_be_given_for_each_episode():
+    for starts in (["fixed", "drawn"], ["drawn", None], [np.zeros((2, 3)), "drawn"]):
+        options = options_of({"starts": starts}, np.arange(2), 2, 2)
+        assert [options[k].starts is None for k in range(2)] == [each is None for each in starts]
+    one = options_of({"starts": "fixed"}, np.arange(2), 2, 2)
+    assert one[0].starts == one[1].starts == "fixed"

@@ -481,3 +481,46 @@ def test_scans_of_as_many_beams_as_there_may_be_find_room_on_the_stacks_of_all_t
         observations, _, _, _, infos = batch.step(batch.action_space.sample())
     assert np.all(infos["truth"]["coverage"] > 0.0)
     assert np.all(observations["scan"].min(axis=1) > 0.0)
+
+
+@pytest.mark.parametrize("ended", ["leave", "zeros"])
+def test_results_are_the_users_own_arrays(ended):
+    options = {"robots": 2, "observe": ["scan"], "lidar": {"beams": 40}, "ended_agents": ended, "horizon_s": 30.0}
+    given, kept = (lidarium.vector_env(2, "apartment", **options) for _ in range(2))
+    for env in (given, kept):
+        env.reset(seed=0)
+        env.team(0).stop("robot_0", "done")
+    for step in range(4):
+        *found, _ = given.step(np.zeros((4, 2)))
+        *wanted, _ = kept.step(np.zeros((4, 2)))
+        assert found[2] is not found[3]
+        for one, other in zip((found[0]["scan"], *found[1:]), (wanted[0]["scan"], *wanted[1:]), strict=True):
+            assert np.array_equal(one, other), step
+        # A user's time limit, normalisation and taking apart, in place.
+        found[3][:] = True
+        found[0]["scan"] /= 10.0
+        found[0].pop("scan")
+    found, _ = given.reset(seed=[None, 3], options={"episodes": np.array([False, True])})
+    wanted, _ = kept.reset(seed=[None, 3], options={"episodes": np.array([False, True])})
+    assert np.array_equal(found["scan"], wanted["scan"])
+
+
+def test_episodes_that_have_not_begun_show_zeros():
+    env = lidarium.vector_env(2, "apartment", robots=1, observe=["scan", "velocity"], lidar={"beams": 40})
+    observations, _ = env.reset(seed=0, options={"episodes": np.array([True, False])})
+    assert env.observation_space.contains(observations)
+    assert not observations["scan"][1].any()
+
+
+def test_a_target_in_one_episode_does_not_change_another():
+    def result(first):
+        env = lidarium.vector_env(2, "scene_room", robots=2, observe=["velocity"], lidar={"beams": 60})
+        env.reset(seed=3)
+        drive = dict.fromkeys(("robot_0", "robot_1"), np.array([1.0, 0.2], np.float32))
+        env.step([drive, dict.fromkeys(drive, lidarium.Target(0.0, 0.0)) if first else drive])
+        env.step([drive, drive])
+        env.team(0).stop("robot_0", "done")
+        env.step([drive, drive])
+        return env.engine.world.poses[:2].copy()
+
+    assert np.array_equal(result(True), result(False))

@@ -6,6 +6,7 @@ from gymnasium import spaces
 from linked_rooms import TWO_ROOMS
 
 import lidarium
+from lidarium.envs.levels.frontier import FrontierLevel
 
 STEPS = np.array([[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0], [0.0, 0.0]])
 
@@ -50,3 +51,66 @@ def test_names_that_are_taken_or_unknown_are_refused():
         lidarium.level("velocity")(lidarium.WaypointLevel)
     with pytest.raises(ValueError, match="unknown level 'compas'; did you mean 'compass'"):
         lidarium.parallel_env(TWO_ROOMS, level="compas")
+
+
+@pytest.fixture
+def registered():
+    """Registers levels under a name for one test."""
+    names = []
+
+    def register(name, kind):
+        names.append(name)
+        return lidarium.level(name, "reads rows in its own way")(kind)
+
+    yield register
+    for name in names:
+        lidarium.registry("level").unregister(name)
+
+
+@pytest.mark.parametrize(
+    ("base", "action", "read"),
+    [
+        (lidarium.VelocityLevel, np.array([0.4, 0.1], np.float32), lambda actions: 0.5 * actions),
+        (lidarium.WaypointLevel, np.array([0.4, 0.1], np.float32), lambda actions: 0.5 * actions),
+        (FrontierLevel, 3, lambda actions: 0 * actions),
+    ],
+)
+def test_a_level_that_reads_rows_in_its_own_way_does_so_at_every_face(base, action, read, registered):
+    class Own(base):
+        def read_rows(self, actions, live):
+            return super().read_rows(read(np.asarray(actions)), live)
+
+    registered("own_way", Own)
+    options = {"level": "own_way", "robots": 1, "observe": ["velocity"], "lidar": {"beams": 40}, "horizon_s": 20.0}
+    env = lidarium.parallel_env("apartment", **options)
+    rows, dicts = (lidarium.vector_env(1, "apartment", **options) for _ in range(2))
+    for each in (env, rows, dicts):
+        each.reset(seed=0)
+    for _ in range(5):
+        env.step({"robot_0": action})
+        rows.step(np.array([action]))
+        dicts.step([{"robot_0": action}])
+    poses = [env.unwrapped.world.poses, rows.engine.world.poses, dicts.engine.world.poses]
+    assert np.array_equal(poses[0], poses[1])
+    assert np.array_equal(poses[0], poses[2])
+    env.step({"robot_0": lidarium.Target(0.5, 0.0)})
+    assert env.unwrapped.driver.target(0) == lidarium.Target(0.5, 0.0)
+
+
+def test_actions_of_an_own_level_are_not_rounded(registered):
+    class Three(lidarium.VelocityLevel):
+        def __init__(self, *arguments):
+            super().__init__(*arguments)
+            self.action_space = spaces.Discrete(3)
+
+        def read_rows(self, actions, live):
+            return super().read_rows(np.stack([0.1 * actions, 0.0 * actions], axis=1), live)
+
+    registered("three_speeds", Three)
+    env = lidarium.parallel_env("apartment", level="three_speeds", robots=1)
+    env.reset(seed=0)
+    for action in (1, 2.0, np.int8(1)):
+        env.step({"robot_0": action})
+    for action in (1.7, "2", [1, 2]):
+        with pytest.raises(ValueError, match="action of robot_0 is"):
+            env.step({"robot_0": action})
