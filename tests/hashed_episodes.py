@@ -32,11 +32,10 @@ OLD_OFFERS: dict[str, Any] = {"frontiers": 16, "least_frontier": 0.1, "frontiers
 
 @dataclasses.dataclass(frozen=True)
 class Case:
-    """An episode: who runs it, and whether there are floats of BLAS, LAPACK or FFT in it."""
+    """An episode: who runs it."""
 
     run: Callable[[Ledger], None]
     block: int
-    solves: bool
 
 
 def drawn_floor() -> Any:
@@ -107,7 +106,6 @@ def team(
     level: str = "velocity",
     merged: Any = None,
     ordered: bool = False,
-    solves: bool = False,
     **options: Any,
 ) -> Case:
     """Return an episode of ``lidarium.parallel_env`` with drawn actions."""
@@ -132,7 +130,7 @@ def team(
             outcome = env.step(actions)
             ledger.told(outcome)
 
-    return Case(run, 50 if level == "velocity" else 5, solves or merged is not None)
+    return Case(run, 50 if level == "velocity" else 5)
 
 
 def solo(name: str, level: str, steps: int, **options: Any) -> Case:
@@ -150,7 +148,7 @@ def solo(name: str, level: str, steps: int, **options: Any) -> Case:
             if outcome[2] or outcome[3]:
                 break
 
-    return Case(run, 50 if level == "velocity" else 5, False)
+    return Case(run, 50 if level == "velocity" else 5)
 
 
 def turns(floor: str, steps: int, **options: Any) -> Case:
@@ -167,7 +165,7 @@ def turns(floor: str, steps: int, **options: Any) -> Case:
             is_over = env.terminations[env.agent_selection] or env.truncations[env.agent_selection]
             env.step(None if is_over else draws.uniform((-0.2, -0.4), (0.8, 0.4)).astype(np.float32))
 
-    return Case(run, 50, False)
+    return Case(run, 50)
 
 
 def rows(
@@ -175,7 +173,6 @@ def rows(
     steps: int,
     level: str = "velocity",
     make: Callable[..., Any] | None = None,
-    solves: bool = False,
     **options: Any,
 ) -> Case:
     """Return episodes of ``lidarium.vector_env``, some of which end and begin anew."""
@@ -192,7 +189,7 @@ def rows(
             ledger.told(outcome)
         env.close()
 
-    return Case(run, 50 if level == "velocity" else 5, solves)
+    return Case(run, 50 if level == "velocity" else 5)
 
 
 def made_rows(episodes: int, floor: str, level: str, **options: Any) -> Any:
@@ -216,10 +213,10 @@ def learner_rows(floor: str, steps: int, **options: Any) -> Case:
             ledger.told((observations, rewards, dones, None, {"rows": infos}))
         env.close()
 
-    return Case(run, 50, False)
+    return Case(run, 50)
 
 
-def formed(face: str, level: str, seed: int, steps: int, solves: bool = False, **options: Any) -> Case:
+def formed(face: str, level: str, seed: int, steps: int, **options: Any) -> Case:
     """Return episodes with conventions, merged maps, drawn settings or another backend, through one face.
 
     ``face`` is ``parallel``, ``rows`` or ``learner``. Actions are drawn for each row, masks are taken from
@@ -280,7 +277,7 @@ def formed(face: str, level: str, seed: int, steps: int, solves: bool = False, *
             ledger.told((*outcome, None, {})[:5] if face == "rows" else (*outcome[:3], None, {"rows": infos}))
         env.close()
 
-    return Case(run, 20 if level == "velocity" else 4, solves)
+    return Case(run, 20 if level == "velocity" else 4)
 
 
 def mask_in(observation: Any, infos: Any, row: int | None = None) -> Any:
@@ -339,7 +336,6 @@ def policy(
     each: bool = False,
     setup: Mapping[str, Any] | None = None,
     merged: bool = False,
-    solves: bool = False,
     **options: Any,
 ) -> Case:
     """Return an episode that a policy of the catalogue runs, with commands and true states of all steps."""
@@ -355,10 +351,10 @@ def policy(
         episode = named("run_episode")(heard, env, SEED, merging=merging)
         ledger.add("infos", {"given_up": episode.given_up, "merges": episode.merges})
 
-    return Case(run, 50, solves or merged)
+    return Case(run, 50)
 
 
-def command(line: str, solves: bool = False) -> Case:
+def command(line: str) -> Case:
     """Return an episode of ``lidarium run``: its result, map, record and log of decisions."""
 
     def run(ledger: Ledger) -> None:
@@ -388,4 +384,4 @@ def command(line: str, solves: bool = False) -> Case:
                 )
                 ledger.add("record", {name: record[name] for name in tables})
 
-    return Case(run, 50, solves)
+    return Case(run, 50)

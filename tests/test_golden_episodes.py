@@ -40,7 +40,6 @@ ALL_SEEN = ("scan", "pose", "velocity", "bumper", "map", "egocentric_map")
 WEAK = part("RadioSettings", kind="signal", power=-28.0, shadowing=4.0, loss=0.2, latency_s=0.3)
 REAL = {"localization": "slam", "odometry": "typical", "noise": "datasheet", "known_starts": False}
 
-# Floats of BLAS, LAPACK or FFT are in those that ``solves``: their hashes hold for one kind of processor.
 CASES: dict[str, Case] = {
     # Levels of decision, floors, bodies, lasers, sizes of teams.
     "velocity": team("apartment", 300, robots=3),
@@ -75,12 +74,12 @@ CASES: dict[str, Case] = {
     "odometry_good": team("apartment", 200, robots=2, localization="odometry", odometry="good"),
     "odometry_typical": team("clinic", 40, "frontier", robots=2, localization="odometry", odometry="typical"),
     "odometry_poor": team("clinic", 200, robots=2, localization="odometry", odometry="poor", known_starts=False),
-    "slam_ideal": team("apartment", 200, solves=True, robots=2, localization="slam"),
-    "slam_typical": team("apartment", 14, "frontier", solves=True, robots=2, **REAL),
-    "splines_ideal": team("srt_l_room", 100, solves=True, robots=1, localization="splines"),
-    "splines_typical": team("clinic", 100, solves=True, robots=2, **{**REAL, "localization": "splines"}),
-    "splines_ekf_ideal": team("srt_l_room", 150, solves=True, robots=1, localization="splines_ekf"),
-    "splines_ekf_typical": team("clinic", 80, solves=True, robots=2, **{**REAL, "localization": "splines_ekf"}),
+    "slam_ideal": team("apartment", 200, robots=2, localization="slam"),
+    "slam_typical": team("apartment", 14, "frontier", robots=2, **REAL),
+    "splines_ideal": team("srt_l_room", 100, robots=1, localization="splines"),
+    "splines_typical": team("clinic", 100, robots=2, **{**REAL, "localization": "splines"}),
+    "splines_ekf_ideal": team("srt_l_room", 150, robots=1, localization="splines_ekf"),
+    "splines_ekf_typical": team("clinic", 80, robots=2, **{**REAL, "localization": "splines_ekf"}),
     # Radios, faults, energy, pauses, all of it.
     "radio_none": team("apartment", 30, "frontier", robots=3, radio="none"),
     "radio_range": team("apartment", 40, "frontier", robots=3, radio=part("RadioSettings", kind="range", reach=4.0)),
@@ -93,8 +92,8 @@ CASES: dict[str, Case] = {
     "battery": team("clinic", 40, "frontier", robots=2, battery=part("Battery", capacity_j=250.0)),
     "battery_kobuki": team("clinic", 150, robots=2, battery="kobuki"),
     "pauses": team("scene_corner", 30, "waypoint", ordered=True, robots=3, pauses_when_blocked=True),
-    "lab": team("clinic", 150, solves=True, robots=2, realism="lab"),
-    "field": team("apartment", 10, "frontier", solves=True, robots=3, realism="field"),
+    "lab": team("clinic", 150, robots=2, realism="lab"),
+    "field": team("apartment", 10, "frontier", robots=3, realism="field"),
     # Merged maps.
     "merged_velocity": team("scene_room", 150, merged=False, robots=2, known_starts=False),
     "merged_frontier": team("apartment", 30, "frontier", merged=False, robots=3, known_starts=False, noise="datasheet"),
@@ -108,7 +107,7 @@ CASES: dict[str, Case] = {
     "rows_waypoint": rows("apartment", 30, "waypoint", robots=2, noise="datasheet", copy=False),
     "rows_frontier": rows("building:5", 30, "frontier", robots=3, threads=THREADS, max_cycles=400, known_starts=False),
     "rows_faults": rows("clinic", 20, "frontier", robots=3, threads=1, faults=faults, radio="range"),
-    "rows_field": rows("clinic", 6, "frontier", solves=True, threads=1, robots=2, realism="field"),
+    "rows_field": rows("clinic", 6, "frontier", threads=1, robots=2, realism="field"),
     "rows_registered": rows("clinic", 20, "waypoint", made_rows),
     "rows_learner": learner_rows("building:5", 120, robots=2, max_cycles=50),
     # Policies.
@@ -123,28 +122,25 @@ CASES: dict[str, Case] = {
     "explore_lite": policy("explore_lite", "office:3", 1000, robots=2, noise="thesis"),
     "tour_frontier": policy("tour_frontier", "apartment", 1000, robots=2, stop_coverage=0.99),
     "predicted_tours": policy("predicted_tours", "apartment", 1000, robots=2, stop_coverage=0.99),
-    "srt": policy("srt", "srt_l_room", 300, robots=1, solves=True),
-    "srt_explores": policy("srt", "clinic", 300, robots=1, solves=True, stop_coverage=0.9),
-    "srt_team": policy("srt", "apartment", 200, robots=2, solves=True, radio="line_of_sight"),
-    "srt_thesis": policy("srt", "srt_lab", 300, setup={"mode": "thesis"}, robots=1, solves=True),
-    "supervised": policy("supervised", "apartment", 800, robots=3, solves=True, known_starts=False),
-    "supervised_slam": policy("supervised", "clinic", 250, robots=2, solves=True, faults=faults, **REAL),
+    "srt": policy("srt", "srt_l_room", 300, robots=1),
+    "srt_explores": policy("srt", "clinic", 300, robots=1, stop_coverage=0.9),
+    "srt_team": policy("srt", "apartment", 200, robots=2, radio="line_of_sight"),
+    "srt_thesis": policy("srt", "srt_lab", 300, setup={"mode": "thesis"}, robots=1),
+    "supervised": policy("supervised", "apartment", 800, robots=3, known_starts=False),
+    "supervised_slam": policy("supervised", "clinic", 250, robots=2, faults=faults, **REAL),
     "supervised_extended": policy(
         "supervised",
         "apartment",
         450,
         robots=3,
-        solves=True,
         known_starts=False,
         radio="signal",
         setup={"assignment": "hungarian", "avoids_rendezvous": True, "returns_home": True},
     ),
-    "independent": policy("independent", "clinic", 1500, robots=2, solves=True, known_starts=False),
-    "oracle_starts": policy(
-        "oracle_starts", "clinic", 900, robots=3, solves=True, known_starts=False, reveals_starts=True
-    ),
+    "independent": policy("independent", "clinic", 1500, robots=2, known_starts=False),
+    "oracle_starts": policy("oracle_starts", "clinic", 900, robots=3, known_starts=False, reveals_starts=True),
     # Whole runs by the command line.
-    "run": command("--robots 2 --horizon-s 11 --map-resolution 0.05", solves=True),
+    "run": command("--robots 2 --horizon-s 11 --map-resolution 0.05"),
     "run_ideal": command("--policy nearest_frontier --floor clinic --horizon-s 60 --map-resolution 0.05"),
     "run_goal": command(
         "--floor srt_t_junction --robots 1 --policy nearest_frontier --horizon-s 40 --map-resolution 0.05"
@@ -184,7 +180,6 @@ for _n, (_form, _options) in enumerate(FORMS.items()):
                 _level,
                 100 + _n,
                 _steps,
-                solves=_form in ("merged", "slam"),
                 **{
                     "floor": "building:5" if _n % 2 else "apartment",
                     "robots": 2,
@@ -194,17 +189,6 @@ for _n, (_form, _options) in enumerate(FORMS.items()):
                     **({"robots": 3} if _form == "talking" else {}),
                 },
             )
-
-
-def processor() -> str:
-    """Return the kind of processor, as far as it tells which code libraries choose."""
-    try:
-        lines = Path("/proc/cpuinfo").read_text().split("\n\n")[0].splitlines()
-    except OSError:
-        return platform.processor()
-    told = {key.strip(): value.strip() for key, _, value in (line.partition(":") for line in lines)}
-    flags = [flag for flag in ("fma", "avx2", "avx512f") if flag in told.get("flags", "").split()]
-    return " ".join([told.get("model name", ""), told.get("cpu family", ""), told.get("model", ""), *flags])
 
 
 def made_with() -> dict[str, str]:
@@ -258,9 +242,7 @@ def golden() -> dict[str, Any]:
 @pytest.mark.filterwarnings("ignore:.*is out of date:DeprecationWarning")  # version 0 of the ids
 @pytest.mark.parametrize("name", CASES)
 def test_an_episode_is_the_same_to_the_bit(name, golden):
-    kept = golden["solved"].get(processor(), {}) if CASES[name].solves else golden["cases"]
-    if name not in kept:
-        pytest.skip(f"has solutions of BLAS in it, and has no hashes made on {processor()}")
+    kept = golden["cases"]
     said = difference(kept[name], run(name, golden).summary())
     assert not said, f"{name}: {'; '.join(said)}"
 
@@ -268,14 +250,13 @@ def test_an_episode_is_the_same_to_the_bit(name, golden):
 def write(names: list[str]) -> None:
     """Write hashes of all cases, or of some, and tell how long each took."""
     kept: dict[str, Any] = {**json.loads(GOLDEN.read_text()), "found": {}}
-    solved = kept["solved"].setdefault(processor(), {})
     for name in names or CASES:
         began = time.perf_counter()
         ledger = run(name, kept if kept.get(keys_of(name)) else None)
         keys = kept["found"].setdefault(keys_of(name), {}) if not kept.get(keys_of(name)) else {}
         for part_name, met in ledger.met.items():
             keys[part_name] = sorted({*keys.get(part_name, ()), *met})
-        (solved if CASES[name].solves else kept["cases"])[name] = ledger.summary()
+        kept["cases"][name] = ledger.summary()
         print(f"{name:28} {ledger.steps:5} steps {time.perf_counter() - began:6.2f} s", flush=True)
         save(kept)
 
@@ -286,10 +267,6 @@ def save(kept: dict[str, Any]) -> None:
         "made_with": made_with(),
         **{name: kept["found"].get(name, kept.get(name)) for name in ("keys", "form_keys")},
         "cases": {name: kept["cases"][name] for name in CASES if name in kept["cases"]},
-        "solved": {
-            kind: {name: cases[name] for name in CASES if name in cases}
-            for kind, cases in sorted(kept["solved"].items())
-        },
     }
     GOLDEN.write_text(json.dumps(whole, indent=1) + "\n")
 

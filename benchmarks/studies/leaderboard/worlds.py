@@ -55,7 +55,11 @@ KINDS = {
     "dungeon": "dungeons, 0.1 m a pixel",
     "slam": "maps that robots made of real buildings",
 }
-NOT_RUN = {"kth": ("unknown", "camera"), "dungeon": ("lab", "unknown", "camera"), "slam": ("lab", "unknown", "camera")}
+NOT_RUN = {
+    "kth": ("lab", "unknown", "camera"),
+    "dungeon": ("lab", "unknown", "camera"),
+    "slam": ("lab", "unknown", "camera"),
+}
 """Worlds in which large floors are left out: an episode takes minutes there."""
 
 BOUNDED = {"test": 8, "lifull": 6}
