@@ -86,6 +86,9 @@ BACKING_SPEED = 0.05
 BLOCKED_S = 1.0
 """A robot that wants to drive and has stood for this long is blocked [s]."""
 
+PUSHING_S = 10.0
+"""A robot that drives and has not moved for this long is blocked [s]; most that push for a moment slide free."""
+
 
 class Courses(NamedTuple):
     """The paths that the robots of a team follow.
@@ -165,7 +168,8 @@ def _drive_on(sensed: Sensed, courses: Courses, bodies: Bodies, robot: int, comm
         is_pushing = abs(sensed.velocities[robot, 0]) < STANDING_SPEED
         courses.stood[robot] = min(courses.stood[robot], 0) - 1 if is_pushing else 0
         courses.states[robot] = DRIVING
-    if abs(courses.stood[robot]) * bodies.limits[TIME_STEP] >= BLOCKED_S - ROUNDING_S:
+    longest = BLOCKED_S if courses.stood[robot] >= 0 else PUSHING_S
+    if abs(courses.stood[robot]) * bodies.limits[TIME_STEP] >= longest - ROUNDING_S:
         courses.states[robot] = BLOCKED
 
 

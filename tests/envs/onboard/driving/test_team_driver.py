@@ -64,7 +64,7 @@ def test_robots_that_have_ended_are_not_planned_for():
 
 def test_a_robot_that_pushes_against_what_its_laser_does_not_see_backs_out():
     low = Solid(np.array([(3.0, 1.0), (3.4, 1.0), (3.4, 2.0), (3.0, 2.0)]), 0.0, 0.2)
-    floor, options = Floor("low", (0.0, 0.0, 6.0, 3.0), (low,)), {"stop_coverage": None, "horizon_s": 15.0}
+    floor, options = Floor("low", (0.0, 0.0, 6.0, 3.0), (low,)), {"stop_coverage": None, "horizon_s": 30.0}
     env = lidarium.parallel_env(floor, robots=1, level="waypoint", decision_period_s=0.5, **options)
     env.reset(seed=0, options={"starts": [(1.0, 1.5, 0.0)]})
     target = Target(*(np.array([5.0, 1.5]) - env.belief("robot_0").frame))
