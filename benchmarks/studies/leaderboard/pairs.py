@@ -35,7 +35,7 @@ def pairs_table(
     names: Mapping[str, str],
     pairs: Sequence[tuple[str, str, str]] = PAIRS,
 ) -> str:
-    """Return the table of pairs of all teams."""
+    """Return the table of pairs of all teams; empty if there are none."""
     rows = [HEADER]
     for world, ours, theirs in pairs:
         first, second = (_times(episodes.get(world, ()), policy) for policy in (ours, theirs))
@@ -46,7 +46,7 @@ def pairs_table(
         cells = [_ratio(first, second, keys) for keys in (*by_team, both)]
         floors = len({floor for floor, _ in both})
         rows.append(f"| {names[world]} | `{ours}` | `{theirs}` | {floors} | {' | '.join(cells)} |")
-    return "\n".join(rows)
+    return "\n".join(rows) if len(rows) > 1 else ""
 
 
 Times = Mapping[tuple[str, int], float]

@@ -56,14 +56,10 @@ Times are medians with 95 % intervals; runs that did not get there count as neve
 that [knows the floor](../reference/bounds.md), medians over floors that have a bound. Differences are of restricted
 means to the baseline of the world (`nearest_frontier`, or `independent` if starts are unknown), pair by pair, for six
 pairs or more; they are bold if both Wilcoxon's signed rank test (5 %, Holm) and the 95 % interval exclude chance.
-{notes}
-## Pairs
 
-On floors of the set `test`: geometric means of ratios of times to 99 %, with their 95 % interval. Below 1 is
+Pairs of policies are compared by geometric means of ratios of times to 99 %, with their 95 % interval. Below 1 is
 less time; runs that did not get there count as the whole time.{merges}
-
-{pairs}
-
+{notes}
 {kinds}
 """
 
@@ -88,13 +84,9 @@ def page(folder: Path) -> str:
         notes.append(f"Not in it: {'; '.join(missing)}.")
     return PAGE.format(
         horizon=HORIZON_S,
-        pairs=pairs_table(
-            {name: _episodes(folder, "test", name) for name in WORLDS},
-            {name: world.about for name, world in WORLDS.items()},
-        ),
         merges=merges_text(each for kind in KINDS for each in _episodes(folder, kind, "unknown")),
         notes="".join(f"\n{note}\n" for note in notes),
-        kinds="\n\n".join(_section(kind, kind_parts) for kind, kind_parts in found.items()),
+        kinds="\n\n".join(_section(folder, kind, kind_parts) for kind, kind_parts in found.items()),
     )
 
 
@@ -125,10 +117,15 @@ def _missing(folder: Path, found: Mapping[str, Any]) -> list[str]:
     return [about for kind, about in KINDS.items() if kind not in found] + worlds
 
 
-def _section(kind: str, found: list[Part]) -> str:
+def _section(folder: Path, kind: str, found: list[Part]) -> str:
     floors = {floor for part in found for group in part.groups for floor in group["floors"]}
     about = KINDS[kind]
-    return f"## {about[0].upper()}{about[1:]} ({len(floors)})\n\n{in_file(table(found))}"
+    pairs = pairs_table(
+        {name: _episodes(folder, kind, name) for name in WORLDS},
+        {name: world.about for name, world in WORLDS.items()},
+    )
+    blocks = (f"## {about[0].upper()}{about[1:]} ({len(floors)})", pairs, in_file(table(found)))
+    return "\n\n".join(block for block in blocks if block)
 
 
 def _parts_in(folder: Path) -> dict[str, list[Part]]:
