@@ -36,7 +36,6 @@ for _name, _module, _summary in (
         "supervisor.study",
         "teams with unknown starts under the supervisor, beside bounds of merging",
     ),
-    ("unknown_starts", "unknown_starts", "explorers that a supervisor leads from unknown starts, beside `supervised`"),
     ("zoo", "zoo", "teams that learned by rewards, five trainings of each, beside classic teams on unseen floors"),
 ):
     STUDIES.register(_name, f"{_PACKAGE}.{_module}:STUDY", _summary)

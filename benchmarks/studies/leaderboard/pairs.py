@@ -20,6 +20,7 @@ PAIRS = (
     ("unknown", "supervised", "independent"),
     ("unknown", "supervised_tours", "supervised"),
     ("unknown", "supervised_predicted", "supervised"),
+    ("unknown", "supervised_predicted", "supervised_tours"),
     ("unknown", "supervised_learned", "supervised"),
 )
 """World, policy, and which one it is set beside."""

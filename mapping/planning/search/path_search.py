@@ -247,7 +247,7 @@ def check_shape(shape: tuple[int, ...]) -> None:
         rows, columns = shape
         raise ValueError(
             f"a map of {rows} rows and {columns} columns cannot be searched; want 1 to {MAX_CELLS_A_SIDE} cells a "
-            "side, so take larger cells (map_resolution)"
+            "side; with a larger resolution there are fewer"
         )
 
 

@@ -20,7 +20,7 @@ NAMES = (
         "merging",
     ),
     *("parity", "people", "prediction", "printed", "realism", "slam", "sparse", "splines", "srt", "supervisor"),
-    *("unknown_starts", "zoo"),
+    "zoo",
 )
 
 

@@ -144,7 +144,7 @@ def test_bad_input_is_named():
         Footprint(0.3, 0.2)
     with pytest.raises(ValueError, match="penalty"):
         Footprint(penalty=-1.0)
-    with pytest.raises(ValueError, match="shape"):
+    with pytest.raises(ValueError, match="a map of 0 rows and 5 columns"):
         SearchSpace((0, 5), RESOLUTION)
 
 
