@@ -217,7 +217,7 @@ class Engine:
         return spaces.Dict({**observation_space(self.settings, self.has_goal).spaces, **level.boxes})
 
     def take_level(self, name: str, level: Level) -> None:
-        """Let actions be those of a level; episodes have to begin anew."""
+        """Take actions at a level; every episode has to be reset."""
         self.level: Level = level
         self.level_name = name
         self.operating.attach(self.level.driver, self.level.make_driver)

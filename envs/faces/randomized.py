@@ -364,7 +364,10 @@ class RandomizedRows:
     def _begun_part(
         self, episode: int, seed: int | None, options: ResetOptions | None, before: int
     ) -> tuple[TeamRows, dict[str, Any], np.random.Generator]:
-        """Return new rows of an episode that have begun, after ``before`` others, with what was drawn for it."""
+        """Make and reset the rows of an episode; return them, the drawn settings and the generator.
+
+        ``before`` is the number of episodes that this reset began earlier.
+        """
         generator = copy.deepcopy(self._generators[episode])
         if seed is not None:
             generator = np.random.default_rng((seed, SETTINGS_STREAM))

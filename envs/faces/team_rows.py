@@ -117,7 +117,7 @@ class TeamRows:
         self._use(form)
 
     def _form_of(self, space: spaces.Dict) -> ObservationForm:
-        """Return the form of the observations of a level, with what is exchanged."""
+        """Return the form of the observations of a level, with received messages and merged maps."""
         boxes = {} if self._merged is None else self._merged.boxes
         if self._board is not None:
             boxes = {**boxes, MESSAGES: self._board.box}

@@ -225,7 +225,7 @@ class RightOfWay:
             return
         movable = [other for other in near if other in live]
         if is_planned and not movable:
-            # Nobody near will ever move: no detour is too long.
+            # None of the robots nearby will move again, so a detour may have any length.
             self._planner.drive_to(row, goal, near, heading)
         for other in sorted(
             movable,

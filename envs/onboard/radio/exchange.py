@@ -282,7 +282,7 @@ class Exchange:
         self.start(0)
 
     def __getstate__(self) -> dict[str, Any]:
-        # The station of a copy answers anew.
+        # The station of a copy sets its own callback.
         return {**self.__dict__, "report_of": None}
 
     @property

@@ -121,7 +121,7 @@ def footprint(
     sensor, beams = world.sensor[row - first], world.ranges.shape[1]
     directions, lengths, ends = np.empty((4, beams)), np.empty(beams), np.empty((2, beams))
     if is_noisy(sensor) or world.sensor[0, SCAN_STEPS] > 1.0:
-        # What the robot has recognised stays what it saw in its last scan.
+        # Keep the people and doors that the robot recognised in its last scan.
         marks, gap = world.recognised[row : row + 1].copy(), np.inf
         if world.walkers.shape[0] > 0:
             gap = world.safety[row, PERSON_GAP]

@@ -142,7 +142,7 @@ def measure(
             cut_by_disc(beams, other_x, other_y, radius, lengths)
     if world.recognised.shape[0] > 0:
         world.recognised[row, :] = 0
-        # Beams that are blind recognise nobody.
+        # Blind beams must not detect people.
         blind_beams(world.faults[row], world.steps[episode], angle_first, increment, ranges, lengths)
     # Doors first: people behind one are not seen.
     if world.doors.shape[0] > 0 and sensor[LASER_HEIGHT] < LEAF_HEIGHT_M:

@@ -1,4 +1,4 @@
-"""Motion within scans is corrected beam by beam; if it cannot be, a remark says so."""
+"""Motion during a scan is corrected beam by beam; a remark reports scans that cannot be corrected."""
 
 import math
 
