@@ -55,6 +55,11 @@ def begin(
 ) -> EpisodeStart:
     """Draw how an episode begins."""
     _compile_kernels()
+    if chosen.goal is not None and not choice.has_goal:
+        raise ValueError(
+            f"option goal is {chosen.goal}, but the floor of the environment has no goal, and robots observe none; "
+            "make the environment with a floor that has one, and each reset can replace it"
+        )
     choice_here = choice if chosen.floor is None else choice.instead(chosen.floor)
     floor = choice_here.load(generator)
     if isinstance(chosen.starts, np.ndarray):

@@ -183,6 +183,12 @@ def test_a_goal_that_no_robot_can_be_at_is_refused_before_the_run(goal, told):
         env.reset(seed=1, options={"goal": goal})
 
 
+def test_a_goal_is_refused_where_none_is_observed():
+    env = make(box())
+    with pytest.raises(ValueError, match=r"option goal is \(2.0, 1.0\), but the floor of the environment has no goal"):
+        env.reset(seed=1, options={"goal": (2.0, 1.0)})
+
+
 def test_the_goal_stays_where_it_is_as_the_frame_of_the_pose_sees_it():
     env = make(box(goal=(4.0, 3.0)))
     observations, _ = env.reset(seed=0)
