@@ -144,7 +144,10 @@ class Transforms:
         self.frames.note(parent, child, each.transform, is_static=is_static)
         if not is_static:
             kept = self.moving.setdefault((parent, child), deque(maxlen=_READINGS))
-            kept.append((seconds_of(each.header.stamp), pose))
+            stamp = seconds_of(each.header.stamp)
+            if kept and kept[-1][0] - stamp >= _SET_BACK_S:
+                kept.clear()
+            kept.append((stamp, pose))
 
 
 class RobotLink:
@@ -287,6 +290,8 @@ class RobotLink:
         for (parent, child), moves in self._transforms.moving.items():
             if child == self._base and parent.rstrip("/").endswith("odom"):
                 self.odom_frame = parent
+                if self._stamps and self._stamps[-1] - moves[-1][0] >= _SET_BACK_S:
+                    self._stamps, self._wheels = [], []
                 for stamp, pose in moves:
                     if not self._stamps or stamp > self._stamps[-1]:
                         self._take_wheels(self.names.transforms, stamp, _Wheels(pose, self._speed(stamp, pose)))

@@ -132,6 +132,19 @@ def test_a_clock_that_is_set_back_for_good_is_followed(nodes):
     assert nodes[1].refused["/robot_0/scan: back in time"] == 9
 
 
+def test_a_clock_that_is_set_back_is_followed_in_transforms_too(nodes):
+    robot, driver = nodes
+    robot.advertise("/tf", TRANSFORMS)
+    link = RobotLink(driver, NAMES, Transforms(driver))
+    link._base = "base"
+    until(lambda: robot.subscribers("/tf"))
+    for time_s, x in ((49.9, 0.1), (50.0, 0.2), (2.0, 0.5), (2.1, 0.6)):
+        robot.transform("odom", "base", time_s, (x, 0.0, 0.0))
+        until(lambda x=x: link._hear_odometry() or (link._wheels and link._wheels[-1].pose[0] == x))
+    assert link._stamps == pytest.approx([2.0, 2.1])
+    assert link._wheels[-1].velocity == pytest.approx((1.0, 0.0))
+
+
 @pytest.mark.parametrize("pose", [(math.nan, 0.0, 0.0), (1e12, 0.0, 0.0)])
 def test_odometry_that_is_no_pose_is_refused(nodes, pose):
     robot = Robot(*nodes)
