@@ -4,7 +4,6 @@ It has their beginnings, steps, endings, rewards, observations and infos. A sing
 episode; every face (PettingZoo, Gymnasium, stable-baselines3) hands actions to it and reads its arrays.
 """
 
-import os
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -34,7 +33,7 @@ from lidarium.envs.levels import LEVELS
 from lidarium.envs.levels.level import DECIDES, SENSES, STEPS, WAITS, Level, Turn
 from lidarium.envs.observing.observables import ComputedObservations
 from lidarium.envs.observing.rows import Rows
-from lidarium.envs.observing.spaces import observation_space
+from lidarium.envs.observing.spaces import check_memory, observation_space
 from lidarium.envs.observing.writer import ObservationWriter
 from lidarium.envs.onboard.meters import Meters
 from lidarium.envs.onboard.perception import Perception
@@ -61,9 +60,6 @@ AfterStep = Callable[[NDArray[np.float64]], None]
 """Called after each time step with the commands (rows, 2) [m/s, rad/s]."""
 
 NO_EPISODES = np.zeros(0, np.int64)
-
-_COPIES = 7
-"""How many times as much as a batch observes is held: in buffers, copies, and bounds of its spaces."""
 
 
 class Engine:
@@ -141,7 +137,7 @@ class Engine:
         self.rows = self.episodes * self.robots
         choice = FloorChoice(floor, image_resolution)
         self.has_goal = choice.has_goal
-        _check_memory(self.episodes, settings, self.has_goal)
+        check_memory(self.episodes, settings, self.has_goal)
         self._beginnings = Beginnings(choice, settings, self.episodes, curriculum)
         self.simulation = make_simulation(settings, self.episodes)
         self.world = self.simulation.world
@@ -190,7 +186,8 @@ class Engine:
         order = np.arange(self.episodes)
         self._orders = [order, order[::-1].copy()]
         self.copies = copy
-        self._calibration = self._calibration_rows()
+        camera = self.simulation.camera
+        self._calibration = None if camera is None else camera.camera.calibrations(self.rows)
         self.use_level(level)
 
     def use_level(self, name: str, shares_map: bool = True, decision_period_s: float | None = None) -> None:
@@ -526,7 +523,7 @@ class Engine:
         infos: dict[str, Any] = {
             "truth": {
                 "pose": self.world.poses.copy(),
-                "coverage": np.repeat(score.coverages(), self.robots) if self.episodes > 1 else self._coverage(),
+                "coverage": score.row_coverages(),
                 "seen_cells": score.seen.copy(),
             },
             "_truth": everyone,
@@ -550,24 +547,6 @@ class Engine:
             infos["camera"] = self._calibration
             infos["_camera"] = everyone
         self.infos = infos
-
-    def _coverage(self) -> NDArray[np.float64]:
-        """Return the coverage of a lone episode for each row; its steps are short."""
-        score, coverage = self.score, np.empty(self.rows)
-        coverage.fill(score.team_seen.item(0) / max(score.counted.item(0), 1))
-        return coverage
-
-    def _calibration_rows(self) -> dict[str, Any] | None:
-        """Return the calibration of the robots' cameras in arrays over rows, None without cameras."""
-        if self.simulation.camera is None:
-            return None
-        calibration = self.simulation.camera.camera.calibration
-        return {
-            "intrinsics": {
-                name: frozen(np.full(self.rows, value)) for name, value in calibration["intrinsics"].items()
-            },
-            "mount": frozen(np.tile(calibration["mount"], (self.rows, 1))),
-        }
 
     def _new_buffers(self) -> Arrays:
         arrays: Arrays = {name: np.zeros(shape, dtype) for name, (shape, dtype) in self._written.items()}
@@ -620,18 +599,3 @@ class Engine:
     def __getstate__(self) -> dict[str, Any]:
         # A copy's arrays lie elsewhere.
         return {**self.__dict__, "_tables": None, "_prediction": None}
-
-
-def _check_memory(episodes: int, settings: ExplorationSettings, has_goal: bool) -> None:
-    """Check that this machine has the memory for what a batch of episodes observes."""
-    if not hasattr(os, "sysconf"):
-        return
-    boxes = observation_space(settings, has_goal).values()
-    observed = settings.robots * sum(box.low.nbytes for box in boxes if isinstance(box, spaces.Box))
-    memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
-    if _COPIES * episodes * observed > memory:
-        raise ValueError(
-            f"the number of episodes is {episodes:,}, which observe {episodes * observed / 2**30:,.1f} GiB and hold "
-            f"about {_COPIES} times as much; this machine has {memory / 2**30:,.1f} GiB: want at most "
-            f"{memory // (_COPIES * observed):,}, or fewer map_cells or egocentric_cells"
-        )

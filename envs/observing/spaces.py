@@ -1,6 +1,7 @@
 """Spaces of observations, and of the actions that go with them."""
 
 import math
+import os
 
 import numpy as np
 from gymnasium import spaces
@@ -22,6 +23,9 @@ KERNEL_SUMMARIES = {
 }
 """One-line description of each observable of the kernel."""
 
+
+_COPIES = 7
+"""How many times as much as a batch observes is held: in buffers, copies, and bounds of its spaces."""
 
 KEYS = (*OBSERVABLES, "goal")
 """All keys that the kernel writes, in the order in which it takes the arrays."""
@@ -68,3 +72,18 @@ def action_space() -> spaces.Box:
     An action is speed and turn rate as shares of the robot's limits.
     """
     return spaces.Box(-1.0, 1.0, (2,), np.float32)
+
+
+def check_memory(episodes: int, settings: ExplorationSettings, has_goal: bool) -> None:
+    """Check that this machine has the memory for what a batch of episodes observes."""
+    if not hasattr(os, "sysconf"):
+        return
+    boxes = observation_space(settings, has_goal).values()
+    observed = settings.robots * sum(box.low.nbytes for box in boxes if isinstance(box, spaces.Box))
+    memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    if _COPIES * episodes * observed > memory:
+        raise ValueError(
+            f"the number of episodes is {episodes:,}, which observe {episodes * observed / 2**30:,.1f} GiB and hold "
+            f"about {_COPIES} times as much; this machine has {memory / 2**30:,.1f} GiB: want at most "
+            f"{memory // (_COPIES * observed):,}, or fewer map_cells or egocentric_cells"
+        )

@@ -101,6 +101,12 @@ class DepthCamera:
         intrinsics = {"fx": pinhole.fx, "fy": pinhole.fy, "cx": pinhole.cx, "cy": pinhole.cy}
         return {"intrinsics": intrinsics, "mount": self.mount}
 
+    def calibrations(self, robots: int) -> dict[str, Any]:
+        """Return the calibration of the cameras of that many robots, in arrays that cannot be written to."""
+        of_one = self.calibration
+        intrinsics = {name: np.broadcast_to(value, robots) for name, value in of_one["intrinsics"].items()}
+        return {"intrinsics": intrinsics, "mount": np.broadcast_to(of_one["mount"], (robots, len(of_one["mount"])))}
+
     @property
     def is_noisy(self) -> bool:
         """Whether depths carry noise or are rounded."""

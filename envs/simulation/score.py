@@ -122,3 +122,11 @@ class Score:
     def coverages(self) -> NDArray[np.float64]:
         """Return the sensed share of F of every episode, ``C_free``, shape (episodes,)."""
         return np.asarray(self.team_seen / np.maximum(self.counted, 1))
+
+    def row_coverages(self) -> NDArray[np.float64]:
+        """Return the coverage of the episode of each row."""
+        if self._episodes > 1:
+            return np.repeat(self.coverages(), self._robots)
+        coverage = np.empty(self._robots)  # steps of a lone episode are short
+        coverage.fill(self.team_seen.item(0) / max(self.counted.item(0), 1))
+        return coverage

@@ -78,5 +78,5 @@ def _counts(cells: NDArray[np.bool_], factor: int) -> NDArray[np.int64]:
     padded = np.zeros((rows * factor, columns * factor), np.uint8)
     padded[: cells.shape[0], : cells.shape[1]] = cells
     # Strided sums: numpy sums short axes, as those of a reshape, slowly.
-    by_row = np.sum([padded[offset::factor] for offset in range(factor)], axis=0, dtype=np.int32)
+    by_row = np.asarray(np.sum([padded[offset::factor] for offset in range(factor)], axis=0, dtype=np.int32))
     return np.asarray(np.sum([by_row[:, offset::factor] for offset in range(factor)], axis=0, dtype=np.int64))
