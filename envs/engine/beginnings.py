@@ -84,6 +84,12 @@ def begin(
         how = starts or settings.starts or ("drawn" if choice_here.is_set else "fixed")
         proposed = floor.starts[:0] if how == "drawn" else floor.starts
         starts = draw_starts(body, radius, settings.robots, generator, proposed)
+    for number, fault in enumerate(settings.faults.schedule):
+        if fault.place is not None:
+            try:
+                check_starts(body, radius, np.array([fault.place]))
+            except ValueError as error:
+                raise ValueError(f"fault {number} puts robot {fault.robot} where none can start: {error}") from error
     goal = (chosen.goal or floor.goal) if choice.has_goal else None
     if goal is not None:
         check_goal(tables.body, goal)

@@ -153,11 +153,11 @@ def talking_space(space: spaces.Space[Any], floats: int) -> spaces.Space[Any]:
 def split_action(
     action: Any,  # noqa: ANN401
     floats: int,
-    has_vectors: bool,
+    space: spaces.Space[Any],
     whose: str,
     acting: NDArray[np.bool_] | None = None,
 ) -> tuple[Any, NDArray[np.float64]]:
-    """Return an action, or those of many rows, without the message, and the message.
+    """Return an action in a space, or those of many rows, without the message, and the message.
 
     Of many rows those that are ``acting`` (rows,) have to have messages; by default all have.
 
@@ -168,9 +168,10 @@ def split_action(
     """
     rest, message = None, np.zeros(0)
     try:
-        if has_vectors:
+        if isinstance(space, spaces.Box):
             numbers = np.asarray(action, np.float64)
-            rest, message = numbers[..., :-floats], numbers[..., -floats:]
+            if numbers.shape[-1] == space.shape[0] + floats and (acting is not None or numbers.ndim == 1):
+                rest, message = numbers[..., :-floats], numbers[..., -floats:]
         else:
             rest, message = action[ACTION], np.asarray(action[MESSAGE], np.float64)
     except (TypeError, ValueError, KeyError, IndexError):
@@ -179,7 +180,7 @@ def split_action(
     if message.shape[-1:] != (floats,) or not np.isfinite(message[acting] if is_of_rows else message).all():
         form = (
             f"the action with {floats} numbers behind it"
-            if has_vectors
+            if isinstance(space, spaces.Box)
             else f"{{'{ACTION}': ..., '{MESSAGE}': {floats} numbers}}"
         )
         raise ValueError(f"the action of {whose} is {shown(action)}; want {form}, all finite")

@@ -7,7 +7,7 @@ from typing import Any
 
 from lidarium.envs.engine.engine import Engine
 from lidarium.envs.faces.parallel import Observation, Outcome
-from lidarium.envs.faces.sparse_routes import SparseRouter
+from lidarium.envs.faces.sparse_routes import SparseRouter, routed
 from lidarium.envs.faces.wrapper import TeamWrapper, exploration_below
 from lidarium.envs.onboard.radio.messages import DriveState
 
@@ -38,11 +38,17 @@ class SparsePlanning(TeamWrapper):
         base = exploration_below(getattr(env, "unwrapped", env), "SparsePlanning")
         super().__init__(env)
         self.metadata = {**env.metadata, "name": str(env.metadata["name"]).replace("_v1", "_sparse_v1")}
-        self._shares_map = shares_map
+        self._shares_map, self._tells = shares_map, base.conventions.infos == "full"
         self._use(base.engine)
 
     def _use(self, engine: Engine) -> None:
         self._engine, self._router = engine, SparseRouter(engine, self._shares_map)
+
+    def use_level(self, name: str, shares_map: bool = True, decision_period_s: float | None = None) -> None:
+        """Let actions be those of another action level; see ``ExplorationEnv.use_level``."""
+        routed(name, self.unwrapped.engine.made_level(name, shares_map, decision_period_s))
+        super().use_level(name, shares_map, decision_period_s)
+        self._use(self.unwrapped.engine)
 
     def reset(
         self, seed: int | None = None, options: dict[str, Any] | None = None
@@ -64,6 +70,6 @@ class SparsePlanning(TeamWrapper):
         return self.unwrapped.drive_state(agent)
 
     def _with_reasons(self, infos: dict[str, dict[str, Any]]) -> dict[str, dict[str, Any]]:
-        for agent, info in infos.items():
+        for agent, info in infos.items() if self._tells else ():
             info["route"] = self._router.reasons[self.possible_agents.index(agent)]
         return infos

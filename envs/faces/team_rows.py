@@ -19,7 +19,7 @@ from lidarium.envs.faces.conventions import (
     shared_rewards,
 )
 from lidarium.envs.faces.messages import MESSAGES, MessageBoard, split_action, talking_space
-from lidarium.envs.faces.sparse_routes import SparseRouter
+from lidarium.envs.faces.sparse_routes import SparseRouter, routed
 from lidarium.envs.faces.team import EpisodeTeam
 from lidarium.envs.faces.team_exchange import CanTalk, MergedRows, MergingSettings
 from lidarium.envs.onboard.radio.messages import Order, Route, Stop, Target
@@ -112,8 +112,12 @@ class TeamRows:
         Parameters are those of `Engine.use_level`.
         """
         level = self.engine.made_level(name, shares_map, decision_period_s)
+        if self._router is not None:
+            routed(name, level)
         form = self._form_of(self.engine.space_at(level))
         self.engine.take_level(name, level)
+        if self._router is not None:
+            self._router = SparseRouter(self.engine, self._router.shares_map)
         self._use(form)
 
     def _form_of(self, space: spaces.Dict) -> ObservationForm:
@@ -190,12 +194,11 @@ class TeamRows:
             told = {row: action for row, action in actions.items() if type(action) in _TOLD}
             actions = {row: action for row, action in actions.items() if row not in told}
         if self._board is not None:
-            has_vectors = isinstance(engine.action_space, spaces.Box)
             self._sent[:] = 0.0
             rest = {}
             for row, action in actions.items():
                 rest[row], self._sent[row] = split_action(
-                    action, self.conventions.comm, has_vectors, names[row % self.robots]
+                    action, self.conventions.comm, engine.action_space, names[row % self.robots]
                 )
             actions = rest
         return engine.level.read(actions, names), told, actions.keys()
@@ -292,8 +295,7 @@ class TeamRows:
 
     def _without_messages(self, actions: Any, acting: NDArray[np.bool_]) -> Any:  # noqa: ANN401
         """Return actions without their messages, which are kept to be sent; only those of ``acting`` rows are read."""
-        has_vectors = isinstance(self.engine.action_space, spaces.Box)
-        rest, message = split_action(actions, self.conventions.comm, has_vectors, "all rows", acting)
+        rest, message = split_action(actions, self.conventions.comm, self.engine.action_space, "all rows", acting)
         if message.shape != self._sent.shape:
             raise ValueError(
                 f"messages have shape {message.shape}; want {self._sent.shape}: one for each row = episode * "

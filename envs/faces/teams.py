@@ -14,6 +14,7 @@ from lidarium.envs.floors.floor_choice import Floors
 from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.settings.making import makers_settings
 from lidarium.envs.settings.reset_options import Curriculum
+from lidarium.mapping.geometry.bounds import shown
 from lidarium.mapping.kernels.compilation import available_threads
 
 
@@ -62,6 +63,9 @@ def make_rows(
     if merging is None and can_talk is not None:
         raise ValueError("can_talk is given, but merging is not; want merging=True or MergingSettings as well")
     plans_sparsely, shares_map = others.pop("plans_sparsely", False), others.pop("shares_map", True)
+    for name, value in (("plans_sparsely", plans_sparsely), ("shares_map", shares_map)):
+        if not isinstance(value, bool):
+            raise ValueError(f"{name} is {shown(value)}; want True or False")
     randomize = others.pop("randomize", None)
     reports, settings = others.pop("reports", False), others.pop("settings", None)
     if settings is None and randomize is None:

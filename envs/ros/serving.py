@@ -248,6 +248,7 @@ class TeamServer:
             env.step({agent: driven[row].target or shares[row] for row, agent in enumerate(env.possible_agents)})
         else:
             env.drive_at(velocities)
+            env.outcome()  # robots end in it
         self.counts.steps += 1
         for each in driven:
             each.is_new = False

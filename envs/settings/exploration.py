@@ -322,20 +322,27 @@ class ExplorationSettings:
             self._check_camera(self.camera)
         if self.scan_period_s is not None:
             self._check_scan_period(self.scan_period_s)
+        for number, fault in enumerate(self.faults.schedule):
+            if fault.robot >= self.robots:
+                raise ValueError(
+                    f"fault {number} ({fault.kind}) is of robot {fault.robot}, but robots is {self.robots}; "
+                    f"want a robot from 0 to {self.robots - 1}"
+                )
         check_sensed(self)
         check_workload(self)
 
     def _check_camera(self, camera: DepthCamera) -> None:
-        """Check that the mount is on the robot, if no wall can be."""
-        if math.hypot(camera.forward, camera.left) > self.robot.radius:
+        """Check that the mount is on each robot, where no wall can be."""
+        radius, height = (min(getattr(robot, name) for robot in self.team) for name in ("radius", "height"))
+        if math.hypot(camera.forward, camera.left) > radius:
             raise ValueError(
                 f"the camera is mounted at forward {camera.forward} m, left {camera.left} m, beyond the "
-                f"robot's radius of {self.robot.radius} m, where a wall may be; want it on the robot"
+                f"robot's radius of {radius} m, where a wall may be; want it on the robot"
             )
-        if camera.height > self.robot.height:
+        if camera.height > height:
             raise ValueError(
                 f"height of the camera is {camera.height} m, above the robot's height of "
-                f"{self.robot.height} m, where furniture may be; want at most that, or a higher robot"
+                f"{height} m, where furniture may be; want at most that, or a higher robot"
             )
 
     def _check_scan_period(self, period: float) -> None:

@@ -97,6 +97,7 @@ def execute(command: _RosDrive) -> Answer:
         options |= supervisor_options(command.supervisor)
         check_supervised(command.policy)
     policy = lidarium.policy(command.policy, **options)
+    _settings(command, policy)  # refused before robots are looked for
     graph = open_graph(command, "lidarium_driver")
     try:
         episode, world, remarks = _driven(command, policy, graph)
@@ -194,8 +195,8 @@ def _given_map(command: _RosDrive, graph: "Graph") -> "GivenMap | None":
     raise ValueError(f"no map came on /map in domain {graph.domain} within {command.timeout_s:g} s; want a map server")
 
 
-def _settings(command: _RosDrive, policy: "Policy", links: "Sequence[RobotLink]") -> "ExplorationSettings":
-    """Return the settings of a team of robots with such lasers."""
+def _settings(command: _RosDrive, policy: "Policy", links: "Sequence[RobotLink]" = ()) -> "ExplorationSettings":
+    """Return the settings of a team of robots with such lasers; those of a simulated team if there are no links yet."""
     from dataclasses import asdict
 
     from lidarium.agents.policy import settings_for
@@ -203,14 +204,16 @@ def _settings(command: _RosDrive, policy: "Policy", links: "Sequence[RobotLink]"
     from lidarium.envs.settings.lidar import Lidar
     from lidarium.envs.settings.making import make_settings
 
-    geometry, period = links[0].geometry, links[0].scan_period_s
-    assert geometry is not None
+    lidar, period = Lidar(), 0.0
+    if links:
+        assert links[0].geometry is not None
+        lidar, period = Lidar(**asdict(links[0].geometry)), links[0].scan_period_s
     on_map = command.localization == "tf"
     settings = make_settings(
-        robots=len(links),
+        robots=len(command.namespaces),
         robot=command.robot,
-        lidar=Lidar(**asdict(geometry)),
-        backend=BACKEND,
+        lidar=lidar,
+        backend=BACKEND if links else "kinematic",
         localization="truth" if on_map else "slam",
         known_starts=on_map,
         time_step=period if 0.01 <= period <= 1.0 else SCAN_PERIOD_S,

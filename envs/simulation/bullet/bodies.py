@@ -155,6 +155,9 @@ RAYS_AT_ONCE = 16_000
 
 _JOINTS = (LEFT, RIGHT)
 
+_FASTEST_WHEEL = 1e6
+"""Bound of the turn rate of wheels [rad/s]; that of Bullet, 100, is below what small wheels need."""
+
 
 @dataclass(frozen=True, slots=True)
 class Motion:
@@ -224,7 +227,14 @@ class Bodies:
         for robot in range(len(self.team)):
             self._robots[robot] = client.load_text(urdf_of(self.team[robot]), flags=bullet.URDF_USE_INERTIA_FROM_FILE)
             for link in range(-1, 3):
-                client.call("changeDynamics", self._robots[robot], link, linearDamping=0.0, angularDamping=0.0)
+                client.call(
+                    "changeDynamics",
+                    self._robots[robot],
+                    link,
+                    linearDamping=0.0,
+                    angularDamping=0.0,
+                    maxJointVelocity=_FASTEST_WHEEL,
+                )
             self.put(robot, starts[robot])
         # Wheels that hang in the air by a hair would slip in the first step.
         self.step(np.zeros((len(self.team), 2)))

@@ -44,6 +44,10 @@ def point_cloud(depth: NDArray[np.floating], camera: DepthCamera) -> NDArray[np.
     (points, 3) float32
         In the robot's frame: x ahead, y to the left, z up from the ground [m].
     """
+    if depth.shape[-2:] != (camera.rows, camera.columns):
+        raise ValueError(
+            f"depth has shape {depth.shape}; want the {camera.rows} x {camera.columns} pixels of this camera"
+        )
     pose = camera_pose(camera)
     points = points_of_depth(depth, camera.intrinsics)
     return np.asarray(points @ pose[:3, :3].T + pose[:3, 3], np.float32)

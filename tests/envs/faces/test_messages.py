@@ -112,3 +112,11 @@ def test_messages_of_rows_that_do_not_act_are_not_read():
     actions[1, 3] = np.nan
     with pytest.raises(ValueError, match="want the action with 2 numbers behind it, all finite"):
         env.step(actions)
+
+
+@pytest.mark.parametrize("action", [np.zeros(2), np.zeros(5), np.zeros((2, 4))])
+def test_an_action_without_its_message_is_shown_as_it_was_given(action):
+    env = lidarium.parallel_env("apartment", comm=2, **OPTIONS, starts="fixed")
+    env.reset(seed=0)
+    with pytest.raises(ValueError, match=r"of robot_0 is array\(\[.*; want the action with 2 numbers behind"):
+        env.step(dict.fromkeys(env.agents, action))

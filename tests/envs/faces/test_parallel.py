@@ -11,6 +11,7 @@ import lidarium
 from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.floors.floor import Floor, Raster, Solid
 from lidarium.envs.settings.exploration import ExplorationSettings
+from lidarium.envs.settings.faults import Fault, FaultSettings
 from lidarium.envs.settings.making import make_settings
 from lidarium.envs.simulation.kernels.arrays import ENDED
 
@@ -181,6 +182,13 @@ def test_a_goal_that_no_robot_can_be_at_is_refused_before_the_run(goal, told):
     env = make(box(solids=[WALL_ACROSS], goal=(1.5, 3.0)))
     with pytest.raises(ValueError, match=told):
         env.reset(seed=1, options={"goal": goal})
+
+
+@pytest.mark.parametrize(("x", "told"), [(9.0, "inside a wall"), (0.1, "does not fit at start")])
+def test_a_kidnapping_to_where_no_robot_fits_is_refused_before_the_run(x, told):
+    faults = FaultSettings(schedule=[Fault(kind="kidnapping", robot=1, at_s=0.2, place=(x, 2.0, 0.0))])
+    with pytest.raises(ValueError, match=rf"fault 0 puts robot 1 where none can start: .*{told}"):
+        make(box(), faults=faults).reset(seed=1)
 
 
 def test_a_goal_is_refused_where_none_is_observed():

@@ -120,6 +120,40 @@ def test_robots_without_cameras_or_without_goals_are_refused():
         run_episode(lidarium.policy("random_walk"), env, 0, plans_sparsely=True)
 
 
+def test_a_goal_far_beyond_the_map_has_no_path():
+    _, info = driven_to(SparsePlanning(made(horizon_s=None)), Target(1000.0, 1000.0), 14)
+    assert (info["route"], info["drive"]) == ("no path", DriveState.NO_PATH)
+
+
+def test_another_level_plans_sparsely_too():
+    env = SparsePlanning(made("apartment", horizon_s=10.0))
+    env.use_level("frontier")
+    fresh = SparsePlanning(made("apartment", "frontier", horizon_s=10.0))
+    for each in (env, fresh):
+        each.reset(seed=0)
+        while each.agents:
+            each.step({"robot_0": 0})
+    assert env.unwrapped.world.poses.tolist() == fresh.unwrapped.world.poses.tolist()
+    assert env.unwrapped.engine.level.router is not None
+    with pytest.raises(ValueError, match="around the level 'velocity'; want waypoints or frontiers"):
+        env.use_level("velocity")
+    assert env.unwrapped.engine.level_name == "frontier"
+
+
+@pytest.mark.parametrize("infos", ["flat", "none"])
+def test_reasons_are_told_in_full_infos_alone(infos):
+    below = lidarium.parallel_env(
+        "apartment", level="waypoint", robots=1, camera=CAMERA, resolution=0.05, infos=infos, map_cells=64
+    )
+    assert "route" not in SparsePlanning(below).reset(seed=0)[1].get("robot_0", {})
+
+
+def test_options_that_are_not_true_or_false_are_refused():
+    for name in ("plans_sparsely", "shares_map"):
+        with pytest.raises(ValueError, match=f"{name} is 'no'; want True or False"):
+            lidarium.vector_env(1, "apartment", level="waypoint", camera=CAMERA, **{name: "no"})
+
+
 def test_maps_may_be_merged_above_it():
     env = MergedMaps(SparsePlanning(made("apartment", robots=2, horizon_s=4.0)))
     observations, _ = env.reset(seed=0)

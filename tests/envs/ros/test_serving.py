@@ -11,6 +11,7 @@ from ros_graphs import heard, node, until
 
 import lidarium
 from lidarium.envs.ros.serving import BEGINNING_S, TeamServer
+from lidarium.envs.settings.faults import Fault, FaultSettings
 from lidarium.mapping.files.bags.messages import (
     CLOCK,
     GRID,
@@ -24,11 +25,11 @@ from lidarium.mapping.files.bags.messages import (
 from lidarium.mapping.files.bags.reading import in_plane
 
 
-def environment(robots=1):
+def environment(robots=1, **options):
     env = lidarium.ExplorationEnv(
         "apartment",
         lidarium.make_settings(
-            robots=robots, horizon_s=None, stop_coverage=None, observe=("velocity",), starts="fixed"
+            robots=robots, horizon_s=None, stop_coverage=None, observe=("velocity",), starts="fixed", **options
         ),
     )
     env.reset(seed=0)
@@ -156,3 +157,11 @@ def test_an_interrupted_run_is_counted_as_well(nodes):
         server.run(0.0, is_over=is_over)
     assert server.counts.wall_s > 0.0
     assert server.counts.cpu_s > 0.0
+
+
+def test_serving_ends_with_the_last_robot(nodes):
+    env = environment(faults=FaultSettings(schedule=[Fault(kind="dead_robot", at_s=0.5)]))
+    server = TeamServer(env, nodes[0])
+    run(server, 20)
+    assert server.counts.steps < 10
+    assert env.scorer.ended_because == {"robot_0": "failed"}

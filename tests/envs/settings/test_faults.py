@@ -5,6 +5,7 @@ import math
 import pytest
 
 from lidarium.envs.settings.faults import KINDS, MOST_DRAWN, NO_FAULTS, Fault, FaultSettings
+from lidarium.envs.settings.making import make_settings
 
 
 def test_faults_of_files_are_mappings():
@@ -47,3 +48,10 @@ def test_a_fault_that_there_is_not_is_refused(fault, message):
 def test_a_schedule_is_a_list_of_faults(schedule):
     with pytest.raises(ValueError, match="schedule of faults is"):
         FaultSettings(schedule=schedule)
+
+
+def test_a_fault_of_a_robot_that_the_team_lacks_is_refused():
+    schedule = [Fault(kind="dead_radio"), Fault(kind="dead_robot", robot=1)]
+    make_settings(robots=2, faults=FaultSettings(schedule=schedule))
+    with pytest.raises(ValueError, match=r"fault 1 \(dead_robot\) is of robot 1, but robots is 1; want a robot"):
+        make_settings(robots=1, faults=FaultSettings(schedule=schedule))

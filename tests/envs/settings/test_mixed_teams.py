@@ -71,3 +71,10 @@ def test_bodies_that_touch_have_radii_of_their_own():
     gap = np.hypot(*(env.world.poses[1] - env.world.poses[0])[:2])
     touching = ROBOTS["kobuki"].radius + ROBOTS["service"].radius
     assert gap == pytest.approx(touching, abs=0.02)
+
+
+@pytest.mark.parametrize("camera", [{"height": 1.0}, {"height": 0.5, "forward": 0.28}])
+def test_a_camera_is_on_each_robot_of_a_team(camera):
+    make_settings(robots=2, robot="service", camera=camera)
+    with pytest.raises(ValueError, match=r"beyond the robot's radius of 0.18 m|above the robot's height of 0.52 m"):
+        make_settings(robots=2, kinds=["kobuki", "service"], camera=camera)

@@ -15,6 +15,8 @@ from lidarium.scripts.main import main
         (["drive", "--namespaces", "a", "a"], "namespaces are a, a; want a different one for each robot"),
         (["drive", "--extent", "1"], "extent is 1.0; want 4 to 200"),
         (["drive", "--stale-s", "nan"], "stale_s is nan; want 0.05 to 60"),
+        (["drive", "--robot", "nosuch"], "unknown robot 'nosuch'"),
+        (["drive", "--map-resolution", "0"], "resolution"),
         (["serve", "--speed", "-1"], "speed is -1.0; want 0 to 1000"),
         (["play", "run.mcap", "--speed", "nan"], "speed is nan; want 0 to 1000"),
     ],

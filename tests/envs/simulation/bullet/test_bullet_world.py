@@ -59,6 +59,14 @@ def test_free_driving_follows_the_kinematic_world(robot):
     assert np.abs(worlds[0].attitudes[0]).max() < math.radians(1.0)
 
 
+@pytest.mark.parametrize("robot", sorted(ROBOTS))
+def test_the_wheels_of_every_robot_measure_its_way_at_its_full_speed(robot):
+    world = placed(hall(), [(1.0, 3.0, 0.0)], robot)
+    drive(world, min(ROBOTS[robot].max_speed, 1.5), steps=30)
+    assert world.odometry[0, 0] == pytest.approx(world.poses[0, 0] - 1.0, rel=0.02)
+    assert world.odometry[0, 0] > 0.5 * min(ROBOTS[robot].max_speed, 1.5)
+
+
 def test_scans_are_the_kinematic_ones_at_the_bodys_pose_to_the_bit():
     floor, noisy = (
         hall(box(5.0, 2.0, 5.6, 3.1), *place("table", 2.0, 4.0, 0.3)),

@@ -43,3 +43,8 @@ def test_the_first_row_is_up_and_the_first_column_to_the_left():
     assert (np.diff(cloud[:, 0, 2]) < 0.0).all()
     assert (np.diff(cloud[0, :, 1]) < 0.0).all()
     assert point_cloud(np.zeros((6, 8), np.float32), camera).shape == (0, 3)
+
+
+def test_an_image_of_another_camera_is_refused():
+    with pytest.raises(ValueError, match=r"depth has shape \(1, 120, 160\); want the 240 x 320 pixels of this camera"):
+        point_cloud(np.ones((1, 120, 160), np.float32), DepthCamera(columns=320, rows=240))
