@@ -222,8 +222,7 @@ def make_policy(name: str, **settings: Any) -> Policy:  # noqa: ANN401
     >>> lidarium.policy("nearest_frontier").level
     'waypoint'
     """
-    is_own = isinstance(name, str) and ":" in name and name not in POLICIES.summaries
-    maker = _maker_at(name) if is_own else POLICIES[name]
+    maker = _maker_of(name)
     _check_named(name, maker, settings)
     try:
         policy = maker(**settings)
@@ -255,7 +254,7 @@ def _check_named(name: str, maker: Callable[..., Any], settings: Mapping[str, An
 
 def source_of(name: str) -> Path | None:
     """Return the file of a policy that is not of the package, None of one that is."""
-    maker = _maker_at(name) if ":" in name and name not in POLICIES.summaries else POLICIES[name]
+    maker = _maker_of(name)
     module = sys.modules.get(getattr(maker, "__module__", ""))
     file = getattr(module, "__file__", None)
     return None if file is None or str(getattr(module, "__name__", "")).startswith("lidarium.") else Path(file)
@@ -268,6 +267,13 @@ def _unknown_setting(maker: Callable[..., Any], error: TypeError) -> str:
     if any(each.kind == each.VAR_KEYWORD for each in parameters.values()):
         return f"there is no setting {wrong!r}; leave it out"
     return unknown("setting", wrong, parameters)
+
+
+def _maker_of(name: str) -> Callable[..., Any]:
+    """Return the factory of a policy; a name such as ``zoo:ppo-2`` is never that of a module, ``zoo``."""
+    families = {known.partition(":")[0] for known in POLICIES.summaries if ":" in known}
+    is_own = isinstance(name, str) and ":" in name and name.partition(":")[0] not in families
+    return _maker_at(name) if is_own else POLICIES[name]
 
 
 def _maker_at(name: str) -> Callable[..., Any]:

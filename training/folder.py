@@ -9,6 +9,7 @@ from typing import Any
 
 import lidarium
 from lidarium.mapping.files.guarded_reading import read_text, reading
+from lidarium.mapping.files.named_files import hash_of, named_files
 from lidarium.mapping.files.output import clear_unfinished, write_json
 from lidarium.mapping.geometry.bounds import shown
 from lidarium.training.loggers import flattened
@@ -17,9 +18,15 @@ MOST_BYTES = 1 << 20
 """Files of what a training was asked for are no larger."""
 
 
-def begin_folder(path: Path, settings: Mapping[str, Any]) -> None:
-    """Check that the folder of a file is that of a training with these settings, or new; then write them."""
+def begin_folder(path: Path, settings: Mapping[str, Any], floors: Mapping[str, str] | None = None) -> None:
+    """Check that the folder of a file is that of a training with these settings, or new; then write them.
+
+    Files that the settings name count by their content, ``floors`` in files by these hashes.
+    """
     asked, folder = asked_for(settings), path.parent
+    inputs = {name: hash_of(files) for name, value in settings.items() if (files := named_files(value))}
+    if inputs := {**inputs, **(floors or {})}:
+        asked["inputs"] = inputs
     if not path.exists():
         clear_unfinished(folder, ".json")
         if folder.exists() and any(folder.iterdir()):

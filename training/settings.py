@@ -212,6 +212,11 @@ class ValueSettings(_Budget):
         if self.kept < self.batch:
             raise ValueError(f"kept of value is {self.kept}; want at least the batch, {self.batch}")
 
+    def chance(self, decisions: int) -> float:
+        """Return the share of choices that are drawn evenly, after so many decisions."""
+        progress = min(2.0 * decisions / self.whole_decisions, 1.0)
+        return self.first_chance + (self.last_chance - self.first_chance) * progress
+
 
 TEAM_PPO: Mapping[str, Any] = {
     "environments": 32,
@@ -260,7 +265,7 @@ class TeamSettings:
     realism : str, default "fast"
         World of the episodes to learn in; validation is in that of ``lidarium evaluate``.
     validation : str, default "set:validation:16"
-        Floors on which checkpoints are compared; the best one is kept.
+        Set of floors on which checkpoints are compared; the best one is kept.
     supervisor : dict, optional
         Settings of a supervisor by name: starts are then unknown, the station merges the maps, and robots follow its
         orders. With ``ppo`` alone; by default there is no supervisor.
@@ -297,10 +302,11 @@ class TeamSettings:
             )
         if not learning.decisions:
             raise ValueError(f"decisions of {name} is 0; want how many the team makes while it learns")
-        if self.algorithm in VALUES and learning.checkpoint < learning.batch * self.robots:
+        if self.algorithm in VALUES and learning.checkpoint < 2 * learning.batch * self.robots:
             raise ValueError(
-                f"checkpoint of {name} is {learning.checkpoint}; want at least batch times robots, "
-                f"{learning.batch * self.robots}: each checkpoint begins with an empty memory"
+                f"checkpoint of {name} is {learning.checkpoint}; want at least twice batch times robots, "
+                f"{2 * learning.batch * self.robots}: each checkpoint begins with an empty memory, and up to half of "
+                "the decisions begin episodes only"
             )
         if self.supervisor is not None and self.algorithm != "ppo":
             raise ValueError(f"algorithm of a team under a supervisor is {self.algorithm!r}; want ppo")
@@ -463,10 +469,19 @@ def _prediction_of(content: Mapping[str, Any]) -> PredictionSettings:
     others = sorted(set(content) - {"prediction", "seed"})
     if others:
         raise ValueError(f"a training of predictions has no {shown(others[0])}; it has seed and [prediction]")
-    table = content["prediction"]
-    if isinstance(table, Mapping) and "seed" in content:
-        table = {"seed": content["seed"], **table}
-    return _made(PredictionSettings, table, "prediction")
+    return _made(PredictionSettings, _with_seed(content, "prediction"), "prediction")
+
+
+def _with_seed(content: Mapping[str, Any], name: str) -> Any:  # noqa: ANN401
+    """Return a table of a file, with the seed at the file's top."""
+    table = content[name]
+    if not isinstance(table, Mapping) or "seed" not in content:
+        return table
+    if "seed" in table:
+        raise ValueError(
+            f"seed is {shown(content['seed'])} at the top and {shown(table['seed'])} in [{name}]; want one"
+        )
+    return {"seed": content["seed"], **table}
 
 
 def _team_of(content: Mapping[str, Any]) -> TeamSettings:
@@ -488,8 +503,7 @@ def _team_of(content: Mapping[str, Any]) -> TeamSettings:
     inner = sorted({"ppo", "value"} & set(table))
     if inner:
         raise ValueError(f"team has the table {shown(inner[0])}; want [{inner[0]}], beside [team]")
-    seed = {"seed": content["seed"]} if "seed" in content else {}
-    return _made(TeamSettings, {**seed, **table, name: learning}, "team")
+    return _made(TeamSettings, {**_with_seed(content, "team"), name: learning}, "team")
 
 
 def training_of(content: Mapping[str, Any]) -> TrainingSettings:

@@ -24,6 +24,9 @@ OBSERVED = {"frontier": (FRONTIERS, GAINS, TEAMMATES), "tour": (TOURS, TEAMMATES
 METRES, SQUARE_METRES, SECONDS, PLACES = 10.0, 10.0, 60.0, 5.0
 """Scales of lengths, areas, ages, and places in tours."""
 
+OFFERS = {"frontier": 32.0, "tour": 30.0}
+"""Scale of the number of options by level: so many are on offer at most, unless settings say otherwise."""
+
 PATH_FACTOR = 3.0
 """Cost of a metre of path in metres of frontier, as in explore_lite."""
 
@@ -86,7 +89,7 @@ class OptionNetwork(AttentionNetwork):
         teammates = observation[TEAMMATES]
         teammates = teammates[teammates[:, -1] > 0]
         tokens = [
-            self.linear("situation", np.array([[offered.mean()]], np.float32)),
+            self.linear("situation", np.array([[offered.sum() / OFFERS[self.level]]], np.float32)),
             self.linear("teammate", np.asarray(teammates / TEAMMATE_UNITS, np.float32)),
             self.linear(self.level, numbers),
         ]
@@ -94,7 +97,7 @@ class OptionNetwork(AttentionNetwork):
         found = np.zeros(len(offered) + 1, np.float32)
         correction = self.linear("correction", mixed[len(mixed) - len(numbers) :])[:, 0]
         found[:-1][offered] = self.weights["steepness"] * classic + correction
-        found[-1] = self.linear("stay", mixed[:1])[0, 0] + found[:-1].min() + STAY[self.level]
+        found[-1] = self.linear("stay", mixed[:1])[0, 0] + min(found[:-1].min(), 0.0) + STAY[self.level]
         return found
 
 

@@ -80,7 +80,8 @@ tours, in the ideal world. The best network of each training by the validation f
 ranks frontiers as explore_lite does; before its training `tours-2` does as `tour_frontier`. All run on the same
 {floors} floors of the set `test` from the starts of the floors, and shipped teams and classic policies on {all_floors},
 until 99 % is seen or {horizon:.0f} s are over, which then count. Classic policies decide at their own level. Ratios
-are geometric means of times over floors, with 95 % intervals; a floor counts by the geometric mean of its trainings.
+are geometric means of times over the floors that all trainings have, with 95 % intervals over floors: they are those of
+these trainings, and other seeds may lie beyond them. The best team is chosen on the same floors.
 
 ## Figures
 
@@ -297,15 +298,20 @@ def _seconds(line: Line) -> float:
 
 
 def _ratio(ours: Sequence[Line], others: Sequence[Line]) -> Interval | None:
-    """Return the geometric mean of the ratios of times on the floors that both have.
+    """Return the geometric mean of the ratios of times on the floors that both have, and all trainings.
 
-    Floors count alike, each by the geometric mean of its runs: some have more trainings than others.
+    Floors count alike, each by the geometric mean of its runs.
     """
     known = {line["floor"]: _seconds(line) for line in others}
-    logs: dict[str, list[float]] = {}
+    trainings = {line["training"] for line in ours}
+    by_floor: dict[str, list[Line]] = {}
     for line in ours:
-        if line["floor"] in known:
-            logs.setdefault(line["floor"], []).append(math.log(_seconds(line)))
+        by_floor.setdefault(line["floor"], []).append(line)
+    logs = {
+        floor: [math.log(_seconds(line)) for line in each]
+        for floor, each in by_floor.items()
+        if floor in known and {line["training"] for line in each} == trainings
+    }
     if len(logs) < 2:
         return None
     return paired_ratio([math.exp(np.mean(each)) for each in logs.values()], [known[floor] for floor in logs])
@@ -403,7 +409,7 @@ def _goals(lines: Sequence[Line]) -> str:
             ratio = _ratio(found[best], found.get(other, []))
             if ratio is None or (robots == LARGE and other != NEAREST):
                 continue
-            sure = len({line["floor"] for line in found[best]}) >= FEWEST_FOR_INTERVAL
+            sure = ratio.size >= FEWEST_FOR_INTERVAL
             if other == TOURS:
                 goal, said = ("at most 1", _said(ratio.estimate <= 1.0, sure)) if is_by_tours else ("published", "-")
             elif robots == LARGE:
@@ -432,6 +438,7 @@ def _again(folder: Path, runs: Sequence[Line]) -> Iterator[str]:
         if ratio := _ratio(own, found.get(NEAREST, [])):
             ratios[training] = ratio.estimate
     again = ratios.pop(seed, None)
+    ratios.pop(SHIPPED, None)  # the same seed
     if again is None or len(ratios) < 2:
         return
     low, high = min(ratios.values()), max(ratios.values())

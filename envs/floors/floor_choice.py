@@ -86,6 +86,11 @@ class FloorChoice:
         """
         return FloorChoice(floor, self._resolution_of(floor))
 
+    def in_files(self) -> dict[str, str]:
+        """Return the hashes of its floors in files, by the names of these."""
+        named = [spec for spec in self._specs if isinstance(spec, str | Path) and is_file_name(str(spec))]
+        return {str(spec): self._load(spec).sha256 for spec in named}
+
     def load(self, generator: np.random.Generator) -> Floor:
         """Return the floor of the next episode."""
         if self._source is not None:

@@ -7,7 +7,6 @@ A folder holds ``suite.json`` (the request), ``episodes.jsonl`` (a line per fini
 before, so that any number of workers leaves the same lines, though in another order.
 """
 
-import hashlib
 import json
 import os
 import sys
@@ -30,6 +29,7 @@ from lidarium.evaluation.suites.suite import MOST_SUITE_BYTES, Suite, suite_of
 from lidarium.evaluation.suites.trial import Trial
 from lidarium.evaluation.suites.trial_run import RECORDS_FOLDER, RecordNotWrittenError, run_trial
 from lidarium.mapping.files.guarded_reading import read_text, reason
+from lidarium.mapping.files.named_files import hash_of, named_files
 from lidarium.mapping.files.output import clear_unfinished, write_json
 from lidarium.registry import IMPORTS_VARIABLE
 
@@ -213,37 +213,17 @@ def _inputs_of(suite: Suite) -> dict[str, str]:
     for name in suite.policies:
         options = dict(suite.policy_settings.get(name, {}))
         source = source_of(options.pop("policy", name))
-        files = [*([] if source is None else [source]), *_files_of(options)]
+        files = [*([] if source is None else [source]), *named_files(options)]
         if files:
-            found[f"policy {name!r}"] = _hash_of(files)
+            found[f"policy {name!r}"] = hash_of(files)
     for name, options in suite.as_dict()["variants"].items():
-        if files := _files_of(options):
-            found[f"settings {name!r}"] = _hash_of(files)
+        if files := named_files(options):
+            found[f"settings {name!r}"] = hash_of(files)
     for module in filter(None, os.environ.get(IMPORTS_VARIABLE, "").split(",")):
         file = getattr(sys.modules.get(module.strip()), "__file__", None)
         if file is not None:
-            found[f"module {module.strip()!r}"] = _hash_of([Path(file)])
+            found[f"module {module.strip()!r}"] = hash_of([Path(file)])
     return found
-
-
-def _files_of(options: object) -> list[Path]:
-    """Return the files that options name, at any depth and also as ``NAME=FILE``."""
-    if isinstance(options, str):
-        return [Path(text) for text in (options, options.partition("=")[2]) if _is_file(text)]
-    if isinstance(options, Mapping):
-        options = list(options.values())
-    return [file for each in options for file in _files_of(each)] if isinstance(options, list | tuple) else []
-
-
-def _is_file(text: str) -> bool:
-    try:
-        return bool(text) and Path(text).is_file()
-    except (OSError, ValueError):  # no name of a file
-        return False
-
-
-def _hash_of(files: Sequence[Path]) -> str:
-    return hashlib.sha256(b"".join(hashlib.sha256(file.read_bytes()).digest() for file in files)).hexdigest()
 
 
 def _check_same_inputs(folder: Path, inputs: Mapping[str, str]) -> None:

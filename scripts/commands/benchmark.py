@@ -54,6 +54,7 @@ class _Benchmark(Command):
 
 def execute(command: _Benchmark) -> Answer:
     """Run what is missing of the tasks, and compare."""
+    from lidarium.agents.catalogue import source_of
     from lidarium.evaluation.benchmark.results import collect
     from lidarium.evaluation.benchmark.tasks import benchmark
     from lidarium.mapping.files.output import check_writable
@@ -70,6 +71,8 @@ def execute(command: _Benchmark) -> Answer:
             f"--policy-set sets options of {name}, whose rows are those of its defaults; want another name: "
             f"--policies mine --policy-set mine.policy={name} mine.KEY=VALUE"
         )
+    for name in command.policies:  # a name that does not exist is refused before anything runs
+        source_of(str(settings.get(name, {}).get("policy", name)))
     folder = command.out or RUNS / command.name
     check_writable(folder)
     shard_of(command.shard)

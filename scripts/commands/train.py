@@ -6,7 +6,7 @@ import shlex
 import sys
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -68,16 +68,13 @@ def execute(command: _Train) -> Answer:
         raise ValueError("no training is named; want a TOML file, or a name of `lidarium train --list`")
     if command.workers < 0:
         raise ValueError(f"--workers is {command.workers}; want 0 for as many as there are cores, or more")
-    if command.seed:
-        raise ValueError(
-            f"--seed is {command.seed}, and a training draws from the seed of its file; write "
-            f"seed = {command.seed} at the top of {command.config}"
-        )
     from lidarium.training.loggers import check_logger
     from lidarium.training.prediction.settings import PredictionSettings
     from lidarium.training.settings import TeamSettings, read_any_training
 
     settings = read_any_training(_file_of(command.config))
+    if "seed" in command.given:
+        settings = replace(settings, seed=command.seed)
     is_prediction, is_team = isinstance(settings, PredictionSettings), isinstance(settings, TeamSettings)
     check_installed("training", EXTRA[:1] if is_prediction else EXTRA, "rl")
     if isinstance(settings, TeamSettings) and settings.table == "value":
@@ -118,8 +115,8 @@ def _shipped() -> "dict[str, Path]":
 
 
 def _file_of(config: Path) -> Path:
-    """Return the file of a training: a file that is there, or a training that ships."""
-    return config if config.exists() else _shipped().get(str(config), config)
+    """Return the file of a training: one that is there, or one that ships."""
+    return config if config.is_file() else _shipped().get(str(config), config)
 
 
 def _listed() -> Answer:

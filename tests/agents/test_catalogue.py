@@ -7,7 +7,7 @@ from lidarium.agents import make_policy, policy_names, register_policy
 
 @pytest.mark.parametrize(
     ("wrong", "meant"),
-    [("nearest_frontir", "nearest_frontier"), ("utility_frontiers", "utility_frontier"), ("randomwalk", "random_walk")],
+    [("nearest_frontir", "nearest_frontier"), ("randomwalk", "random_walk"), ("zoo:mapo-2", "zoo:mappo-2")],
 )
 def test_an_unknown_policy_is_refused_with_the_nearest_name(wrong, meant):
     with pytest.raises(ValueError, match=f"did you mean '{meant}'"):

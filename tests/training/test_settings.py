@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from lidarium.training.settings import TrainingSettings, read_training, training_of
+from lidarium.training.settings import TrainingSettings, ValueSettings, read_training, training_of
 
 WHOLE = """
 seed = 3
@@ -116,3 +116,10 @@ def test_what_cannot_be_used_is_named(tmp_path, change, message):
 def test_a_missing_file_is_named(tmp_path):
     with pytest.raises(FileNotFoundError, match=r"nowhere\.toml"):
         read_training(tmp_path / "nowhere.toml")
+
+
+def test_chances_go_from_the_first_to_the_last_one_whichever_is_higher():
+    for first, last in ((0.3, 0.05), (0.05, 0.3), (0.0, 0.8)):
+        value = ValueSettings(decisions=100, checkpoint=100, environments=2, first_chance=first, last_chance=last)
+        found = [value.chance(decisions) for decisions in (0, 25, 50, 100)]
+        assert found == pytest.approx([first, 0.5 * (first + last), last, last])

@@ -95,7 +95,8 @@ def latest_checkpoint(folder: Path) -> Checkpoint | None:
     found = sorted(folder.glob("decisions-*.json"))
     if not found:
         return None
-    with reading(found[-1], "how far a training has come"):
+    cure = f"remove {found[-1].with_suffix('')}.* to go on from the checkpoint before"
+    with reading(found[-1], "how far a training has come", cure):
         content = json.loads(read_text(found[-1], MOST_STATE))
         curve = [(int(number), None if reward is None else float(reward)) for number, reward in content["curve"]]
         return Checkpoint(int(content["decisions"]), curve)

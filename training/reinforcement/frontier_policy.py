@@ -27,6 +27,7 @@ from lidarium.agents.zoo.network import (
     GAINS,
     MASK,
     METRES,
+    OFFERS,
     OPTION_NUMBERS,
     OTHER_STOPS,
     PATH_FACTOR,
@@ -139,21 +140,21 @@ class OptionRanking(BaseFeaturesExtractor):
         """Return how many numbers of an option it sees."""
 
     @abstractmethod
-    def _options(self, observations: Mapping[str, Tensor], rows: Tensor, width: int) -> tuple[Tensor, Tensor]:
+    def _options(self, observations: Mapping[str, Tensor], rows: Tensor, offered: Tensor) -> tuple[Tensor, Tensor]:
         """Return the numbers of the first options of some decisions, and how these are ranked before a training."""
 
     def _ranked(self, observations: Mapping[str, Tensor], offered: Tensor, rows: Tensor, is_rated: bool) -> Tensor:
         """Rank the options of some decisions; no more of them are taken than the widest one has."""
         actions = offered.shape[1]
         offered = offered[rows]
-        width = max(int(offered.sum(dim=1).max()), 1)  # offers come first
+        width = max(int(offered.any(dim=0).nonzero().max()) + 1, 1) if offered.any() else 1
         offered = offered[:, :width]
         tokens, is_there = [self._situation(observations, rows)[:, None]], [torch.ones_like(offered[:, :1])]
         if self.teammate is not None:
             teammates = observations[TEAMMATES][rows]
             tokens.append(self.teammate(_teammate_numbers(teammates)))
             is_there.append(teammates[..., -1] > 0)
-        numbers, classic = self._options(observations, rows, width)
+        numbers, classic = self._options(observations, rows, offered)
         tokens.append(self.get_submodule(self.level)(numbers))
         mixed, seen = torch.cat(tokens, dim=1), torch.cat([*is_there, offered], dim=1)
         for layer in self.layers:
@@ -161,7 +162,7 @@ class OptionRanking(BaseFeaturesExtractor):
         mixed = self.last(mixed)
         ranked = self.steepness * classic + self.correction(mixed[:, -width:])[..., 0]
         ranked = nn.functional.pad(ranked.masked_fill(~offered, 0.0), (0, actions - width))
-        last = ranked.min(dim=1, keepdim=True).values
+        last = ranked.min(dim=1, keepdim=True).values.clamp(max=0.0)
         stay = self.stay(mixed[:, 0]) + last + STAY[self.level]  # behind all, before a training
         found = [ranked, stay]
         if is_rated:
@@ -171,7 +172,7 @@ class OptionRanking(BaseFeaturesExtractor):
 
     def _situation(self, observations: Mapping[str, Tensor], rows: Tensor) -> Tensor:
         parts = [observations[name][rows].to(torch.float32) for name in self.situation_names]
-        count = observations[MASK][rows, :-1].to(torch.float32).mean(dim=1, keepdim=True)
+        count = observations[MASK][rows, :-1].to(torch.float32).sum(dim=1, keepdim=True) / OFFERS[self.level]
         tokens: Tensor = self.situation(torch.cat([count, *parts], dim=1))
         return tokens
 
@@ -184,7 +185,8 @@ class FrontierRanking(OptionRanking):
     def _numbers(self, shapes: Mapping[str, tuple[int, ...]]) -> int:
         return OPTION_NUMBERS[self.level] - (GAINS not in shapes)
 
-    def _options(self, observations: Mapping[str, Tensor], rows: Tensor, width: int) -> tuple[Tensor, Tensor]:
+    def _options(self, observations: Mapping[str, Tensor], rows: Tensor, offered: Tensor) -> tuple[Tensor, Tensor]:
+        width = offered.shape[1]
         frontiers = observations[FRONTIERS][rows, :width]
         numbers = [frontiers / METRES, torch.log1p(frontiers[..., 2:])]  # near 1, path and size as logarithms too
         if GAINS in observations:
@@ -200,10 +202,9 @@ class TourRanking(OptionRanking):
     def _numbers(self, shapes: Mapping[str, tuple[int, ...]]) -> int:
         return OPTION_NUMBERS[self.level]
 
-    def _options(self, observations: Mapping[str, Tensor], rows: Tensor, width: int) -> tuple[Tensor, Tensor]:
-        stops = observations[TOURS][rows, :width]
-        is_first = torch.zeros_like(stops[..., :1])
-        is_first[:, 0] = 1.0
+    def _options(self, observations: Mapping[str, Tensor], rows: Tensor, offered: Tensor) -> tuple[Tensor, Tensor]:
+        stops = observations[TOURS][rows, : offered.shape[1]]
+        is_first = (offered & (offered.cumsum(dim=1) == 1))[..., None].to(stops.dtype)
         numbers = [stops / torch.from_numpy(TOUR_UNITS), torch.log1p(stops[..., 2:5]), is_first]
         classic = torch.where(is_first[..., 0] > 0, 0.0, OTHER_STOPS - stops[..., 2] / METRES)
         return torch.cat(numbers, dim=2), classic

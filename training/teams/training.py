@@ -51,9 +51,11 @@ class TeamTraining:
 
     def run(self) -> Generator[Progress, None, None]:
         """Learn from the last checkpoint on, and yield each step when it is on the disk."""
-        set_floors(self.settings.validation)  # floors are looked up before anything is written
-        FloorChoice(self.settings.floors)
-        begin_folder(self.folder / TRAINING_FILE, self.settings.as_dict())
+        try:  # floors are looked up before anything is written
+            set_floors(self.settings.validation)
+        except ValueError as error:
+            raise ValueError(f"validation of team is not a set of floors: {error}") from error
+        begin_folder(self.folder / TRAINING_FILE, self.settings.as_dict(), FloorChoice(self.settings.floors).in_files())
         with only_writer(self.folder / TRAINING_FILE):
             checkpoints = self.folder / CHECKPOINTS
             for folder, suffix in itertools.product((self.folder, checkpoints), (".json", ".csv")):
@@ -62,6 +64,11 @@ class TeamTraining:
             torch.set_num_threads(1)
             last, total = latest_checkpoint(checkpoints), self.settings.learning.whole_decisions
             done = 0 if last is None else last.decisions
+            if done and not (self.folder / WEIGHTS_FILE).is_file():
+                raise FileNotFoundError(
+                    f"{self.folder / WEIGHTS_FILE}, the best weights of {done:,} decisions, is missing; "
+                    "put it back, or choose another folder"
+                )
             yield Progress("rewards", done, total)
             if last is None or done < total:
                 learn = self._learn_values if self.settings.algorithm in VALUES else self._learn_policy
@@ -164,12 +171,13 @@ class TeamTraining:
         environment = self._led(batch)
         with closing(environment):
             seen, infos = environment.reset(seed=[0] * len(floors), options={"floor": list(floors)})
-            reached, is_over = infos["truth"]["coverage"].copy(), np.zeros(environment.num_envs, np.bool_)
+            reached, has_ended = infos["truth"]["coverage"].copy(), np.zeros((len(floors), settings.robots), np.bool_)
             decisions, total = math.ceil(settings.horizon_s / batch.engine.level.period_s), 0.0
             for _ in range(decisions):
                 seen, _, terminated, truncated, infos = environment.step(network.preferred(seen))
-                reached[~is_over] = infos["truth"]["coverage"][~is_over]
-                is_over |= terminated | truncated
+                lasts = ~np.repeat(has_ended.all(axis=1), settings.robots)  # its robots may end one by one
+                reached[lasts] = infos["truth"]["coverage"][lasts]
+                has_ended |= (terminated | truncated).reshape(has_ended.shape)
                 total += float(reached.mean())
         return total / decisions
 

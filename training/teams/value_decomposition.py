@@ -108,11 +108,7 @@ def _learn_on(
     observations, _ = environment.reset(seed=seed)
     before = _teams(environment, observations)
     for _ in range(value.checkpoint // environment.num_envs):
-        chance = max(
-            value.first_chance + (value.last_chance - value.first_chance) * 2.0 * decisions / value.whole_decisions,
-            value.last_chance,
-        )
-        choices = _choices(network, before, chance, generator)
+        choices = _choices(network, before, value.chance(decisions), generator)
         began = environment.batch.is_over.copy()
         observations, rewards, _, truncated, infos = environment.step(choices.ravel())
         after = _teams(environment, observations, infos[ACTIVE])

@@ -52,6 +52,12 @@ def test_the_order_of_frontiers_and_teammates_changes_nothing_but_the_order(netw
     np.testing.assert_allclose(again[-1], found[-1], rtol=1e-4, atol=1e-4)
 
 
+def test_places_that_nothing_is_offered_in_change_nothing(network):
+    seen, wide = observation(places=8), observation(places=40)
+    found, again = network.preferences(seen), network.preferences(wide)
+    np.testing.assert_array_equal(np.append(found[:5], found[-1]), np.append(again[:5], again[-1]))
+
+
 def test_unknown_teammates_are_not_seen_and_known_ones_are(network):
     seen = observation()
     fewer = {**seen, "teammates": seen["teammates"][:2]}

@@ -144,6 +144,7 @@ def test_a_task_counts_once_by_whatever_names(tiny, tmp_path):
         (["--tasks", "Home-1"], "did you mean 'Homes-1'"),
         (["--shard", "3/2", "--policies", "srt"], "--shard is '3/2'"),
         (["--workers", "-1"], "--workers is -1"),
+        (["--policies", "zoo:ppo-9"], "unknown policy 'zoo:ppo-9'"),
         (
             ["--policies", "random_walk", "--policy-set", "random_walk.seed=1"],
             "--policies mine --policy-set mine.policy=random_walk",

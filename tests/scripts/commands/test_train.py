@@ -14,7 +14,7 @@ import pytest
 
 from lidarium.agents.learned.network import load_weights
 from lidarium.extras import install_command
-from lidarium.scripts.commands.train import _Shown, _span
+from lidarium.scripts.commands.train import _file_of, _Shown, _span
 from lidarium.scripts.main import main
 from lidarium.training.progress import Progress
 
@@ -71,7 +71,20 @@ def test_a_missing_file_is_named_and_where_to_find_one(tmp_path, capsys):
 
 def test_numbers_that_cannot_be_used_are_refused(config, tmp_path, capsys):
     refused([config, "--workers", "-1"], tmp_path / "out", capsys, "--workers is -1")
-    refused([config, "--seed", "3"], tmp_path / "out", capsys, "--seed is 3", "seed = 3", "training.toml")
+
+
+def test_the_seed_of_the_line_is_that_of_the_training(config, tmp_path, capsys, monkeypatch):
+    def stopped(settings, *_):
+        raise ValueError(f"the seed is {settings.seed}")
+
+    monkeypatch.setattr("lidarium.scripts.commands.train._training_of", stopped)
+    refused([config, "--seed", "3"], tmp_path / "out", capsys, "the seed is 3")
+
+
+def test_a_training_that_ships_is_meant_beside_a_folder_of_its_name(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "ppo-2").mkdir()
+    assert _file_of(Path("ppo-2")).name == "ppo-2.toml"
 
 
 @pytest.mark.parametrize("missing", ["torch", "sb3_contrib", "stable_baselines3", "tensorboard"])

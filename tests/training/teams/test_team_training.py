@@ -1,6 +1,7 @@
 """Trainings of teams by rewards, into a folder."""
 
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -134,6 +135,53 @@ def test_a_finished_training_is_not_run_again(whole):
     assert (folder / WEIGHTS_FILE).read_bytes() == before
 
 
+def test_missing_weights_are_named(tmp_path):
+    settings = settings_of(TINY, tmp_path)
+    steps = TeamTraining(settings, tmp_path / "run").run()
+    assert [next(steps).done, next(steps).done] == [0, 16]
+    steps.close()
+    (tmp_path / "run" / WEIGHTS_FILE).unlink()
+    with pytest.raises(FileNotFoundError, match="the best weights of 16 decisions, is missing; put it back"):
+        next(TeamTraining(settings, tmp_path / "run").run())
+
+
+def test_a_training_does_not_go_on_with_another_floor_of_the_same_name(tmp_path):
+    thresholds = "negate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.25\n"
+    (tmp_path / "floor.yaml").write_text(f"image: floor.pgm\nresolution: 0.5\norigin: [0, 0, 0]\n{thresholds}")
+    settings = settings_of(TINY.replace('"apartment"', f"'{tmp_path / 'floor.yaml'}'"), tmp_path)
+    for cells in (b"\xfe" * 380 + b"\x00" * 20, b"\x00" * 20 + b"\xfe" * 380):
+        (tmp_path / "floor.pgm").write_bytes(b"P5 20 20 255\n" + cells)
+        steps = TeamTraining(settings, tmp_path / "run").run()
+        if cells[0]:
+            next(steps)
+            steps.close()
+    with pytest.raises(ValueError, match=r"holds a training with inputs\..*floor.yaml = .*choose another folder"):
+        next(steps)
+
+
+def test_a_team_counts_until_its_last_robot_ends(monkeypatch):
+    class Team:
+        num_envs = 2
+        engine = SimpleNamespace(level=SimpleNamespace(period_s=10.0))
+
+        def reset(self, **_):
+            self.coverages = iter(([0.25, 0.25], [0.5, 0.5], [0.0, 0.0]))
+            self.ended = iter(([True, False], [False, True], [False, False]))
+            return {}, {"truth": {"coverage": np.zeros(2)}}
+
+        def step(self, _):
+            ended = np.array(next(self.ended))
+            return {}, None, ended, np.zeros(2, np.bool_), {"truth": {"coverage": np.array(next(self.coverages))}}
+
+        def close(self):
+            pass
+
+    monkeypatch.setattr("lidarium.training.teams.training.vector_env", lambda *_, **__: Team())
+    training = TeamTraining(TeamSettings(horizon_s=30.0, validation="validation:1"), None)
+    network = SimpleNamespace(preferred=lambda _: np.zeros(2, np.int64))
+    assert training._validated(network) == pytest.approx((0.25 + 0.5 + 0.5) / 3.0)
+
+
 @pytest.mark.parametrize("level", OBSERVED)
 def test_numpy_decides_as_torch(level):
     generator = np.random.default_rng(0)
@@ -148,6 +196,14 @@ def test_numpy_decides_as_torch(level):
     for _ in range(5):
         tensors = {name: torch.from_numpy(array.astype(np.float32)) for name, array in seen.items()}
         wanted = ranking(tensors).detach().numpy()[:, :-1]
+        holes = generator.random(seen["action_mask"].shape) < 0.3
+        holes[:, -1] = False
+        gaps = {**seen, "action_mask": np.where(holes, 0, seen["action_mask"])}  # as a wrapper may forbid some
+        tensors["action_mask"] = torch.from_numpy(gaps["action_mask"].astype(np.float32))
+        barred = ranking(tensors).detach().numpy()[:, :-1]
+        for row, mask in enumerate(gaps["action_mask"] > 0):
+            found = network.preferences({name: array[row] for name, array in gaps.items()})
+            np.testing.assert_allclose(found[mask], barred[row][mask], rtol=1e-3, atol=1e-3)
         for row, mask in enumerate(seen["action_mask"] > 0):
             found = network.preferences({name: array[row] for name, array in seen.items()})
             np.testing.assert_allclose(found[mask], wanted[row][mask], rtol=1e-3, atol=1e-3)
@@ -184,6 +240,8 @@ def test_before_a_training_a_team_does_as_tours_do():
         ("robots = 2", "robots = 2\nsupervisor = { merge_s = 1 }", "supervisor of team cannot be used"),
         ("[ppo]", "[value]", "a training of teams by ppo has no 'value'"),
         ('"validation:2"', '"castle:3"', "castle"),
+        ('"validation:2"', '"apartment"', "validation of team is not a set of floors"),
+        ("[team]", "[team]\nseed = 4", "seed is 3 at the top and 4 in [team]; want one"),
         ('"apartment"', '"set:train:0"', "'train:0' wants '0' floors"),
         ("robots = 2", 'robots = 2\nrealism = "fsat"', "fsat"),
         ("[ppo]", "[team.ppo]", "team has the table 'ppo'; want [ppo], beside [team]"),
@@ -201,7 +259,7 @@ def test_bad_settings_are_refused_before_anything_is_written(old, new, words, tm
     ("new", "words"),
     [
         ("batch = 4\nkept = 3", "kept of value is 3; want at least the batch, 4"),
-        ("batch = 32", "checkpoint of value is 32; want at least batch times robots, 64"),
+        ("batch = 16", "checkpoint of value is 32; want at least twice batch times robots, 64"),
     ],
 )
 def test_values_that_would_never_be_learned_are_refused(new, words, tmp_path):
