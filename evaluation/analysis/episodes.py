@@ -4,7 +4,7 @@ Episodes that do not belong together are refused.
 """
 
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -84,7 +84,19 @@ def read_episodes(directory: Path) -> Episodes:
     if not kept:
         raise NoEpisodesError(f"{path} has no finished episode; run `lidarium evaluate` on")
     _check_alike(kept, path)
-    return Episodes(tuple(row for _, row in kept), str(kept[0][1]["version"]), (*warnings, *doubled))
+    rows = tuple(row for _, row in kept)
+    _tell_floors_apart(rows)
+    return Episodes(rows, str(rows[0]["version"]), (*warnings, *doubled))
+
+
+def _tell_floors_apart(rows: Sequence[Row]) -> None:
+    """Add the beginning of their hashes to the names of different floors of one name, such as ``map``."""
+    hashes: dict[str, set[str]] = {}
+    for row in rows:
+        hashes.setdefault(row["floor"], set()).add(row["floor_sha256"])
+    for row in rows:
+        if len(hashes[row["floor"]]) > 1:
+            row["floor"] = f"{row['floor']} ({row['floor_sha256'][:6]})"
 
 
 def _key_of(row: Row) -> tuple[Any, ...]:
@@ -168,6 +180,7 @@ def _check_alike(numbered: Iterable[tuple[int, Row]], path: Path) -> None:
     """
     first: tuple[int, Row] | None = None
     alike: dict[tuple[str, int], tuple[int, Row]] = {}
+    rules: dict[tuple[str, str], tuple[int, Row]] = {}
     for number, row in numbered:
         first = first or (number, row)
         if row["version"] != first[1]["version"]:
@@ -189,4 +202,10 @@ def _check_alike(numbered: Iterable[tuple[int, Row]], path: Path) -> None:
                 f"{path} has episodes of two settings with {row['robots']} robots, in lines {known_number} "
                 f"and {number}: {differing}; "
                 "want a name for each set of settings"
+            )
+        rule_number, other = rules.setdefault((row["policy"], variant_of(row)), (number, row))
+        if {"setup_sha256"} <= row.keys() & other.keys() and row["setup_sha256"] != other["setup_sha256"]:
+            raise ValueError(
+                f"{path} has episodes of {row['policy']} with two options of the policy, rules to stop or ways to "
+                f"start, in lines {rule_number} and {number}; want a directory for each"
             )

@@ -49,15 +49,19 @@ class OverBound:
 
 
 def over_bound(rows: Sequence[Row], horizon_s: float, seed: int = 0) -> OverBound | None:
-    """Return the times to 99 % beside their bounds; None if no run has one. Times not reached are the horizon."""
-    bounded = [row for row in rows if row.get("bound_s")]
+    """Return the times to 99 % beside their bounds; None if no run has one.
+
+    Times not reached are later than all others in the median, and the horizon in the gap. Runs that see the floor from
+    their starts are left out.
+    """
+    bounded = [row for row in rows if row.get("bound_s") and row["t99_s"] != 0.0]
     if not bounded:
         return None
-    times = np.array([horizon_s if row["t99_s"] is None else row["t99_s"] for row in bounded])
+    times, clusters = times_to(bounded, "t99_s", horizon_s), clusters_of(bounded)
     bounds = np.array([row["bound_s"] for row in bounded])
-    clusters = clusters_of(bounded)
     return OverBound(
-        median_interval(times / bounds, clusters=clusters), optimality_gap(times, bounds, seed=seed, clusters=clusters)
+        median_interval(times.or_never / bounds, clusters=clusters),
+        optimality_gap(times.up_to_horizon, bounds, seed=seed, clusters=clusters),
     )
 
 
@@ -65,10 +69,8 @@ TIMES = {key: METRICS[key].title for key in ("t90_s", "t99_s")}
 """Keys of times to a share of the floor, and their titles."""
 
 
-MAY_LACK = ("bound_s", "t99_over_bound")
-"""Figures in addition to times that are null if something was not reached."""
-
-_NOT_FIGURES = ("robots", "seed", "horizon_s", *TIMES)
+_NOT_FIGURES = ("robots", "seed", "horizon_s", "t99_over_bound", *TIMES)
+"""Numbers of rows that are shown elsewhere."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -211,19 +213,25 @@ def value_figure(
 
 
 def further_keys(rows: Sequence[Row], values: Sequence[Value]) -> list[str]:
-    """Return the keys, apart from times and values, under which every run has a number; some may be null."""
+    """Return the keys, apart from times and values, under which runs have numbers; those of some may be null."""
     told = {*_NOT_FIGURES, *(value.metric for value in values)}
     candidates = [key for key in rows[0] if key not in told and not key.endswith("_sha256")]
-    return [key for key in candidates if all(_is_figure(key, row.get(key, "")) for row in rows)]
+    return [
+        key
+        for key in candidates
+        if all(row.get(key, "") is None or _is_number(row.get(key, "")) for row in rows)
+        and (is_time(key) or any(row[key] is not None for row in rows))
+    ]
 
 
 def further_figure(rows: Sequence[Row], key: str) -> Interval:
-    """Return the median of any other figure of the runs.
+    """Return the median of any other figure, of the runs that have it.
 
     A time that was not reached is later than all others.
     """
-    values = [np.inf if row[key] is None else float(row[key]) for row in rows]
-    return median_interval(values, clusters=clusters_of(rows))
+    known = [row for row in rows if is_time(key) or row[key] is not None]
+    values = [np.inf if row[key] is None else float(row[key]) for row in known]
+    return median_interval(values, clusters=clusters_of(known))
 
 
 def compared(group: Group, values: Sequence[Value], baseline: str, seed: int) -> list[Comparison]:
@@ -301,8 +309,10 @@ def _tested(
     return replace(found, wilcoxon=wilcoxon_test(a, b), sign=sign_test(a, b))
 
 
-def _is_figure(key: str, value: Any) -> bool:  # noqa: ANN401
-    is_time = key.startswith("t") and key.endswith("_s") and key[1:-2].isdigit()
-    return (value is None and (is_time or key in MAY_LACK)) or (
-        isinstance(value, int | float) and not isinstance(value, bool)
-    )
+def is_time(key: str) -> bool:
+    """Whether a key is that of a time to a share of the floor."""
+    return key.startswith("t") and key.endswith("_s") and key[1:-2].isdigit()
+
+
+def _is_number(value: Any) -> bool:  # noqa: ANN401
+    return isinstance(value, int | float) and not isinstance(value, bool)

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from lidarium.envs.floors.catalogue.names import GENERATORS, SETS, floor_names
 from lidarium.envs.floors.catalogue.real import COLLECTIONS
 from lidarium.evaluation.analysis.episodes import Row, pair_key_of, variant_of
+from lidarium.evaluation.episodes.stop_rules import STOP_REASON
 from lidarium.evaluation.statistics import CensoredTimes
 from lidarium.evaluation.suites.episodes_file import TIMINGS
 from lidarium.evaluation.suites.trial import DEFAULT_VARIANT
@@ -150,7 +151,7 @@ def times_to(rows: Sequence[Row], key: str, horizon_s: float) -> _Reached:
 
     A run that missed it is never dropped. If it ended by itself, with nothing left to do, it would not have reached
     the share later either, and counts as not there at the horizon. If it was cut (by the horizon, by the user, by
-    the physics), it is censored then.
+    the physics, by a stop rule, or at a smaller share), it is censored then.
     """
     times, is_reached, cut = [], [], 0
     for row in rows:
@@ -191,7 +192,7 @@ def repeats(rows: Iterable[Row]) -> int:
 
 def _is_cut(row: Row) -> bool:
     return bool(row["interrupted"]) or any(
-        reason in (None, "horizon", "physics") for reason in row["ended_because"].values()
+        reason in (None, "horizon", "physics", STOP_REASON, "covered") for reason in row["ended_because"].values()
     )
 
 

@@ -38,7 +38,7 @@ class LearningCurve:
     seeds : (n, k) float64
         Value of each training there.
     mean, low, high : (k,) float64
-        Mean, and a band that holds the whole true mean curve with 95 %; infinite below three trainings.
+        Mean, and a band that holds the whole true mean curve with 95 %; infinite below five trainings.
     """
 
     name: str

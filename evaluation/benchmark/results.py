@@ -109,7 +109,7 @@ def rows_file(name: str) -> str:
 
 
 NOT_SHIPPED = (*TIMINGS, "record", "operating", "given_up", "d_sum85_m")
-"""What differs between two runs of one episode, lists that no table shows, and a sum of paths that no project reports."""
+"""What differs between two runs of one episode, lists that no table shows, and a sum that no project reports."""
 
 
 def packed(rows: Iterable[Row]) -> bytes:

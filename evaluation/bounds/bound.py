@@ -323,6 +323,9 @@ def _team_of(settings: ExplorationSettings) -> ExplorationSettings:
     """Return the settings that affect the time in a world without noise."""
     if settings.kinds:
         raise ValueError(f"kinds is {list(settings.kinds)}; bounds are for teams of robots of one kind")
+    for name, value in (("doors", settings.doors), ("people", settings.people)):
+        if value:
+            raise ValueError(f"{name} is {value}; bounds are for floors without doors that move and people")
     if len(set(settings.team_lidars)) > 1:
         raise ValueError("the lidars of the robots differ; bounds are for teams whose robots have the same lidar")
     return ExplorationSettings(

@@ -3,6 +3,7 @@
 The format is in docs/reference/files.md.
 """
 
+import json
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import replace
@@ -195,7 +196,9 @@ def _figures_or_errors(data: EpisodeData) -> tuple[dict[str, Any], dict[str, str
     failed = {"report": data.run.report_error} if data.run.report_error else {}
     for name in METRICS:
         try:
-            figures |= figures_of(data, [name])
+            made = figures_of(data, [name])
+            json.dumps(made, allow_nan=False)  # nan, or what no file can hold
+            figures |= made
         except Exception as error:  # of a metric of a user's own, anything
             figures[name] = None
             failed[name] = f"{type(error).__name__}: {error}"

@@ -4,7 +4,7 @@ It has numbers, tables, plots, and cautions.
 """
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -20,6 +20,7 @@ from lidarium.evaluation.analysis.figures import (
     compared,
     further_figure,
     further_keys,
+    is_time,
     over_bound,
     time_figure,
     value_figure,
@@ -36,7 +37,7 @@ from lidarium.evaluation.drawing.plots import (
 )
 from lidarium.evaluation.report import tables
 from lidarium.evaluation.report.tables import code, plain
-from lidarium.evaluation.statistics import FEWEST_FOR_INTERVAL, FEWEST_FOR_NOMINAL, median_interval
+from lidarium.evaluation.statistics import FEWEST_FOR_INTERVAL, FEWEST_FOR_NOMINAL, Interval, median_interval
 
 _LONGEST_STEM = 60
 
@@ -163,6 +164,22 @@ def _describe_values(section: Section, seed: int) -> None:
     section.numbers["further_medians"] = further
     if text := tables.further_table(further, section.group.horizon_s):
         section.markdown += ["### Further figures", text]
+        if lacking := _lacking(section.group.runs, further):
+            section.markdown.append(f"Of the runs that have it: {', '.join(lacking)}.")
+
+
+def _lacking(runs: Mapping[str, Sequence[Row]], further: Mapping[str, Mapping[str, Interval]]) -> list[str]:
+    """Return which figures some runs lack, and how many have them."""
+    found = []
+    for key in next(iter(further.values())):
+        numbers = [
+            f"{sum(row[key] is not None for row in rows)} of {len(rows)} of {code(policy)}"
+            for policy, rows in runs.items()
+            if key in further[policy] and not is_time(key) and any(row[key] is None for row in rows)
+        ]
+        if numbers:
+            found.append(f"{code(key)} ({', '.join(numbers)})")
+    return found
 
 
 def _describe_comparisons(section: Section, baseline: str, seed: int) -> None:

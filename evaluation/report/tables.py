@@ -4,7 +4,7 @@ import math
 import re
 from collections.abc import Iterable, Sequence
 
-from lidarium.evaluation.analysis.figures import TIMES, Comparison, OverBound, TimeFigure, Value, ValueFigure
+from lidarium.evaluation.analysis.figures import TIMES, Comparison, OverBound, TimeFigure, Value, ValueFigure, is_time
 from lidarium.evaluation.analysis.groups import Group, times_to
 from lidarium.evaluation.episodes.result import METRICS
 from lidarium.evaluation.statistics import FEWEST_FOR_INTERVAL, Interval, median_interval
@@ -116,7 +116,13 @@ def further_table(figures: dict[str, dict[str, Interval]], horizon_s: float) -> 
     policies = list(figures)
     keys = [key for key in figures[policies[0]] if all(key in by_key for by_key in figures.values())]
     rows = [
-        [code(key), *(interval(figures[policy][key], horizon_s, digits=_digits(key)) for policy in policies)]
+        [
+            code(key),
+            *(
+                interval(figures[policy][key], horizon_s if is_time(key) else None, digits=_digits(key))
+                for policy in policies
+            ),
+        ]
         for key in keys
     ]
     return markdown_table(["figure, median", *(code(policy) for policy in policies)], rows) if rows else ""

@@ -257,7 +257,7 @@ def _check_same(episodes: list[dict[str, Any]], suite: Suite, folder: Path) -> N
                 f"{folder} holds episodes of policy {name!r} with other settings, {options.get(name, {})}; choose "
                 "another folder"
             )
-    for name in ("draws_starts", "bounds"):
+    for name in ("draws_starts", "bounds", "image_resolution"):
         if kept.get(name, asked[name]) != asked[name]:
             raise ValueError(
                 f"{folder} holds episodes of a suite with {name} = {kept[name]}, this one has {asked[name]}; choose "
@@ -271,6 +271,14 @@ def _check_same(episodes: list[dict[str, Any]], suite: Suite, folder: Path) -> N
     for floor, teams in kept.get("starts", {}).items():
         if floor in suite.floors and suite.as_dict()["starts"].get(floor) != teams:
             raise ValueError(f"{folder} holds episodes with other starts on {floor!r}; choose another folder")
+    for episode in episodes:
+        if episode["policy"] in suite.policies and episode["variant"] in suite.variants:
+            setup = suite.setup_sha256(episode["policy"], episode["variant"])
+            if episode.get("setup_sha256", setup) != setup:
+                raise ValueError(
+                    f"{folder} holds episodes of {episode['policy']} with other options, rules to stop or ways to "
+                    "start; choose another folder"
+                )
 
 
 def _check_same_options(folder: Path, variant: str, kept: Mapping[str, Any], asked: Mapping[str, Any]) -> None:

@@ -1,5 +1,6 @@
 """Suites: policies x floors x robots x seeds x settings, read from TOML, and their single trials."""
 
+import hashlib
 import json
 import tomllib
 from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
@@ -264,6 +265,16 @@ class Suite:
         if trial.start < 0:
             return None
         return [list(start) for start in self.starts[trial.floor][trial.start][: trial.robots]]
+
+    def setup_sha256(self, policy: str, variant: str) -> str:
+        """Return a hash of what episodes of a policy depend on besides the settings of their world."""
+        told = {
+            "draws_starts": self.draws_starts,
+            "stop": self.stop,
+            "run": {name: value for name, value in self.variants[variant].items() if name in RUN_OPTIONS},
+            "policy": self.policy_settings.get(policy, {}),
+        }
+        return hashlib.sha256(json.dumps(told, sort_keys=True, default=str).encode()).hexdigest()
 
     def as_dict(self) -> dict[str, Any]:
         """Return it as types that JSON has."""

@@ -91,7 +91,8 @@ def run_trial(suite: Suite, trial: Trial, records: Path | None = None) -> dict[s
         _keep_record(records / f"{trial.file_name}.npz", recorder.finish())
     where = [[round(float(number), 6) for number in start] for start in env.world.starts]
     record = None if records is None else f"{RECORDS_FOLDER}/{trial.file_name}.npz"
-    about = {KEY: trial.key, "variant": trial.variant, "starts": where, "record": record}
+    setup = suite.setup_sha256(trial.policy, trial.variant)
+    about = {KEY: trial.key, "variant": trial.variant, "starts": where, "record": record, "setup_sha256": setup}
     if suite.bounds:
         try:
             result |= beside_bound(trial, settings, {**about, **result}, image_resolution)

@@ -257,7 +257,7 @@ def summary_of(episodes: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
         groups.items(), key=lambda item: (item[0][0], item[0][2], item[0][1])
     ):
         times = [episode["t99_s"] if episode["t99_s"] is not None else float("inf") for episode in group]
-        median = statistics.median_high(times)
+        median = statistics.median(times)
         rows.append(
             {
                 "variant": variant,

@@ -49,8 +49,8 @@ To sort and filter it, save [leaderboard.html](leaderboard.html) and open it in 
 
 Simulated time; Kobuki, the URG laser (240 deg, 5.6 m), maps of 5 cm, cut at {horizon:.0f} s. Starts are drawn by the
 seed, the same for every policy. The world *ideal* has perfect poses, no noise and known starts; *lab* has SLAM on
-noisy scans and odometry; with *unknown starts* robots find out by their maps where the others are. *By camera* a floor
-counts as seen if depth cameras saw the ground.
+noisy scans and odometry; with *unknown starts* robots find out by their maps where the others are. *By camera*
+robots explore by depth cameras; the floor counts as seen by lasers, as everywhere.
 
 Times are medians with 95 % intervals; runs that did not get there count as never. Multiples are of the time of a team
 that [knows the floor](../reference/bounds.md), medians over floors that have a bound. Differences are of restricted

@@ -72,6 +72,19 @@ def test_what_does_not_belong_together_is_refused_and_named(rows, directory_of, 
         read_episodes(directory_of([rows[0], rows[1], changed(rows[0], **change)]))
 
 
+def test_floors_of_one_name_are_told_apart(rows, directory_of):
+    other = changed(rows[0], floor_sha256="ab" * 32, seed=7)
+    floors = [row["floor"] for row in read_episodes(directory_of([*rows, other])).rows]
+    assert floors == [f"apartment ({rows[0]['floor_sha256'][:6]})"] * len(rows) + ["apartment (ababab)"]
+
+
+def test_episodes_of_two_setups_of_a_policy_are_refused(rows, directory_of):
+    first, other = (changed(rows[0], seed=seed, setup_sha256=letter) for seed, letter in enumerate("ab"))
+    with pytest.raises(ValueError, match="of nearest_frontier with two options of the policy, rules to stop"):
+        read_episodes(directory_of([first, other]))
+    read_episodes(directory_of([first, changed(other, policy="mine")]))
+
+
 def test_other_settings_with_other_numbers_of_robots_are_fine(rows, directory_of):
     episodes = read_episodes(directory_of([rows[0], changed(rows[0], robots=3, settings_sha256="ab" * 32)]))
     assert len(episodes.rows) == 2

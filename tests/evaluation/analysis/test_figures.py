@@ -31,6 +31,14 @@ def test_numbers_under_other_keys_are_figures_too(row):
     assert further_figure(runs, "t50_s").estimate == np.inf
 
 
+def test_a_figure_that_some_runs_lack_is_that_of_the_others(row):
+    runs = [row(seed=seed, d99_m=None if seed == 1 else 5.0 + seed, nowhere=None) for seed in range(4)]
+    keys = further_keys(runs, values_of(runs))
+    assert "d99_m" in keys
+    assert not {"nowhere", "t99_over_bound"} & set(keys)
+    assert further_figure(runs, "d99_m").estimate == 7.0
+
+
 def test_a_faster_policy_is_found_pair_by_pair(row):
     slow = [row("slow", seed, t90_s=40.0 + 7.0 * seed % 31, t99_s=60.0 + 7.0 * seed % 31) for seed in range(20)]
     fast = [
@@ -80,9 +88,11 @@ def test_the_median_is_of_those_that_have_a_bound(row):
         row(t99_s=None, bound_s=20.0),
         row(t99_s=1.0),
         row(t99_s=1.0, bound_s=None),
+        row(t99_s=0.0, bound_s=0.1),  # seen from the start
     ]
     found = over_bound(rows, 100.0)
     assert found.ratio.estimate == pytest.approx(4.0)
+    assert over_bound([rows[2]], 100.0).ratio.estimate == np.inf
     assert found.gap.estimate == pytest.approx((1 / 3 + 3 / 4 + 4 / 5) / 3)
 
 

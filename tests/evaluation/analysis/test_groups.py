@@ -1,4 +1,5 @@
 import numpy as np
+import pytest
 
 from lidarium.evaluation.analysis.groups import floor_set_of, grouped, paired, repeats, times_to
 
@@ -45,6 +46,13 @@ def test_a_run_that_was_cut_early_is_censored_then(row):
     )
     assert found.times.tolist() == [20.0, 35.0]
     assert found.cut == 1
+
+
+@pytest.mark.parametrize("reason", ["stop_rule", "covered"])
+def test_a_run_that_a_rule_or_a_smaller_share_ended_is_censored_then(row, reason):
+    ended = row(time_s=20.0, ended_because={"robot_0": reason})
+    assert times_to([ended], "t99_s", 100.0).cut == 1
+    assert times_to([{**ended, "t99_s": 18.0}], "t99_s", 100.0).cut == 0
 
 
 def test_pairs_share_floor_starts_and_seed(row):

@@ -81,6 +81,9 @@ def test_a_bound_is_kept_and_the_same_again(monkeypatch, tmp_path):
 
 
 def test_settings_without_a_share_and_wrong_starts_are_refused():
+    for name, value in (("doors", 0.5), ("people", 2)):
+        with pytest.raises(ValueError, match=f"{name} is {value}; bounds are for floors without doors that move"):
+            known_floor_bound(ROOM, replace(settings_of(), **{name: value}), ROOM.starts)
     with pytest.raises(ValueError, match="stop_coverage is None"):
         known_floor_bound(ROOM, make_settings(robots=1, stop_coverage=None), ROOM.starts)
     with pytest.raises(ValueError, match="one for each of 2 robots"):

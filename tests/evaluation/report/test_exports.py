@@ -29,6 +29,13 @@ def test_marl_eval_has_a_number_for_each_floor_of_each_run(rows):
     assert all(len(numbers) == 2 for numbers in algorithms["a_b"]["seed_0"]["absolute_metrics"].values())
 
 
+def test_marl_eval_has_the_floors_that_all_policies_have(rows):
+    (group,) = grouped(rows[1:])
+    (algorithms,) = marl_eval([group], values_of(rows))["lidarium"].values()
+    times = {policy: len(runs["seed_0"]["absolute_metrics"]["t99_s"]) for policy, runs in algorithms.items()}
+    assert times == {"a_b": 1, "c": 1}
+
+
 def test_the_table_in_latex_has_a_line_for_each_policy(rows):
     (group,) = grouped(rows)
     figures = {policy: time_figure(runs, "t99_s", group.horizon_s, 0) for policy, runs in group.runs.items()}

@@ -218,3 +218,10 @@ def test_episodes_of_another_request_are_not_taken_for_those_of_this_one(folder,
     shutil.copytree(folder, tmp_path / "copy")
     with pytest.raises(ValueError, match=words):
         list(Campaign(suite(**changes), tmp_path / "copy").run())
+
+
+def test_without_the_file_of_the_suite_rows_tell_of_another_rule(folder, tmp_path):
+    shutil.copytree(folder, tmp_path / "copy")
+    (tmp_path / "copy" / "suite.json").unlink()
+    with pytest.raises(ValueError, match="holds episodes of nearest_frontier with other options, rules to stop"):
+        list(Campaign(suite(stop={"decisions": 1}), tmp_path / "copy").run())

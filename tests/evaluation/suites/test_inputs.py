@@ -103,6 +103,17 @@ def test_a_metric_that_fails_loses_no_episode(here, capsys):
         assert row["coverage_final"] > 0.0
 
 
+def test_a_metric_that_no_file_can_hold_loses_no_episode(here):
+    lidarium.metric("mean_wait_s", unit="s", summary="mean of nothing")(lambda _: np.float64("nan"))
+    try:
+        assert evaluate("--policies", "random_walk") == 4
+    finally:
+        registry("metric").unregister("mean_wait_s")
+    row = json.loads((here / "out" / "episodes.jsonl").read_text())
+    assert row["mean_wait_s"] is None
+    assert row["failed_metrics"]["mean_wait_s"].startswith("ValueError: Out of range float values")
+
+
 def test_a_report_that_fails_loses_no_episode(here, capsys):
     (here / "fails_at_the_end.py").write_text(f"{POLICY}\n    def report(self):\n        raise KeyError('no record')\n")
     assert evaluate("--policies", "fails_at_the_end:Mine") == 4
