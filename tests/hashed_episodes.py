@@ -73,12 +73,13 @@ def part(name: str, **values: Any) -> Callable[[], Any]:
     return lambda: named(name)(**values)
 
 
-def faults() -> Any:
-    """Return every kind of fault: one of each at a time of its own, and some that are drawn."""
+def faults(robots: int = 3) -> Any:
+    """Return every kind of fault of three robots: one of each at a time of its own, and some that are drawn."""
     kinds = ("laser_dropout", "blind_sector", "stuck_wheel", "kidnapping", "dead_radio", "dead_robot")
     schedule = tuple(
         named("Fault")(kind=kind, robot=n % 3, at_s=2.0 + 2 * n, lasts_s=None if n > 2 else 2.0)
         for n, kind in enumerate(kinds)
+        if n % 3 < robots
     )
     return named("FaultSettings")(schedule=schedule, laser_dropout=120.0, stuck_wheel=60.0)
 

@@ -9,6 +9,7 @@ import json
 import platform
 import sys
 import time
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -127,7 +128,7 @@ CASES: dict[str, Case] = {
     "srt_team": policy("srt", "apartment", 200, robots=2, radio="line_of_sight"),
     "srt_thesis": policy("srt", "srt_lab", 300, setup={"mode": "thesis"}, robots=1),
     "supervised": policy("supervised", "apartment", 800, robots=3, known_starts=False),
-    "supervised_slam": policy("supervised", "clinic", 250, robots=2, faults=faults, **REAL),
+    "supervised_slam": policy("supervised", "clinic", 250, robots=2, faults=partial(faults, 2), **REAL),
     "supervised_extended": policy(
         "supervised",
         "apartment",
