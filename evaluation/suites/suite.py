@@ -18,6 +18,7 @@ from lidarium.envs.settings.making import make_settings
 from lidarium.evaluation.episodes.stop_rules import stop_rule_of
 from lidarium.evaluation.suites.trial import DEFAULT_VARIANT, Trial
 from lidarium.mapping.files.guarded_reading import read_text, reading
+from lidarium.mapping.files.named_files import hash_of, named_files
 from lidarium.mapping.geometry.bounds import Rule, above, shown, within
 
 MOST_SUITE_BYTES = 1 << 20
@@ -267,12 +268,19 @@ class Suite:
         return [list(start) for start in self.starts[trial.floor][trial.start][: trial.robots]]
 
     def setup_sha256(self, policy: str, variant: str) -> str:
-        """Return a hash of what episodes of a policy depend on besides the settings of their world."""
+        """Return a hash of what episodes of a policy depend on besides the settings of their world.
+
+        Files that the policy's options name count by their content.
+        """
+        options = {
+            name: hash_of(files) if (files := named_files(value)) else value
+            for name, value in self.policy_settings.get(policy, {}).items()
+        }
         told = {
             "draws_starts": self.draws_starts,
             "stop": self.stop,
             "run": {name: value for name, value in self.variants[variant].items() if name in RUN_OPTIONS},
-            "policy": self.policy_settings.get(policy, {}),
+            "policy": options,
         }
         return hashlib.sha256(json.dumps(told, sort_keys=True, default=str).encode()).hexdigest()
 

@@ -47,5 +47,5 @@ def test_a_supervised_tree_explores_on_the_map_that_the_station_has_merged():
 
 @pytest.mark.parametrize("name", ["supervised:thesi", "srt:tehsis"])
 def test_a_misspelt_policy_of_a_thesis_is_refused(name):
-    with pytest.raises(ValueError, match="cannot be imported"):
+    with pytest.raises(ValueError, match=f"did you mean '{name.partition(':')[0]}:thesis'"):
         lidarium.policy(name)

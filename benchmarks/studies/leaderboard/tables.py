@@ -1,5 +1,6 @@
 """Tables of the leaderboard, from the numbers of reports."""
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -77,7 +78,7 @@ def _row(part: Part, policy: str, group: Mapping[str, Any]) -> list[str]:
         str(times["size"]),
         f"{100.0 * times['success']['estimate']:.0f} %",
         _interval(times["median"]),
-        "-" if multiple is None else f"{multiple:.2f}",
+        "-" if multiple is None else "never" if math.isinf(multiple) else f"{multiple:.2f}",
         _difference(policy, group),
         _estimate(values, "path_m"),
         _estimate(values, "overlap_percent"),

@@ -13,7 +13,9 @@ from linked_rooms import TWO_ROOMS
 from lidarium.envs.simulation.bullet.bullet_world import BulletWorld
 from lidarium.envs.simulation.bullet.making import make_bullet
 
-SETTINGS = make_settings(robots=2, backend="bullet", kinds=("kobuki", "pioneer"), time_step=0.05, camera="depth_64x48")
+CAMERA = {"columns": 64, "rows": 48, "height": 0.2}
+
+SETTINGS = make_settings(robots=2, backend="bullet", kinds=("kobuki", "pioneer"), time_step=0.05, camera=CAMERA)
 
 
 def test_it_has_the_team_the_step_and_the_camera_of_the_settings():
