@@ -92,7 +92,9 @@ def over_bound_table(figures: dict[str, OverBound | None]) -> str:
         for policy, figure in figures.items()
         if figure is not None
     ]
-    return markdown_table(("policy", "time to 99 % over the bound, median", "optimality gap, mean [%]"), rows)
+    return markdown_table(
+        ("policy", f"time to 99 % over the bound, median ({NONE} if not reached)", "optimality gap, mean [%]"), rows
+    )
 
 
 def values_table(figures: dict[str, dict[str, ValueFigure]], values: Sequence[Value]) -> str:

@@ -74,6 +74,7 @@ class Campaign:
             inputs = _inputs_of(self.suite)
             _check_same(file.episodes, self.suite, self.folder)
             _check_same_inputs(self.folder, inputs)
+            _check_same_setups(file.episodes, self.suite, self.folder)
             _write_suite(self.folder / SUITE_FILE, self.suite, inputs)
             records = self.folder / RECORDS_FOLDER if self.records else None
             clear_unfinished(self.folder / RECORDS_FOLDER, ".npz")
@@ -271,6 +272,10 @@ def _check_same(episodes: list[dict[str, Any]], suite: Suite, folder: Path) -> N
     for floor, teams in kept.get("starts", {}).items():
         if floor in suite.floors and suite.as_dict()["starts"].get(floor) != teams:
             raise ValueError(f"{folder} holds episodes with other starts on {floor!r}; choose another folder")
+
+
+def _check_same_setups(episodes: list[dict[str, Any]], suite: Suite, folder: Path) -> None:
+    """Check that existing episodes are of the suite's options of policies, its stop rule and its starts."""
     for episode in episodes:
         if episode["policy"] in suite.policies and episode["variant"] in suite.variants:
             setup = suite.setup_sha256(episode["policy"], episode["variant"])

@@ -95,7 +95,7 @@ def test_multiples_of_the_bound_have_a_column_where_there_are_any(driver, report
     page = Browser(driver)
     page.open(report)
     assert "Over the bound" not in [each.text for each in page.find_all("#leaderboard .sort")]
-    text = "".join(json.dumps({**row, "bound_s": 20.0, "t99_s": 50.0}) + "\n" for row in rows)
+    text = "".join(json.dumps({**row, "bound_s": 12.0, "t99_s": 30.0}) + "\n" for row in rows)
     (tmp_path / "episodes.jsonl").write_text(text)
     write_report(tmp_path, tmp_path / "report")
     page.open(tmp_path / "report" / "report.html")
