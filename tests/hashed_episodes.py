@@ -74,7 +74,7 @@ def part(name: str, **values: Any) -> Callable[[], Any]:
 
 
 def faults(robots: int = 3) -> Any:
-    """Return every kind of fault of three robots: one of each at a time of its own, and some that are drawn."""
+    """Return scheduled faults of every kind, for three robots, and random ones."""
     kinds = ("laser_dropout", "blind_sector", "stuck_wheel", "kidnapping", "dead_radio", "dead_robot")
     schedule = tuple(
         named("Fault")(kind=kind, robot=n % 3, at_s=2.0 + 2 * n, lasts_s=None if n > 2 else 2.0)

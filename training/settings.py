@@ -213,7 +213,7 @@ class ValueSettings(_Budget):
             raise ValueError(f"kept of value is {self.kept}; want at least the batch, {self.batch}")
 
     def chance(self, decisions: int) -> float:
-        """Return the share of choices that are drawn evenly, after so many decisions."""
+        """Return the probability of a random choice after a number of decisions."""
         progress = min(2.0 * decisions / self.whole_decisions, 1.0)
         return self.first_chance + (self.last_chance - self.first_chance) * progress
 

@@ -25,7 +25,7 @@ METRES, SQUARE_METRES, SECONDS, PLACES = 10.0, 10.0, 60.0, 5.0
 """Scales of lengths, areas, ages, and places in tours."""
 
 OFFERS = {"frontier": 32.0, "tour": 30.0}
-"""Scale of the number of options by level: so many are on offer at most, unless settings say otherwise."""
+"""Scale of the number of options by level: the default maximum."""
 
 PATH_FACTOR = 3.0
 """Cost of a metre of path in metres of frontier, as in explore_lite."""

@@ -89,7 +89,7 @@ def begin(
             try:
                 check_starts(body, radius, np.array([fault.place]))
             except ValueError as error:
-                raise ValueError(f"fault {number} puts robot {fault.robot} where none can start: {error}") from error
+                raise ValueError(f"the place of fault {number} does not fit robot {fault.robot}: {error}") from error
     goal = (chosen.goal or floor.goal) if choice.has_goal else None
     if goal is not None:
         check_goal(tables.body, goal)

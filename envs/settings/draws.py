@@ -60,7 +60,7 @@ class Draws:
         Raises
         ------
         ValueError
-            If it cannot be known, or a draw is no number of robots.
+            If the distribution is a callable, or has values that are not whole numbers of 1 or more.
         """
         sizes = self._distributions.get(ROBOTS)
         if sizes is None:

@@ -332,7 +332,7 @@ class ExplorationSettings:
         check_workload(self)
 
     def _check_camera(self, camera: DepthCamera) -> None:
-        """Check that the mount is on each robot, where no wall can be."""
+        """Check that the camera is within the body of each robot; elsewhere it could be inside a wall."""
         radius, height = (min(getattr(robot, name) for robot in self.team) for name in ("radius", "height"))
         if math.hypot(camera.forward, camera.left) > radius:
             raise ValueError(

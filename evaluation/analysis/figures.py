@@ -49,7 +49,7 @@ class OverBound:
 
 
 def over_bound(rows: Sequence[Row], horizon_s: float, seed: int = 0) -> OverBound | None:
-    """Return the times to 99 % beside their bounds; None if no run has one.
+    """Return the times to 99 % relative to their bounds; None if no run has a bound.
 
     Times not reached are later than all others in the median, and the horizon in the gap. Runs that see the floor from
     their starts are left out.

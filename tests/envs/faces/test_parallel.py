@@ -187,7 +187,7 @@ def test_a_goal_that_no_robot_can_be_at_is_refused_before_the_run(goal, told):
 @pytest.mark.parametrize(("x", "told"), [(9.0, "inside a wall"), (0.1, "does not fit at start")])
 def test_a_kidnapping_to_where_no_robot_fits_is_refused_before_the_run(x, told):
     faults = FaultSettings(schedule=[Fault(kind="kidnapping", robot=1, at_s=0.2, place=(x, 2.0, 0.0))])
-    with pytest.raises(ValueError, match=rf"fault 0 puts robot 1 where none can start: .*{told}"):
+    with pytest.raises(ValueError, match=rf"the place of fault 0 does not fit robot 1: .*{told}"):
         make(box(), faults=faults).reset(seed=1)
 
 
