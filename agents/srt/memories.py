@@ -14,8 +14,7 @@ from lidarium.envs.onboard.navigation import NavigationMap
 from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.planning.frontiers.approach import approach, default_reach
 from lidarium.mapping.planning.frontiers.frontier_map import FRONTIER
-from lidarium.mapping.planning.grid_planning import Cell, Until, centres_of, plan, search
-from lidarium.mapping.planning.search.search_state import Targets
+from lidarium.mapping.planning.grid_planning import centres_of, plan, search
 
 Place = NDArray[np.float64]
 Legs = list[Place]
@@ -188,30 +187,12 @@ class MapMemory:
             sizes=clusters.sizes[chosen],
             costs=costs,
             ahead=np.array([way[min(ahead, len(way) - 1)] for way in ways]),
-            between=lambda numbers: self._between([stands[k] for k in numbers], costs[numbers]),
+            # There is always the way past where the robot is.
+            between=lambda numbers: self._map.path_costs(footprint).between(
+                [stands[k] for k in numbers], costs[numbers]
+            ),
             legs=lambda k: self._legs(start, ways[k][1:] or ways[k]),
         )
-
-    def _between(self, stands: list[Cell], costs: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the costs of the paths between cells (n), shape (n, n) [m].
-
-        The costs from the robot to each cell are known.
-        """
-        footprint = footprint_of(self._body)
-        table = np.zeros((len(stands), len(stands)))
-        targets = Targets.at(stands, self._map.log_odds.shape)
-        for k, stand in enumerate(stands[:-1]):
-            targets.mask[stand] = 0
-            # There is always the way past where the robot is: nothing beyond it needs to be examined.
-            until = Until(
-                targets=targets,
-                count=len(set(stands[k + 1 :]) - {stand}),
-                maximum_cost=float(costs[k] + costs.max()),
-            )
-            found = search(self._map.space, self._map.log_odds, self._map.clearance, stand, footprint, until=until)
-            for other in range(k + 1, len(stands)):
-                table[k, other] = table[other, k] = min(found.cost(stands[other]), costs[k] + costs[other])
-        return table
 
     def is_frontier(self, focus: Place) -> bool:
         """Whether the cell is a frontier of the map."""

@@ -16,7 +16,9 @@ from numpy.typing import NDArray
 from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.kernels.views import grid_at
 from lidarium.mapping.planning.clearance import ClearanceField, Window, changed_cells, update_around
+from lidarium.mapping.planning.footprint import Footprint
 from lidarium.mapping.planning.frontiers.frontier_map import FrontierMap, update_frontiers
+from lidarium.mapping.planning.path_costs import PathCosts
 from lidarium.mapping.planning.search.path_search import SearchSpace
 
 CLEARANCE_LIMIT = 0.6
@@ -52,6 +54,7 @@ class NavigationMap:
         self.clearance = ClearanceField((rows, columns), resolution, CLEARANCE_LIMIT)
         self._frontiers: FrontierMap | None = None
         self._space: SearchSpace | None = None
+        self._path_costs: dict[Footprint, PathCosts] = {}
         self._long: FrontierMap | None = None
         self._long_cells: NDArray[np.int64] = np.zeros((0, 2), np.int64)
         self._record: NDArray[np.int64] = np.zeros(RECORD, np.int64)
@@ -82,6 +85,12 @@ class NavigationMap:
         if self._space is None:
             self._space = SearchSpace((self._log_odds.shape[0], self._log_odds.shape[1]), self.resolution)
         return self._space
+
+    def path_costs(self, footprint: Footprint) -> PathCosts:
+        """Return the costs of a body's paths, which are kept until the map changes around them."""
+        if footprint not in self._path_costs:
+            self._path_costs[footprint] = PathCosts(self.space, self._log_odds, self.clearance, footprint)
+        return self._path_costs[footprint]
 
     def changed(self, window: Window) -> None:
         """Update clearance and frontiers in a window.
