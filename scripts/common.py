@@ -9,6 +9,7 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import closing, nullcontext, suppress
 from dataclasses import dataclass, field
+from fnmatch import fnmatch
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
@@ -197,6 +198,25 @@ def _aligned(cell: str, width: int, is_number: bool) -> str:
 def file_name(name: str) -> str:
     """Return a name in which letters unfit for file names are replaced."""
     return "".join(letter if letter.isalnum() or letter in "._-" else "-" for letter in name).strip(".-") or "floor"
+
+
+def check_output(folder: Path, names: Iterable[str], inputs: Iterable[Path | str | None]) -> None:
+    """Check that a command can write to a folder, and that it overwrites none of its inputs there.
+
+    ``names`` are those of its files, with wildcards as in ``map*``; the image of a ROS map counts as its yaml does.
+    """
+    from lidarium.mapping.files.map_files import image_of
+    from lidarium.mapping.files.output import check_writable
+
+    check_writable(folder)
+    patterns, read = tuple(names), [Path(each) for each in inputs if each is not None]
+    for path in (each for given in read for each in (given, image_of(given)) if each is not None):
+        # Links are replaced, not followed: both a link of such a name and what it leads to must be elsewhere.
+        for place in (path.parent.resolve() / path.name, path.resolve()):
+            if place.parent == folder.resolve() and any(fnmatch(place.name, pattern) for pattern in patterns):
+                raise ValueError(
+                    f"{path} is read, and would be overwritten in {folder}; choose another folder with --out"
+                )
 
 
 def counted(

@@ -20,6 +20,18 @@ if TYPE_CHECKING:
     from lidarium.mapping.geometry.rigid import Transform
 
 
+RESULT = "result.json"
+TEAM_FILES = (
+    *(f"robot_{number}.{kind}" for number in ("[0-9]", "[0-9][0-9]") for kind in ("yaml", "pgm", "smap")),
+    *(f"merged{number}.{kind}" for number in ("", "-[0-9]") for kind in ("yaml", "pgm")),
+    "transforms.json",
+    "view.png",
+    "decisions.jsonl",
+)
+"""Files that a run writes or not, by its team; those of an earlier run in the same folder go, by exact names."""
+
+RUN_FILES = (RESULT, *TEAM_FILES, "map.yaml", "map.pgm", "run.png")
+
 VIEW_SIZE = 900, 1200
 """Rows and columns of the picture from above [pixels]."""
 
@@ -37,11 +49,12 @@ def write_run(
     from lidarium.evaluation.episodes.events import decision_lines
     from lidarium.evaluation.truth.beliefs import team_log_odds
     from lidarium.mapping.files.map_files import write_ros_map
-    from lidarium.mapping.files.output import check_written, write_json, write_text
+    from lidarium.mapping.files.output import check_written, clear_earlier, write_json, write_text
     from lidarium.mapping.grids.occupancy import three_levels
 
     env = episode.env
-    write_json(folder / "result.json", result)
+    clear_earlier(folder, RESULT, TEAM_FILES)
+    write_json(folder / RESULT, result)
     if recorder is not None:
         from lidarium.evaluation.record import write_record
 
@@ -49,7 +62,7 @@ def write_run(
     log_odds, (x, y) = team_log_odds(env)
     write_ros_map(folder, "map", three_levels(log_odds), (x, y, 0.0), env.settings.occupancy.resolution)
     save_run_picture(folder / "run.png", episode, policy)
-    files = ["result.json", "map.yaml", "map.pgm", "run.png", *write_team(folder, episode)]
+    files = [RESULT, "map.yaml", "map.pgm", "run.png", *write_team(folder, episode)]
     if env.settings.camera is not None:
         _save_view(folder / "view.png", episode)
         files += ["view.png", *_write_sparse_maps(folder, episode)]

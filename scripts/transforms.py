@@ -5,6 +5,9 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     from lidarium.mapping.geometry.rigid import Transform
     from lidarium.mapping.merging.pair import PairResult
 
@@ -59,6 +62,8 @@ def _pair(names: tuple[str, str], placed: PlacedMaps) -> dict[str, Any]:
     def between(a_from_b: "Transform | None") -> dict[str, float | None]:
         return _numbers(None if a_from_b is None else first @ a_from_b @ second.inverse())
 
+    from lidarium.mapping.geometry.rigid import turned
+
     agreement, is_used = found.agreement, names in placed.used
     bend = found.ranked[0].bend if found.ranked and found.ranked[0].bend.is_held else None
     reason = found.reason
@@ -82,7 +87,8 @@ def _pair(names: tuple[str, str], placed: PlacedMaps) -> dict[str, Any]:
         "bend_m": None if bend is None else round(bend.bend_m, 4),
         "strain": None if bend is None else round(bend.strain, 5),
         "scale": None if bend is None else round(bend.scale, 5),
-        "covariance": None if bend is None else [[float(f"{v:.3g}") for v in row] for row in bend.covariance],
+        "covariance": None if bend is None else _shortened(turned(bend.covariance, first.theta)),
+        "covariance_at": None if bend is None else [round(float(v), 3) for v in first.apply(bend.middle)],
         "alternatives": [
             {
                 **between(one.bend.a_from_b),
@@ -94,6 +100,10 @@ def _pair(names: tuple[str, str], placed: PlacedMaps) -> dict[str, Any]:
         ],
         "time_ms": round(found.time_ms, 3),
     }
+
+
+def _shortened(matrix: "NDArray[np.float64]") -> list[list[float]]:
+    return [[float(f"{value:.3g}") for value in row] for row in matrix]
 
 
 def _numbers(transform: "Transform | None") -> dict[str, float | None]:

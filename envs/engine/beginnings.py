@@ -71,7 +71,7 @@ def begin(
     if settings.doors > 0.0:
         # Doors come from the seed of the episode, and robots do not start beyond one that stays shut.
         seed = int(generator.integers(2**63))
-        doors = draw_doors(tables, settings.doors, radius, seed)
+        doors = draw_doors(tables, settings.doors, radius, seed, starts if isinstance(starts, np.ndarray) else None)
         if not len(doors) and not choice_here.is_set:
             raise ValueError(
                 f"doors is {settings.doors}, but floor {floor.name!r} has no opening of {NARROWEST_M} to {WIDEST_M} m "

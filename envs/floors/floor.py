@@ -161,7 +161,7 @@ def _middle_line(polygon: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _ring(kind: str, ring: NDArray[np.float64]) -> NDArray[np.float64]:
-    corners = np.ascontiguousarray(ring, dtype=np.float64)
+    corners = np.array(ring, dtype=np.float64, order="C")
     if corners.ndim != 2 or corners.shape[0] < 3 or corners.shape[1] != 2 or not np.isfinite(corners).all():
         raise ValueError(
             f"{kind} has shape {corners.shape} or values that are not finite; want at least 3 points (x, y) in metres"
@@ -235,13 +235,14 @@ class Floor:
                 f"floor {self.name!r} has cells of shape {self.cells.solid.shape} at {self.cells.resolution} "
                 "m; want a grid, resolution > 0"
             )
-        starts = np.asarray(self.starts, dtype=np.float64)
+        starts = np.array(self.starts, dtype=np.float64)  # a copy: floors are shared by environments
         if starts.ndim != 2 or starts.shape[1] != 3 or not np.isfinite(starts).all():
             raise ValueError(
                 f"floor {self.name!r} has starts of shape {starts.shape} or not finite; want (K, 3): x, y, theta"
             )
         if self.goal is not None and (len(self.goal) != 2 or not np.isfinite(self.goal).all()):
             raise ValueError(f"floor {self.name!r} has goal {self.goal}; want (x, y) in metres")
+        starts.flags.writeable = False
         object.__setattr__(self, "starts", starts)
 
     def raster(self, resolution: float, z_low: float, z_high: float) -> Raster:

@@ -196,7 +196,7 @@ class Simulation:
         smallest = float(self.world.bodies[:, RADIUS].min())
         body = floor.body
         if self.population is not None and self.population.share:
-            body = with_shut_doors(body, self.population.draw_doors(floor, seed))
+            body = with_shut_doors(body, self.population.draw_doors(floor, starts, seed))
         free = reachable_free_space(body, smallest, starts) & (floor.laser.solid == 0)
         floors = enumerate(self.world.floors)
         same = [other for other, known in floors if other != episode and known is floor]

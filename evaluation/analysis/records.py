@@ -22,7 +22,7 @@ Key = str
 Empty for no record.
 """
 
-_SAME = ("policy", "floor", "floor_sha256", "seed", "robots", "settings_sha256")
+_SAME = ("policy", "floor_sha256", "seed", "robots", "settings_sha256")
 """Keys that a record and the line of its episode share."""
 
 

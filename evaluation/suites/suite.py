@@ -222,9 +222,14 @@ class Suite:
             if name in options:
                 raise ValueError(f"variant {variant!r} sets {name}, which is fixed by {why}; leave it out")
         try:
-            return make_settings(robots=robots, **options)
+            settings = make_settings(robots=robots, **options)
         except (ValueError, TypeError, AttributeError) as error:
             raise ValueError(f"variant {variant!r} with {robots} robots cannot be used: {error}") from error
+        if settings.robots != robots:
+            raise ValueError(
+                f"variant {variant!r} has {settings.robots} robots, and the suite {robots}; want --robots alone"
+            )
+        return settings
 
     def run_options(self, variant: str) -> dict[str, Any]:
         """Return the options of ``run_episode`` that a variant sets."""

@@ -32,6 +32,7 @@ from lidarium.mapping.files.beams import (
 )
 from lidarium.mapping.files.guarded_reading import read_lines, reading
 from lidarium.mapping.files.laser_logs import LaserLog, made_usable
+from lidarium.mapping.files.odometry_faults import axes_of
 from lidarium.mapping.files.trajectories import interpolated
 from lidarium.mapping.geometry.rigid import composed, relative
 
@@ -359,9 +360,9 @@ def _log(path: Path, content: _Content) -> LaserLog:
         sweep = symmetric_scans(ranges, beams.angle_min, beams.increment, (0.0, highest))
     except ValueError as error:
         raise ValueError(f"{path}: {error}") from error
-    laser_pose = _mounting(content, kept[0][0]) + np.array([0.0, 0.0, sweep.axis])
     stamps = np.array([scan.stamp for scan, _ in kept], np.float64)
     robot_poses = np.array([scan.robot_pose for scan, _ in kept], np.float64)
+    laser_pose = _mounting(content, kept[0][0], robot_poses) + np.array([0.0, 0.0, sweep.axis])
     readings_stamps = np.array([stamp for _, stamp in content.odometry], np.float64)
     readings = np.array([pose for pose, _ in content.odometry], np.float64).reshape(-1, 3)
     before = np.array([before for _, before in kept], np.int64)
@@ -443,11 +444,14 @@ def _at_scans(
     return odometry
 
 
-def _mounting(content: _Content, first: _Scan) -> NDArray[np.float64]:
+def _mounting(content: _Content, first: _Scan, robot_poses: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the laser's pose on the robot.
 
-    It is from the parameters, or, if the first scan's line has two poses, from them.
+    It is from the parameters, or, if the first scan's line has two poses, from them, in the axes that all poses of the
+    robot show.
     """
     if "robot_frontlaser_offset" in content.parameters:
         return np.array([_parameter(content, "robot_frontlaser_offset") or 0.0, 0.0, 0.0])
-    return relative(np.array(first.robot_pose), np.array(first.laser_pose))
+    poses, axes = np.array([first.robot_pose, first.laser_pose], np.float64), axes_of(robot_poses)
+    robot, laser = poses if axes is None else axes.corrected(poses)
+    return relative(robot, laser)

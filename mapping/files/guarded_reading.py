@@ -38,6 +38,9 @@ MAX_MESSAGE = 500
 MIN_UNPACKED, UNPACKED_RATIO = 4 << 20, 16
 """Maximum size of a packed file when unpacked [bytes]: the first number, or a multiple of its own size."""
 
+_GZIP = b"\x1f\x8b"
+"""First bytes of a packed file."""
+
 READING_ERRORS = (
     ArithmeticError,
     AttributeError,
@@ -162,7 +165,8 @@ def read_lines(path: Path, longest: int) -> Iterator[str]:
     Bytes that are no text become replacement characters.
     """
     with open_guarded(path) as file:
-        is_packed = path.suffix.lower() == ".gz"
+        is_packed = file.read(2) == _GZIP
+        file.seek(0)
         allowed = max_unpacked(os.fstat(file.fileno()).st_size) if is_packed else MAX_FILE_BYTES
         length = 0
         # Lines of a packed file are found ten times as fast in a buffer.

@@ -196,7 +196,8 @@ class LaserLog:
 def made_usable(log: LaserLog, where: str) -> LaserLog:
     """Return a log without unusable scans and odometry.
 
-    Scans are dropped without any finite stamp or if stamps go back in time; a clock that restarts is continued.
+    Scans are dropped without a finite stamp, if they repeat an earlier one, stamp, ranges and odometry, or if stamps go
+    back in time; a clock that restarts is continued.
     Scans out of the order of time are sorted. Odometry is dropped if it contains no information, and mended by
     ``odometry_faults``.
 
@@ -205,6 +206,10 @@ def made_usable(log: LaserLog, where: str) -> LaserLog:
     for poses in (log.odometry, log.corrected, log.readings, log.laser_pose):
         if poses is not None and poses.size and not np.nanmax(np.abs(poses), initial=0.0) <= MAX_POSE_M:
             raise ValueError(f"{where} has poses beyond {MAX_POSE_M:,.0f} m; want metres and radians")
+    first = _first_told(log)
+    if len(first) < len(log.stamps):
+        skipped = {**log.skipped, "repeated scans": len(log.stamps) - len(first)}
+        log = replace(_without_readings(_at(log, first)), skipped=skipped)
     order = _order(log.stamps)
     if order is not None:
         moved = int((order != np.arange(len(order))).sum())
@@ -216,7 +221,9 @@ def made_usable(log: LaserLog, where: str) -> LaserLog:
         log = _without_readings(log)
     clock = _continued(stamps)
     if len(clock.kept) < len(stamps):
-        skipped["scans back in time"] = len(stamps) - len(clock.kept)
+        timeless = int((~np.isfinite(stamps)).sum())
+        dropped = {"scans without a stamp": timeless, "scans back in time": len(stamps) - len(clock.kept) - timeless}
+        skipped |= {reason: count for reason, count in dropped.items() if count}
     if not len(clock.kept):
         raise ValueError(
             f"{where} holds no scan that can be used; want FLASER or ROBOTLASER1 lines, or an npz with "
@@ -239,6 +246,19 @@ def made_usable(log: LaserLog, where: str) -> LaserLog:
             log = replace(log, ranges=ranges, is_in_time=False)
         log = replace(log, odometry=better)
     return replace(log, remarks=tuple(remarks)).swept(log.beam_interval_s)
+
+
+def _first_told(log: LaserLog) -> NDArray[np.int64]:
+    """Return the numbers of the scans that repeat no earlier one; a clock that stands still tells no scans apart."""
+    stamps, repeats = np.unique(log.stamps, return_counts=True)
+    again, told, numbers = set(stamps[repeats > 1].tolist()) if len(stamps) > 1 else set(), set(), []
+    for k, stamp in enumerate(log.stamps.tolist()):
+        scan = (stamp, log.ranges[k].tobytes(), b"" if log.odometry is None else log.odometry[k].tobytes())
+        if stamp not in again or scan not in told:
+            numbers.append(k)
+        if stamp in again:
+            told.add(scan)
+    return np.array(numbers, np.int64)
 
 
 def _at(log: LaserLog, numbers: NDArray[np.int64]) -> LaserLog:

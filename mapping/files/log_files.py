@@ -52,8 +52,8 @@ def read_log(path: Path | str, topic: str | None = None, field_of_view: float | 
     path = Path(path)
     if is_bag(path):
         return read_bag_log(path, topic)
-    if path.suffix == ".npz":
+    if path.suffix.lower() == ".npz":
         return read_npz_log(path)
-    if path.name.endswith((".dat", ".dat.gz")):
+    if path.name.lower().endswith((".dat", ".dat.gz")):
         return read_mines_log(path)
     return read_carmen_log(path, field_of_view)

@@ -360,6 +360,18 @@ def _read_header(path: Path) -> dict[str, Any]:
     return header
 
 
+def image_of(path: Path) -> Path | None:
+    """Return the image that the yaml file of a ROS map names, None if it is no such file or names none."""
+    if path.suffix.lower() not in (".yaml", ".yml"):
+        return None
+    try:
+        name = str(_read_header(path)["image"])
+    except (OSError, ValueError):
+        return None
+    named = path.parent / name
+    return named if named.exists() else path.parent / PureWindowsPath(name).name
+
+
 def _image_path(yaml_path: Path, name: str) -> Path:
     """Return the path of the image of a map.
 

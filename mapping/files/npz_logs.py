@@ -65,6 +65,8 @@ def _from_arrays(path: Path, arrays: Mapping[str, NDArray[Any]]) -> LaserLog:
     readings_stamps = np.asarray(arrays.get("odometry_stamp", np.zeros(0)), np.float64)
     readings = _table(path, arrays, "odometry_pose", (len(readings_stamps), 3))
     laser_pose = _table(path, arrays, "laser_pose", (3,))
+    if laser_pose is not None and not np.isfinite(laser_pose).all():
+        raise ValueError(f"{path}: laser_pose is {laser_pose.tolist()}; want x, y, theta, all finite")
     return LaserLog(
         stamps=np.arange(scans, dtype=np.float64) if stamps is None else stamps,
         ranges=sweep.ranges,

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -94,8 +95,10 @@ def mended(
             f"odometry is missing in {len(gaps)} stretches while the robot moves, the longest from {stamps[first]:.3f} "
             f"to {stamps[last - 1]:.3f} s: {sum(b - a for a, b in gaps)} scans are matched without it"
         )
-    odometry, remark = _in_robot_axes(odometry)
-    remarks += remark
+    axes = axes_of(odometry)
+    if axes is not None:
+        odometry = axes.corrected(odometry)
+        remarks.append(f"{axes.what}, and taken so")
     odometry, jumps = _without_jumps(odometry, stamps)
     if jumps:
         remarks.append(f"odometry jumps {jumps} times as no robot moves; the jumps are taken out")
@@ -133,27 +136,39 @@ def _check_metres(odometry: NDArray[np.float64], stamps: NDArray[np.float64]) ->
         )
 
 
-def _in_robot_axes(odometry: NDArray[np.float64]) -> tuple[NDArray[np.float64], list[str]]:
-    """Return odometry with headings in radians, counter-clockwise from x to y, and a remark on what they were.
+class PoseAxes(NamedTuple):
+    """Axes and units of a log's poses: `order` of x, y, theta, the `scale` of headings, and `what` they are."""
+
+    order: list[int]
+    scale: float
+    what: str
+
+    def corrected(self, poses: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return poses (..., 3) as x, y [m] and headings counter-clockwise from x to y [rad]."""
+        return poses[..., self.order] * [1.0, 1.0, self.scale]
+
+
+def axes_of(odometry: NDArray[np.float64]) -> PoseAxes | None:
+    """Return the axes of a log's odometry (n, 3); None if they are as they should be, or cannot be told.
 
     A robot mostly moves in one direction of its body. If it does not, and moves along its heading by other units or
     axes, these are the log's.
     """
     known = np.isfinite(odometry).all(axis=1)
     if abs(_direction(odometry)) > _INCONSISTENT:
-        return odometry, []
+        return None
     degrees, same, swapped = math.pi / 180.0, [0, 1, 2], [1, 0, 2]
-    for axes, scale, what in (
-        (same, degrees, "headings of odometry are in degrees"),
-        (swapped, 1.0, "x and y of odometry are swapped"),
-        (same, -1.0, "headings of odometry are clockwise"),
-        (swapped, degrees, "x and y of odometry are swapped, its headings in degrees"),
-        (same, -degrees, "headings of odometry are clockwise, in degrees"),
+    for axes in (
+        PoseAxes(same, degrees, "headings of odometry are in degrees"),
+        PoseAxes(swapped, 1.0, "x and y of odometry are swapped"),
+        PoseAxes(same, -1.0, "headings of odometry are clockwise"),
+        PoseAxes(swapped, degrees, "x and y of odometry are swapped, its headings in degrees"),
+        PoseAxes(same, -degrees, "headings of odometry are clockwise, in degrees"),
     ):
-        changed = odometry[:, axes] * [1.0, 1.0, scale]
+        changed = axes.corrected(odometry)
         if abs(_direction(changed).real) > _CONSISTENT and np.ptp(changed[known, 2]) > _TURNED:
-            return changed, [f"{what}, and taken so"]
-    return odometry, []
+            return axes
+    return None
 
 
 def _without_jumps(odometry: NDArray[np.float64], stamps: NDArray[np.float64]) -> tuple[NDArray[np.float64], int]:

@@ -143,6 +143,17 @@ def check_written(folder: Path, names: Iterable[str]) -> None:
             )
 
 
+def clear_earlier(folder: Path, marker: str, names: Iterable[str]) -> None:
+    """Remove what an earlier run of the same command left, so that no file beside a result is of another one.
+
+    ``names`` may have wildcards; nothing is removed from a folder without ``marker``, the result of such a run.
+    """
+    if (Path(folder) / marker).is_file():
+        for path in (each for name in names for each in Path(folder).glob(name)):
+            if path.is_file():
+                path.unlink()
+
+
 def write_text(path: Path, text: str) -> None:
     """Write a text file (UTF-8)."""
     with whole_file(path) as beside:

@@ -223,8 +223,10 @@ def _from_json(content: dict[str, Any], settings: SplineSettings | None) -> Spli
         counts, last_seen = np.array(marks["counts"], np.int64), np.array(marks["last_seen"], np.int64)
         if not len(points) == len(weights) == len(counts) == len(last_seen):
             raise ValueError(f"its {name} have not as many points as weights, counts and times")
+        if not (np.isfinite(points).all() and np.isfinite(weights).all() and (weights >= 0.0).all()):
+            raise ValueError(f"its {name} have points or weights that are not finite, or weights below 0")
         setattr(spline_map, name, Landmarks(points, weights, counts, last_seen))
     spline_map.updates = _counted(content["updates"])
-    if not all(math.isfinite(value) for curve in spline_map.curves for value in curve.weights.tolist()):
-        raise ValueError("weights are not finite")
+    if not all(0.0 <= value < math.inf for curve in spline_map.curves for value in curve.weights.tolist()):
+        raise ValueError("weights of curves are not finite, or below 0")
     return spline_map

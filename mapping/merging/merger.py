@@ -51,13 +51,14 @@ class Question:
         About how the second map's lower left corner lies in the first map [m, rad].
     is_forced : bool
         Whether two maps are joined by the best transform, whatever speaks against it.
-    is_explained : bool
-        Whether of every pair the hypotheses are ranked, also if it joins at once.
+    is_explained : bool, default True
+        Whether pairs that join at once have their other hypotheses ranked too, which confidence and doubt are from;
+        otherwise these are 0 and none.
     """
 
     guess: Transform | None = None
     is_forced: bool = False
-    is_explained: bool = False
+    is_explained: bool = True
 
 
 def merge_maps(

@@ -1,13 +1,15 @@
 """`lidarium drive`: drive a robot by hand in a browser, beside the score of a policy."""
 
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from tyro.conf import Positional, Suppress, arg
 
 from lidarium.scripts.commands import run
-from lidarium.scripts.common import Answer, notify
+from lidarium.scripts.common import Answer, check_output, notify
 from lidarium.scripts.options import PORT, policy_options
+from lidarium.scripts.run_output import RUN_FILES
 
 if TYPE_CHECKING:
     from lidarium.evaluation.viewing.hand import Times
@@ -51,11 +53,10 @@ def execute(command: Drive) -> Answer:
     from lidarium.agents.by_hand import ByHand
     from lidarium.evaluation.viewing.hand import DrivenView, Hand
     from lidarium.evaluation.viewing.server import address_of, view_server
-    from lidarium.mapping.files.output import check_writable
     from lidarium.scripts.options import check_view
 
     check_view(command)
-    check_writable(command.out or run.DEFAULT_FOLDER)
+    check_output(run.folder_of(command, Path(command.floor).stem), RUN_FILES, (command.floor,))
     others, options = None, policy_options(command.policy_set)
     if command.robots > 1:
         others = lidarium.policy(command.policy or "tour_frontier", **options)

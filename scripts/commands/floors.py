@@ -9,7 +9,17 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from tyro.conf import Positional, subcommand
 
-from lidarium.scripts.common import DONE, DOUBTFUL, INTERRUPTED, Answer, Command, counted, file_name, table
+from lidarium.scripts.common import (
+    DONE,
+    DOUBTFUL,
+    INTERRUPTED,
+    Answer,
+    Command,
+    check_output,
+    counted,
+    file_name,
+    table,
+)
 
 if TYPE_CHECKING:
     from lidarium.envs.floors.floor import Floor
@@ -185,13 +195,16 @@ def _show_floor(command: _Show) -> Answer:
         if options
         else load_floor(command.name, command.resolution)
     )
+    if command.out is not None:
+        stem = file_name(floor.name)
+        check_output(command.out, (f"{stem}.png", f"{stem}.json"), (command.name,))
     result = describe_floor(floor)
     about = about_floor(command.name) if command.name in floor_names() else ""
     files = []
     if command.out is not None:
-        _save_picture(command.out / f"{file_name(floor.name)}.png", floor)
-        write_result(command, f"{file_name(floor.name)}.json", result)
-        files = [f"{file_name(floor.name)}.json", f"{file_name(floor.name)}.png"]
+        _save_picture(command.out / f"{stem}.png", floor)
+        write_result(command, f"{stem}.json", result)
+        files = [f"{stem}.json", f"{stem}.png"]
     return Answer(result, floor_description(result, command.out, files, about), verdict_of_reach(result))
 
 
@@ -210,7 +223,7 @@ def _import_floor(command: _Import) -> Answer:
 
     check_out(command)
     floor = load_file(command.file, command.resolution, **_import_options(command))
-    return write_floor(command, floor, command.map_resolution)
+    return write_floor(command, floor, command.map_resolution, command.file)
 
 
 def _import_options(command: _Show | _Import) -> dict[str, Any]:
@@ -306,21 +319,21 @@ It is that of the robots' lasers.
 """
 
 
-def write_floor(command: Command, floor: "Floor", resolution: float) -> Answer:
-    """Write a floor as a ROS map and a picture, with its figures."""
+def write_floor(command: Command, floor: "Floor", resolution: float, source: Path | None = None) -> Answer:
+    """Write a floor as a ROS map and a picture, with its figures; it was read from ``source``."""
     from lidarium.envs.floors.catalogue.names import describe_floor
     from lidarium.mapping.files.map_files import write_ros_map
-    from lidarium.mapping.files.output import check_writable, check_written
+    from lidarium.mapping.files.output import check_written
 
     stem = file_name(floor.name)
     folder = command.out or Path("floors") / stem
-    check_writable(folder)
+    files = [f"{stem}.{kind}" for kind in ("yaml", "pgm", "png", "json")]
+    check_output(folder, files, (source,))
     raster = floor.raster(resolution, LASER_HEIGHT, LASER_HEIGHT)
     result = describe_floor(floor)
     write_ros_map(folder, stem, _levels(raster.solid, resolution), (*raster.origin, 0.0), resolution)
     _save_picture(folder / f"{stem}.png", floor)
     write_result(command, f"{stem}.json", result, folder)
-    files = [f"{stem}.{kind}" for kind in ("yaml", "pgm", "png", "json")]
     check_written(folder, files)
     return Answer(result, floor_description(result, folder, files), verdict_of_reach(result))
 

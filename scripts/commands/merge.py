@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from tyro.conf import Positional
 
-from lidarium.scripts.common import DONE, DOUBTFUL, NO, Answer, Command, file_name, table
+from lidarium.scripts.common import DONE, DOUBTFUL, NO, Answer, Command, check_output, file_name, table
 from lidarium.scripts.transforms import PlacedMaps, transforms
 
 if TYPE_CHECKING:
@@ -22,6 +22,11 @@ if TYPE_CHECKING:
     from lidarium.mapping.merging.settings import MergeSettings
 
 DEFAULT_FOLDER = Path("merged")
+RESULT, MAPS, REGIONS = "transforms.json", ("map.yaml", "map.pgm", "map-*.yaml", "map-*.pgm"), "regions.png"
+MOST_MAPS = 64
+"""A fused map holds the sources of at most so many."""
+
+FILES = (RESULT, *MAPS, "merge.png", REGIONS)
 
 LEAST_SCALE = 0.01
 """Minimum scale that can be given, and one over the maximum."""
@@ -73,6 +78,8 @@ class _Merge(Command):
         Command.__post_init__(self)
         if len(self.maps) < 2:
             raise ValueError(f"{len(self.maps)} map is given; want two or more")
+        if len(self.maps) > MOST_MAPS:
+            raise ValueError(f"{len(self.maps)} maps are given; want at most {MOST_MAPS}: merge them in parts")
         if self.resolution is not None and not 0.0 < self.resolution < float("inf"):
             raise ValueError(f"resolution is {self.resolution} m; want a positive number of metres per pixel")
         factor = self.factor
@@ -102,11 +109,10 @@ class _Merge(Command):
 
 def execute(command: _Merge) -> Answer:
     """Merge maps and write the results."""
-    from lidarium.mapping.files.output import check_writable
     from lidarium.mapping.merging.settings import TOLERANCES, merge_settings
 
     out = command.out or DEFAULT_FOLDER
-    check_writable(out)
+    check_output(out, FILES, command.maps)
     images = _read(command)
     settings = merge_settings(command.mode, max(image.resolution for image in images.values()))
     if command.mode == "default":
@@ -169,7 +175,7 @@ def _merged(
         scaled = merge_scaled(_grids(images), settings)
         return scaled.merged, _grown(images, scaled.scale), scaled.scale
     images = _grown(images, factor)
-    question = Question(guess=_guess(command, list(images.values())), is_forced=command.force, is_explained=True)
+    question = Question(guess=_guess(command, list(images.values())), is_forced=command.force)
     return merge_maps(_grids(images), settings, question), images, factor
 
 
@@ -307,12 +313,13 @@ def write_merged(
     """
     from lidarium.evaluation.drawing.merge_picture import save_merge_picture
     from lidarium.mapping.files.map_files import write_ros_map
-    from lidarium.mapping.files.output import check_written, write_json
+    from lidarium.mapping.files.output import check_written, clear_earlier, write_json
     from lidarium.mapping.geometry.rigid import Transform
 
     files = []
     joined = [group for group in merged.groups() if len(group) > 1]
     fused_maps = [bent.fused for bent in deformed] or [merged.fused(group) for group in joined]
+    clear_earlier(out, RESULT, FILES)
     for number, (group, fused) in enumerate(zip(joined, fused_maps, strict=True)):
         name = "map" if number == 0 else f"map-{number + 1}"
         origin = corner_of(images[group[0]]) @ Transform(*fused.origin)
@@ -320,8 +327,8 @@ def write_merged(
         files += [f"{name}.yaml", f"{name}.pgm"]
     corners = {name: corner_of(image) for name, image in images.items()}
     save_merge_picture(out / "merge.png", merged, corners, deformed)
-    write_json(out / "transforms.json", result)
-    files += ["transforms.json", "merge.png"]
+    write_json(out / RESULT, result)
+    files += [RESULT, "merge.png"]
     check_written(out, files)
     return files
 
@@ -335,5 +342,5 @@ def draw_regions(merged: "Merged", images: "dict[str, MapImage]", settings: "Reg
     for name, levels in merged.levels.items():
         graph = find_regions(levels, merged.resolution, settings)
         maps[name] = RegionMap(levels, merged.resolution, graph, corner_of(images[name]))
-    save_region_picture(out / "regions.png", maps)
-    return "regions.png"
+    save_region_picture(out / REGIONS, maps)
+    return REGIONS

@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from tyro.conf import Positional
 
-from lidarium.scripts.common import Answer, Command, file_name
+from lidarium.scripts.common import Answer, Command, check_output, file_name
 
 DEFAULT_FOLDER = Path("predicted")
 
@@ -46,7 +46,7 @@ def execute(command: _Predict) -> Answer:
 
     from lidarium.evaluation.drawing.prediction_picture import save_prediction_picture
     from lidarium.mapping.files.map_files import read_grey_map, read_ros_map, write_ros_map
-    from lidarium.mapping.files.output import check_writable, write_arrays
+    from lidarium.mapping.files.output import write_arrays
     from lidarium.mapping.prediction.levels import UNKNOWN
     from lidarium.mapping.prediction.predictors import make_predictor
     from lidarium.mapping.prediction.whole_maps import predict_map
@@ -56,14 +56,14 @@ def execute(command: _Predict) -> Answer:
         want = "leave --resolution out" if is_ros else "want --resolution, its metres per pixel"
         raise ValueError(f"{command.map} is {'a ROS map that states its scale' if is_ros else 'no ROS map'}; {want}")
     out = command.out or DEFAULT_FOLDER
-    check_writable(out)
+    name = file_name(command.map.stem)
+    check_output(out, (f"{name}.yaml", f"{name}.pgm", "probability.npz", "prediction.png"), (command.map,))
     if command.resolution is None:
         image = read_ros_map(command.map)
     else:
         image = read_grey_map(command.map, command.resolution)
     options = {} if command.weights is None else {"weights": command.weights}
     found = predict_map(image, make_predictor(command.predictor, **options), command.margin)
-    name = file_name(command.map.stem)
     arrays = {
         "probability": found.probability,
         "levels": found.levels,

@@ -271,11 +271,12 @@ def _result(
 
 
 def _write(out: Path, episode: "Episode", result: dict[str, Any]) -> list[str]:
-    from lidarium.mapping.files.output import check_written, write_json
-    from lidarium.scripts.run_output import write_team
+    from lidarium.mapping.files.output import check_written, clear_earlier, write_json
+    from lidarium.scripts.run_output import RESULT, TEAM_FILES, write_team
 
     out.mkdir(parents=True, exist_ok=True)
-    write_json(out / "result.json", result)
-    files = ["result.json", *write_team(out, episode)]
+    clear_earlier(out, RESULT, TEAM_FILES)
+    write_json(out / RESULT, result)
+    files = [RESULT, *write_team(out, episode)]
     check_written(out, files)
     return files

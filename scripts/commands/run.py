@@ -14,6 +14,7 @@ from lidarium.scripts.common import (
     Answer,
     Progress,
     TeamCommand,
+    check_output,
     compile_first,
     file_name,
     notify,
@@ -26,7 +27,7 @@ from lidarium.scripts.options import (
     policy_options,
     supervisor_options,
 )
-from lidarium.scripts.run_output import RunFilms, run_summary, write_run
+from lidarium.scripts.run_output import RUN_FILES, RunFilms, run_summary, write_run
 
 if TYPE_CHECKING:
     import numpy as np
@@ -126,10 +127,9 @@ class Run(FilmOptions, TeamCommand, ViewOptions):
 def execute(command: Run) -> Answer:
     """Run one episode and write its results."""
     import lidarium
-    from lidarium.mapping.files.output import check_writable
 
-    check_writable(command.out or DEFAULT_FOLDER)
     command = _completed(command)
+    check_output(folder_of(command, Path(command.floor).stem), RUN_FILES, (command.floor,))
     options = _policy_options(command)
     policy = lidarium.policy(command.chosen_policy, **options)
     if "depth" in policy.observes and command.camera is None:
@@ -148,7 +148,7 @@ def answer(command: Run, policy: "Policy", options: dict[str, Any], views: "Sequ
     compile_first()
     episode = _explore(command, policy, env, films, options_of_reset)
     assert env.floor is not None
-    folder = _folder(command, env.floor.name)
+    folder = folder_of(command, env.floor.name)
     from lidarium.envs.floors.catalogue.names import describe_reach
     from lidarium.evaluation.episodes.result import result_of
 
@@ -275,7 +275,7 @@ def _explore(
     def on_decision(current: "ExplorationEnv") -> None:
         # The folder is named by the floor, which a set draws at the reset; nothing is written before that.
         assert current.floor is not None
-        films.begin(_folder(command, current.floor.name))
+        films.begin(folder_of(command, current.floor.name))
         progress.show(current)
 
     with closing(progress), films.kept():
@@ -287,5 +287,6 @@ def _explore(
     return episode
 
 
-def _folder(command: Run, floor: str) -> Path:
+def folder_of(command: Run, floor: str) -> Path:
+    """Return the folder for the files of a run on a floor of a name."""
     return command.out or DEFAULT_FOLDER / file_name(f"{floor}-{command.chosen_policy}-{command.seed}")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from tyro.conf import Positional
 
-from lidarium.scripts.common import DONE, DOUBTFUL, Answer, Command, counted, notify, table
+from lidarium.scripts.common import DONE, DOUBTFUL, Answer, Command, check_output, counted, notify, table
 
 if TYPE_CHECKING:
     import numpy as np
@@ -109,7 +109,6 @@ class _Slam(Command):
 
 def execute(command: _Slam) -> Answer:
     """Run SLAM over a log and write the results."""
-    from lidarium.mapping.files.output import check_writable
     from lidarium.mapping.localization.slam.localizer import Slam
 
     if command.start_map is not None and command.localizer == "slam":
@@ -120,7 +119,7 @@ def execute(command: _Slam) -> Answer:
         option = f"--{min(ignored).replace('_', '-')}"
         raise ValueError(f"{option} is set and the localizer {command.localizer}; want --localizer slam")
     out = command.out or DEFAULT_FOLDER
-    check_writable(out)
+    check_output(out, (*FILES, SPLINES), (command.log, command.start_map, command.reference, command.relations))
     log = _log(command)
     reference = None if command.reference is None else _reference(command, log)
     relations = None if command.relations is None else _relations(command, log)
@@ -156,7 +155,7 @@ def _followed(command: _Slam, log: "LaserLog", watch: "Callable[[Iterable[int]],
 
     if command.localizer == "slam":
         return follow(log, _settings_of(command), watch)
-    return follow_with(_on_splines(command, log), log, watch)
+    return follow_with(_on_splines(command, log), log, watch, seed=command.seed)
 
 
 def _on_splines(command: _Slam, log: "LaserLog") -> "SplineTracker":
@@ -354,7 +353,7 @@ def _against_relations(
 def _write(out: Path, log: "LaserLog", followed: "_AnyFollowed", result: dict[str, Any]) -> tuple[str, ...]:
     """Write the results; return the names of the files."""
     from lidarium.mapping.files.map_files import cropped, write_ros_map
-    from lidarium.mapping.files.output import check_written, write_json
+    from lidarium.mapping.files.output import check_written, clear_earlier, write_json
     from lidarium.mapping.files.spline_files import write_spline_map
     from lidarium.mapping.files.trajectories import write_tum
     from lidarium.mapping.localization.slam.localizer import Slam
@@ -363,6 +362,7 @@ def _write(out: Path, log: "LaserLog", followed: "_AnyFollowed", result: dict[st
     slam = followed.slam
     files: tuple[str, ...] = FILES
     grid = slam.map if isinstance(slam, Slam) else slam.grid
+    clear_earlier(out, "slam.json", (*FILES, SPLINES))
     if not isinstance(slam, Slam):
         write_spline_map(out / SPLINES, slam.map)
         files = (*files, SPLINES)

@@ -66,12 +66,18 @@ def load_image(path: Path, resolution: float | None) -> Floor:
 
 
 def _grey(pixels: NDArray[Any]) -> NDArray[np.uint8]:
+    """Return the greys of a picture, on white where it is transparent."""
     eight = pixels if pixels.dtype == np.uint8 else (pixels // 257).astype(np.uint8)
     if eight.ndim == 2:
         return eight
     if eight.shape[2] == 2:
-        return eight[..., 0]
-    return np.asarray(cv2.cvtColor(np.ascontiguousarray(eight[..., :3]), cv2.COLOR_BGR2GRAY), dtype=np.uint8)
+        grey = eight[..., 0]
+    else:
+        grey = np.asarray(cv2.cvtColor(np.ascontiguousarray(eight[..., :3]), cv2.COLOR_BGR2GRAY), dtype=np.uint8)
+    if eight.shape[2] == 3:
+        return grey
+    solid = eight[..., -1].astype(np.uint32)
+    return ((grey * solid + 255 * (255 - solid) + 127) // 255).astype(np.uint8)
 
 
 def _levels(grey: NDArray[np.uint8], where: NDArray[np.bool_] | None = None) -> NDArray[np.int64]:

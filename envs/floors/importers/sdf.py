@@ -102,7 +102,7 @@ def load(path: Path, resolution: float | None, *, skip_meshes: bool = False) -> 
     solids, ceiling = _without_slabs(found.solids + ([] if skip_meshes else found.boxes))
     for name, box in [] if skip_meshes else zip(found.boxed, found.boxes, strict=True):
         # The box of a mesh of a whole building fills it.
-        if any(solid.polygon is box.polygon for solid in solids) and _covers_all(box, solids):
+        if any(np.array_equal(solid.polygon, box.polygon) for solid in solids) and _covers_all(box, solids):
             raise ValueError(f"{path}: the box of mesh {name} fills the world; want walls of boxes, or --skip-meshes")
     if not solids:
         raise ValueError(f"{path} has no collision above the ground; want models that stand there ({_SHAPES})")
@@ -170,7 +170,7 @@ def _parted(solids: list[Solid], may_be: Callable[[Solid], bool]) -> tuple[list[
 
 
 def _covers_all(box: Solid, solids: list[Solid]) -> bool:
-    others = [solid for solid in solids if solid.polygon is not box.polygon]
+    others = [solid for solid in solids if not np.array_equal(solid.polygon, box.polygon)]
     return not others or _covered_share([box], others) >= _SLAB_SHARE
 
 

@@ -99,10 +99,13 @@ def _openings(floor: Floor, resolution: float) -> NDArray[np.float64]:
     return openings_of(floor.raster(resolution, *WALL_BAND_M))
 
 
-def draw_doors(tables: FloorTables, share: float, radius: float, seed: int) -> NDArray[np.float64]:
+def draw_doors(
+    tables: FloorTables, share: float, radius: float, seed: int, starts: NDArray[np.float64] | None = None
+) -> NDArray[np.float64]:
     """Return the doors of an episode, (doors, 7), in a share of the openings of its floor, one at least.
 
-    A floor without openings has none. ``radius`` is that of the largest robot [m].
+    A floor without openings has none. ``radius`` is that of the largest robot [m]. Doors that stay shut cut off none of
+    the floor's own starts, and leave room for ``starts`` (n, 3), those of the episode if they are given.
     """
     floor = tables.floor
     if floor is None:
@@ -117,19 +120,25 @@ def draw_doors(tables: FloorTables, share: float, radius: float, seed: int) -> N
     doors = np.zeros((count, DOOR_NUMBERS))
     doors[:, : DOOR_END_Y + 1] = openings[chosen]
     doors[:, DOOR_KIND] = generator.choice(KINDS, count, p=SHARES)
-    starts = np.zeros((0, 3)) if floor is None else floor.starts
+    nowhere = np.zeros((0, 3))
+    own, given = nowhere if floor is None else floor.starts, nowhere if starts is None else starts
     for door in np.flatnonzero(doors[:, DOOR_KIND] == STAYS_SHUT):
         others = doors[:door][doors[:door, DOOR_KIND] == STAYS_SHUT]
-        if _cuts_off(tables.body, others, doors[door], radius, starts):
+        if _cuts_off(tables.body, others, doors[door], radius, own, given):
             doors[door, DOOR_KIND] = OPENS
     doors[:, DOOR_OPEN] = doors[:, DOOR_KIND] == STANDS_OPEN
     return doors
 
 
 def _cuts_off(
-    raster: Raster, shut: NDArray[np.float64], door: NDArray[np.float64], radius: float, starts: NDArray[np.float64]
+    raster: Raster,
+    shut: NDArray[np.float64],
+    door: NDArray[np.float64],
+    radius: float,
+    own: NDArray[np.float64],
+    given: NDArray[np.float64],
 ) -> bool:
-    """Whether a door that stays shut, with others, cuts off too much."""
+    """Whether a door that stays shut, with others, cuts off too much: room, a floor's own start or a given one."""
     before, after = (
         configuration_space(with_shut_doors(raster, each), radius).view(np.uint8)
         for each in (shut, np.concatenate([shut, door[None]]))
@@ -139,7 +148,10 @@ def _cuts_off(
     if len(sizes) == 1 or sizes[1:, cv2.CC_STAT_AREA].max() < (1.0 - MOST_CUT_OFF) * largest:
         return True
     main = 1 + int(np.argmax(sizes[1:, cv2.CC_STAT_AREA]))
-    return any(labels[cell_of(raster, start)] not in (0, main) for start in starts)
+    if any(labels[cell_of(raster, start)] not in (0, main) for start in own):
+        return True
+    cells = (cell_of(raster, start) for start in given)
+    return not all((labels[max(i - 1, 0) : i + 2, max(j - 1, 0) : j + 2] == main).any() for i, j in cells)
 
 
 def middles_of(doors: NDArray[np.float64]) -> NDArray[np.float64]:

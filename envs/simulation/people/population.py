@@ -91,7 +91,7 @@ class Population:
         if len(self.recognised):
             self.recognised[rows] = 0
         if self.share > 0.0:
-            drawn = self.draw_doors(floor, seed)
+            drawn = self.draw_doors(floor, starts, seed)
             doors[:] = 0.0
             doors[: len(drawn)] = drawn
             # A robot that starts in a doorway finds the door open.
@@ -104,11 +104,11 @@ class Population:
             self._point_at(episode)
             self.people_of(episode)[:] = self._draw_people(floor, ways, doors, starts, seed)
 
-    def draw_doors(self, floor: FloorTables, seed: int) -> NDArray[np.float64]:
-        """Return the doors of an episode on a floor, (doors, 7); none if no opening has any."""
+    def draw_doors(self, floor: FloorTables, starts: NDArray[np.float64], seed: int) -> NDArray[np.float64]:
+        """Return the doors of an episode from starts on a floor, (doors, 7); none if no opening has any."""
         if self.share == 0.0:
             return np.zeros((0, DOOR_NUMBERS))
-        return draw_doors(floor, self.share, float(self._bodies[:, RADIUS].max()), seed)
+        return draw_doors(floor, self.share, float(self._bodies[:, RADIUS].max()), seed, starts)
 
     def people_of(self, episode: int) -> NDArray[np.float64]:
         """Return the people of an episode, (people, 11); a view."""

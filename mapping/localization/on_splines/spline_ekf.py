@@ -46,7 +46,7 @@ class SplineEkfSettings:
         Settings of matching and of the map.
     gate_sigmas : float, default 3.0
         Measurements that differ from their expectation by more standard deviations are left out.
-    start_distance, start_turn : float, default 0.0
+    start_distance, start_turn : float, default 0.0 (0.05 and 1 degree with ``start_map``)
         Standard deviations of the first pose [m, rad].
     distance_bias, turn_bias : float, default 0.05
         Constant scale errors of odometry's paths and turns, as a standard
@@ -99,7 +99,7 @@ class SplineEkf(SplineTracker):
         settings = self.settings
         self.landmarks = np.empty((0, 2))
         self.scales = np.ones(SCALES)
-        start = [settings.start_distance, settings.start_distance, settings.start_turn]
+        start = self._start_spread(settings.start_distance, settings.start_turn)
         self.state_covariance = np.diag([*start, settings.distance_bias, settings.turn_bias]) ** 2
 
     def _change_frame(self, change: Transform, reach: float) -> None:

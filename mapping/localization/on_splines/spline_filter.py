@@ -129,7 +129,7 @@ class SplineFilterSettings:
         Settings of matching and of the map.
     particles : int, default 400
         Number of particles.
-    start_distance, start_turn : float, default 0.0
+    start_distance, start_turn : float, default 0.0 (0.05 and 1 degree with ``start_map``)
         Standard deviations of the particles around the first pose [m, rad].
     distance_bias, turn_bias : float, default 0.05
         Constant scale errors of odometry's paths and turns, as a standard
@@ -199,7 +199,7 @@ class SplineFilter(SplineTracker):
     def _begin(self, pose: NDArray[np.float64], seed: int) -> None:
         settings = self.settings
         self._generator = np.random.default_rng(seed)
-        spread = np.array([settings.start_distance, settings.start_distance, settings.start_turn])
+        spread = self._start_spread(settings.start_distance, settings.start_turn)
         self.particles = pose + spread * self._generator.standard_normal((settings.particles, 3))
         self.weights = np.full(settings.particles, 1.0 / settings.particles)
         self.scales = 1.0 + np.array([settings.distance_bias, settings.turn_bias]) * self._generator.standard_normal(

@@ -29,6 +29,9 @@ from lidarium.mapping.splines.curve import CurveLookup
 from lidarium.mapping.splines.features import Observation, observe, scan_points
 from lidarium.mapping.splines.spline_map import SplineMap
 
+START_SPREAD = 0.05, math.radians(1.0)
+"""Standard deviations of the first pose on a map of an earlier run [m, rad]."""
+
 
 class SplineTracker(ABC):
     """A localizer that makes a map of curves and keeps itself on it.
@@ -67,7 +70,9 @@ class SplineTracker(ABC):
         self.local, self.updates = np.zeros(3), 0
         self.local_map = self._known_around(begin, self.geometry.range_max + 1.0)
         self._mount = np.array([self.tracking.splines.points.laser_x, 0.0, 0.0])
-        self._path = MappedPath(self.tracking.path, self.geometry, composed(begin, self._mount))
+        self._path = MappedPath(
+            self.tracking.path, self.geometry, composed(begin, self._mount), finds_start=self._known is None
+        )
         self._path.local = self._path.at_node = self._mount.copy()
         # Local maps that are finished, each with the node in whose frame it is.
         self._finished: list[tuple[int, SplineMap]] = []
@@ -111,6 +116,15 @@ class SplineTracker(ABC):
             self._take_in(observation, self._at_last_beam(sensing, motion, motion_s))
         self._path.local = composed(self.local, self._mount)
         return self.pose
+
+    def _start_spread(self, distance: float, turn: float) -> NDArray[np.float64]:
+        """Return the standard deviations of the first pose, (3,) [m, rad].
+
+        Where a robot begins on a map of an earlier run is never known exactly: there ``START_SPREAD`` stands for zeros.
+        """
+        if self._known is not None and distance == turn == 0.0:
+            distance, turn = START_SPREAD
+        return np.array([distance, distance, turn])
 
     @property
     def pose(self) -> NDArray[np.float64]:

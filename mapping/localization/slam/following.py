@@ -147,9 +147,10 @@ def follow_with(
     log: LaserLog,
     watch: Callable[[Iterable[int]], Iterable[int]] = iter,
     clock: Callable[[], float] = time.process_time,
+    seed: int = 0,
 ) -> Followed[LocalizerOfLog]:
-    """Run a localizer of the log's laser over a log; see `follow`."""
-    slam.reset(log.laser_pose, 0)
+    """Run a localizer of the log's laser over a log, with draws from ``seed``; see `follow`."""
+    slam.reset(log.laser_pose, seed)
     scans = len(log.stamps)
     odometry = np.zeros((scans, 3)) if log.odometry is None else composed(log.odometry, log.laser_pose)
     numbers, positions = np.zeros(scans, np.int64), np.zeros((scans, 3))

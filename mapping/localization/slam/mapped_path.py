@@ -195,6 +195,8 @@ class MappedPath:
         Directions of the beams.
     pose : (3,) float64
         Start of the path: x, y, theta [m, rad].
+    finds_start : bool
+        Whether the start is corrected by the map that the path begins; not if poses are those of a known map.
 
     Attributes
     ----------
@@ -213,8 +215,10 @@ class MappedPath:
         Closures that have acted, and how often the past was corrected.
     """
 
-    def __init__(self, settings: SlamSettings, geometry: ScanGeometry, pose: NDArray[np.float64]) -> None:
-        self._settings, self.sampling = settings, _ScanSampling(settings, geometry)
+    def __init__(
+        self, settings: SlamSettings, geometry: ScanGeometry, pose: NDArray[np.float64], *, finds_start: bool = True
+    ) -> None:
+        self._settings, self._finds_start, self.sampling = settings, finds_start, _ScanSampling(settings, geometry)
         self.mapper = LocalMapper(settings, geometry)
         self._loops = _LoopClosing(settings)
         self._walls = _WallSurvey(settings, self.sampling)
@@ -294,7 +298,8 @@ class MappedPath:
         """
         self._has_begun = True
         self.note_key(ranges, time_s)
-        self._first = self.sampling.all_points(ranges), self.local.copy()
+        if self._finds_start:
+            self._first = self.sampling.all_points(ranges), self.local.copy()
         return self._begin_maps(ranges, self.motion_covariance(covariance, self.local))
 
     def restart(

@@ -10,6 +10,7 @@ Non-rigid alignment by a stiff deformation graph: Sumner, Schmid, Pauly, "Embedd
 manipulation", ACM Transactions on Graphics 26, 2007.
 """
 
+import dataclasses
 import math
 from dataclasses import dataclass
 from typing import Annotated
@@ -253,6 +254,8 @@ class Bend:
         Of x, y [m2] and theta [rad2] of the motion, about the middle of the walls that agree.
     growth_m : float
         Root mean square of what the scale explains of the offsets [m].
+    middle : (2,) float64
+        That middle in map a [m].
     """
 
     a_from_b: Transform
@@ -263,6 +266,7 @@ class Bend:
     scale: float
     covariance: NDArray[np.float64]
     growth_m: float = 0.0
+    middle: NDArray[np.float64] = dataclasses.field(default_factory=lambda: np.zeros(2))
 
     @property
     def is_held(self) -> bool:
@@ -361,10 +365,11 @@ def _described(
     bend_m = float(np.sqrt((rest.at(held) ** 2).sum(axis=1).mean()))
     spread = math.sqrt(0.5 * math.pi) * float(np.abs(gaps[found]).mean())
     variance = spread**2 + MIN_SPREAD_M**2 + BENT_ALIKE_M / INDEPENDENT_M * bend_m**2
-    covariance = _covariance(target - target.mean(axis=0), normals[found], variance, wall_m)
+    middle = target.mean(axis=0)
+    covariance = _covariance(target - middle, normals[found], variance, wall_m)
     covariance += np.diag([side**2, side**2, 0.0])
     growth_m = abs(scale - 1.0) * float(np.sqrt(((held - held.mean(axis=0)) ** 2).sum(axis=1).mean()))
-    return Bend(nearest, rest, bend_m, strain, spread, scale, covariance, growth_m)
+    return Bend(nearest, rest, bend_m, strain, spread, scale, covariance, growth_m, middle)
 
 
 def _nearest_motion(points: NDArray[np.float64], target: NDArray[np.float64]) -> tuple[Transform, float]:

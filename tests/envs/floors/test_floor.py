@@ -297,3 +297,14 @@ def test_the_hash_is_of_what_stands_there_and_stays_the_same():
     ]
     assert len({one.sha256 for one in [floor(), *others]}) == 5
     assert floor().sha256 == "b236adf4bae3db9b101d33274b7ec1aab6ed3d2e38e3ca01e271accf74793f78"
+
+
+def test_a_floor_keeps_its_corners_and_starts_whatever_becomes_of_the_given_ones():
+    wall, starts = np.array(rectangle(1.0, 1.0, 0.1, 1.0)), np.zeros((1, 3))
+    floor = Floor("a", (0.0, 0.0, 3.0, 3.0), (Solid(wall),), starts=starts)
+    wall += 1.0
+    starts += 1.0
+    np.testing.assert_array_equal(floor.solids[0].polygon, rectangle(1.0, 1.0, 0.1, 1.0))
+    np.testing.assert_array_equal(floor.starts, np.zeros((1, 3)))
+    with pytest.raises(ValueError, match="read-only"):
+        floor.starts[0, 2] = 1.0

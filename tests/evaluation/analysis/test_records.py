@@ -34,3 +34,8 @@ def test_a_track_is_that_of_the_record(episodes_folder, rows):
     assert track.poses.shape == (len(track.times), 2, 3)
     assert set(np.unique(track.levels)) == {0, 127, 255}
     assert entry.coverage[-1, 1] == pytest.approx(rows[0]["coverage_final"], abs=1e-6)
+
+
+def test_records_are_found_of_floors_that_only_a_hash_tells_apart(episodes_folder, rows):
+    told = {**rows[0], "floor": f"{rows[0]['floor']} ({rows[0]['floor_sha256'][:6]})"}
+    assert list(read_records(episodes_folder, [told])[0]) == [rows[0]["record"]]

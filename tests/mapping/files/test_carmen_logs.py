@@ -16,6 +16,7 @@ from lidarium.mapping.files.carmen_logs import (
     _Scan,
     read_carmen_log,
 )
+from lidarium.mapping.geometry.rigid import composed
 from lidarium.mapping.grids.scan_geometry import ScanGeometry
 
 TURN = 2.0 * math.pi
@@ -165,7 +166,7 @@ def test_a_scan_without_a_stamp_is_left_out_alone(tmp_path, stamp):
     (tmp_path / "run.log").write_text("\n".join(lines))
     log = read_carmen_log(tmp_path / "run.log")
     assert log.stamps.tolist() == [float(k) for k in range(20) if k != 7]
-    assert log.skipped == {"scans back in time": 1}
+    assert log.skipped == {"scans without a stamp": 1}
 
 
 def test_parameters_are_numbers_or_none():
@@ -467,3 +468,23 @@ def test_ranges_in_centimetres_are_refused(tmp_path):
     ranges = np.random.default_rng(0).uniform(50.0, 700.0, 90).round(1).tolist()
     with pytest.raises(ValueError, match="as of ranges in centimetres; want metres"):
         read_of_carmen_logs(tmp_path, *(flaser_of_carmen_logs(k, ranges, (k, 0, 0)) for k in range(3)))
+
+
+@pytest.mark.parametrize("scale", [1.0, -1.0, 180.0 / math.pi], ids=["radians", "clockwise", "degrees"])
+@pytest.mark.parametrize("start", [0.5, 2.6])
+def test_a_mounting_is_in_the_axes_that_odometry_shows(scale, start, tmp_path):
+    draws, mounting = np.random.default_rng(0), np.array([0.3, 0.1, 0.2])
+    pose, lines = np.array([10.0, 4.0, start]), []
+    for k in range(120):
+        pose = composed(pose, np.array([0.1, 0.0, 0.03]))
+        laser = composed(pose, mounting)
+        ranges = " ".join(f"{each:.2f}" for each in draws.uniform(1.0, 4.0, 181))
+        poses = " ".join(f"{x:.6f} {y:.6f} {scale * theta:.6f}" for x, y, theta in (laser, pose))
+        lines.append(f"FLASER 181 {ranges} {poses} {0.1 * k:.1f} host {0.1 * k:.1f}\n")
+    (tmp_path / "log.log").write_text("".join(lines))
+    np.testing.assert_allclose(read_carmen_log(tmp_path / "log.log").laser_pose, mounting, atol=1e-4)
+
+
+def test_a_packed_log_of_any_name_is_read(tmp_path):
+    (tmp_path / "packed.log").write_bytes(gzip.compress(flaser(1.0, [2.0] * 181).encode()))
+    assert len(read_carmen_log(tmp_path / "packed.log").stamps) == 1

@@ -148,3 +148,43 @@ def test_a_real_log_has_the_odometry_that_others_found_in_it(shared_data):
     assert len(text.stamps) == 906
     assert np.abs(text.odometry - parsed.odometry)[:, :2].max() < 1e-6
     np.testing.assert_array_equal(text.ranges[0, :-1] < 9.0, parsed.ranges[0, :-1] < 9.0)
+
+
+def _drawn_arrays(count):
+    draws = np.random.default_rng(2)
+    return {
+        "ranges": draws.uniform(1.0, 4.0, (count, 30)).astype(np.float32),
+        "stamp": 100.0 + 0.1 * np.arange(count),
+        "pose_odom": np.column_stack([0.03 * np.arange(count), np.zeros(count), np.zeros(count)]),
+        "angle_min": np.array(-1.5),
+        "angle_increment": np.array(0.1),
+    }
+
+
+@pytest.mark.parametrize("how", ["parts that overlap", "every scan twice"])
+def test_repeated_scans_are_left_out(how, tmp_path):
+    arrays = _drawn_arrays(80)
+    order = np.repeat(np.arange(80), 2) if how == "every scan twice" else np.append(np.arange(50), np.arange(30, 80))
+    repeated = {name: each[order] if each.ndim else each for name, each in arrays.items()}
+    np.savez(tmp_path / "once.npz", **arrays)
+    np.savez(tmp_path / "again.npz", **repeated)
+    once, again = (read_npz_log(tmp_path / f"{name}.npz") for name in ("once", "again"))
+    np.testing.assert_array_equal(again.stamps, once.stamps)
+    np.testing.assert_array_equal(again.ranges, once.ranges)
+    np.testing.assert_array_equal(again.odometry, once.odometry)
+    assert again.skipped == {"repeated scans": len(order) - 80}
+    assert again.remarks == once.remarks
+
+
+def test_scans_of_one_stamp_that_differ_are_no_repeats(tmp_path):
+    arrays = _drawn_arrays(40)
+    arrays["stamp"][1::2] = arrays["stamp"][::2]
+    np.savez(tmp_path / "log.npz", **arrays)
+    assert "repeated scans" not in read_npz_log(tmp_path / "log.npz").skipped
+
+
+def test_scans_without_a_stamp_are_counted_apart(tmp_path):
+    arrays = _drawn_arrays(40)
+    arrays["stamp"][::5] = math.nan
+    np.savez(tmp_path / "log.npz", **arrays)
+    assert read_npz_log(tmp_path / "log.npz").skipped == {"scans without a stamp": 8}

@@ -58,3 +58,15 @@ def test_what_is_no_npz_file_is_refused(tmp_path):
     (tmp_path / "run.npz").write_bytes(b"PK\x03\x04 nothing")
     with pytest.raises(ValueError, match="not an npz file"):
         read_npz_log(tmp_path / "run.npz")
+
+
+def test_a_mounting_that_is_not_finite_is_named(tmp_path):
+    np.savez(
+        tmp_path / "log.npz",
+        ranges=np.full((9, 36), 3.0),
+        angle_min=-np.pi,
+        angle_increment=np.pi / 18,
+        laser_pose=[np.nan, 0.0, 0.0],
+    )
+    with pytest.raises(ValueError, match=r"log\.npz: laser_pose is \[nan, 0\.0, 0\.0\]; want x, y, theta, all finite"):
+        read_npz_log(tmp_path / "log.npz")

@@ -172,3 +172,16 @@ def test_maps_of_too_many_cells_are_refused_with_the_limit():
 def test_scales_that_are_none_are_refused(scale):
     with pytest.raises(ValueError, match="'b': the resolution of a map is"):
         merge_maps({"a": (hall(), 0.05), "b": (hall(), scale)})
+
+
+def test_pairs_that_join_have_a_confidence_and_rivals():
+    maps, _ = parts()
+    merged = merge_maps({name: maps[name] for name in ("west", "middle")})
+    (found,) = merged.pairs.values()
+    assert found.is_accepted
+    assert found.confidence > 0.9
+    assert found.ranked
+    half = kept(apartment(), slice(0, 180), slice(0, 110))
+    mirrored = np.concatenate([half, half[:, ::-1]], axis=1)
+    merged = merge_maps({"p": (mirrored, RESOLUTION), "q": (np.rot90(mirrored).copy(), RESOLUTION)})
+    assert all(pair.doubt or not pair.is_accepted for pair in merged.pairs.values())

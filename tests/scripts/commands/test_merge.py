@@ -81,6 +81,7 @@ def test_two_maps_are_joined_in_the_ros_frame_of_the_first(maps, tmp_path, capsy
         "strain",
         "scale",
         "covariance",
+        "covariance_at",
         "alternatives",
         "time_ms",
     }
@@ -484,3 +485,22 @@ def test_options_that_the_thesis_has_not_are_refused(maps, tmp_path, option, cap
     assert main(["merge", *paths, "--mode", "thesis", *option, "--out", str(tmp_path / "out")]) == 2
     assert f"{option[0]} is set and the mode thesis; want --mode default" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
+
+
+def test_a_covariance_is_in_the_frame_of_the_first_map(maps, tmp_path, capsys):
+    paths, _ = maps
+    found = []
+    for yaw in (0.0, math.pi / 2):
+        header = yaml.safe_load((tmp_path / "in" / "west.yaml").read_text())
+        (tmp_path / "in" / "west.yaml").write_text(yaml.safe_dump({**header, "origin": [0.0, 0.0, yaw]}))
+        assert main(["merge", *paths, "--out", str(tmp_path / "out"), "--json"]) == 0
+        found.append(json.loads(capsys.readouterr().out)["pairs"][0])
+    (x, y), (xx, xy, _), (_, yy, _) = found[0]["covariance_at"], *found[0]["covariance"][:2]
+    np.testing.assert_allclose(found[1]["covariance_at"], [-y, x], atol=2e-3)
+    (turned_xx, turned_xy, _), (_, turned_yy, _) = found[1]["covariance"][:2]
+    np.testing.assert_allclose([turned_xx, turned_yy, turned_xy], [yy, xx, -xy], rtol=0.01, atol=1e-8)
+
+
+def test_more_maps_than_can_be_fused_are_refused_at_once(capsys):
+    assert main(["merge", *(f"map-{k}.yaml" for k in range(65))]) == 2
+    assert "65 maps are given; want at most 64: merge them in parts" in capsys.readouterr().err

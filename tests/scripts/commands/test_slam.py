@@ -97,7 +97,7 @@ def test_a_carmen_log_with_damage_is_used_as_far_as_it_goes(run, tmp_path, capsy
     told = capsys.readouterr()
     assert "1 WIND lines" in told.err
     assert "1 damaged FLASER lines" in told.err
-    assert "1 scans back in time" in told.err
+    assert "1 repeated scans" in told.err
     assert json.loads((tmp_path / "out" / "slam.json").read_text())["scans"] == 60
 
 
@@ -296,3 +296,12 @@ def test_a_localizer_on_splines_refuses_odometry_that_stops(shared_cases, tmp_pa
     assert main(["slam", str(log), "--localizer", "splines", "--out", str(tmp_path / "out")]) == 2
     assert f"{log} has no odometry at" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
+
+
+def test_a_seed_draws_other_particles(log, tmp_path):
+    found = []
+    for name, seed in (("first", "0"), ("again", "0"), ("other", "7")):
+        out = tmp_path / name
+        main(["slam", str(log), "--localizer", "splines", "--seed", seed, "--out", str(out)])
+        found.append((out / "trajectory.tum").read_bytes())
+    assert found[0] == found[1] != found[2]

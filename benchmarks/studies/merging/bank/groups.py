@@ -8,7 +8,7 @@ import cv2
 from lidarium.benchmarks.studies.merging.bank.bank import BankMap
 from lidarium.benchmarks.studies.merging.bank.drives import RESOLUTION
 from lidarium.benchmarks.studies.merging.bank.pairs import overlap_of
-from lidarium.mapping.merging.merger import merge_maps
+from lidarium.mapping.merging.merger import Question, merge_maps
 
 TEAM = 5
 
@@ -26,7 +26,7 @@ def merge_teams(maps: dict[str, BankMap]) -> list[dict[str, Any]]:
     for floor in floors:
         team = [one for one in maps.values() if one.floor.name == floor and one.stage == 2][:TEAM]
         began = time.process_time()
-        merged = merge_maps({one.key: (one.levels, RESOLUTION) for one in team})
+        merged = merge_maps({one.key: (one.levels, RESOLUTION) for one in team}, question=Question(is_explained=False))
         seconds = time.process_time() - began
         group = max(merged.groups(), key=len)
         distances, angles = [0.0], [0.0]

@@ -47,3 +47,19 @@ def test_every_dungeon_has_a_start_in_free_space(shared_data):
         (x, y, _) = floor.starts[0]
         assert raster.solid[int((y - raster.origin[1]) / 0.1), int((x - raster.origin[0]) / 0.1)] == 0
         assert 500.0 < (raster.solid == 0).sum() * 0.01 < 1000.0
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16])
+def test_a_transparent_ground_is_white(dtype, tmp_path):
+    walls = np.zeros((60, 80), bool)
+    walls[:3] = walls[-3:] = walls[:, :3] = walls[:, -3:] = walls[25:28, :40] = True
+    opaque = walls.copy()
+    table = (slice(40, 50), slice(10, 30))
+    opaque[table] = True
+    most, colour = np.iinfo(dtype).max, np.zeros((60, 80), dtype)
+    colour[table] = most
+    drawn = cv2.merge([colour, colour, colour, (opaque * most).astype(dtype)])
+    cv2.imwrite(str(tmp_path / "drawn.png"), drawn)
+    cv2.imwrite(str(tmp_path / "plain.png"), np.where(walls, 0, most).astype(dtype))
+    drawn, plain = (free_of(load_file(tmp_path / f"{name}.png", 0.1), 0.1) for name in ("drawn", "plain"))
+    np.testing.assert_array_equal(drawn, plain)

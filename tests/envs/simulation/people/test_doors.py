@@ -6,9 +6,13 @@ import numpy as np
 import pytest
 from doored_rooms import ROOMS, robot_at_door
 
+from lidarium.envs.engine.beginnings import begin
 from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.floors.floor import Floor
+from lidarium.envs.floors.floor_choice import FloorChoice
+from lidarium.envs.floors.starts import check_starts
 from lidarium.envs.settings.making import make_settings
+from lidarium.envs.settings.reset_options import ResetOptions
 from lidarium.envs.simulation.kernels.arrays import (
     DOOR_KIND,
     DOOR_OPEN,
@@ -19,7 +23,8 @@ from lidarium.envs.simulation.kernels.arrays import (
     WALKER_Y,
 )
 from lidarium.envs.simulation.people.crowd import crowd_of
-from lidarium.envs.simulation.people.doors import middles_of, openings_of
+from lidarium.envs.simulation.people.doors import draw_doors, middles_of, openings_of, with_shut_doors
+from lidarium.evaluation.suites.starts import drawn_starts
 
 HALL = Floor("hall", (0.0, 0.0, 6.0, 4.0))
 
@@ -130,3 +135,28 @@ def test_a_door_that_stays_shut_does_not_cut_off_a_start_of_the_floor():
     for seed in range(20):
         env.reset(seed=seed)
         assert env.simulation.population.doors_of(0)[0, DOOR_KIND] != STAYS_SHUT
+
+
+@pytest.mark.parametrize(
+    ("floor", "robots", "doors", "seed"), [("apartment", 3, 1.0, 4), ("building:3000005", 3, 0.5, 2)]
+)
+def test_a_door_that_stays_shut_does_not_cut_off_a_start_that_is_asked_for(floor, robots, doors, seed):
+    settings = make_settings(robots=robots, doors=doors, horizon_s=5.0)
+    starts = np.array(drawn_starts(floor, settings, seed))
+    env = ExplorationEnv(floor, settings)
+    env.reset(seed=seed, options={"starts": starts})
+    shut = with_shut_doors(env.world.floors[0].body, _shut(env))
+    check_starts(shut, settings.robot.radius, starts)
+
+
+def test_doors_are_the_same_whether_drawn_starts_are_known_or_not():
+    settings, generator = make_settings(robots=3, doors=1.0), np.random.default_rng(0)
+    for _ in range(12):
+        start = begin(generator, FloorChoice("set:test"), ResetOptions(), settings)
+        given = (start.tables, settings.doors, settings.robot.radius, start.seed)
+        np.testing.assert_array_equal(draw_doors(*given), draw_doors(*given, start.starts))
+
+
+def _shut(env):
+    doors = env.simulation.population.doors_of(0)
+    return doors[doors[:, DOOR_KIND] == STAYS_SHUT]

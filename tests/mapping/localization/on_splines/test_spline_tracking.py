@@ -125,20 +125,24 @@ def test_steps_lead_where_the_motion_leads(x, y, turn, heading):
     assert abs(math.remainder(found[2] - expected[2], 2.0 * math.pi)) < 1e-9
 
 
+SPREAD = {"start_distance": 0.05, "start_turn": math.radians(1.0)}
+
+
+@pytest.mark.parametrize(("spread", "wrong"), [(SPREAD, [0.06, -0.04, 0.0]), ({}, [0.0, -0.15, 0.0])])
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_map_of_an_earlier_run_corrects_a_wrong_start(kind, tmp_path):
+def test_a_map_of_an_earlier_run_corrects_a_wrong_start(kind, spread, wrong, tmp_path):
     odometry = biased_odometry(POSES, 0.0)
     earlier = kind()
     follow(earlier, odometry)
     write_spline_map(tmp_path / "map.npz", earlier.map)
     tracking = TrackingSettings(start_map=str(tmp_path / "map.npz"))
-    localizer = kind(kind.Settings(tracking=tracking, start_distance=0.05, start_turn=math.radians(1.0)))
+    localizer = kind(kind.Settings(tracking=tracking, **spread))
     assert localizer.map.length == pytest.approx(earlier.map.length, rel=0.05)
-    wrong = POSES[0] + [0.06, -0.04, 0.0]
+    wrong = POSES[0] + wrong
     localizer.reset(wrong, 0)
     found = [localizer.localize(Sensing(0.1 * k, odometry[k], SCANS[k])) for k in range(20)]
     assert gap(found[-1], POSES[19])[0] < 0.03
-    blank = kind(kind.Settings(start_distance=0.05, start_turn=math.radians(1.0)))
+    blank = kind(kind.Settings(**spread))
     blank.reset(wrong, 0)
     alone = [blank.localize(Sensing(0.1 * k, odometry[k], SCANS[k])) for k in range(20)]
     assert gap(alone[-1], POSES[19])[0] > 0.05  # nothing says where it began
