@@ -118,6 +118,8 @@ def run_episode(
     >>> env.scorer.time
     5.0
     """
+    if not isinstance(env, ExplorationEnv):
+        raise ValueError(f"env is a {type(env).__name__}; want an environment of `parallel_env` without randomize")
     check_observed(policy, type(policy).__name__, env.settings.observe)
     env.use_level(level or policy.level, policy.shares_map, policy.decision_period_s)
     env.perception.predicts |= policy.predicts  # before the first frame

@@ -8,7 +8,7 @@ from tyro.conf import Positional, Suppress, arg
 
 from lidarium.scripts.commands import run
 from lidarium.scripts.common import Answer, check_output, notify
-from lidarium.scripts.options import PORT, policy_options
+from lidarium.scripts.options import PORT
 from lidarium.scripts.run_output import RUN_FILES
 
 if TYPE_CHECKING:
@@ -57,9 +57,10 @@ def execute(command: Drive) -> Answer:
 
     check_view(command)
     check_output(run.folder_of(command, Path(command.floor).stem), RUN_FILES, (command.floor,))
-    others, options = None, policy_options(command.policy_set)
+    of_others = command.policy or "tour_frontier"
+    others, options = None, run.policy_options_of(command, of_others)
     if command.robots > 1:
-        others = lidarium.policy(command.policy or "tour_frontier", **options)
+        others = lidarium.policy(of_others, **options)
     hand = Hand()
     policy = ByHand(hand, others)
     with view_server(command.view_port) as server:

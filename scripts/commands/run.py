@@ -130,7 +130,7 @@ def execute(command: Run) -> Answer:
 
     command = _completed(command)
     check_output(folder_of(command, Path(command.floor).stem), RUN_FILES, (command.floor,))
-    options = _policy_options(command)
+    options = policy_options_of(command, command.chosen_policy)
     policy = lidarium.policy(command.chosen_policy, **options)
     if "depth" in policy.observes and command.camera is None:
         command = replace(command, camera=CAMERA)
@@ -190,12 +190,12 @@ def _completed(command: Run) -> Run:
     return team if is_world_given else replace(team, **TEAM_WORLD)
 
 
-def _policy_options(command: Run) -> dict[str, Any]:
-    """Return the settings of the policy."""
+def policy_options_of(command: Run, policy: str) -> dict[str, Any]:
+    """Return the settings of a policy that a command gives."""
     options = policy_options(command.policy_set)
     if command.supervisor:
         options |= supervisor_options(command.supervisor)
-        check_supervised(command.chosen_policy)
+        check_supervised(policy)
     return options
 
 

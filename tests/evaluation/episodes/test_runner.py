@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+import lidarium
 from lidarium.agents import Policy, Stop
 from lidarium.envs.faces.parallel import ExplorationEnv
 from lidarium.envs.settings.making import make_settings
@@ -57,3 +58,9 @@ def test_an_unknown_level_is_refused_before_anything_runs():
     policy.level = "thought"
     with pytest.raises(ValueError, match="thought"):
         run_episode(policy, ExplorationEnv("apartment", make_settings(robots=1)), seed=0)
+
+
+def test_an_environment_of_drawn_settings_is_refused():
+    env = lidarium.parallel_env("scene_room", robots=2, resolution=0.1, randomize={"lidar.noise_floor": (0.0, 0.001)})
+    with pytest.raises(ValueError, match="env is a RandomizedTeam; want an environment of `parallel_env` without rand"):
+        run_episode(lidarium.policy("nearest_frontier"), env, seed=0)

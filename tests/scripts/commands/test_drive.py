@@ -58,6 +58,7 @@ def test_nothing_is_run_beside_if_nothing_is_wanted(server, tmp_path, capsys):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
+        (["--robots", "2", "--policy", "supervised", "--supervisor.nosuch", "5"], "nosuch"),
         (["--beside", "no_such"], "no_such"),
         (["--robots", "2", "--policy", "no_such"], "no_such"),
         (["--view-port", "70000"], "--view-port is 70000; want 0 to 65535"),
