@@ -10,8 +10,8 @@ from lidarium.scripts.commands.run import (
     TEAM_WORLD,
     Run,
     _completed,
-    _folder,
     _parsed_starts,
+    folder_of,
 )
 
 
@@ -57,5 +57,5 @@ def test_starts_that_cannot_be_read_are_refused(text, message):
 def test_films_and_the_folder_are_named_by_what_is_run():
     assert Run(video=True, gif=True).films == ["run.mp4", "run.gif"]
     assert Run().films == []
-    assert _folder(Run(policy="random_walk", seed=4), "maps/a b") == Path("runs/maps-a-b-random_walk-4")
-    assert _folder(Run(out=Path("here")), "apartment") == Path("here")
+    assert folder_of(Run(policy="random_walk", seed=4), "maps/a b") == Path("runs/maps-a-b-random_walk-4")
+    assert folder_of(Run(out=Path("here")), "apartment") == Path("here")
