@@ -211,7 +211,7 @@ def check_output(folder: Path, names: Iterable[str], inputs: Iterable[Path | str
     check_writable(folder)
     patterns, read = tuple(names), [Path(each) for each in inputs if each is not None]
     for path in (each for given in read for each in (given, image_of(given)) if each is not None):
-        # Links are replaced, not followed: both a link of such a name and what it leads to must be elsewhere.
+        # Writing replaces links. Check the link itself and the file that it points to.
         for place in (path.parent.resolve() / path.name, path.resolve()):
             if place.parent == folder.resolve() and any(fnmatch(place.name, pattern) for pattern in patterns):
                 raise ValueError(

@@ -249,7 +249,7 @@ def made_usable(log: LaserLog, where: str) -> LaserLog:
 
 
 def _first_told(log: LaserLog) -> NDArray[np.int64]:
-    """Return the numbers of the scans that repeat no earlier one; a clock that stands still tells no scans apart."""
+    """Return the indices of scans that are not repeats of earlier ones; all of them if all stamps are equal."""
     stamps, repeats = np.unique(log.stamps, return_counts=True)
     again, told, numbers = set(stamps[repeats > 1].tolist()) if len(stamps) > 1 else set(), set(), []
     for k, stamp in enumerate(log.stamps.tolist()):

@@ -361,7 +361,7 @@ def _read_header(path: Path) -> dict[str, Any]:
 
 
 def image_of(path: Path) -> Path | None:
-    """Return the image that the yaml file of a ROS map names, None if it is no such file or names none."""
+    """Return the path of the image of a ROS map, None if the file is not a readable yaml of a map."""
     if path.suffix.lower() not in (".yaml", ".yml"):
         return None
     try:

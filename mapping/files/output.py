@@ -144,9 +144,9 @@ def check_written(folder: Path, names: Iterable[str]) -> None:
 
 
 def clear_earlier(folder: Path, marker: str, names: Iterable[str]) -> None:
-    """Remove what an earlier run of the same command left, so that no file beside a result is of another one.
+    """Remove files of an earlier run of the same command from a folder.
 
-    ``names`` may have wildcards; nothing is removed from a folder without ``marker``, the result of such a run.
+    ``names`` may have wildcards. Nothing is removed if the folder lacks ``marker``, the result file of such a run.
     """
     if (Path(folder) / marker).is_file():
         for path in (each for name in names for each in Path(folder).glob(name)):

@@ -145,7 +145,7 @@ def _hold(ends: Array, costs: Array, boxes: Array, unit: float) -> NDArray[np.bo
 
 @kernel
 def _known_costs(places: Array, ends: Array, costs: Array) -> NDArray[np.float64]:
-    """Return the kept costs between places (n, 2), shape (n, n), ``_MISSING`` where none is kept (kernel)."""
+    """Return the known costs between places (n, 2), shape (n, n), and ``_MISSING`` for the others (kernel)."""
     count = len(places)
     table = np.full((count, count), _MISSING)
     for i in range(count):

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 DEFAULT_FOLDER = Path("merged")
 RESULT, MAPS, REGIONS = "transforms.json", ("map.yaml", "map.pgm", "map-*.yaml", "map-*.pgm"), "regions.png"
 MOST_MAPS = 64
-"""A fused map holds the sources of at most so many."""
+"""Maximum number of maps: a fused map records the sources of each cell in 64 bits."""
 
 FILES = (RESULT, *MAPS, "merge.png", REGIONS)
 

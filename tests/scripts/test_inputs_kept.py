@@ -1,4 +1,4 @@
-"""Commands that would write over what they read, and what an earlier run left in their folder."""
+"""Commands do not overwrite their input files, and remove files of earlier runs."""
 
 import shutil
 

@@ -120,7 +120,7 @@ class SplineTracker(ABC):
     def _start_spread(self, distance: float, turn: float) -> NDArray[np.float64]:
         """Return the standard deviations of the first pose, (3,) [m, rad].
 
-        Where a robot begins on a map of an earlier run is never known exactly: there ``START_SPREAD`` stands for zeros.
+        With a start map, ``START_SPREAD`` replaces zeros, as the start on that map is not known exactly.
         """
         if self._known is not None and distance == turn == 0.0:
             distance, turn = START_SPREAD
