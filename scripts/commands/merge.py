@@ -23,9 +23,6 @@ if TYPE_CHECKING:
 
 DEFAULT_FOLDER = Path("merged")
 RESULT, MAPS, REGIONS = "transforms.json", ("map.yaml", "map.pgm", "map-*.yaml", "map-*.pgm"), "regions.png"
-MOST_MAPS = 64
-"""Maximum number of maps: a fused map records the sources of each cell in 64 bits."""
-
 FILES = (RESULT, *MAPS, "merge.png", REGIONS)
 
 LEAST_SCALE = 0.01
@@ -78,8 +75,10 @@ class _Merge(Command):
         Command.__post_init__(self)
         if len(self.maps) < 2:
             raise ValueError(f"{len(self.maps)} map is given; want two or more")
-        if len(self.maps) > MOST_MAPS:
-            raise ValueError(f"{len(self.maps)} maps are given; want at most {MOST_MAPS}: merge them in parts")
+        from lidarium.mapping.merging.fusion import MAX_MAPS
+
+        if len(self.maps) > MAX_MAPS:
+            raise ValueError(f"{len(self.maps)} maps are given; want at most {MAX_MAPS}: merge them in parts")
         if self.resolution is not None and not 0.0 < self.resolution < float("inf"):
             raise ValueError(f"resolution is {self.resolution} m; want a positive number of metres per pixel")
         factor = self.factor
