@@ -46,8 +46,9 @@ class SplineEkfSettings:
         Settings of matching and of the map.
     gate_sigmas : float, default 3.0
         Measurements that differ from their expectation by more standard deviations are left out.
-    start_distance, start_turn : float, default 0.0 (0.05 and 1 degree with ``start_map``)
-        Standard deviations of the first pose [m, rad].
+    start_distance, start_turn : float, default 0.0
+        Standard deviations of the first pose [m, rad]; with ``start_map``
+        0.0 means 0.05 m and 1 degree.
     distance_bias, turn_bias : float, default 0.05
         Constant scale errors of odometry's paths and turns, as a standard
         deviation.

@@ -129,8 +129,9 @@ class SplineFilterSettings:
         Settings of matching and of the map.
     particles : int, default 400
         Number of particles.
-    start_distance, start_turn : float, default 0.0 (0.05 and 1 degree with ``start_map``)
-        Standard deviations of the particles around the first pose [m, rad].
+    start_distance, start_turn : float, default 0.0
+        Standard deviations of the particles around the first pose [m, rad]; with ``start_map``
+        0.0 means 0.05 m and 1 degree.
     distance_bias, turn_bias : float, default 0.05
         Constant scale errors of odometry's paths and turns, as a standard
         deviation: particles try how much, and those that fit the walls teach it.
