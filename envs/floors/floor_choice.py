@@ -9,7 +9,7 @@ import numpy as np
 
 from lidarium.envs.floors.catalogue.names import is_file_name, load_floor, set_floors
 from lidarium.envs.floors.floor import Floor
-from lidarium.envs.floors.importers import FORMATS, ros_map, takes_resolution
+from lidarium.envs.floors.importers import FORMATS, is_floor, ros_map, takes_resolution
 from lidarium.mapping.geometry.bounds import shown
 
 SET_PREFIX = "set:"
@@ -145,19 +145,17 @@ def _is_folder(floor: Any) -> bool:  # noqa: ANN401
 
 
 def _folder_floors(folder: Path) -> tuple[Path, ...]:
-    """Return the files of a folder that have the name of a floor, in the order of their names.
+    """Return the files of a folder that are floors, in the order of their names.
 
     Pictures next to the description of a ROS map of the same name belong to it.
     """
-    suffixes = tuple(suffix for known in FORMATS.values() for suffix in known.suffixes)
-    files = sorted(path for path in folder.iterdir() if path.name.lower().endswith(suffixes))
+    files = sorted(path for path in folder.iterdir() if path.is_file() and is_floor(path))
     described = {path.stem for path in files if path.suffix.lower() in ros_map.SUFFIXES}
     is_own = (path.stem not in described or path.suffix.lower() in ros_map.SUFFIXES for path in files)
     floors = tuple(path for path, keeps in zip(files, is_own, strict=True) if keeps)
     if not floors:
-        raise ValueError(
-            f"folder {str(folder)!r} has no floors; want files that end in {', '.join(sorted(set(suffixes)))}"
-        )
+        suffixes = sorted({suffix for known in FORMATS.values() for suffix in known.suffixes})
+        raise ValueError(f"folder {str(folder)!r} has no floors; want files that end in {', '.join(suffixes)}")
     return floors
 
 

@@ -62,7 +62,7 @@ FORMATS.register("ros_map", Format(ros_map.SUFFIXES, _always, ros_map.load), "RO
 FORMATS.register("houseexpo", Format((".json", ".json.gz"), _always, houseexpo.load), "HouseExpo, a plan as JSON")
 FORMATS.register("kth", Format((".xml", ".xml.gz"), _always, kth.load), "KTH floor plan as XML")
 FORMATS.register("amrl", Format((".txt", ".txt.gz"), amrl.matches, amrl.load), "AMRL vector map")
-FORMATS.register("lifull", Format((".txt", ".txt.gz"), _always, lifull.load), "LIFULL vector annotation")
+FORMATS.register("lifull", Format((".txt", ".txt.gz"), lifull.matches, lifull.load), "LIFULL vector annotation")
 FORMATS.register(
     "movingai",
     Format((".map", ".map.gz"), movingai.matches, movingai.load, movingai.has_scale),
@@ -104,6 +104,8 @@ def load_file(path: Path, resolution: float | None = None, **options: Any) -> Fl
             if unknown := sorted(set(options) - set(known.options)):
                 raise ValueError(f"{path} takes no {' or '.join(unknown)}; want {', '.join(known.options) or 'none'}")
             return known.load(path, resolution, **options)
+    if by_name := [name for name, known in FORMATS.items() if path.name.lower().endswith(known.suffixes)]:
+        raise ValueError(f"{path} has the content of no known floor format; want {' or '.join(by_name)}")
     suffixes = sorted({suffix for known in FORMATS.values() for suffix in known.suffixes})
     raise ValueError(f"{path} is of no known floor format; want a file that ends in {', '.join(suffixes)}")
 
@@ -113,6 +115,12 @@ def takes_resolution(path: Path) -> bool:
     with reading(path, "a floor"):
         known = _format_of(path)
         return known is not None and not known.has_scale(path)
+
+
+def is_floor(path: Path) -> bool:
+    """Whether a file is a floor of a known format, by its name and content."""
+    with reading(path, "a floor"):
+        return _format_of(path) is not None
 
 
 def _format_of(path: Path) -> Format | None:

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from lidarium.envs.floors.floor import Floor
-from lidarium.envs.floors.importers.common import floor_of_lines, read_text, refuse_resolution
+from lidarium.envs.floors.importers.common import floor_of_lines, is_number, read_text, refuse_resolution
 
 
 def matches(path: Path) -> bool:
@@ -19,7 +19,7 @@ def matches(path: Path) -> bool:
     if ".vectormap." in path.name.lower():
         return True
     first = read_text(path).lstrip().split("\n", 1)[0].split(",")
-    return len(first) == 4 and all(_is_number(word) for word in first)
+    return len(first) == 4 and all(is_number(word) for word in first)
 
 
 def load(path: Path, resolution: float | None) -> Floor:
@@ -33,16 +33,9 @@ def load(path: Path, resolution: float | None) -> Floor:
         words = line.split(",")
         if not line.strip():
             continue
-        if len(words) != 4 or not all(_is_number(word) for word in words):
+        if len(words) != 4 or not all(is_number(word) for word in words):
             raise ValueError(f"{path}, line {number}: {line[:60]!r} is no wall; want x1, y1, x2, y2 in metres")
         lines.append([float(word) for word in words])
     if not lines:
         raise ValueError(f"{path} has no lines; want x1, y1, x2, y2 per wall in metres")
     return floor_of_lines(path, np.array(lines), np.zeros((0, 4)))
-
-
-def _is_number(word: str) -> bool:
-    try:
-        return bool(np.isfinite(float(word)))
-    except ValueError:
-        return False

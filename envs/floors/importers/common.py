@@ -3,6 +3,7 @@
 They read text, find the free areas of pixel floors and put walls around line drawings.
 """
 
+import math
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import TypeVar
@@ -49,6 +50,14 @@ def floor_name(path: Path) -> str:
         if name.lower().endswith(suffix):
             name = name[: -len(suffix)]
     return Path(name).stem if len(name) == len(path.name) else name
+
+
+def is_number(word: str) -> bool:
+    """Return whether a word is a finite number."""
+    try:
+        return math.isfinite(float(word))
+    except ValueError:
+        return False
 
 
 def refuse_resolution(path: Path, resolution: float | None) -> None:

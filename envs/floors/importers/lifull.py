@@ -15,7 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.envs.floors.floor import Floor, check_pairs
-from lidarium.envs.floors.importers.common import WALL_THICKNESS, floor_of_lines, read_text, refuse_resolution
+from lidarium.envs.floors.importers.common import (
+    WALL_THICKNESS,
+    floor_of_lines,
+    is_number,
+    read_text,
+    refuse_resolution,
+)
 
 OPENING_WIDTH = 0.8
 MAX_PIXEL = 1e9
@@ -23,6 +29,12 @@ MAX_PIXEL = 1e9
 
 # Shorter pieces of wall than this next to an opening are annotation errors [m].
 _SLIP = 0.02
+
+
+def matches(path: Path) -> bool:
+    """Return whether the first line of text is four numbers and a label."""
+    words = read_text(path).lstrip().split("\n", 1)[0].split()
+    return len(words) >= 5 and all(is_number(word) for word in words[:4])
 
 
 def load(path: Path, resolution: float | None) -> Floor:

@@ -66,7 +66,8 @@ def folder(tmp_path):
     levels[0] = levels[-1] = levels[:, 0] = levels[:, -1] = 0
     write_ros_map(tmp_path, "room", levels, (0.0, 0.0, 0.0), 0.05)
     np.save(tmp_path / "grid.npy", levels == 0)
-    (tmp_path / "readme.md").write_text("no floor")
+    for name in ("readme.md", "LICENCE.txt"):  # the name of the second is that of a floor
+        (tmp_path / name).write_text("Free to use, as these floors are.\n")
     return tmp_path
 
 

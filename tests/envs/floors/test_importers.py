@@ -11,8 +11,9 @@ from lidarium.envs.floors.importers import load_file
     ("name", "content", "message"),
     [
         ("a.txt", "0 0 1 0 wall\n", "doors give the scale"),
-        ("a.txt", "0 0 1\n", "line 1"),
-        ("a.txt", "", "0 walls"),
+        ("a.txt", "0 0 1 0 wall\n0 0 1\n", "line 2"),
+        ("a.txt", "0 0 1\n", "content of no known floor format"),
+        ("a.txt", "", "content of no known floor format"),
         ("a.vectormap.txt", "", "no lines"),
         ("a.vectormap.txt", "1,2,3,4\n1,2,x,4\n", "line 2"),
         ("a.vectormap.txt", "1,2,3,nan\n", "line 1"),
@@ -32,6 +33,9 @@ def test_missing_files_folders_and_unknown_formats_are_refused(tmp_path):
     (tmp_path / "floor.doc").write_text("")
     with pytest.raises(ValueError, match=r"no known floor format; want a file that ends in .*\.yaml"):
         load_file(tmp_path / "floor.doc")
+    (tmp_path / "LICENCE.txt").write_text("Free to use.")
+    with pytest.raises(ValueError, match=r"content of no known floor format; want amrl or lifull"):
+        load_file(tmp_path / "LICENCE.txt")
     for name in ("a.png", "a.npy", "a.npz"):
         (tmp_path / name).write_bytes(b"nothing of the kind")
         with pytest.raises(ValueError, match=name):

@@ -57,7 +57,7 @@ def test_a_grid_needs_a_resolution(tmp_path):
         (("height 6\n", ""), r"no good height"),
         (("map\n", ""), r"no line 'map'"),
         (("SG", "S?"), r"line 7 has a cell '\?'; want one of \. G S @ O T W"),
-        (("type octile\n", "octile\n"), r"of no known floor format"),
+        (("type octile\n", "octile\n"), r"content of no known floor format"),
     ],
 )
 def test_what_is_no_grid_is_refused_by_line(tmp_path, changed, message):
