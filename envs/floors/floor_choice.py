@@ -51,7 +51,7 @@ class FloorChoice:
         self._weights: np.ndarray[Any, np.dtype[np.float64]] | None = None
         self._specs: tuple[Any, ...] = ()
         if isinstance(floor, str | Path | Floor):
-            self._specs = _expanded(floor)
+            self._specs = single_floors(floor)
             self.is_set = self._specs != (floor,)
             if not self.is_set and isinstance(floor, str) and not is_file_name(floor):
                 # A floor of the catalogue never changes, and is looked up once.
@@ -111,12 +111,7 @@ class FloorChoice:
     def _load(self, spec: FloorName) -> Floor:
         if isinstance(spec, Floor):
             return spec
-        # One floor alone is refused with a resolution that it cannot have; of many some are plain images.
-        resolution = self._image_resolution
-        if self.is_set and resolution is not None:
-            is_plain = is_file_name(spec) and takes_resolution(Path(spec))
-            return load_floor(spec, resolution if is_plain else None)
-        return load_floor(spec, resolution)
+        return load_floor(spec, pixel_side(spec, self._image_resolution, is_alone=not self.is_set))
 
     def _resolution_of(self, spec: Any) -> float | None:  # noqa: ANN401
         """Return the side of a pixel for files, folders and choices; None for floors by name."""
@@ -130,7 +125,17 @@ class FloorChoice:
         return not isinstance(spec, str | Path) or str(spec).startswith(SET_PREFIX) or _is_folder(spec)
 
 
-def _expanded(floor: FloorName) -> tuple[FloorName, ...]:
+def pixel_side(floor: str | Path, image_resolution: float | None, is_alone: bool) -> float | None:
+    """Return the side of a pixel to read a floor with [m].
+
+    A floor alone is refused with a side that it cannot have; of many it concerns those that do not state theirs.
+    """
+    if is_alone or image_resolution is None:
+        return image_resolution
+    return image_resolution if is_file_name(floor) and takes_resolution(Path(floor)) else None
+
+
+def single_floors(floor: FloorName) -> tuple[FloorName, ...]:
     """Return the floors of a set or of a folder; any other floor alone."""
     if isinstance(floor, str) and floor.startswith(SET_PREFIX):
         return set_floors(floor.removeprefix(SET_PREFIX))

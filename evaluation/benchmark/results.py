@@ -137,7 +137,7 @@ def collect(
     Parameters
     ----------
     failures : dict
-        By task and policy: why some of its episodes, or all of them, did not finish.
+        By task and policy: why some of its episodes, or all of them, are missing.
     """
     shipped, everything, standings, remarks = reference_rows(found.name), [], [], []
     for task in tasks:

@@ -54,6 +54,8 @@ class BenchmarkTask:
         As the options of ``lidarium.parallel_env``.
     policies : tuple of str
         Reference policies; ``baseline``, one of them, is what ratios are of.
+    observes : tuple of str
+        Observations that a policy reads to take part.
     hashes : TaskHashes or None
         None before they are frozen.
     """
@@ -66,6 +68,7 @@ class BenchmarkTask:
     settings: Mapping[str, Any]
     policies: tuple[str, ...]
     baseline: str
+    observes: tuple[str, ...]
     hashes: TaskHashes | None
 
     @property
@@ -155,6 +158,7 @@ def benchmark(name: str) -> Benchmark:
             settings={**common, **_flat(given.get("settings", {}))},
             policies=(*given.get("policies", content["policies"]), *given.get("also", ())),
             baseline=given.get("baseline", content["baseline"]),
+            observes=tuple(given.get("observes", ())),
             hashes=TaskHashes(known["settings"], tuple(known["floors"]), tuple(known["starts"])) if known else None,
         )
     return Benchmark(name, content["about"], tasks)

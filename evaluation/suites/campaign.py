@@ -207,8 +207,8 @@ def _inputs_of(suite: Suite) -> dict[str, str]:
     as weights, and modules that are imported for what they register.
     """
     found = {
-        f"floor {floor!r}": load_floor(floor, suite.image_resolution).sha256
-        for floor in suite.floors
+        f"floor {floor!r}": load_floor(floor, suite.pixel_side(floor)).sha256
+        for floor in suite.single_floors
         if is_file_name(floor)
     }
     for name in suite.policies:

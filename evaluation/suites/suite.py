@@ -11,7 +11,8 @@ from typing import Any
 from lidarium.agents import Policy, make_policy
 from lidarium.agents.catalogue import POLICIES
 from lidarium.agents.policy import settings_for
-from lidarium.envs.floors.catalogue.names import is_generated, load_floor, set_floors
+from lidarium.envs.floors.catalogue.names import is_generated, load_floor
+from lidarium.envs.floors.floor_choice import pixel_side, single_floors
 from lidarium.envs.levels import LEVELS
 from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.settings.making import make_settings
@@ -154,7 +155,7 @@ class Suite:
         Rule that ends episodes in addition to the settings, as ``StopRule``; ``decisions`` may be a table by the
         number of robots.
     image_resolution : float or None
-        Metres per pixel, if floors are plain images.
+        Metres per pixel of those floors that are plain images.
     policy_settings : dict
         By a name among the policies: options of the policy, and ``policy``, the policy itself,
         if the name is another.
@@ -186,9 +187,11 @@ class Suite:
             if name not in self.policies:
                 raise ValueError(f"the suite has settings of a policy {name!r}, which is not among its policies")
         made = {name: self.make_policy(name) for name in self.policies}
+        check_members("floors", self.single_floors)
         for floor in self.floors:
-            _check_floor(floor, self.image_resolution)
-        check_members("floors", self._singles)
+            if not (floor.startswith("set:") or is_generated(floor)):
+                for single in map(str, single_floors(floor)):
+                    load_floor(single, self.pixel_side(single))
         for variant in self.variants:
             options = self.run_options(variant)
             level = options.pop("level", None)
@@ -206,8 +209,8 @@ class Suite:
         for floor, given in self.starts.items():
             if floor not in self.floors:
                 raise ValueError(f"the suite has starts on {floor!r}, which is not among its floors")
-            if floor.startswith("set:"):
-                raise ValueError(f"the suite has starts on the set {floor!r}; want them for each of its floors")
+            if single_floors(floor) != (floor,):
+                raise ValueError(f"the suite has starts on {floor!r}, which are many; want them for each of its floors")
             for team in given:
                 if len(team) < max(self.robots) or any(len(start) != 3 for start in team):
                     raise ValueError(
@@ -246,10 +249,15 @@ class Suite:
             raise ValueError(f"policy {name!r} of the suite cannot be made: {error}") from error
 
     @property
-    def _singles(self) -> tuple[str, ...]:
+    def single_floors(self) -> tuple[str, ...]:
         """Names of the single floors."""
-        sets = (set_floors(floor) if floor.startswith("set:") else (floor,) for floor in self.floors)
-        return tuple(single for each in sets for single in each)
+        return tuple(str(single) for floor in self.floors for single in single_floors(floor))
+
+    def pixel_side(self, floor: str) -> float | None:
+        """Return the side of a pixel to read one of the floors with [m]; None if it states its own."""
+        if is_generated(floor):
+            return None
+        return pixel_side(floor, self.image_resolution, is_alone=self.floors == (floor,))
 
     def trials(self) -> Iterator[Trial]:
         """Yield all trials, paired ones one after the other.
@@ -259,7 +267,7 @@ class Suite:
         for variant in self.variants:
             for floor in self.floors:
                 teams = range(len(self.starts[floor])) if floor in self.starts else (-1,)
-                for single in set_floors(floor) if floor.startswith("set:") else (floor,):
+                for single in map(str, single_floors(floor)):
                     for robots in self.robots:
                         for start in teams:
                             for seed in self.seeds:
@@ -385,11 +393,3 @@ def _check_sensors(name: str, policy: Policy, variant: str, settings: Exploratio
         settings_for(policy, settings)
     except ValueError as error:
         raise ValueError(f"policy {name!r} cannot run with variant {variant!r}: {error}") from error
-
-
-def _check_floor(floor: str, image_resolution: float | None) -> None:
-    """Check that there is such a floor, without generating any."""
-    if floor.startswith("set:"):
-        set_floors(floor)
-    elif not is_generated(floor):
-        load_floor(floor, image_resolution)

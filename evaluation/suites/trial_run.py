@@ -66,7 +66,7 @@ def run_trial(suite: Suite, trial: Trial, records: Path | None = None) -> dict[s
         records = None  # a record runs again by speeds, which moves along edges do not have
     settings = settings_for(policy, suite.settings(trial.variant, trial.robots))
     history = History()
-    image_resolution = _image_resolution(suite, trial)
+    image_resolution = suite.pixel_side(trial.floor)
     recorder = Recorder(trial.policy, trial.seed, trial.floor, image_resolution)
     env = WatchedExploration(
         trial.floor, settings, image_resolution, [history] if records is None else [history, recorder]
@@ -132,9 +132,3 @@ def _kept(path: Path) -> Iterator[None]:
             f"{error.strerror or error}; the episodes before are kept, the same command goes on from there",
             str(path),
         ) from error
-
-
-def _image_resolution(suite: Suite, trial: Trial) -> float | None:
-    from lidarium.envs.floors.catalogue.names import is_file_name
-
-    return suite.image_resolution if is_file_name(trial.floor) else None

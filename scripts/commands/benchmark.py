@@ -80,12 +80,13 @@ def execute(command: _Benchmark) -> Answer:
     if command.policies or command.reference:
         compile_first()
     failures: dict[tuple[str, str], str] = {}
+    absent: dict[tuple[str, str], str] = {}
     is_interrupted = False
     for task in tasks:
         policies = tuple(dict.fromkeys([*command.policies, *(task.policies if command.reference else ())]))
         if policies and not is_interrupted:
-            is_interrupted = _run(command, task, policies, settings, folder / task.name, failures)
-    results = collect(found, tasks, size, folder, failures)
+            is_interrupted = _run(command, task, policies, settings, folder / task.name, failures, absent)
+    results = collect(found, tasks, size, folder, absent | failures)
     code = INTERRUPTED if is_interrupted else DEFECT if failures else DONE
     return Answer({"folder": str(folder), "interrupted": is_interrupted}, _text(results, folder), code)
 
@@ -97,21 +98,26 @@ def _run(
     settings: Mapping[str, Mapping[str, Any]],
     folder: Path,
     failures: dict[tuple[str, str], str],
+    absent: dict[tuple[str, str], str],
 ) -> bool:
     """Run what is missing of a task, keep what failed, and return whether it was interrupted.
 
-    A policy that cannot run in the task's world fails there alone.
+    A policy that cannot run in the task's world fails there alone; one that does not observe what the task is about
+    is absent.
     """
     from lidarium.evaluation.suites.campaign import Campaign
 
     runnable = []
     for policy in policies:
         try:
-            task.suite((policy,), "easy", settings)
+            observes = task.suite((policy,), "easy", settings).make_policy(policy).observes
         except Exception as error:  # a policy of the user may fail in any way
             failures[task.name, policy] = f"{type(error).__name__}: {error}"
         else:
-            runnable.append(policy)
+            if missing := [name for name in task.observes if name not in observes]:
+                absent[task.name, policy] = f"does not take part, as it does not observe {' and '.join(missing)}"
+            else:
+                runnable.append(policy)
     if not runnable:
         return False
     suite = task.suite(tuple(runnable), "easy" if command.quick else "full", settings)

@@ -58,7 +58,7 @@ class _Evaluate(TeamCommand):
     policy_set: tuple[str, ...] = ()
     """settings of policies as POLICY.KEY=VALUE, such as learned.weights=FILE"""
     floors: tuple[str, ...] = ()
-    """floors as for `lidarium run`, apartment by default.
+    """floors as for `lidarium run`, or folders of them; apartment by default.
 
     Set:NAME for all floors of a set, set:NAME:COUNT for its first ones
     """
@@ -74,7 +74,7 @@ class _Evaluate(TeamCommand):
     stop_coverage: float = 0.99
     """share of the floor at which an episode ends"""
     resolution: float | None = None
-    """metres per pixel, if floors are plain images"""
+    """metres per pixel of those floors that are plain images"""
     workers: int = 0
     """processes that run episodes; 0 for as many as there are cores"""
     ray: str | None = None

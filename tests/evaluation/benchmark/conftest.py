@@ -34,6 +34,7 @@ easy = 1
 settings = { camera = { columns = 64, rows = 48, pitch = 0.35 }, lidar.range_max = 4.0 }
 policies = ["sparse_frontier"]
 baseline = "sparse_frontier"
+observes = ["depth"]
 """
 
 

@@ -105,6 +105,15 @@ def test_a_policy_that_cannot_run_in_one_task_fails_there_alone(tiny, tmp_path, 
 
 
 @pytest.mark.usefixtures("without_page")
+def test_a_policy_that_does_not_observe_what_a_task_is_about_is_absent_from_it(tiny, tmp_path):
+    code, written = answer(tmp_path / "mine", "--policies", "nearest_frontier", "--quick")
+    assert code == 0
+    assert ("Homes-1", "nearest_frontier") in by_name(written)
+    assert ("Seen-1", "nearest_frontier") not in by_name(written)
+    assert "Seen-1, nearest_frontier: does not take part, as it does not observe depth" in written["remarks"]
+
+
+@pytest.mark.usefixtures("without_page")
 def test_a_task_in_which_all_episodes_failed_leaves_the_others(tiny, tmp_path):
     folder = tmp_path / "mine" / "Homes-1"
     folder.mkdir(parents=True)

@@ -1,7 +1,10 @@
 """Suites."""
 
+import cv2
+import numpy as np
 import pytest
 
+from lidarium.envs.floors.catalogue.names import load_floor
 from lidarium.evaluation.suites.suite import (
     MOST_EACH,
     ROBOTS,
@@ -17,6 +20,7 @@ from lidarium.evaluation.suites.suite import (
     suite_of,
     tables_of,
 )
+from lidarium.mapping.files.map_files import write_ros_map
 
 TOML = """
 policies = ["nearest_frontier", "random_walk"]
@@ -48,6 +52,30 @@ def test_trials_are_the_product_and_all_keys_and_names_differ(tmp_path):
     assert len(trials) == 2 * (2 + 1 + 1) * 2 * 3 * 2
     assert len({trial.key for trial in trials}) == len({trial.file_name for trial in trials}) == len(trials)
     assert {trial.floor for trial in trials} == {"apartment", "building:3000000", "building:3000001"}
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """Return a folder of a plain image, which states no scale, of a ROS map, which does, and of their licence."""
+    levels = np.full((40, 60), 255, np.uint8)
+    levels[0] = levels[-1] = levels[:, 0] = levels[:, -1] = 0
+    (tmp_path / "floors").mkdir()
+    write_ros_map(tmp_path / "floors", "room", levels, (0.0, 0.0, 0.0), 0.05)
+    cv2.imwrite(str(tmp_path / "floors" / "hall.png"), levels)
+    (tmp_path / "floors" / "LICENCE.txt").write_text("Free to use.")
+    return tmp_path / "floors"
+
+
+def test_a_folder_is_its_floors_of_which_images_alone_take_the_side_of_a_pixel(folder):
+    found = suite(floors=(str(folder), "apartment"), image_resolution=0.1)
+    hall, room = str(folder / "hall.png"), str(folder / "room.yaml")
+    assert [trial.floor for trial in found.trials()] == [hall, room, "apartment"]
+    assert [found.pixel_side(floor) for floor in (hall, room, "apartment")] == [0.1, None, None]
+    assert load_floor(hall, found.pixel_side(hall)).bounds[2:] == pytest.approx((6.0, 4.0), abs=0.15)  # its walls
+    with pytest.raises(ValueError, match="its own scale"):
+        suite(floors=(room,), image_resolution=0.1)
+    with pytest.raises(ValueError, match="which are many"):
+        suite(floors=(str(folder),), image_resolution=0.1, starts={str(folder): [[(1.0, 1.0, 0.0)]]})
 
 
 def test_trials_that_are_paired_follow_each_other():
