@@ -30,6 +30,11 @@ _SIDES = ((0, 1, 5, 4), (1, 3, 7, 5), (3, 2, 6, 7), (2, 0, 4, 6), (4, 5, 7, 6), 
 """Corners of a box's faces, counter-clockwise seen from the outside; bits 0 to 2 of a corner are x, y, z."""
 
 
+def picture_paths(path: Path) -> tuple[Path, Path]:
+    """Return the files of the pictures of a sparse map, from above and in space."""
+    return path.with_suffix(".png"), path.with_name(f"{path.stem}_3d.png")
+
+
 def save_sparse_pictures(
     path: Path,
     boxes: NDArray[np.float64],
@@ -48,7 +53,7 @@ def save_sparse_pictures(
     way : (P, 3) float64 or None
         A path [m].
     """
-    plane, space = path.with_suffix(".png"), path.with_name(f"{path.stem}_3d.png")
+    plane, space = picture_paths(path)
     _save_plane(plane, boxes, free, graph, way)
     with whole_file(space) as beside:
         imageio.imwrite(beside, _in_space(boxes, free, way), extension=".png")

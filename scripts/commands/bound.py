@@ -6,7 +6,7 @@ from typing import Annotated, Any, ClassVar
 
 from tyro.conf import Positional, arg
 
-from lidarium.scripts.common import DONE, NO, Answer, TeamCommand, table
+from lidarium.scripts.common import DONE, NO, Answer, TeamCommand, check_output, table
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,10 +38,10 @@ def execute(command: _Bound) -> Answer:
     from lidarium.evaluation.bounds.bound import known_floor_bound
     from lidarium.evaluation.drawing.bound_picture import save_bound_picture
     from lidarium.evaluation.suites.starts import drawn_starts, starts_in
-    from lidarium.mapping.files.output import check_writable, write_json
+    from lidarium.mapping.files.output import write_json
 
     if command.out is not None:
-        check_writable(command.out)
+        check_output(command.out, ("bound.json", "bound.png"), (command.floor,))
     if command.rounds < 0:
         raise ValueError(f"rounds is {command.rounds}; want zero or more")
     options = {**command.team_options, "robots": command.robots, "stop_coverage": command.coverage}

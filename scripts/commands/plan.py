@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Protocol
 from tyro.conf import Positional, arg
 
 from lidarium.scripts.commands.sparse_map import numbers_of
-from lidarium.scripts.common import DONE, NO, Answer, Command, notify, table
+from lidarium.scripts.common import DONE, NO, Answer, Command, check_output, notify, table
 
 if TYPE_CHECKING:
     from lidarium.mapping.sparse.graph import TopologicalGraph
@@ -76,12 +76,12 @@ def execute(command: _Plan) -> Answer:
     import numpy as np
 
     from lidarium.evaluation.drawing.sparse_picture import save_sparse_pictures
-    from lidarium.mapping.files.output import check_writable, write_json
+    from lidarium.mapping.files.output import write_json
     from lidarium.mapping.sparse.map_files import read_sparse_map
     from lidarium.mapping.sparse.planning import check_on_map, map_bounds, plan
 
     if command.out is not None:
-        check_writable(command.out)
+        check_output(command.out, ("path.json", "path.png", "path_3d.png"), (command.map,))
     start, goal = (
         np.array(numbers_of(name, text, (2, 3))) for name, text in (("--from", command.start), ("--to", command.goal))
     )

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from tyro.conf import Positional
 
-from lidarium.scripts.common import DONE, DOUBTFUL, Answer, Command, counted, notify, table
+from lidarium.scripts.common import DONE, DOUBTFUL, Answer, Command, check_output, counted, notify, table
 
 if TYPE_CHECKING:
     import numpy as np
@@ -72,14 +72,15 @@ class _SparseMapping(Command):
 
 def execute(command: _SparseMapping) -> Answer:
     """Make a map and write it."""
-    from lidarium.evaluation.drawing.sparse_picture import save_sparse_pictures
-    from lidarium.mapping.files.output import check_writable
+    from lidarium.evaluation.drawing.sparse_picture import picture_paths, save_sparse_pictures
     from lidarium.mapping.sparse.map_files import write_sparse_map
 
     if not command.clouds:
         raise ValueError("no cloud is named; want at least one file")
-    path = command.map_path
-    check_writable(path.parent)
+    path, clouds = command.map_path, command.clouds[0]
+    files = [each.name for each in (path, *picture_paths(path))]
+    beside = clouds.iterdir() if clouds.is_dir() else ()  # poses, times
+    check_output(path.parent, files, (*command.clouds, *command.poses, *beside))
     began = perf_counter()
     told = _Told()
     sparse_map, points = _mapped(command, _frames_of(command, told), told)

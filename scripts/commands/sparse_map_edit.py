@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, ClassVar
 from tyro.conf import Positional, UseAppendAction
 
 from lidarium.scripts.commands.sparse_map import SUFFIXES, numbers_of
-from lidarium.scripts.common import Answer, Command, table
+from lidarium.scripts.common import Answer, Command, check_output, table
 
 if TYPE_CHECKING:
     import numpy as np
@@ -48,15 +48,15 @@ class _EditSparseMap(Command):
 
 def execute(command: _EditSparseMap) -> Answer:
     """Edit a map and write the new one."""
-    from lidarium.evaluation.drawing.sparse_picture import save_sparse_pictures
-    from lidarium.mapping.files.output import check_writable
+    from lidarium.evaluation.drawing.sparse_picture import picture_paths, save_sparse_pictures
     from lidarium.mapping.sparse.editing import edited, join_maps
     from lidarium.mapping.sparse.map_files import read_sparse_map, write_sparse_map
 
     if not (command.remove or command.add or command.join):
         raise ValueError("nothing is to be edited; want --add, --remove or --join")
     path = command.map_path
-    check_writable(path.parent)
+    files = [each.name for each in (path, *picture_paths(path))]
+    check_output(path.parent, files, (command.map, command.join))
     remove, add, motion = (
         _boxes("--remove", command.remove),
         _boxes("--add", command.add),

@@ -18,6 +18,8 @@ def folder(tmp_path):
         write_ros_map(tmp_path, name, kept(apartment(), slice(0, 180), columns), (0.0, 0.0, 0.0), RESOLUTION)
     cv2.imwrite(str(tmp_path / "plan.png"), apartment())
     (tmp_path / "trajectory.tum").write_text("0 0 0 0 0 0 0 1\n1 0 0 0 0 0 0 1\n")
+    for name in ("bound.png", "map.png", "map_3d.png", "edited.smap", "path.json"):
+        (tmp_path / name).write_bytes(b"refused before it is read")
     np.savez(tmp_path / "log.npz", ranges=np.full((9, 36), 3.0), angle_min=-np.pi, angle_increment=np.pi / 18)
     return tmp_path
 
@@ -32,6 +34,11 @@ def folder(tmp_path):
         ("run --floor map.yaml --horizon-s 1", "map.yaml"),
         ("floors show plan.png --resolution 0.05", "plan.png"),
         ("floors import other.yaml", "other.yaml"),
+        ("bound bound.png --resolution 0.05", "bound.png"),
+        ("sparse-map map_3d.png --intrinsics 50,50,32,24", "map_3d.png"),
+        ("sparse-map frames/cloud.txt --poses map.png", "map.png"),
+        ("sparse-map-edit edited.smap --add 0,0,0,1,1,1", "edited.smap"),
+        ("plan path.json --from 0,0 --to 1,1", "path.json"),
     ],
 )
 def test_no_command_writes_over_what_it_reads(words, name, folder, monkeypatch, capsys):
