@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from lidarium.mapping.geometry.rigid import Transform
 
 
-RESULT = "result.json"
+RESULT, RECORD, FILMS = "result.json", "episode.npz", ("run.mp4", "run.gif")
 TEAM_FILES = (
     *(f"robot_{number}.{kind}" for number in ("[0-9]", "[0-9][0-9]") for kind in ("yaml", "pgm", "smap")),
     *(f"merged{number}.{kind}" for number in ("", "-[0-9]") for kind in ("yaml", "pgm")),
@@ -30,7 +30,7 @@ TEAM_FILES = (
 )
 """Files that a run writes or not, by its team; those of an earlier run in the same folder go, by exact names."""
 
-RUN_FILES = (RESULT, *TEAM_FILES, "map.yaml", "map.pgm", "run.png")
+RUN_FILES = (RESULT, RECORD, *FILMS, *TEAM_FILES, "map.yaml", "map.pgm", "run.png")
 
 VIEW_SIZE = 900, 1200
 """Rows and columns of the picture from above [pixels]."""
@@ -53,12 +53,12 @@ def write_run(
     from lidarium.mapping.grids.occupancy import three_levels
 
     env = episode.env
-    clear_earlier(folder, RESULT, TEAM_FILES)
+    clear_earlier(folder, RESULT, (RECORD, *(film for film in FILMS if film not in films), *TEAM_FILES))
     write_json(folder / RESULT, result)
     if recorder is not None:
         from lidarium.evaluation.record import write_record
 
-        write_record(folder / "episode.npz", recorder.finish(is_interrupted=episode.is_interrupted))
+        write_record(folder / RECORD, recorder.finish(is_interrupted=episode.is_interrupted))
     log_odds, (x, y) = team_log_odds(env)
     write_ros_map(folder, "map", three_levels(log_odds), (x, y, 0.0), env.settings.occupancy.resolution)
     save_run_picture(folder / "run.png", episode, policy)
@@ -71,7 +71,7 @@ def write_run(
     if report.supervision is not None:
         write_text(folder / "decisions.jsonl", decision_lines(report))
         files.append("decisions.jsonl")
-    files += [*(["episode.npz"] if recorder is not None else []), *films]
+    files += [*([RECORD] if recorder is not None else []), *films]
     check_written(folder, files)
     return files
 
