@@ -6,8 +6,8 @@ import sys
 import traceback
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import fields, replace
-from typing import Any, TextIO, get_origin, get_type_hints
+from dataclasses import fields, is_dataclass, replace
+from typing import Any, TextIO, get_args, get_origin, get_type_hints
 
 import lidarium
 from lidarium.registry import import_own
@@ -143,6 +143,14 @@ def _imports(words: list[str]) -> list[str]:
     return found[::-1]
 
 
+def _lists(options: type) -> set[str]:
+    """Return the options that take several values, with those of the commands below."""
+    hints = get_type_hints(options, include_extras=True)
+    found = {f"--{key.replace('_', '-')}" for key, hint in hints.items() if get_origin(hint) is tuple}
+    below = [get_args(member)[0] for hint in hints.values() for member in get_args(hint) if get_origin(member)]
+    return found.union(*(_lists(each) for each in below if is_dataclass(each)))
+
+
 def _options(execute: Callable[[Any], Answer], name: str, words: list[str]) -> Command:
     """Return the options of a command, read from the words behind its name."""
     import tyro
@@ -150,9 +158,7 @@ def _options(execute: Callable[[Any], Answer], name: str, words: list[str]) -> C
     config = (tyro.conf.OmitArgPrefixes, tyro.conf.OmitSubcommandPrefixes, tyro.conf.FlagCreatePairsOff)
     parameter = next(iter(inspect.signature(execute).parameters))
     options: type[Command] = get_type_hints(execute)[parameter]
-    hints = get_type_hints(options, include_extras=True)
-    lists = {f"--{key.replace('_', '-')}" for key, hint in hints.items() if get_origin(hint) is tuple}
-    words = gathered(words, lists)
+    words = gathered(words, _lists(options))
     try:
         command = tyro.cli(options, prog=f"lidarium {name}", args=words, config=config)
     except BrokenPipeError as error:  # the reader of the help has ended

@@ -282,6 +282,8 @@ def test_layers_meshes_and_what_cannot_be_reached_are_told(shared_cases, tmp_pat
     assert "cannot be reached and are left out" in json.loads(capsys.readouterr().out)["remark"]
     assert main(["floors", "import", flat, "--layers", "A-WALL", "--out", str(tmp_path / "flat"), "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["area_m2"] == pytest.approx(77.5, abs=0.05)
+    assert main(["floors", "show", flat, "--layers", "A-WALL", "--layers", "A-FURN", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["area_m2"] == pytest.approx(75.3, abs=0.05)
     hall = str(shared_cases / "sdf-frames-and-meshes" / "two_meshes.world")
     assert main(["floors", "show", hall]) == 2
     assert "--skip-meshes leaves them out" in capsys.readouterr().err
