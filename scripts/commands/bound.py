@@ -42,6 +42,9 @@ def execute(command: _Bound) -> Answer:
 
     if command.out is not None:
         check_output(command.out, ("bound.json", "bound.png"), (command.floor,))
+    for name in ("merging", "plans_sparsely", "supervisor"):
+        if getattr(command, name):
+            raise ValueError(f"--{name.replace('_', '-')} is given, but no policy drives in a bound; leave it out")
     if command.rounds < 0:
         raise ValueError(f"rounds is {command.rounds}; want zero or more")
     options = {**command.team_options, "robots": command.robots, "stop_coverage": command.coverage}

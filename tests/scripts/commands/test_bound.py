@@ -43,6 +43,12 @@ def test_draws_come_from_the_seed(monkeypatch):
     assert seeds == [5]
 
 
+@pytest.mark.parametrize("option", ["--merging", "--plans-sparsely", "--supervisor.merge_period_s=2"])
+def test_options_of_policies_are_refused(option, capsys):
+    assert main(["bound", "apartment:3", option]) == 2
+    assert "no policy drives in a bound" in capsys.readouterr().err
+
+
 def test_a_plain_image_is_a_floor_with_a_resolution(tmp_path, capsys):
     pytest.importorskip("ortools", reason="OR-Tools is not installed")
     room = np.zeros((40, 40), np.uint8)
