@@ -143,7 +143,7 @@ def _imports(words: list[str]) -> list[str]:
     return found[::-1]
 
 
-def _lists(options: type) -> set[str]:
+def _lists(options: Any) -> set[str]:  # noqa: ANN401
     """Return the options that take several values, with those of the commands below."""
     hints = get_type_hints(options, include_extras=True)
     found = {f"--{key.replace('_', '-')}" for key, hint in hints.items() if get_origin(hint) is tuple}

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from lidarium.evaluation.suites.episodes_file import TIMINGS, read_lines
+from lidarium.evaluation.suites.episodes_file import KEY, TIMINGS, read_failures, read_lines
 from lidarium.mapping.files.guarded_reading import printable
 from lidarium.mapping.geometry.bounds import Rule, shown, within
 
@@ -81,6 +81,9 @@ def read_episodes(directory: Path) -> Episodes:
     for number, row in numbered:
         _check_row(row, f"{path}, line {number}")
     kept, doubled = _without_doubles(numbered, path)
+    if failed := read_failures(Path(directory)):
+        key, why = next(iter(failed.items()))
+        warnings.append(f"{len(failed)} episodes failed and are missing, first {key}: {why}.")
     if not kept:
         raise NoEpisodesError(f"{path} has no finished episode; run `lidarium evaluate` on")
     _check_alike(kept, path)
@@ -147,7 +150,7 @@ def _check_row(row: Row, where: str) -> None:
     ):
         if not is_good:
             raise ValueError(f"{where} has {key} {shown(row[key])}; want what `lidarium run` writes to result.json")
-    for key in _MAY_BE_NULL:
+    for key in (*_MAY_BE_NULL, *({"bound_s"} & row.keys())):
         if row[key] is not None and not _FIGURE.hold(row[key]):
             raise ValueError(f"{where} has {key} {shown(row[key])}; want seconds or null")
 
@@ -159,7 +162,9 @@ def _without_doubles(numbered: Iterable[tuple[int, Row]], path: Path) -> tuple[l
         known = kept.setdefault((*_key_of(row), row["version"], row["settings_sha256"]), (number, row))
         if known[1] is row:
             continue
-        differing = [key for key in sorted({*known[1], *row} - set(TIMINGS)) if known[1].get(key) != row.get(key)]
+        # A floor may have two names, and an episode a record in one of two folders that were joined.
+        compared = sorted({*known[1], *row} - {*TIMINGS, KEY, "record"})
+        differing = [key for key in compared if known[1].get(key) != row.get(key)]
         if differing:
             raise ValueError(
                 f"{path}, lines {known[0]} and {number} tell of the same episode ({name_of(row)}) but differ "

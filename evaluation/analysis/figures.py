@@ -40,12 +40,13 @@ class OverBound:
     ----------
     ratio : Interval
         Median of the times over their bounds.
-    gap : Interval
-        Optimality gap: mean share of the time that is above the bound.
+    gap : Interval or None
+        Optimality gap: mean share of the time that is above the bound; None if a run missed 99 % within a horizon that
+        is below its bound, so that its share is unknown.
     """
 
     ratio: Interval
-    gap: Interval
+    gap: Interval | None
 
 
 def over_bound(rows: Sequence[Row], horizon_s: float, seed: int = 0) -> OverBound | None:
@@ -59,9 +60,10 @@ def over_bound(rows: Sequence[Row], horizon_s: float, seed: int = 0) -> OverBoun
         return None
     times, clusters = times_to(bounded, "t99_s", horizon_s), clusters_of(bounded)
     bounds = np.array([row["bound_s"] for row in bounded])
+    is_known = (times.is_reached | (bounds < horizon_s)).all()
     return OverBound(
         median_interval(times.or_never / bounds, clusters=clusters),
-        optimality_gap(times.up_to_horizon, bounds, seed=seed, clusters=clusters),
+        optimality_gap(times.up_to_horizon, bounds, seed=seed, clusters=clusters) if is_known else None,
     )
 
 
@@ -273,8 +275,14 @@ def _compared_times(
         # As above: without restricted means there is nothing to subtract; the tests still tell which was
         # faster.
         pass
-    improvement = probability_of_improvement(a.or_never, b.or_never, clusters=clusters)
-    return _tested(policy, key, a.up_to_horizon, b.up_to_horizon, difference, ratio, improvement, clusters)
+    ours_s, theirs_s = a.up_to_horizon, b.up_to_horizon
+    # Nothing is known of a run after it was cut: unless the other was there before, neither was sooner.
+    is_open = (a.is_cut & ~(b.is_reached & (b.times <= a.times))) | (b.is_cut & ~(a.is_reached & (a.times <= b.times)))
+    ours_s[is_open] = theirs_s[is_open] = horizon_s
+    improvement = None
+    if not is_open.any():
+        improvement = probability_of_improvement(a.or_never, b.or_never, clusters=clusters)
+    return _tested(policy, key, ours_s, theirs_s, difference, ratio, improvement, clusters)
 
 
 def _compared_values(policy: str, value: Value, ours: Sequence[Row], theirs: Sequence[Row], seed: int) -> Comparison:

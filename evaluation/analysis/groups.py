@@ -99,6 +99,11 @@ class _Reached:
         return CensoredTimes(self.times, self.is_reached, self.horizon_s)
 
     @property
+    def is_cut(self) -> NDArray[np.bool_]:
+        """Whether runs that did not reach the share were cut before the horizon."""
+        return ~self.is_reached & (self.times < self.horizon_s)
+
+    @property
     def or_never(self) -> NDArray[np.float64]:
         """The times, inf if the share was not reached."""
         return np.where(self.is_reached, self.times, np.inf)
@@ -156,7 +161,7 @@ def times_to(rows: Sequence[Row], key: str, horizon_s: float) -> _Reached:
     times, is_reached, cut = [], [], 0
     for row in rows:
         reached = row[key] is not None and row[key] <= horizon_s
-        until = float(row["time_s"]) if _is_cut(row) else horizon_s
+        until = _end_of(row) if _is_cut(row) else horizon_s
         cut += not reached and until < horizon_s
         times.append(float(row[key]) if reached else until)
         is_reached.append(reached)
@@ -188,6 +193,12 @@ def repeats(rows: Iterable[Row]) -> int:
         for row in rows
     ]
     return len(said) - len(set(said))
+
+
+def _end_of(row: Row) -> float:
+    """Return the time up to which a run is known: its horizon, which may be no whole number of steps, or its end."""
+    is_whole = "horizon" in row["ended_because"].values() and not row["interrupted"]
+    return float(row["horizon_s"] if is_whole and row["horizon_s"] is not None else row["time_s"])
 
 
 def _is_cut(row: Row) -> bool:

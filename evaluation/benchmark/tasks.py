@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from lidarium.envs.floors.catalogue.names import load_floor, set_floors
 from lidarium.envs.settings.making import make_settings
 from lidarium.evaluation.episodes.settings_identity import settings_sha256
-from lidarium.evaluation.suites.starts import drawn_starts, starts_in
+from lidarium.evaluation.suites.starts import starts_for
 from lidarium.evaluation.suites.suite import Suite
 
 if TYPE_CHECKING:
@@ -99,7 +99,7 @@ class BenchmarkTask:
     def measured_on(self, floors: tuple[str, ...]) -> TaskHashes:
         """Compute the hashes of the task, on some floors, as this installation has it."""
         settings = make_settings(robots=self.robots, **self.settings)
-        starts = [drawn_starts(floor, settings, SEED) or starts_in(floor, settings, SEED) for floor in floors]
+        starts = [starts_for(floor, settings, SEED) for floor in floors]
         return TaskHashes(
             settings_sha256(settings)[:16],
             tuple(load_floor(floor).sha256[:16] for floor in floors),

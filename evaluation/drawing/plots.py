@@ -223,7 +223,7 @@ def profiles(group: Group) -> dict[str, Any]:
     lowest = min(row["coverage_final"] for rows in group.runs.values() for row in rows)
     thresholds = np.arange(10 * min(int(20.0 * lowest), 19), COVERAGE_STEPS + 1) / COVERAGE_STEPS
     scores = {
-        policy: score_profile([row["coverage_final"] for row in rows], thresholds).tolist()
+        policy: score_profile([row["coverage_final"] for row in rows], thresholds, clusters=clusters_of(rows)).tolist()
         for policy, rows in group.runs.items()
     }
     return {

@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from lidarium.evaluation.analysis.episodes import pair_key_of
 from lidarium.evaluation.analysis.figures import TIMES, TimeFigure, Value
 from lidarium.evaluation.analysis.groups import Group, times_to
 from lidarium.evaluation.report.tables import number
@@ -20,20 +21,19 @@ _LATEX = {character: rf"\{character}" for character in "&%$#_{}"} | {
 def marl_eval(groups: Sequence[Group], values: Sequence[Value]) -> dict[str, Any]:
     """Return episodes as marl-eval reads them: environment, task, algorithm, run, step, metric.
 
-    A task is a group, a run is a seed, and a metric is a list of one number per floor, in the order of their names;
-    floors that a policy lacks with this seed are left out.
+    A task is a group, a run is a seed, and a metric is a list of one number per floor and starts, in the order of their
+    names; runs that not all policies have are left out.
     Times not reached are the horizon. Reference policies do not learn: their only step is 0.
     """
     tasks: dict[str, Any] = {}
     for group in groups:
         algorithms = tasks.setdefault(group.title, {})
-        known = [{(row["seed"], row["floor"]) for row in rows} for rows in group.runs.values()]
-        common = set.intersection(*known)
+        common = set.intersection(*({pair_key_of(row) for row in rows} for rows in group.runs.values()))
         for policy, rows in group.runs.items():
             runs = algorithms.setdefault(policy, {})
-            for seed in sorted({row["seed"] for row in rows}):
-                of_seed = [row for row in rows if row["seed"] == seed and (seed, row["floor"]) in common]
-                of_seed.sort(key=lambda row: str(row["floor"]))
+            shared = sorted((row for row in rows if pair_key_of(row) in common), key=pair_key_of)
+            for seed in sorted({row["seed"] for row in shared}):
+                of_seed = [row for row in shared if row["seed"] == seed]
                 metrics: dict[str, list[float]] = {
                     key: times_to(of_seed, key, group.horizon_s).up_to_horizon.tolist() for key in TIMES
                 }

@@ -67,7 +67,9 @@ def median_interval(
     median = _between(ordered[(size - 1) // 2], ordered[size // 2], 0.5)
     indices, groups = cluster_indices(clusters, size)
     if groups < size:
-        below = (sample < median) + 0.5 * (sample == median)
+        less, equal = sample < median, sample == median
+        # Of equal values so many are below that half of all are: runs after the horizon may be more than a half.
+        below = less + equal * (0.5 * size - less.sum()) / max(equal.sum(), 1)
         found = mean_share_interval(below, confidence, indices)
         low, high = (float(ordered[min(int(share * size), size - 1)]) for share in (found.low, found.high))
         if groups < FEWEST_FOR_INTERVAL or (low == high and math.isfinite(low)):

@@ -9,7 +9,7 @@ Dolan and More, Benchmarking optimization software with performance profiles, Ma
 import numpy as np
 from numpy.typing import ArrayLike
 
-from lidarium.evaluation.statistics.estimates import share_interval
+from lidarium.evaluation.statistics.estimates import mean_share_interval
 from lidarium.evaluation.statistics.samples import Values, checked_values
 
 
@@ -45,7 +45,9 @@ def ratio_profile(costs: ArrayLike, factors: ArrayLike) -> Values:
     return np.asarray(is_good.mean(axis=0))
 
 
-def score_profile(scores: ArrayLike, thresholds: ArrayLike, confidence: float = 0.95) -> Values:
+def score_profile(
+    scores: ArrayLike, thresholds: ArrayLike, confidence: float = 0.95, clusters: ArrayLike | None = None
+) -> Values:
     """Return the share of runs with a score of at least each threshold.
 
     The ends of Wilson's intervals are returned with it.
@@ -56,13 +58,19 @@ def score_profile(scores: ArrayLike, thresholds: ArrayLike, confidence: float = 
         Score of each run.
     thresholds : (k,) array_like
         Thresholds.
+    clusters : (n,) array_like or None, default None
+        As in `mean_interval`.
 
     Returns
     -------
     (3, k) float64
         Share, low and high end.
     """
-    reached, asked = np.sort(checked_values(scores, "scores")), checked_values(thresholds, "thresholds")
-    counts = len(reached) - np.searchsorted(reached, asked, side="left")
-    intervals = {int(count): share_interval(int(count), len(reached), confidence) for count in np.unique(counts)}
+    found, asked = checked_values(scores, "scores"), checked_values(thresholds, "thresholds")
+    counts = len(found) - np.searchsorted(np.sort(found), asked, side="left")
+    # As many runs that reach a threshold are the same runs.
+    first = {int(count): threshold for count, threshold in zip(counts[::-1], asked[::-1], strict=True)}
+    intervals = {
+        count: mean_share_interval(found >= threshold, confidence, clusters) for count, threshold in first.items()
+    }
     return np.array([[each.estimate, each.low, each.high] for each in (intervals[int(count)] for count in counts)]).T

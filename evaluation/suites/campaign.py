@@ -10,7 +10,7 @@ before, so that any number of workers leaves the same lines, though in another o
 import json
 import os
 import sys
-from collections.abc import Generator, Mapping, Sequence
+from collections.abc import Container, Generator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field
 from functools import partial
@@ -22,9 +22,11 @@ from tqdm import tqdm
 
 import lidarium
 from lidarium.agents.catalogue import source_of
+from lidarium.agents.policy import settings_for
 from lidarium.envs.floors.catalogue.names import is_file_name, load_floor
+from lidarium.evaluation.episodes.settings_identity import settings_sha256
 from lidarium.evaluation.processes import shared_out
-from lidarium.evaluation.suites.episodes_file import KEY, EpisodesFile, read_episodes
+from lidarium.evaluation.suites.episodes_file import FAILURES_FILE, KEY, EpisodesFile, read_episodes, read_failures
 from lidarium.evaluation.suites.suite import MOST_SUITE_BYTES, Suite, suite_of
 from lidarium.evaluation.suites.trial import Trial
 from lidarium.evaluation.suites.trial_run import RECORDS_FOLDER, RecordNotWrittenError, run_trial
@@ -89,9 +91,21 @@ class Campaign:
                         self.failures.append((trial, result))
                         continue
                     file.append(result)
+                    finished.add(trial.key)
                     self.done += 1
                     yield result
             file.check_in_place()
+            self._keep_failures(finished)
+
+    def _keep_failures(self, finished: Container[str]) -> None:
+        """Keep which episodes failed, for reports, until they finish."""
+        path = self.folder / FAILURES_FILE
+        found = {trial.key: f"{type(error).__name__}: {error}" for trial, error in self.failures}
+        left = {key: why for key, why in (read_failures(self.folder) | found).items() if key not in finished}
+        if left:
+            write_json(path, left)
+        else:
+            path.unlink(missing_ok=True)
 
     def _work(
         self, missing: Sequence[Trial], records: Path | None
@@ -269,20 +283,36 @@ def _check_same(episodes: list[dict[str, Any]], suite: Suite, folder: Path) -> N
             f"{folder} holds episodes that ended by the rule {kept.get('stop')}, this suite has "
             f"{suite.stop}; choose another folder"
         )
-    for floor, teams in kept.get("starts", {}).items():
-        if floor in suite.floors and suite.as_dict()["starts"].get(floor) != teams:
+    for floor in suite.floors:
+        if floor in kept.get("floors", ()) and asked["starts"].get(floor) != kept.get("starts", {}).get(floor):
             raise ValueError(f"{folder} holds episodes with other starts on {floor!r}; choose another folder")
 
 
 def _check_same_setups(episodes: list[dict[str, Any]], suite: Suite, folder: Path) -> None:
-    """Check that existing episodes are of the suite's options of policies, its stop rule and its starts."""
+    """Check that existing episodes are of the suite's settings, options of policies, stop rule and ways to start.
+
+    Folders of joined episodes have no file of their suite.
+    """
+    worlds: dict[tuple[str, str, int], str] = {}
     for episode in episodes:
-        if episode["policy"] in suite.policies and episode["variant"] in suite.variants:
-            setup = suite.setup_sha256(episode["policy"], episode["variant"])
-            if episode.get("setup_sha256", setup) != setup:
+        policy, variant, robots = episode["policy"], episode["variant"], episode["robots"]
+        if not (policy in suite.policies and variant in suite.variants):
+            continue
+        setup = suite.setup_sha256(policy, variant)
+        if episode.get("setup_sha256", setup) != setup:
+            raise ValueError(
+                f"{folder} holds episodes of {policy} with other options, rules to stop or ways to start; choose "
+                "another folder"
+            )
+        if robots in suite.robots:
+            asked = policy, variant, robots
+            if asked not in worlds:
+                settings = settings_for(suite.make_policy(policy), suite.settings(variant, robots))
+                worlds[asked] = settings_sha256(settings)
+            if episode.get("settings_sha256", worlds[asked]) != worlds[asked]:
                 raise ValueError(
-                    f"{folder} holds episodes of {episode['policy']} with other options, rules to stop or ways to "
-                    "start; choose another folder"
+                    f"{folder} holds episodes of {policy} in variant {variant!r} with other settings; choose another "
+                    "folder"
                 )
 
 

@@ -30,6 +30,19 @@ TIMINGS = ("decision_ms", "tick_ms", "steps_per_s", "wall_s", "peak_mb")
 """Keys that differ between two runs of the same episode."""
 
 
+FAILURES_FILE = "failed.json"
+"""Errors of the episodes that failed in the last call, by their keys."""
+
+
+def read_failures(folder: Path) -> dict[str, str]:
+    """Return the errors of episodes that failed, and have not finished since, by their keys."""
+    try:
+        found = json.loads(read_bytes(folder / FAILURES_FILE))
+    except (OSError, ValueError):  # none, or no file of ours
+        return {}
+    return {str(key): str(why) for key, why in found.items()} if isinstance(found, dict) else {}
+
+
 def read_episodes(path: Path) -> list[dict[str, Any]]:
     """Read all episodes of a file, in its order; none if there is no file."""
     return _parsed(path)[0]

@@ -12,18 +12,26 @@ def drawn_starts(
 ) -> list[list[float]] | None:
     """Draw start poses on a floor that has starts of its own.
 
-    None on other floors, if a reset draws by the seed.
+    None on other floors, if a reset draws by the seed, and if the settings ask for the floor's starts.
     """
     from lidarium.envs.floors.catalogue.names import load_floor
     from lidarium.envs.floors.starts import draw_starts
     from lidarium.envs.simulation.kernels.floor_cache import floor_tables
 
     loaded = load_floor(floor, image_resolution)
-    if not len(loaded.starts):
+    if settings.starts == "fixed" or not len(loaded.starts):
         return None
     tables = floor_tables(loaded, settings.raster_resolution, settings.lidar.height, settings.robot.height)
     drawn = draw_starts(tables.body, settings.robot.radius, settings.robots, np.random.default_rng(seed))
     return [[float(number) for number in start] for start in drawn]
+
+
+def starts_for(
+    floor: str, settings: ExplorationSettings, seed: int, image_resolution: float | None = None
+) -> list[list[float]]:
+    """Return the start poses of an episode of a suite: drawn, or the floor's if the settings ask for them."""
+    where = floor, settings, seed, image_resolution
+    return drawn_starts(*where) or starts_in(*where)
 
 
 def starts_in(

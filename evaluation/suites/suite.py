@@ -211,6 +211,8 @@ class Suite:
                 raise ValueError(f"the suite has starts on {floor!r}, which is not among its floors")
             if single_floors(floor) != (floor,):
                 raise ValueError(f"the suite has starts on {floor!r}, which are many; want them for each of its floors")
+            if not given:
+                raise ValueError(f"the suite has no starts on {floor!r}; want at least one team of them, or no entry")
             for team in given:
                 if len(team) < max(self.robots) or any(len(start) != 3 for start in team):
                     raise ValueError(

@@ -37,7 +37,7 @@ def execute(command: _Bound) -> Answer:
     from lidarium.envs.settings.making import make_settings
     from lidarium.evaluation.bounds.bound import known_floor_bound
     from lidarium.evaluation.drawing.bound_picture import save_bound_picture
-    from lidarium.evaluation.suites.starts import drawn_starts, starts_in
+    from lidarium.evaluation.suites.starts import starts_for
     from lidarium.mapping.files.output import write_json
 
     if command.out is not None:
@@ -49,8 +49,13 @@ def execute(command: _Bound) -> Answer:
         raise ValueError(f"rounds is {command.rounds}; want zero or more")
     options = {**command.team_options, "robots": command.robots, "stop_coverage": command.coverage}
     settings = make_settings(**options)
-    where = command.floor, settings, command.seed, command.resolution
-    starts = drawn_starts(*where) or starts_in(*where)
+    for option, asked, given in (
+        ("--robots", command.robots, settings.robots),
+        ("--coverage", command.coverage, settings.stop_coverage),
+    ):
+        if given != asked:
+            raise ValueError(f"--set gives another value, {given}, than {option}, {asked}; want {option} alone")
+    starts = starts_for(command.floor, settings, command.seed, command.resolution)
     floor = load_floor(command.floor, command.resolution)
     found = known_floor_bound(floor, settings, starts, command.rounds, command.seed)
     is_found = math.isfinite(found.time_s)

@@ -12,7 +12,7 @@ from lidarium.envs.settings.making import make_settings
 from lidarium.evaluation.bounds.bound import known_floor_bound
 from lidarium.evaluation.processes import shared_out
 from lidarium.evaluation.suites.episodes_file import KEY, EpisodesFile, read_episodes
-from lidarium.evaluation.suites.starts import drawn_starts, starts_in
+from lidarium.evaluation.suites.starts import starts_for
 from lidarium.evaluation.suites.suite import Suite
 from lidarium.mapping.files.output import write_json
 
@@ -158,7 +158,6 @@ class Bounded(Task):
 def measure_bound(team: Bounded) -> dict[str, Any]:
     """Return what a team needs that knows the floor, None if it cannot see 99 %."""
     settings = make_settings(robots=team.robots, **team.settings)
-    starts = drawn_starts(team.floor, settings, 0) or starts_in(team.floor, settings, 0)
-    bound = known_floor_bound(team.floor, settings, starts)
+    bound = known_floor_bound(team.floor, settings, starts_for(team.floor, settings, 0))
     known = bound.time_s if math.isfinite(bound.time_s) else None
     return {"floor": team.floor, "robots": team.robots, "known_s": known}

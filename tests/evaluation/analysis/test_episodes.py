@@ -46,6 +46,19 @@ def test_an_episode_that_is_there_twice_is_counted_once_and_told(rows, directory
     )
 
 
+def test_an_episode_under_two_names_of_a_floor_or_with_a_record_is_counted_once(rows, directory_of):
+    again = changed(rows[0], key="the same floor by another name", record=None)
+    assert len(read_episodes(directory_of([rows[0], again])).rows) == 1
+
+
+def test_episodes_that_failed_are_told(rows, directory_of):
+    folder = directory_of(rows)
+    (folder / "failed.json").write_text(json.dumps({"default | clinic": "ValueError: no"}))
+    assert read_episodes(folder).warnings == (
+        "1 episodes failed and are missing, first default | clinic: ValueError: no.",
+    )
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [
@@ -65,6 +78,7 @@ def test_an_episode_that_is_there_twice_is_counted_once_and_told(rows, directory
         ({"path_m": 3.0}, "line 3 has path_m 3.0"),
         ({"robots": True}, "line 3 has robots True"),
         ({"t99_s": -1.0}, "line 3 has t99_s -1.0; want seconds or null"),
+        ({"bound_s": "soon"}, "line 3 has bound_s 'soon'; want seconds or null"),
     ],
 )
 def test_what_does_not_belong_together_is_refused_and_named(rows, directory_of, change, message):

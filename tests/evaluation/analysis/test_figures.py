@@ -96,6 +96,22 @@ def test_the_median_is_of_those_that_have_a_bound(row):
     assert found.gap.estimate == pytest.approx((1 / 3 + 3 / 4 + 4 / 5) / 3)
 
 
+def test_a_run_that_missed_within_a_horizon_below_its_bound_has_no_gap(row):
+    found = over_bound([row(t99_s=30.0, bound_s=20.0), row(t99_s=None, bound_s=150.0)], 100.0)
+    assert found.gap is None
+    assert over_bound([row(t99_s=130.0, bound_s=120.0)], 140.0).gap is not None
+
+
+def test_the_order_of_runs_that_were_cut_is_not_known(row):
+    """A run that was cut after 20 s is later than one of 15 s, and neither sooner nor later than one of 50 s."""
+    cut = [row("b", seed, time_s=20.0, ended_because={"robot_0": "stop_rule"}) for seed in range(12)]
+    for time_s, losses in ((50.0, 0), (15.0, 12)):
+        (group,) = grouped([*(row("a", seed, t99_s=time_s, t90_s=time_s) for seed in range(12)), *cut])
+        found = next(each for each in compared(group, (), "b", seed=0) if each.key == "t99_s")
+        assert found.wilcoxon.less == losses
+        assert (found.improvement is None) == (losses == 0)
+
+
 def test_without_bounds_there_is_none(row):
     assert over_bound([row(t99_s=30.0)], 100.0) is None
     assert over_bound([], 100.0) is None

@@ -55,6 +55,11 @@ def test_a_run_that_a_rule_or_a_smaller_share_ended_is_censored_then(row, reason
     assert times_to([{**ended, "t99_s": 18.0}], "t99_s", 100.0).cut == 0
 
 
+def test_a_run_up_to_a_horizon_of_no_whole_number_of_steps_was_not_cut_before_it(row):
+    found = times_to([row(time_s=200.0, horizon_s=200.04)], "t99_s", 200.04)
+    assert (found.times.tolist(), found.cut) == ([200.04], 0)
+
+
 def test_pairs_share_floor_starts_and_seed(row):
     ours = [row("a", 0), row("a", 1), row("a", 2, starts=[[0.0, 1.0, 0.0]])]
     theirs = [row("b", 2, starts=[[5.0, 1.0, 0.0]]), row("b", 1), row("b", 0, floor="office:3000000")]

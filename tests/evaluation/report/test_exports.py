@@ -36,6 +36,12 @@ def test_marl_eval_has_the_floors_that_all_policies_have(rows):
     assert times == {"a_b": 1, "c": 1}
 
 
+def test_marl_eval_has_no_seed_that_a_policy_lacks(rows):
+    (group,) = grouped([row for row in rows if row["policy"] == "c" or row["seed"] == 0])
+    (algorithms,) = marl_eval([group], values_of(rows))["lidarium"].values()
+    assert {policy: set(runs) for policy, runs in algorithms.items()} == {"a_b": {"seed_0"}, "c": {"seed_0"}}
+
+
 def test_the_table_in_latex_has_a_line_for_each_policy(rows):
     (group,) = grouped(rows)
     figures = {policy: time_figure(runs, "t99_s", group.horizon_s, 0) for policy, runs in group.runs.items()}

@@ -236,6 +236,15 @@ def test_clusters_of_one_change_nothing():
     assert median_interval(values, clusters=np.arange(40)) == median_interval(values)
 
 
+def test_a_median_after_the_horizon_has_a_lower_end_with_clusters_too():
+    """Of 40 floors with three runs each a little less than half were in time."""
+    times = np.concatenate([np.linspace(300.0, 1700.0, 58), np.full(62, np.inf)])
+    np.random.default_rng(5).shuffle(times)
+    alone, within = median_interval(times), median_interval(times, clusters=np.repeat(np.arange(40), 3))
+    assert alone.estimate == within.estimate == within.high == np.inf
+    assert within.low == pytest.approx(alone.low, abs=150.0)
+
+
 def held_by(interval, trials=400):
     """Return the share of trials in which the interval of clustered values holds their mean or median, 0."""
     generator, hits = np.random.default_rng(3), 0

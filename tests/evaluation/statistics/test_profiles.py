@@ -36,7 +36,15 @@ def test_shares_of_runs_with_at_least_a_score():
     assert (low <= share).all()
     assert (high >= share).all()
     ends = share_interval(3, 4)
-    assert (low[1], high[1]) == (ends.low, ends.high)
+    assert (low[1], high[1]) == pytest.approx((ends.low, ends.high))
+
+
+def test_scores_of_a_cluster_that_are_the_same_count_as_one():
+    scores = np.array([0.2, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 1.0])
+    alone = score_profile(scores, [0.55])
+    often = score_profile(np.repeat(scores, 5), [0.55], clusters=np.repeat(np.arange(8), 5))
+    assert often == pytest.approx(alone)
+    assert (score_profile(np.repeat(scores, 5), [0.55])[1] > alone[1]).all()
 
 
 @pytest.mark.parametrize(

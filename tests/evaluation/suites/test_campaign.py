@@ -151,10 +151,20 @@ def test_a_trial_that_fails_is_told_and_the_others_run(tmp_path):
         suite(policies=("nearest_frontier",), seeds=(0,), starts={"apartment": (free, solid)}), tmp_path
     )
     assert [line["starts"][0] for line in campaign.run()] == [[round(number, 6) for number in free[0]]]
-    assert [(trial.start, type(error)) for trial, error in campaign.failures] == [(1, ValueError)]
+    ((failed, error),) = campaign.failures
+    assert (failed.start, type(error)) == (1, ValueError)
+    assert json.loads((tmp_path / "failed.json").read_text()) == {failed.key: f"ValueError: {error}"}
     moved = suite(policies=("nearest_frontier",), seeds=(0,), starts={"apartment": (solid,)})
     with pytest.raises(ValueError, match="other starts on 'apartment'"):
         list(Campaign(moved, tmp_path).run())
+
+
+def test_an_error_is_forgotten_when_its_episode_finishes(folder, tmp_path):
+    shutil.copytree(folder, tmp_path / "copy")
+    done = read_episodes(folder / "episodes.jsonl")[0]["key"]
+    (tmp_path / "copy" / "failed.json").write_text(json.dumps({done: "ValueError: no"}))
+    list(Campaign(suite(), tmp_path / "copy").run())
+    assert not (tmp_path / "copy" / "failed.json").exists()
 
 
 def test_a_rule_stops_an_episode_and_says_so():
@@ -225,3 +235,13 @@ def test_without_the_file_of_the_suite_rows_tell_of_another_rule(folder, tmp_pat
     (tmp_path / "copy" / "suite.json").unlink()
     with pytest.raises(ValueError, match="holds episodes of nearest_frontier with other options, rules to stop"):
         list(Campaign(suite(stop={"decisions": 1}), tmp_path / "copy").run())
+    other = suite(variants={"default": {"horizon_s": 60.0, "resolution": 0.05, "realism": "field"}})
+    with pytest.raises(ValueError, match="of nearest_frontier in variant 'default' with other settings"):
+        list(Campaign(other, tmp_path / "copy").run())
+
+
+def test_given_starts_are_not_taken_for_drawn_ones(folder, tmp_path):
+    shutil.copytree(folder, tmp_path / "copy")
+    given = {"apartment": (((2.5, 4.0, 0.0), (3.5, 4.0, 0.0)),)}
+    with pytest.raises(ValueError, match="other starts on 'apartment'"):
+        list(Campaign(suite(starts=given), tmp_path / "copy").run())

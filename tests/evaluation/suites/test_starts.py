@@ -4,8 +4,9 @@ import numpy as np
 from small_pictures import RESOLUTION, save_room
 
 from lidarium.envs.faces.parallel import ExplorationEnv
+from lidarium.envs.floors.catalogue.names import load_floor
 from lidarium.envs.settings.making import make_settings
-from lidarium.evaluation.suites.starts import drawn_starts, starts_in
+from lidarium.evaluation.suites.starts import drawn_starts, starts_for, starts_in
 
 SETTINGS = make_settings(robots=2, resolution=0.05)
 
@@ -16,6 +17,13 @@ def test_starts_are_drawn_by_the_seed_and_fit():
     env = ExplorationEnv("apartment", SETTINGS)
     env.reset(seed=0, options={"starts": np.array(first)})
     assert env.world.starts.tolist() == first
+
+
+def test_the_starts_of_the_floor_are_taken_if_the_settings_ask_for_them():
+    settings = make_settings(robots=2, resolution=0.05, starts="fixed")
+    assert drawn_starts("apartment", settings, 3) is None
+    assert starts_for("apartment", settings, 3) == load_floor("apartment").starts[:2].tolist()
+    assert starts_for("apartment", SETTINGS, 3) == drawn_starts("apartment", SETTINGS, 3)
 
 
 def test_on_a_floor_without_starts_of_its_own_the_reset_draws(tmp_path):

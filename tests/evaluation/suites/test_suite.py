@@ -120,6 +120,7 @@ def test_given_starts_are_taken_in_place_of_drawn_ones(tmp_path):
         ({"variants": {"a": {"robots": 3}}}, "leave it out"),
         ({"variants": {"a": {"speed": 3}}}, "variant 'a'"),
         ({"starts": {"clinic": ()}}, "not among its floors"),
+        ({"starts": {"apartment": ()}}, "no starts on 'apartment'; want at least one team"),
         ({"starts": {"apartment": (((1.0, 1.5, 0.0),),)}, "robots": (2,)}, "at least 2"),
     ],
 )

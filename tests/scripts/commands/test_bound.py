@@ -49,6 +49,12 @@ def test_options_of_policies_are_refused(option, capsys):
     assert "no policy drives in a bound" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(("change", "option"), [("robots=2", "--robots"), ("stop_coverage=0.5", "--coverage")])
+def test_what_has_an_option_is_not_set_besides(change, option, capsys):
+    assert main(["bound", "apartment:3", "--set", change]) == 2
+    assert f"want {option} alone" in capsys.readouterr().err
+
+
 def test_a_plain_image_is_a_floor_with_a_resolution(tmp_path, capsys):
     pytest.importorskip("ortools", reason="OR-Tools is not installed")
     room = np.zeros((40, 40), np.uint8)

@@ -25,7 +25,7 @@ export type OfFloor = { runs: number; coverage_percent: number } & Record<
 
 export type Group = {
   title: string; settings: string; robots: number; floor_set: string; floors: string[]; horizon_s: number;
-  over_bound: Record<string, { ratio: Interval; gap: Interval } | null>;
+  over_bound: Record<string, { ratio: Interval; gap: Interval | null } | null>;
   times: Record<TimeKey, Record<string, TimeFigure>>;
   values: Record<string, Record<string, ValueFigure>>;
   comparisons: Comparison[];
