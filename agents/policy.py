@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.agents.report import GivenUp, PolicyReport, TeamMaps
+from lidarium.envs.faces.conventions import MASK, PLAIN, Conventions
 from lidarium.envs.faces.parallel import ExplorationEnv, Observation
 from lidarium.envs.faces.team import EpisodeTeam
 from lidarium.envs.levels import LEVELS
@@ -22,6 +23,12 @@ from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.mapping.merging.fusion import FusedMap
 
 _DONE = (DriveState.ARRIVED, DriveState.NO_PATH, DriveState.BLOCKED)
+
+_OWN = {"frontier": ("frontiers", MASK), "tour": ("tours", MASK)}
+"""Observations that levels show whatever ``settings.observe`` has."""
+
+_HINTS = {"depth": ", with a depth camera: camera='xtion_tilted'", "teammates": ", with two robots or more"}
+"""What observations need besides, for messages."""
 
 Action = NDArray[np.float32] | Target | Route | int | Stop | Order | None
 
@@ -112,7 +119,10 @@ class Policy(ABC):
     shares_map : bool
         Whether the robots plan on the team's map, if it reaches them, or on their own.
     observes : tuple of str
-        The observations that it reads, of ``settings.observe``; a run checks it before the first step.
+        The observations that it reads, of ``settings.observe`` or of its level, as ``action_mask``; a run checks it
+        before the first step.
+    name : str
+        Its name in messages; that of its class by default.
     decision_period_s : float or None
         How often it decides at the level of waypoints [s]; None for as often as the settings say.
     predicts : bool
@@ -123,6 +133,7 @@ class Policy(ABC):
     shares_map: bool = True
     predicts: bool = False
     observes: tuple[str, ...] = ()
+    name: str = ""
     decision_period_s: float | None = None
 
     @abstractmethod
@@ -139,7 +150,8 @@ class Policy(ABC):
         Raises
         ------
         ValueError
-            If the environment's level cannot carry out the policy's actions, or robots lack an observation for it.
+            If the environment's level cannot carry out the policy's actions, robots lack an observation for it, or
+            observations have a form of trainers that it does not read.
         """
 
     @abstractmethod
@@ -196,7 +208,7 @@ def _checked(reset: Callable[..., None]) -> Callable[..., None]:
     def checked(policy: Policy, team: Any, seed: int = 0) -> None:  # noqa: ANN401
         team = getattr(team, "unwrapped", team)
         if isinstance(team, ExplorationEnv):
-            team = EpisodeTeam(team.engine)
+            team = EpisodeTeam(team.engine, conventions=team.conventions)
         level = getattr(team, "level", policy.level)
         if level != policy.level and policy.level not in LEVELS[level].carries:
             raise ValueError(
@@ -204,7 +216,7 @@ def _checked(reset: Callable[..., None]) -> Callable[..., None]:
                 f"{level!r} does not carry out; want level={policy.level!r}"
             )
         if (settings := getattr(team, "settings", None)) is not None:
-            check_observed(policy, type(policy).__name__, settings.observe)
+            check_observed(policy, _name_of(policy), settings.observe, getattr(team, "conventions", PLAIN))
         if policy.predicts and isinstance(team, EpisodeTeam):
             team.show_predictions()
         policy._driven = team
@@ -284,20 +296,34 @@ class _Pace:
         return actions
 
 
-def check_observed(policy: Policy, name: str, observe: Sequence[str]) -> None:
-    """Check that robots observe everything that a policy reads."""
+def _name_of(policy: Policy) -> str:
+    return policy.name or type(policy).__name__
+
+
+def check_observed(policy: Policy, name: str, observe: Sequence[str], conventions: Conventions = PLAIN) -> None:
+    """Check that robots observe everything that a policy reads, in the form in which it does."""
     missing = _missing(policy, observe)
     if missing:
-        camera = ", with a depth camera: camera='xtion_tilted'" if "depth" in missing else ""
+        hints = "".join(_HINTS.get(each, "") for each in missing)
         raise ValueError(
-            f"{name} needs {', '.join(missing)}, which the robots do not observe; add to settings.observe{camera}"
+            f"{name} needs {', '.join(missing)}, which the robots do not observe; add to settings.observe{hints}"
+        )
+    if policy.observes and conventions.observation != PLAIN.observation:
+        raise ValueError(
+            f"{name} reads {', '.join(policy.observes)} by name, and observation is {conventions.observation!r}; "
+            f"want observation={PLAIN.observation!r}"
+        )
+    place = conventions.action_mask
+    if (place == "beside" and policy.observes) or (place == "infos" and MASK in policy.observes):
+        raise ValueError(
+            f"{name} reads {', '.join(policy.observes)} of an observation, and action_mask is {place!r}; "
+            f"want action_mask={PLAIN.action_mask!r}"
         )
 
 
 def _missing(policy: Policy, observe: Sequence[str]) -> tuple[str, ...]:
-    """Return the observables that a policy reads and robots lack; the level of frontiers always shows its own."""
-    shown = ("frontiers", "action_mask") if policy.level == "frontier" else ()
-    return tuple(each for each in policy.observes if each not in (*observe, *shown))
+    """Return the observables that a policy reads and robots lack; its level always shows its own."""
+    return tuple(each for each in policy.observes if each not in (*observe, *_OWN.get(policy.level, ())))
 
 
 def settings_for(policy: Policy, settings: ExplorationSettings) -> ExplorationSettings:
@@ -306,9 +332,11 @@ def settings_for(policy: Policy, settings: ExplorationSettings) -> ExplorationSe
     Raises
     ------
     ValueError
-        If they lack a sensor for it; the message tells how to add it.
+        If they lack a sensor for it, or teammates; the message tells how to add it.
     """
     missing = _missing(policy, settings.observe)
+    if "teammates" in missing and settings.robots == 1:
+        raise ValueError(f"policy {_name_of(policy)} wants two robots or more; robots is 1")
     return replace(settings, observe=(*settings.observe, *missing)) if missing else settings
 
 

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from lidarium.agents.policy import Action, Policy, Team
-from lidarium.agents.zoo.network import NETWORKS, OBSERVED, network_shapes
+from lidarium.agents.zoo.network import MASK, NETWORKS, OBSERVED, network_shapes
 from lidarium.envs.faces.parallel import Observation
 from lidarium.mapping.files.weight_files import WeightFiles
 
@@ -31,7 +31,8 @@ class ZooTeam(Policy):
 
     def __init__(self, name: str, weights: str | Path = "", level: str = "frontier") -> None:
         self.level = level
-        self.observes = OBSERVED[level][1:]  # the level adds the options
+        self.name = f"zoo:{name}"
+        self.observes = (*OBSERVED[level][1:], MASK)  # the level adds the options and the mask
         self._network = NETWORKS[level](zoo_files(name, level).load(weights))
 
     def reset(self, team: Team, seed: int = 0) -> None:

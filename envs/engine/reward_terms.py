@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.envs.observing.rows import Rows, check_finite
+from lidarium.mapping.geometry.bounds import shown
 from lidarium.registry import Registry
 
 
@@ -48,14 +49,7 @@ class _FunctionTerm:
 
     def amounts(self, rows: Rows) -> NDArray[np.float64]:
         """Return the values of the function."""
-        amounts = np.asarray(self._function(rows), np.float64)
-        wanted = (rows.robots * rows.episodes,)
-        if amounts.shape != wanted:
-            raise ValueError(
-                f"the reward term {self._function.__name__!r} has shape {amounts.shape}; want {wanted}: a "
-                "number for each row = episode * robots + robot"
-            )
-        return amounts
+        return self._function(rows)
 
 
 def reward_term(
@@ -242,9 +236,25 @@ class ExtraTerms:
         Raises
         ------
         ValueError
-            If an amount is not finite.
+            If amounts are not a finite number for each row.
         """
-        earned = {name: weight * term.amounts(self._rows) for name, (weight, term) in self._terms.items()}
+        earned = {
+            name: weight * self._checked(name, term.amounts(self._rows)) for name, (weight, term) in self._terms.items()
+        }
         for name, amounts in earned.items():
             check_finite("reward term", name, amounts, self._rows)
         return earned
+
+    def _checked(self, name: str, amounts: Any) -> NDArray[np.float64]:  # noqa: ANN401
+        """Return what a term has returned as an array of a number for each row."""
+        wanted = (self._rows.robots * self._rows.episodes,)
+        try:
+            numbers = np.asarray(amounts, np.float64)
+        except (TypeError, ValueError) as error:
+            raise ValueError(f"the reward term {name!r} is {shown(amounts)}; want numbers of shape {wanted}") from error
+        if numbers.shape != wanted:
+            raise ValueError(
+                f"the reward term {name!r} has shape {numbers.shape}; want {wanted}: a number for each row = "
+                "episode * robots + robot"
+            )
+        return numbers

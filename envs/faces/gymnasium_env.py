@@ -75,6 +75,11 @@ class SoloExploration(gymnasium.Env[Observation, Any]):
         observations, rewards, terminations, truncations, infos = self.parallel.step({AGENT: action})
         return observations[AGENT], rewards[AGENT], terminations[AGENT], truncations[AGENT], infos[AGENT]
 
+    @property
+    def drawn(self) -> dict[str, Any]:
+        """The values that were drawn for this episode, by name; empty if no settings are drawn."""
+        return getattr(self.parallel, "drawn", {})
+
     def action_masks(self) -> NDArray[np.bool_]:
         """Return which actions may be chosen now, (frontiers + 1,), as sb3-contrib's MaskablePPO asks for.
 

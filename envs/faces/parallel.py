@@ -406,17 +406,17 @@ class ExplorationEnv(ParallelEnv[str, Any, Any]):
         return self.station.forget_walls(self._row(agent), trail)
 
     def action_masks(self, agent: str) -> NDArray[np.bool_]:
-        """Return which actions an agent may choose now, (actions,).
+        """Return which actions an agent may choose now, (actions,); one that has ended may only stay.
 
         Raises
         ------
         AttributeError
             If the level has no mask.
         """
-        masks = self.engine.observations.get("action_mask")
+        masks = self._rows.masks
         if masks is None:
             raise AttributeError("action_masks are there at the level of frontiers only; use level='frontier'")
-        return np.asarray(masks[self._row(agent)] != 0)
+        return np.asarray(masks[self._row(agent)])
 
     def _row(self, agent: str) -> int:
         if agent not in self._index:

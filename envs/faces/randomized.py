@@ -9,6 +9,7 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from lidarium.envs.engine.team_state import ROBOT_NUMBERS, state_space, team_state
+from lidarium.envs.faces.conventions import MASK
 from lidarium.envs.faces.team import EpisodeTeam
 from lidarium.envs.faces.team_rows import TeamRows
 from lidarium.envs.faces.wrapper import TeamWrapper
@@ -168,7 +169,8 @@ class RandomizedRows:
 
     Kernels have one choice of settings, so each episode is an engine of its own, and they are stepped one after the
     other. An episode is that of a `RandomizedTeam` with the same seed, to the bit. If the size of teams is drawn, each
-    episode has rows for the largest team; rows of robots that it lacks are never active, and hold zeros.
+    episode has rows for the largest team; rows of robots that it lacks are never active, and hold zeros, with a mask
+    that allows them to stay alone.
 
     Parameters
     ----------
@@ -214,6 +216,7 @@ class RandomizedRows:
             largest = make(self._draws.settings_of({**self.drawn[0], ROBOTS: self.robots}), 0)
         self.settings = largest.engine.settings
         self.space, self.action_space, self.columns = largest.space, largest.action_space, largest.columns
+        self._absent = zeros_of(self.space, self.columns)
         self._generators: list[np.random.Generator | None] = [None] * self.episodes
         self._is_ready = np.zeros(self.episodes, np.bool_)
         self._begun = 0
@@ -338,14 +341,14 @@ class RandomizedRows:
     @property
     def observations(self) -> Any:  # noqa: ANN401
         """The observations of all rows."""
-        return _joined([self._whole(part.observations, self.space) for part in self.parts])
+        return _joined([self._whole(part.observations, self._absent) for part in self.parts])
 
     def observation(self, row: int) -> Any:  # noqa: ANN401
         """Return the observation of one row, its own arrays."""
         episode, robot = divmod(row, self.robots)
         part = self.parts[episode]
         if robot >= part.robots:
-            return zeros_of(self.space)
+            return copy.deepcopy(self._absent)
         found = part.observation(robot)
         return padded(found, self.space) if self._pads else found
 
@@ -355,20 +358,24 @@ class RandomizedRows:
         infos = [
             {name: self._padded_info(values, part.rows) for name, values in part.infos.items()} for part in self.parts
         ]
-        return _joined_infos(infos, self.robots)
+        found = _joined_infos(infos, self.robots)
+        if MASK in found:
+            found[MASK][~self._exists, -1] = 1
+            found[f"_{MASK}"] = np.ones(self.rows, np.bool_)
+        return found
 
     def _padded_info(self, values: Any, rows: int) -> Any:  # noqa: ANN401
         if isinstance(values, Mapping):
             return {name: self._padded_info(each, rows) for name, each in values.items()}
         return _longer(values, self.robots) if rows < self.robots else values
 
-    def _whole(self, seen: Any, space: spaces.Space[Any]) -> Any:  # noqa: ANN401
+    def _whole(self, seen: Any, absent: Any) -> Any:  # noqa: ANN401
         """Return the observations of an episode with rows for the largest team."""
         if not self._pads:
             return seen
-        if isinstance(space, spaces.Dict):
-            return {name: self._whole(seen[name], part) for name, part in space.spaces.items()}
-        whole = np.zeros((self.robots, *(space.shape or ())), space.dtype)
+        if isinstance(absent, Mapping):
+            return {name: self._whole(seen[name], part) for name, part in absent.items()}
+        whole = np.repeat(absent[None], self.robots, axis=0)
         whole[tuple(slice(size) for size in seen.shape)] = seen
         return whole
 
@@ -382,7 +389,7 @@ class RandomizedRows:
         if masks[0] is None:
             return None
         found = self._together([each for each in masks if each is not None])
-        found[~self._exists, -1] = True  # robots that a team lacks can only stay
+        found[~self._exists, -1] = True  # as in observations
         return found
 
     def states(self, episodes: NDArray[np.int64] | None = None) -> NDArray[np.float32]:
@@ -500,8 +507,18 @@ def _padded_state(state: NDArray[np.float32], robots: int, space: spaces.Box) ->
     return np.concatenate([state[:own], lacking, state[own:]])
 
 
-def zeros_of(space: spaces.Space[Any]) -> Any:  # noqa: ANN401
-    """Return an observation of zeros."""
+def zeros_of(space: spaces.Space[Any], columns: tuple[tuple[str, int, int], ...] = ()) -> Any:  # noqa: ANN401
+    """Return the observation of an absent robot: zeros, with a mask that allows it to stay alone.
+
+    ``columns`` are those of the flat form, in which a mask may be.
+    """
     if isinstance(space, spaces.Dict):
-        return {name: zeros_of(part) for name, part in space.spaces.items()}
-    return np.zeros(space.shape or (), space.dtype)
+        found = {name: zeros_of(part) for name, part in space.spaces.items()}
+        if MASK in found:
+            found[MASK][-1] = 1
+        return found
+    zeros = np.zeros(space.shape or (), space.dtype)
+    for name, _, last in columns:
+        if name == MASK:
+            zeros[last - 1] = 1
+    return zeros

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.envs.engine.engine import Engine
+from lidarium.envs.faces.conventions import PLAIN, Conventions
 from lidarium.envs.onboard.belief import Belief
 from lidarium.envs.onboard.radio.messages import DriveState, OperatingState, Order
 from lidarium.envs.onboard.station.reports import Report, Station
@@ -25,14 +26,23 @@ class EpisodeTeam:
         Which one. The first by default.
     observe : callable, optional
         Returns the observation of a row. Without it `observations` is not there.
+    conventions : Conventions, optional
+        The form of observations. That of a plain environment by default.
     """
 
-    def __init__(self, engine: Engine, episode: int = 0, observe: Callable[[int], Any] | None = None) -> None:
+    def __init__(
+        self,
+        engine: Engine,
+        episode: int = 0,
+        observe: Callable[[int], Any] | None = None,
+        conventions: Conventions = PLAIN,
+    ) -> None:
         if not 0 <= episode < engine.episodes:
             raise ValueError(f"episode is {episode}; want a number from 0 to {engine.episodes - 1}")
         self._engine = engine
         self._episode = episode
         self._observe = observe
+        self.conventions = conventions
         self._first = episode * engine.robots
         self._index = {agent: robot for robot, agent in enumerate(engine.settings.agents)}
 

@@ -42,7 +42,8 @@ class TeamRows:
 
     A robot that ends before its team is terminated once; its row then repeats its last observation with reward 0,
     and the info ``active`` is False. When the last robot of an episode ends, the rows that repeat are truncated. With
-    ``ended_agents="zeros"`` rows of ended robots have observations of zeros instead, and all end with the last one.
+    ``ended_agents="zeros"`` rows of ended robots have observations of zeros instead, with a mask that allows them to
+    stay alone, and all end with the last one.
 
     Parameters
     ----------
@@ -324,16 +325,14 @@ class TeamRows:
         if self.engine.copies or blanks:
             arrays = {name: array.copy() for name, array in arrays.items()}
         if blanks:
-            for array in arrays.values():
-                array[self._kept] = 0
+            _blank(arrays, self._kept)
         return dict(arrays) if self._is_plain else self._form.of(arrays, (self.rows,))
 
     def observation(self, row: int) -> Any:  # noqa: ANN401
         """Return the observation of one row, its own arrays."""
         arrays = {name: array[row].copy() for name, array in self._with_more().items()}
         if self._keeps and self._kept[row]:
-            for array in arrays.values():
-                array[...] = 0
+            _blank(arrays, ...)
         return self._form.of(arrays)
 
     def _with_more(self) -> Mapping[str, NDArray[Any]]:
@@ -363,8 +362,7 @@ class TeamRows:
         if self._form.has_mask_apart:
             masks = self.engine.observations[MASK].copy()
             if self._keeps:
-                masks[self._kept] = 0
-                masks[self._kept, -1] = 1
+                _blank({MASK: masks}, self._kept)
             infos = {**infos, MASK: masks, f"_{MASK}": everyone}
         return infos
 
@@ -412,9 +410,16 @@ class TeamRows:
 
     @property
     def masks(self) -> NDArray[np.bool_] | None:
-        """Which actions each row may choose now, (rows, actions); None if the level has no mask."""
+        """Which actions each row may choose now, (rows, actions); None if the level has no mask.
+
+        Robots that have ended may only stay.
+        """
         masks = self.engine.observations.get(MASK)
-        return None if masks is None else masks != 0
+        if masks is None:
+            return None
+        allowed = np.asarray(masks != 0)
+        _blank({MASK: allowed}, ~self.engine.live)
+        return allowed
 
     def states(self, episodes: NDArray[np.int64] | None = None) -> NDArray[np.float32]:
         """Return the true state of each team or of some episodes' teams, (episodes, numbers); see `team_state`."""
@@ -427,11 +432,19 @@ class TeamRows:
 
     def team(self, episode: int) -> EpisodeTeam:
         """Return the handle of an episode's team."""
-        return EpisodeTeam(self.engine, episode, self.observation)
+        return EpisodeTeam(self.engine, episode, self.observation, self.conventions)
 
     def close(self) -> None:
         """Release everything that the world holds beyond arrays."""
         self.engine.simulation.close()
+
+
+def _blank(arrays: Mapping[str, NDArray[Any]], rows: Any) -> None:  # noqa: ANN401
+    """Fill rows of observations with zeros; a mask allows to stay, since learners cannot draw from no action."""
+    for name, array in arrays.items():
+        array[rows] = 0
+        if name == MASK:
+            array[rows, -1] = 1
 
 
 def _check_agents(actions: Any, agents: Collection[str]) -> None:  # noqa: ANN401

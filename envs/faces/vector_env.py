@@ -40,6 +40,12 @@ class BatchFace:
             raise AttributeError("episodes with drawn settings have an engine each; see batch.parts")
         return self.batch.engine
 
+    @property
+    def drawn(self) -> list[dict[str, Any]]:
+        """The values that each episode has drawn, by name; empty if no settings are drawn."""
+        batch = self.batch
+        return batch.drawn if isinstance(batch, RandomizedRows) else [{} for _ in range(batch.episodes)]
+
     def team(self, episode: int) -> EpisodeTeam:
         """Return the handle of an episode's team, which policies ask; see ``Policy.reset``."""
         return self.batch.team(episode)
@@ -205,6 +211,7 @@ class ExplorationVectorEnv(BatchFace, VectorEnv[Any, NDArray[Any], NDArray[Any]]
         masked = {name: values & rows if name.startswith("_") else values for name, values in final.items()}
         return {
             **_of_both(final, self._infos(), rows),
+            ACTIVE: final[ACTIVE],  # of the step, as rewards are: it says which rows are left out of a loss
             "final_obs": last,
             "_final_obs": rows,
             "final_info": masked,

@@ -1,13 +1,14 @@
 """Which floor an episode takes: a named one, or one drawn from many."""
 
 import math
+import sys
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from lidarium.envs.floors.catalogue.names import is_file_name, load_floor, set_floors
+from lidarium.envs.floors.catalogue.names import check_floor, is_file_name, is_generated, load_floor, set_floors
 from lidarium.envs.floors.floor import Floor
 from lidarium.envs.floors.importers import FORMATS, is_floor, ros_map, takes_resolution
 from lidarium.mapping.geometry.bounds import shown
@@ -59,14 +60,22 @@ class FloorChoice:
         elif callable(floor):
             self._source, self.is_set = floor, True
         elif isinstance(floor, Mapping | Sequence) and len(floor):
-            self._specs, self.is_set = tuple(floor), True
             self._weights = _shares(floor) if isinstance(floor, Mapping) else None
+            self._specs, self.is_set = tuple(map(self._member, floor)), True
         else:
             raise ValueError(
                 f"floor is {shown(floor)}; want a name such as apartment, building:17 or set:train, a path, "
                 "a Floor, or many of them: a list, a folder, a mapping to weights, a callable"
             )
         self.has_goal = self._first_has_goal(floor)
+
+    def _member(self, floor: Any) -> Any:  # noqa: ANN401
+        """Return a floor of a list, or the choice that it is itself; one that is not there must not fail later."""
+        if self._holds_choices(floor):
+            return self.instead(floor)
+        if not isinstance(floor, Floor):
+            check_floor(floor)
+        return floor
 
     def _first_has_goal(self, floor: Floors) -> bool:
         """Whether the first floor has a goal.
@@ -75,9 +84,10 @@ class FloorChoice:
         """
         if self._source is not None or (isinstance(floor, str) and floor.startswith(SET_PREFIX)):
             return False
-        if isinstance(floor, str | Path | Floor):
-            return self._load(self._specs[0]).goal is not None
-        return FloorChoice(self._specs[0], self._resolution_of(self._specs[0])).has_goal
+        first = self._specs[0]
+        if isinstance(first, FloorChoice):
+            return first.has_goal
+        return not (isinstance(first, str) and is_generated(first)) and self._load(first).goal is not None
 
     def instead(self, floor: Floors) -> "FloorChoice":
         """Return the choice of another floor or of others.
@@ -88,17 +98,20 @@ class FloorChoice:
 
     def in_files(self) -> dict[str, str]:
         """Return the hashes of its floors in files, by the names of these."""
-        named = [spec for spec in self._specs if isinstance(spec, str | Path) and is_file_name(str(spec))]
-        return {str(spec): self._load(spec).sha256 for spec in named}
+        found: dict[str, str] = {}
+        for spec in self._specs:
+            if isinstance(spec, FloorChoice):
+                found |= spec.in_files()
+            elif isinstance(spec, str | Path) and is_file_name(str(spec)):
+                found[str(spec)] = self._load(spec).sha256
+        return found
 
     def load(self, generator: np.random.Generator) -> Floor:
         """Return the floor of the next episode."""
         if self._source is not None:
             return self.instead(self._source(generator)).load(generator)
         spec = self._specs[self._draw(generator)]
-        if self._holds_choices(spec):
-            return self.instead(spec).load(generator)
-        return self._load(spec)
+        return spec.load(generator) if isinstance(spec, FloorChoice) else self._load(spec)
 
     def _draw(self, generator: np.random.Generator) -> int:
         count = len(self._specs)
@@ -168,7 +181,9 @@ def _shares(weights: Mapping[Any, float]) -> np.ndarray[Any, np.dtype[np.float64
     """Return weights as shares of their sum."""
     for floor, weight in weights.items():
         is_number = isinstance(weight, int | float | np.number) and not isinstance(weight, bool)
-        if not (is_number and math.isfinite(weight) and weight > 0):
+        if not (is_number and 0 < weight <= sys.float_info.max):
             raise ValueError(f"the weight of floor {shown(floor)} is {shown(weight)}; want a positive number")
+    if not math.isfinite(total := sum(map(float, weights.values()))):
+        raise ValueError(f"the weights of the floors add up to {total}; want a finite sum")
     numbers = np.array([float(weight) for weight in weights.values()])
     return np.asarray(numbers / numbers.sum())

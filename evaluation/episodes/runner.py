@@ -120,7 +120,7 @@ def run_episode(
     """
     if not isinstance(env, ExplorationEnv):
         raise ValueError(f"env is a {type(env).__name__}; want an environment of `parallel_env` without randomize")
-    check_observed(policy, type(policy).__name__, env.settings.observe)
+    check_observed(policy, policy.name or type(policy).__name__, env.settings.observe, env.conventions)
     env.use_level(level or policy.level, policy.shares_map, policy.decision_period_s)
     env.perception.predicts |= policy.predicts  # before the first frame
     if plans_sparsely and env.driver is None:

@@ -23,7 +23,7 @@ from lidarium.envs.floors.catalogue.store import floor_store, hash_of_code
 from lidarium.envs.floors.floor import Floor, Solid
 from lidarium.envs.floors.free_space import measure_building, measure_reach
 from lidarium.envs.floors.generation.buildings import KINDS, BuildingSettings, generate_building
-from lidarium.envs.floors.importers import FORMATS, load_file
+from lidarium.envs.floors.importers import FORMATS, check_floor_file, load_file
 from lidarium.mapping.files.map_files import RESOLUTION
 from lidarium.mapping.geometry.bounds import shown
 
@@ -165,6 +165,19 @@ def is_generated(spec: str) -> bool:
     """
     prefix, colon, rest = spec.partition(":")
     return bool(colon) and prefix in GENERATORS and rest.isascii() and rest.isdigit()
+
+
+@lru_cache(maxsize=1 << 16)
+def check_floor(spec: str | Path) -> None:
+    """Check that there is a floor of a name or path, for `load_floor`; none is generated, and no file is loaded."""
+    if isinstance(spec, str) and (is_generated(spec) or spec in drawn_names()):
+        return
+    if is_file_name(spec):
+        check_floor_file(Path(spec))
+        return
+    collection = str(spec).partition(":")[0]
+    if collection not in COLLECTIONS or spec not in real_floors(collection):
+        _load_named(str(spec))  # says what is wrong with the name
 
 
 def set_floors(name: str) -> tuple[str, ...]:

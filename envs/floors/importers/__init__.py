@@ -104,10 +104,22 @@ def load_file(path: Path, resolution: float | None = None, **options: Any) -> Fl
             if unknown := sorted(set(options) - set(known.options)):
                 raise ValueError(f"{path} takes no {' or '.join(unknown)}; want {', '.join(known.options) or 'none'}")
             return known.load(path, resolution, **options)
+    raise _no_floor(path)
+
+
+def check_floor_file(path: Path) -> None:
+    """Check that a file is there and of a known format; it is not loaded."""
+    check_file(path)
+    if not is_floor(path):
+        raise _no_floor(path)
+
+
+def _no_floor(path: Path) -> ValueError:
+    """Return the error of a file that is of no known format."""
     if by_name := [name for name, known in FORMATS.items() if path.name.lower().endswith(known.suffixes)]:
-        raise ValueError(f"{path} has the content of no known floor format; want {' or '.join(by_name)}")
+        return ValueError(f"{path} has the content of no known floor format; want {' or '.join(by_name)}")
     suffixes = sorted({suffix for known in FORMATS.values() for suffix in known.suffixes})
-    raise ValueError(f"{path} is of no known floor format; want a file that ends in {', '.join(suffixes)}")
+    return ValueError(f"{path} is of no known floor format; want a file that ends in {', '.join(suffixes)}")
 
 
 def takes_resolution(path: Path) -> bool:

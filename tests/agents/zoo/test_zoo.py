@@ -122,10 +122,10 @@ def test_weights_of_another_network_are_refused(tmp_path):
         lidarium.policy("zoo:ppo-2", weights=path)
 
 
-def test_one_robot_alone_has_no_teammates_to_observe(tmp_path, capsys):
+def test_a_team_of_one_is_refused(tmp_path, capsys):
     arguments = ["run", "--policy", "zoo:ppo-2", "--robots", "1", "--out", str(tmp_path / "run")]
     assert main(arguments) == 2
-    assert "observe has 'teammates', which needs two robots or more" in capsys.readouterr().err
+    assert "policy zoo:ppo-2 wants two robots or more; robots is 1" in capsys.readouterr().err
     assert not (tmp_path / "run").exists()
 
 
@@ -141,3 +141,17 @@ def test_starts_of_a_reset_are_known_whatever_is_observed():
     plain = lidarium.make_settings(robots=2)
     shown = lidarium.make_settings(robots=2, observe=["frontier_gains", "teammates"])
     assert starts_in("apartment:7", shown, 3) == starts_in("apartment:7", plain, 3)
+
+
+@pytest.mark.parametrize("form", [{"observation": "flat"}, {"action_mask": "beside"}, {"action_mask": "infos"}])
+def test_forms_of_observations_that_it_does_not_read_are_refused(form):
+    options = {"level": "frontier", "robots": 2, "observe": ["frontier_gains", "teammates"], **form}
+    ((name, value),) = form.items()
+    words = rf"zoo:ppo-2 reads .*, and {name} is '{value}'; want {name}='"
+    env, batch = lidarium.parallel_env("scene_room", **options), lidarium.vector_env(1, "scene_room", **options)
+    env.reset(seed=0)
+    batch.reset(seed=0)
+    for team in (env, batch.team(0)):
+        with pytest.raises(ValueError, match=words):
+            lidarium.policy("zoo:ppo-2").reset(team)
+        lidarium.policy("nearest_frontier_own_map").reset(team)  # it reads beliefs

@@ -107,6 +107,33 @@ def test_a_function_of_another_shape_is_refused_by_name():
         REWARD_TERMS.unregister("odd")
 
 
+@pytest.mark.parametrize(
+    ("amounts", "words"),
+    [
+        (np.ones(1), r"the reward term 'odd' has shape \(1,\); want \(2,\)"),
+        (np.ones((2, 1)), r"the reward term 'odd' has shape \(2, 1\); want \(2,\)"),
+        (None, r"the reward term 'odd' has shape \(\); want \(2,\)"),
+        ("much", r"the reward term 'odd' is 'much'; want numbers of shape \(2,\)"),
+    ],
+)
+def test_amounts_that_are_no_number_for_each_row_are_refused_by_name(amounts, words):
+    class Odd:
+        def start(self, rows, episode):
+            pass
+
+        def amounts(self, rows):
+            return amounts
+
+    REWARD_TERMS.register("odd", Odd, "for tests")
+    try:
+        env = lidarium.parallel_env("scene_room", robots=2, reward={"more": {"odd": 1.0}}, starts="fixed")
+        env.reset(seed=0)
+        with pytest.raises(ValueError, match=words):
+            env.step(dict.fromkeys(env.agents, DRIVE))
+    finally:
+        REWARD_TERMS.unregister("odd")
+
+
 def test_shares_of_the_floor_add_up_to_what_the_team_has_seen():
     env = lidarium.parallel_env(
         "scene_room", robots=2, stop_coverage=None, reward={"area": 0.0, "more": {"floor_share": 1.0}}, starts="fixed"

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from conventional_teams import AHEAD, CLOSET, make, step
 
+import lidarium
+
 
 @pytest.mark.parametrize("level", ["velocity", "frontier"])
 def test_the_flat_form_holds_the_numbers_of_the_dict_form(level):
@@ -98,3 +100,38 @@ def test_a_share_of_the_reward_is_the_mean_of_the_team(share):
         for agent, reward in rewards.items():
             assert reward == pytest.approx((1 - share) * alone[agent] + share * mean)
             assert math.fsum(infos[agent]["reward_terms"].values()) == pytest.approx(reward)
+
+
+@pytest.mark.parametrize("place", ["inside", "beside", "infos"])
+@pytest.mark.parametrize("form", ["dict", "flat"])
+def test_the_mask_of_an_ended_robot_allows_to_stay_in_every_form(place, form):
+    env = lidarium.parallel_env(
+        "scene_room",
+        robots=2,
+        level="frontier",
+        frontiers=4,
+        observe=["time_left"],
+        observation=form,
+        action_mask=place,
+        ended_agents="zeros",
+        starts="fixed",
+    )
+    env.reset(seed=0)
+    env.stop("robot_0", "enough")
+    env.step(dict.fromkeys(env.agents, 4))
+    observations, *_, infos = env.step(dict.fromkeys(env.agents, 4))
+    assert env.action_masks("robot_0").tolist() == [False] * 4 + [True]
+    assert env.action_masks("robot_1").any()
+    seen = infos["robot_0"] if place == "infos" else observations["robot_0"]
+    if (place, form) == ("inside", "flat"):
+        ((first, last),) = (rest for name, *rest in env.columns("robot_0") if name == "action_mask")
+        seen = {"action_mask": seen[first:last]}
+    assert seen["action_mask"].tolist() == [0, 0, 0, 0, 1]
+
+
+def test_a_robot_that_has_left_may_only_stay():
+    env = lidarium.parallel_env("scene_room", robots=2, level="frontier", frontiers=4, starts="fixed")
+    env.reset(seed=0)
+    env.stop("robot_0", "enough")
+    env.step(dict.fromkeys(env.agents, 4))
+    assert env.action_masks("robot_0").tolist() == [False] * 4 + [True]

@@ -1,5 +1,6 @@
 """Batches whose episodes draw settings: each is the randomized team with the same seed."""
 
+import gymnasium
 import numpy as np
 import pytest
 from gymnasium.vector import AutoresetMode
@@ -108,3 +109,46 @@ def test_a_reset_that_fails_begins_no_episode():
         env.reset(seed=0, options={"starts": starts})
     with pytest.raises(RuntimeError, match="reset"):
         env.step(np.zeros((2, 2)))
+
+
+@pytest.mark.parametrize("place", ["inside", "beside", "infos"])
+@pytest.mark.parametrize("form", ["dict", "flat"])
+def test_robots_that_a_team_lacks_may_only_stay(place, form):
+    env = lidarium.vector_env(
+        1,
+        "scene_room",
+        randomize={"robots": [1, 2]},
+        **{**SMALL, "observe": ["time_left"], "starts": "fixed"},
+        level="frontier",
+        frontiers=4,
+        observation=form,
+        action_mask=place,
+    )
+    for seed in range(9):
+        observations, infos = env.reset(seed=seed)
+        if env.drawn[0]["robots"] == 1:
+            break
+    seen = infos if place == "infos" else observations
+    if (place, form) == ("inside", "flat"):
+        ((first, last),) = (rest for name, *rest in env.columns if name == "action_mask")
+        seen = {"action_mask": observations[:, first:last]}
+        assert env.batch.observation(1)[first:last].tolist() == [0, 0, 0, 0, 1]
+    assert seen["action_mask"][1].tolist() == [0, 0, 0, 0, 1]
+    assert env.batch.masks[1].tolist() == [False] * 4 + [True]
+    assert infos["active"].tolist() == [True, False]
+
+
+def test_faces_have_the_drawn_values():
+    options = {**SMALL, "randomize": NOISE}
+    batch, names = make(2), [set(NOISE)] * 2
+    batch.reset(seed=0)
+    assert list(map(set, batch.drawn)) == names
+    team = lidarium.parallel_env("scene_room", **options)
+    team.reset(seed=1)
+    assert batch.drawn[1] == team.drawn
+    solo = gymnasium.make("lidarium/Exploration-v1", floor="scene_room", **{**options, "robots": 1}).unwrapped
+    solo.reset(seed=1)
+    assert set(solo.drawn) == set(NOISE)
+    assert lidarium.vector_env(2, "scene_room", **SMALL).drawn == [{}, {}]
+    pytest.importorskip("stable_baselines3")
+    assert list(map(set, lidarium.sb3_vec_env(2, "scene_room", **options).drawn)) == names

@@ -88,3 +88,12 @@ def test_infos_of_episodes_that_go_on_are_those_of_the_step():
         np.testing.assert_array_equal(now["reward_terms"][name][2:], values[2:])
     assert now["reward_terms"]["time"].tolist() == [0.0, 0.0, -0.001, -0.001]
     np.testing.assert_array_equal(now["truth"]["coverage"][2:], wanted["truth"]["coverage"][2:])
+
+
+def test_the_step_that_ends_a_team_tells_which_robots_had_ended_before():
+    for mode in AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP:
+        env = lidarium.vector_env(1, "scene_room", autoreset_mode=mode, **OPTIONS, starts="fixed")
+        env.reset(seed=0)
+        env.team(0).stop("robot_0", "enough")
+        told = [env.step(np.zeros((2, 2), np.float32))[4]["active"].tolist() for _ in range(6)]
+        assert told == [[True, True], *[[False, True]] * 4, [True, True]]

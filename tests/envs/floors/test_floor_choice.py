@@ -93,6 +93,12 @@ def test_a_folder_of_no_floors_is_refused(tmp_path):
         ({"apartment": "often"}, "the weight of floor 'apartment' is 'often'"),
         ({"apartment": True}, "the weight of floor 'apartment' is True"),
         (["apartmnt"], "no floor called 'apartmnt', did you mean 'apartment'"),
+        (["apartment", "apartmnt"], "no floor called 'apartmnt', did you mean 'apartment'"),
+        ({"apartment": 1, "building:x": 1}, "floor 'building:x' has seed 'x'"),
+        (["apartment", "home:nix"], "no floor 'home:nix'"),
+        (["apartment", ["set:training"]], "no set called 'training', did you mean 'train'"),
+        (["apartment", 17], "floor is 17; want a name"),
+        ({"apartment": 1e308, "clinic": 1e308}, "the weights of the floors add up to inf; want a finite sum"),
     ],
 )
 def test_what_is_no_choice_of_floors_is_refused(floor, words):
@@ -110,3 +116,19 @@ def test_the_first_floor_says_whether_a_goal_is_observed():
         goals[env.floor.name] = observations["robot_0"]["goal"].tolist()
     assert goals["apartment"] == [0.0, 0.0]
     assert goals["srt_l_room"] != [0.0, 0.0]
+
+
+def test_floors_of_lists_are_looked_up_at_once_but_not_loaded(monkeypatch, folder):
+    loaded = []
+    monkeypatch.setattr("lidarium.envs.floors.floor_choice.load_floor", lambda *given: loaded.append(given))
+    FloorChoice(["building:1", "building:2", "home:17", folder / "room.yaml", "set:test"])
+    assert not loaded
+    with pytest.raises(FileNotFoundError, match=r"there is no file .*plan\.yaml"):
+        FloorChoice(["building:1", str(folder / "plan.yaml")])
+    with pytest.raises(ValueError, match=r"readme\.md is of no known floor format"):
+        FloorChoice({"building:1": 1, folder / "readme.md": 2})
+
+
+def test_files_of_nested_choices_are_hashed(folder):
+    found = FloorChoice(["building:1", [str(folder / "room.yaml")]]).in_files()
+    assert found == {str(folder / "room.yaml"): load_floor(folder / "room.yaml").sha256}
