@@ -33,7 +33,7 @@ def begin_folder(path: Path, settings: Mapping[str, Any], floors: Mapping[str, s
             raise ValueError(f"{folder} has files, and no training has written them; choose another folder")
         write_json(path, asked)
         return
-    with reading(path, "what a training was asked for"):
+    with reading(path, "what a training was asked for", "put a copy back, or choose another folder"):
         kept = flattened(dict(json.loads(read_text(path, MOST_BYTES))))
     asked = flattened(asked)
     for name in sorted({*kept, *asked}):

@@ -89,7 +89,7 @@ class FitSettings:
     most_regret : float, default 10.0
         Greater regrets count as this one [m].
     held_out : float, default 0.1
-        Share of the floors that are not fitted; the epoch that is best on them is kept.
+        Share of the floors that are not fitted, at least one; the epoch that is best on them is kept.
     correction_cost : float, default 0.001
         Cost of the square of a correction [1/m2]: without evidence tours remain as they are.
     """
@@ -99,7 +99,7 @@ class FitSettings:
     learning_rate: Annotated[float, above(0.0, 1.0)] = 3e-4
     weight_decay: Annotated[float, within(0.0, 10.0)] = 0.01
     most_regret: Annotated[float, above(0.0, 1000.0)] = 10.0
-    held_out: Annotated[float, share()] = 0.1
+    held_out: Annotated[float, share(has_minimum=False, has_maximum=False)] = 0.1
     correction_cost: Annotated[float, within(0.0, 10.0)] = 0.001
 
     def __post_init__(self) -> None:
@@ -310,10 +310,7 @@ class TeamSettings:
             )
         if self.supervisor is not None and self.algorithm != "ppo":
             raise ValueError(f"algorithm of a team under a supervisor is {self.algorithm!r}; want ppo")
-        try:
-            SupervisorSettings(**(self.supervisor or {}))
-        except TypeError as error:
-            raise ValueError(f"supervisor of team cannot be used: {error}") from error
+        _made(SupervisorSettings, self.supervisor or {}, "supervisor of team")
         taken = sorted({"robots", "horizon_s", "realism", "observe"} & set(self.settings))
         if taken:
             raise ValueError(f"settings of team has {shown(taken[0])}; the table [team] sets it, observe is fixed")

@@ -6,7 +6,8 @@ Finished parts are on the disk. The same call continues an interrupted one.
 import json
 import time
 from collections.abc import Generator
-from dataclasses import asdict, dataclass
+from contextlib import closing
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,9 +15,13 @@ import numpy as np
 import torch
 
 from lidarium.agents.learned.network import load_weights, save_weights
+from lidarium.agents.tours.policy import TourFrontier
+from lidarium.envs.faces.parallel import ExplorationEnv
+from lidarium.evaluation.episodes.runner import run_episode
 from lidarium.mapping.files.guarded_reading import read_text, reading
 from lidarium.mapping.files.output import clear_unfinished, only_writer, remove_unfinished, write_json
 from lidarium.training.folder import asked_for, begin_folder, versions
+from lidarium.training.places import place_of
 from lidarium.training.progress import Progress
 from lidarium.training.settings import MOST_BYTES, TrainingSettings
 from lidarium.training.teaching.rounds import FIT, LESSONS, RoundFolder, run_round
@@ -50,6 +55,7 @@ class Training:
         if self.workers < 1:
             raise ValueError(f"workers is {self.workers}; want at least 1")
         validation_suite(self.settings, {})  # hours of lessons are not for floors that are not there
+        self._try_worlds()
         begin_folder(self.folder / TRAINING_FILE, self.settings.as_dict())
         with only_writer(self.folder / TRAINING_FILE):
             self._clear_unfinished()
@@ -58,6 +64,14 @@ class Training:
             for step in self._steps():
                 yield step
                 clock = self._count_hours(clock)
+
+    def _try_worlds(self) -> None:
+        """Begin an episode to learn from and one of validation: some settings are first refused by an environment."""
+        place = place_of(self.settings, self.settings.rounds[0], 0)
+        settings = replace(place.settings, horizon_s=place.settings.time_step)
+        for floor in (place.floor, self.settings.validation.floors[0]):
+            with closing(ExplorationEnv(floor, settings)) as env:
+                run_episode(TourFrontier(), env, place.seed)
 
     def _steps(self) -> Generator[Progress, None, None]:
         candidates: dict[str, Path] = {}

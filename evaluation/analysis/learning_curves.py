@@ -19,6 +19,9 @@ from lidarium.mapping.files.guarded_reading import read_text
 POINTS = 200
 """Points of joined curves."""
 
+EARLY = 0.9
+"""A training ends early that has less than this share of the longest one."""
+
 STEP, VALUE = "step", "value"
 """Names of the columns of TensorBoard's scalars, and of CSV files without a header."""
 
@@ -39,6 +42,8 @@ class LearningCurve:
         Value of each training there.
     mean, low, high : (k,) float64
         Mean, and a band that holds the whole true mean curve with 95 %; infinite below five trainings.
+    remark : str
+        Which training ends much earlier than others, and cuts these; empty if none does.
     """
 
     name: str
@@ -47,6 +52,7 @@ class LearningCurve:
     mean: Values
     low: Values
     high: Values
+    remark: str = ""
 
     @property
     def has_band(self) -> bool:
@@ -79,18 +85,25 @@ def joined(name: str, paths: Sequence[Path], x: str, y: str, seed: int = 0) -> L
         If a file lacks a column, has fewer than two points, or the trainings have no range in common.
     """
     read = [read_curve(path, x, y) for path in paths]
-    first, last = max(line[0][0] for line in read), min(line[0][-1] for line in read)
+    ends = [float(line[0][-1]) for line in read]
+    first, last = max(line[0][0] for line in read), min(ends)
     if not first < last:
         raise ValueError(f"the trainings of {name} have no range of {x} in common")
+    remark = ""
+    if last < EARLY * max(ends):
+        path = paths[ends.index(last)]
+        remark = f"the curves of {name} end at {x} {last:.10g}, where {path} ends; the longest ends at {max(ends):.10g}"
     grid = np.linspace(first, last, POINTS)
     seeds = np.stack([np.interp(grid, *line) for line in read])
-    return LearningCurve(name, grid, seeds, *mean_bands(seeds, seed=seed))
+    mean, low, high = mean_bands(seeds, seed=seed)
+    return LearningCurve(name, grid, seeds, mean, low, high, remark)
 
 
 def read_curve(path: Path, x: str, y: str) -> tuple[Values, Values]:
     """Return two columns of a training, in the order of the first.
 
-    Lines that lack one of both are passed over, as trainers write columns at different times.
+    Lines that lack one of both are passed over, as trainers write columns at different times. Of a training that went
+    on from an earlier step, the lines that it wrote again count.
 
     Parameters
     ----------
@@ -109,10 +122,15 @@ def read_curve(path: Path, x: str, y: str) -> tuple[Values, Values]:
             raise ValueError(f"{path} has no column {name!r}{guess}; it has {', '.join(known) or 'none'}")
     pairs = np.array([(line[x], line[y]) for line in lines if x in line and y in line]).reshape(-1, 2)
     pairs = pairs[np.isfinite(pairs).all(axis=1)]
-    pairs = pairs[np.argsort(pairs[:, 0], kind="stable")]
-    if len(np.unique(pairs[:, 0])) < 2:
+    if (np.diff(pairs[:, 0]) < 0.0).all():  # the newest line is first
+        pairs = pairs[::-1]
+    # Where a step repeats or goes back, the training went on from there: lines before, of that step or a later one,
+    # are of the run that was broken off.
+    least_later = np.minimum.accumulate(np.append(pairs[1:, 0], np.inf)[::-1])[::-1]
+    kept = pairs[pairs[:, 0] < least_later]
+    if len(kept) < 2:
         raise ValueError(f"{path} has {len(pairs)} numbers of {y!r} by {x!r}; want two or more at different {x!r}")
-    return pairs[:, 0], pairs[:, 1]
+    return kept[:, 0], kept[:, 1]
 
 
 def _lines(path: Path, scalar: str) -> Iterator[Mapping[str, float]]:

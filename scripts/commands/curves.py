@@ -35,11 +35,19 @@ def execute(command: _Curves) -> Answer:
     check_writable(out)
     files = _files(command.trainings)
     curves = [joined(name, paths, command.x, command.y, command.seed) for name, paths in files.items()]
-    for curve in curves:
-        if not curve.has_band:
-            notify(f"{curve.name} has {len(curve.seeds)} trainings: no band below {FEWEST_FOR_BANDS}")
+    few = [curve for curve in curves if not curve.has_band]
+    remarks = [curve.remark for curve in curves if curve.remark]
+    remarks += [f"{curve.name} has {len(curve.seeds)} trainings: no band below {FEWEST_FOR_BANDS}" for curve in few]
+    for remark in remarks:
+        notify(remark)
     save_learning_curves(out / "curves.png", curves, command.x, command.y)
-    result = {"x": command.x, "y": command.y, "confidence": 0.95, "curves": {c.name: c.as_json() for c in curves}}
+    result = {
+        "x": command.x,
+        "y": command.y,
+        "confidence": 0.95,
+        "curves": {curve.name: curve.as_json() for curve in curves},
+        "remarks": remarks,
+    }
     write_json(out / "curves.json", result)
     rows = []
     for curve in curves:

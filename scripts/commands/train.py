@@ -215,6 +215,7 @@ def _span(seconds: float) -> str:
 
 
 def _team_answer(folder: Path, is_interrupted: bool) -> Answer:
+    from lidarium.agents.zoo.network import OBSERVED
     from lidarium.mapping.files.guarded_reading import read_text
     from lidarium.training.folder import MOST_BYTES
     from lidarium.training.teams.training import CARD_FILE, WEIGHTS_FILE
@@ -231,9 +232,20 @@ def _team_answer(folder: Path, is_interrupted: bool) -> Answer:
     ]
     if best["coverage"] <= untrained:
         lines.append("it is no better than before it learned; want more decisions or floors")
-    weights = shlex.quote(f"weights={folder / WEIGHTS_FILE}")
-    name = "zoo:tours-2" if card["training"]["level"] == "tour" else "zoo:ppo-2"
-    lines.append(f"use them: lidarium run --policy {name} --policy-set {weights}")
+    asked = card["training"]
+    name = "zoo:tours-2" if asked["level"] == "tour" else "zoo:ppo-2"
+    if asked["supervisor"] is None:
+        weights = shlex.quote(f"weights={folder / WEIGHTS_FILE}")
+        lines.append(f"use them: lidarium run --policy {name} --policy-set {weights}")
+    else:  # no policy of the command line puts a team of the zoo under a supervisor
+        given = "".join(f", {key}={value!r}" for key, value in asked["supervisor"].items())
+        lines += [
+            "use them in Python, under their supervisor and from unknown starts:",
+            f"policy = lidarium.Supervised(lidarium.policy({name!r}, weights={str(folder / WEIGHTS_FILE)!r}){given})",
+            f"env = lidarium.parallel_env(robots={asked['robots']}, known_starts=False, level={asked['level']!r}, "
+            f"observe={[*OBSERVED[asked['level']][1:]]})",
+            "lidarium.run_episode(policy, env, seed=0)",
+        ]
     return Answer({"folder": str(folder), "interrupted": False, **card}, "\n".join(lines))
 
 

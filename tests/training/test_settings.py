@@ -75,6 +75,8 @@ def test_all_has_defaults():
         ("[fit]\nepoch = 1", "fit has no 'epoch'"),
         ("[fit]\nepochs = 0", "epochs"),
         ("[fit]\nepochs = '3'", "epochs"),
+        ("[fit]\nheld_out = 0.0", "held_out of fit is 0.0; want a share above 0 and below 1"),
+        ("[fit]\nheld_out = 1.0", "held_out of fit is 1.0; want a share above 0 and below 1"),
         ("[ppo]\ndecisions = -1", "decisions"),
         ("[ppo]\ndiscount = 0.0", "discount"),
         ("rounds = []", "one or more tables"),

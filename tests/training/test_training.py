@@ -168,6 +168,13 @@ def test_floors_of_the_validation_are_checked_before_anything_is_written(tmp_pat
     assert not (tmp_path / "new").exists()
 
 
+def test_what_only_an_environment_refuses_is_refused_before_anything_is_written(tmp_path):
+    for settings, words in (({"reward": {"more": {"nix": 1.0}}}, "'nix'"), ({"scan_period_s": 50.0}, "longer than")):
+        with pytest.raises(ValueError, match=words):
+            run(tmp_path / "new", {**SMALL, "settings": settings})
+        assert not (tmp_path / "new").exists()
+
+
 def test_a_folder_of_other_files_is_refused(tmp_path):
     (tmp_path / "mine.txt").write_text("x")
     with pytest.raises(ValueError, match="no training has written them"):

@@ -74,7 +74,7 @@ class PredictionSettings:
     batch: Annotated[int, within(1, 100_000)] = 128
     learning_rate: Annotated[float, above(0.0, 1.0)] = 1e-3
     weight_decay: Annotated[float, within(0.0, 10.0)] = 0.01
-    held_out: Annotated[float, share()] = 0.05
+    held_out: Annotated[float, share(has_minimum=False, has_maximum=False)] = 0.05
     far_weight: Annotated[float, share()] = 0.3
     checkpoint: Annotated[int, within(1, 10_000_000)] = 250
 

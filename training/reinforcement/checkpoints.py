@@ -1,6 +1,7 @@
 """Checkpoints of a training by rewards: weights, the optimizer, and how far it has come. No pickle."""
 
 import json
+import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
@@ -15,6 +16,7 @@ from torch import nn
 from lidarium.mapping.files.guarded_reading import read_bytes, read_text, reading, shortened
 from lidarium.mapping.files.output import write_json, write_whole
 from lidarium.mapping.files.weight_files import WeightFiles
+from lidarium.mapping.geometry.bounds import shown
 
 MOMENTS = ("exp_avg", "exp_avg_sq")
 """Adam's state of each parameter, besides its step count."""
@@ -99,7 +101,12 @@ def latest_checkpoint(folder: Path) -> Checkpoint | None:
     with reading(found[-1], "how far a training has come", cure):
         content = json.loads(read_text(found[-1], MOST_STATE))
         curve = [(int(number), None if reward is None else float(reward)) for number, reward in content["curve"]]
-        return Checkpoint(int(content["decisions"]), curve)
+        checkpoint = Checkpoint(int(content["decisions"]), curve)
+        if not curve or curve[-1][0] != checkpoint.decisions:
+            raise ValueError(f"its curve {shown(curve)} does not end at its {checkpoint.decisions:,} decisions")
+        if not all(reward is None or math.isfinite(reward) for _, reward in curve):
+            raise ValueError(f"its curve {shown(curve)} has values that are not finite")
+        return checkpoint
 
 
 def restore(folder: Path, checkpoint: Checkpoint, network: Trained, learner: Learner) -> None:

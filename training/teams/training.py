@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from sb3_contrib import MaskablePPO
 from stable_baselines3.common.vec_env import VecEnv, VecMonitor
 
@@ -55,6 +56,7 @@ class TeamTraining:
             set_floors(self.settings.validation)
         except ValueError as error:
             raise ValueError(f"validation of team is not a set of floors: {error}") from error
+        self._try_worlds()
         begin_folder(self.folder / TRAINING_FILE, self.settings.as_dict(), FloorChoice(self.settings.floors).in_files())
         with only_writer(self.folder / TRAINING_FILE):
             checkpoints = self.folder / CHECKPOINTS
@@ -64,11 +66,8 @@ class TeamTraining:
             torch.set_num_threads(1)
             last, total = latest_checkpoint(checkpoints), self.settings.learning.whole_decisions
             done = 0 if last is None else last.decisions
-            if done and not (self.folder / WEIGHTS_FILE).is_file():
-                raise FileNotFoundError(
-                    f"{self.folder / WEIGHTS_FILE}, the best weights of {done:,} decisions, is missing; "
-                    "put it back, or choose another folder"
-                )
+            if done:
+                self._best_weights()  # damaged ones are named before more is learned
             yield Progress("rewards", done, total)
             if last is None or done < total:
                 learn = self._learn_values if self.settings.algorithm in VALUES else self._learn_policy
@@ -80,11 +79,17 @@ class TeamTraining:
             self._write(latest_checkpoint(checkpoints))
         yield Progress("best weights", 1, 1)
 
+    def _try_worlds(self) -> None:
+        """Begin an episode of each world: some settings are first refused by an environment."""
+        settings = self.settings
+        for floor, realism in ((settings.floors, settings.realism), (set_floors(settings.validation)[0], "ideal")):
+            with closing(self._led(vector_env(1, floor, **self._options(realism)))) as environment:
+                environment.reset(seed=0)
+
     def _learn_policy(self, is_new: bool) -> Generator[Checkpoint, None, None]:
         """Learn by PPO or MAPPO."""
         settings, ppo = self.settings, self.settings.ppo
-        options = {"level": settings.level, "threads": 1, **self._world}
-        rows: VecEnv = self._led(sb3_vec_env(*self._floors(ppo), reports=self._is_led, **options))
+        rows: VecEnv = self._led(sb3_vec_env(*self._floors(ppo), **self._options(settings.realism)))
         if settings.algorithm == "mappo":
             rows = CentralState(rows)
         with closing(VecMonitor(rows)) as environment:
@@ -117,7 +122,7 @@ class TeamTraining:
         from lidarium.training.teams.value_decomposition import learn_values
 
         settings, value = self.settings, self.settings.value
-        with closing(vector_env(*self._floors(value), level=settings.level, threads=1, **self._world)) as environment:
+        with closing(vector_env(*self._floors(value), **self._options(settings.realism))) as environment:
             torch.manual_seed(settings.seed)
             network = POLICIES[settings.level].ranking(environment.single_observation_space)
             yield from learn_values(
@@ -140,9 +145,10 @@ class TeamTraining:
         led = self.settings.supervisor
         return environment if led is None else Supervised(environment, masks_orders=True, **led)
 
-    @property
-    def _world(self) -> dict[str, Any]:
-        return self.settings.options(self.settings.realism)
+    def _options(self, realism: str) -> dict[str, Any]:
+        """Return the options of environments."""
+        own = {"level": self.settings.level, "threads": 1, "reports": self._is_led}
+        return own | self.settings.options(realism)
 
     def _floors(self, learning: PpoSettings | ValueSettings) -> tuple[int, str]:
         """Return the number of parallel episodes, and their floors."""
@@ -165,9 +171,7 @@ class TeamTraining:
         The network takes its preferred actions, from the same starts each time.
         """
         settings, floors = self.settings, set_floors(self.settings.validation)
-        options = settings.options("ideal")
-        options |= {"level": settings.level, "threads": 1, "copy": False, "reports": self._is_led}
-        batch = vector_env(len(floors), floors[0], **options)
+        batch = vector_env(len(floors), floors[0], copy=False, **self._options("ideal"))
         environment = self._led(batch)
         with closing(environment):
             seen, infos = environment.reset(seed=[0] * len(floors), options={"floor": list(floors)})
@@ -181,14 +185,23 @@ class TeamTraining:
                 total += float(reached.mean())
         return total / decisions
 
+    def _best_weights(self) -> dict[str, NDArray[np.float32]]:
+        """Return the weights of the best network so far."""
+        path, cure = self.folder / WEIGHTS_FILE, "put a copy back, or choose another folder"
+        if not path.is_file():
+            raise FileNotFoundError(f"{path}, the best weights so far, is missing; {cure}")
+        try:
+            return zoo_files("", self.settings.level).load(path)
+        except ValueError as error:
+            raise ValueError(f"{error}; {cure}") from error
+
     def _write(self, checkpoint: Checkpoint | None) -> None:
         """Write the curve and the card of the best network so far."""
         assert checkpoint is not None  # the curve has one point at least
         curve = [(number, found) for number, found in checkpoint.curve if found is not None]
         write_text(self.folder / CURVE_FILE, "step,coverage\n" + "".join(f"{k},{found}\n" for k, found in curve))
         best = max(curve[1:] or curve, key=lambda entry: entry[1])
-        files = zoo_files("", self.settings.level)
-        digest = files.save(self.folder / WEIGHTS_FILE, files.load(self.folder / WEIGHTS_FILE))
+        digest = zoo_files("", self.settings.level).save(self.folder / WEIGHTS_FILE, self._best_weights())
         card: dict[str, Any] = {
             "sha256": digest,
             "decisions": checkpoint.decisions,

@@ -39,6 +39,24 @@ def test_json_lines_and_files_without_a_header_are_read(tmp_path):
         assert (x.tolist(), y.tolist()) == ([1.0, 2.0], [3.0, 5.0])
 
 
+def test_of_a_training_that_went_on_the_lines_written_again_count(tmp_path):
+    steps = [0, 10, 20, 30, 40, 15, 25, 25]
+    (tmp_path / "a.csv").write_text("".join(f"{step},{line}\n" for line, step in enumerate(steps)))
+    x, y = read_curve(tmp_path / "a.csv", "step", "value")
+    assert (x.tolist(), y.tolist()) == ([0.0, 10.0, 15.0, 25.0], [0.0, 1.0, 5.0, 7.0])
+
+
+@pytest.mark.parametrize(("end", "is_early"), [(300, True), (950, False)])
+def test_a_training_that_ends_early_and_cuts_others_is_named(end, is_early, tmp_path, capsys):
+    for name, last in (("a", 1000), ("b", end)):
+        (tmp_path / f"{name}.csv").write_text(f"0,0.0\n{last},1.0\n")
+    assert main(["curves", f"A={tmp_path}/*.csv", "--json", "--out", str(tmp_path / "out")]) == 0
+    captured = capsys.readouterr()
+    said = f"the curves of A end at step 300, where {tmp_path / 'b.csv'} ends; the longest ends at 1000"
+    assert (said in captured.err) is is_early
+    assert (said in json.loads(captured.out)["remarks"]) is is_early
+
+
 def test_tensorboard_folders_are_read(tmp_path):
     tensorboard = pytest.importorskip("torch.utils.tensorboard", reason="PyTorch is not installed")
     with tensorboard.SummaryWriter(str(tmp_path / "log")) as writer:

@@ -64,7 +64,7 @@ def test_network_critic_and_optimizer_go_on_as_if_nothing_had_happened(tmp_path)
 def test_the_last_two_stay(tmp_path):
     network, found = learner(0, 1)
     for number in range(1, 5):
-        write_checkpoint(tmp_path, Checkpoint(8 * number, []), network, found)
+        write_checkpoint(tmp_path, Checkpoint(8 * number, [(8 * number, None)]), network, found)
     kept = {path.name.partition(".")[0] for path in tmp_path.iterdir()}
     assert kept == {"decisions-000000024", "decisions-000000032"}
     assert len(list(tmp_path.iterdir())) == 6
@@ -101,7 +101,7 @@ def test_of_a_kill_between_two_files_the_checkpoint_before_is_left(tmp_path, mon
 def test_of_a_kill_while_old_ones_are_removed_the_last_two_are_whole(tmp_path, monkeypatch):
     network, found = learner(0, 1)
     for number in (1, 2):
-        write_checkpoint(tmp_path, Checkpoint(8 * number, []), network, found)
+        write_checkpoint(tmp_path, Checkpoint(8 * number, [(8 * number, None)]), network, found)
 
     def die(path, **options):
         path.unlink_really()
@@ -167,11 +167,24 @@ def test_a_learner_of_another_network_is_refused(tmp_path, change):
     refused(tmp_path, checkpoint, r"learner\.safetensors is missing, damaged or of another network")
 
 
-@pytest.mark.parametrize("text", ["", "[]", "{}", '{"decisions": "x", "curve": []}', "{" * 1000])
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "[]",
+        "{}",
+        '{"decisions": "x", "curve": []}',
+        '{"decisions": 8, "curve": []}',
+        '{"decisions": 8, "curve": [[4, 0.5]]}',
+        '{"decisions": 8, "curve": [[4, NaN], [8, 0.5]]}',
+        '{"decisions": 8, "curve": [[4, 0.5], [8, Infinity]]}',
+        "{" * 1000,
+    ],
+)
 def test_a_damaged_state_is_named(tmp_path, text):
     written(tmp_path)
     (tmp_path / "decisions-000000008.json").write_text(text)
-    with pytest.raises(ValueError, match=r"decisions-000000008\.json"):
+    with pytest.raises(ValueError, match=r"decisions-000000008\.json is not .*; remove .*000000008\.\* to go"):
         latest_checkpoint(tmp_path)
 
 

@@ -1,6 +1,7 @@
 """Trainings of teams by rewards, into a folder."""
 
 import json
+import shutil
 from types import SimpleNamespace
 
 import numpy as np
@@ -9,9 +10,11 @@ import pytest
 torch = pytest.importorskip("torch", reason='PyTorch is not installed: extra "rl"')
 pytest.importorskip("sb3_contrib", reason='sb3-contrib is not installed: extra "rl"')
 
+import lidarium  # noqa: E402
 from lidarium.agents.zoo.network import NETWORKS, OBSERVED, network_shapes  # noqa: E402
 from lidarium.agents.zoo.policy import zoo_files  # noqa: E402
 from lidarium.envs.faces.makers import sb3_vec_env  # noqa: E402
+from lidarium.scripts.commands.train import _team_answer  # noqa: E402
 from lidarium.scripts.main import main  # noqa: E402
 from lidarium.training.settings import TeamSettings, read_any_training  # noqa: E402
 from lidarium.training.teams.training import (  # noqa: E402
@@ -19,6 +22,7 @@ from lidarium.training.teams.training import (  # noqa: E402
     CHECKPOINTS,
     CURVE_FILE,
     POLICIES,
+    TRAINING_FILE,
     WEIGHTS_FILE,
     TeamTraining,
 )
@@ -141,8 +145,34 @@ def test_missing_weights_are_named(tmp_path):
     assert [next(steps).done, next(steps).done] == [0, 16]
     steps.close()
     (tmp_path / "run" / WEIGHTS_FILE).unlink()
-    with pytest.raises(FileNotFoundError, match="the best weights of 16 decisions, is missing; put it back"):
+    with pytest.raises(FileNotFoundError, match="the best weights so far, is missing; put a copy back"):
         next(TeamTraining(settings, tmp_path / "run").run())
+
+
+def test_damaged_weights_and_requests_are_named_with_a_cure(whole, tmp_path):
+    settings, folder, _ = whole
+    shutil.copytree(folder, tmp_path / "run")
+    for name in (WEIGHTS_FILE, TRAINING_FILE):
+        path = tmp_path / "run" / name
+        path.write_bytes(path.read_bytes()[:100])
+        with pytest.raises(ValueError, match=rf"{name}.*; put a copy back, or choose another folder"):
+            list(TeamTraining(settings, tmp_path / "run").run())
+
+
+def test_a_team_under_a_supervisor_is_used_under_one(tmp_path):
+    weights = {name: np.zeros(shape, np.float32) for name, shape in network_shapes("frontier").items()}
+    zoo_files("", "frontier").save(tmp_path / WEIGHTS_FILE, weights)
+    asked = {"level": "frontier", "robots": 2, "supervisor": {"merge_period_s": 4.0}}
+    best = {"decisions": 32, "coverage": 0.5}
+    card = {"training": asked, "decisions": 32, "best": best, "untrained": {"coverage": 0.25}}
+    (tmp_path / CARD_FILE).write_text(json.dumps(card))
+    text = _team_answer(tmp_path, False).text
+    assert "lidarium run" not in text
+    names = {"lidarium": lidarium}
+    exec(text.partition("from unknown starts:\n")[2].replace("robots=2", "robots=2, horizon_s=1.0"), names)
+    assert names["policy"].settings.merge_period_s == 4.0
+    assert not names["env"].settings.known_starts
+    assert names["env"].scorer.time == 1.0
 
 
 def test_a_training_does_not_go_on_with_another_floor_of_the_same_name(tmp_path):
@@ -237,13 +267,19 @@ def test_before_a_training_a_team_does_as_tours_do():
         ("seed = 3", "seed = 3\nfit = {}", "a training of teams by ppo has no 'fit'"),
         ("robots = 2", 'robots = 2\nalgorithm = "qmix"', "a training of teams by qmix has no 'ppo'"),
         ("robots = 2", 'robots = 2\nsupervisor = {}\nalgorithm = "mappo"', "under a supervisor is 'mappo'; want ppo"),
-        ("robots = 2", "robots = 2\nsupervisor = { merge_s = 1 }", "supervisor of team cannot be used"),
+        (
+            "robots = 2",
+            "robots = 2\nsupervisor = { merge_s = 1 }",
+            "team has no 'merge_s'; it has period_s",
+        ),
         ("[ppo]", "[value]", "a training of teams by ppo has no 'value'"),
         ('"validation:2"', '"castle:3"', "castle"),
         ('"validation:2"', '"apartment"', "validation of team is not a set of floors"),
         ("[team]", "[team]\nseed = 4", "seed is 3 at the top and 4 in [team]; want one"),
         ('"apartment"', '"set:train:0"', "'train:0' wants '0' floors"),
         ("robots = 2", 'robots = 2\nrealism = "fsat"', "fsat"),
+        ("robots = 2", "robots = 2\nsettings = { reward = { more = { nix = 1 } } }", "unknown reward term 'nix'"),
+        ("robots = 2", "robots = 2\nsettings = { scan_period_s = 5.0 }", "longer than a decision"),
         ("[ppo]", "[team.ppo]", "team has the table 'ppo'; want [ppo], beside [team]"),
     ],
 )
