@@ -211,7 +211,7 @@ class ExplorationVectorEnv(BatchFace, VectorEnv[Any, NDArray[Any], NDArray[Any]]
         masked = {name: values & rows if name.startswith("_") else values for name, values in final.items()}
         return {
             **_of_both(final, self._infos(), rows),
-            ACTIVE: final[ACTIVE],  # of the step, as rewards are: it says which rows are left out of a loss
+            ACTIVE: final[ACTIVE],  # describes the step, as rewards do: learners leave inactive rows out of the loss
             "final_obs": last,
             "_final_obs": rows,
             "final_info": masked,

@@ -83,7 +83,7 @@ def read_episodes(directory: Path) -> Episodes:
     kept, doubled = _without_doubles(numbered, path)
     if failed := read_failures(Path(directory)):
         key, why = next(iter(failed.items()))
-        warnings.append(f"{len(failed)} episodes failed and are missing, first {key}: {why}.")
+        warnings.append(f"Failed episodes, which are missing here: {len(failed)}, first {key}: {why}.")
     if not kept:
         raise NoEpisodesError(f"{path} has no finished episode; run `lidarium evaluate` on")
     _check_alike(kept, path)

@@ -68,7 +68,7 @@ def median_interval(
     indices, groups = cluster_indices(clusters, size)
     if groups < size:
         less, equal = sample < median, sample == median
-        # Of equal values so many are below that half of all are: runs after the horizon may be more than a half.
+        # Values equal to the median count as below in part, so that half of all are: it may lie beyond the horizon.
         below = less + equal * (0.5 * size - less.sum()) / max(equal.sum(), 1)
         found = mean_share_interval(below, confidence, indices)
         low, high = (float(ordered[min(int(share * size), size - 1)]) for share in (found.low, found.high))

@@ -10,7 +10,7 @@ before, so that any number of workers leaves the same lines, though in another o
 import json
 import os
 import sys
-from collections.abc import Container, Generator, Mapping, Sequence
+from collections.abc import Generator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field
 from functools import partial
@@ -77,6 +77,7 @@ class Campaign:
             _check_same(file.episodes, self.suite, self.folder)
             _check_same_inputs(self.folder, inputs)
             _check_same_setups(file.episodes, self.suite, self.folder)
+            failed = read_failures(self.folder)
             _write_suite(self.folder / SUITE_FILE, self.suite, inputs)
             records = self.folder / RECORDS_FOLDER if self.records else None
             clear_unfinished(self.folder / RECORDS_FOLDER, ".npz")
@@ -95,17 +96,12 @@ class Campaign:
                     self.done += 1
                     yield result
             file.check_in_place()
-            self._keep_failures(finished)
-
-    def _keep_failures(self, finished: Container[str]) -> None:
-        """Keep which episodes failed, for reports, until they finish."""
-        path = self.folder / FAILURES_FILE
-        found = {trial.key: f"{type(error).__name__}: {error}" for trial, error in self.failures}
-        left = {key: why for key, why in (read_failures(self.folder) | found).items() if key not in finished}
-        if left:
-            write_json(path, left)
-        else:
-            path.unlink(missing_ok=True)
+            found = {trial.key: f"{type(error).__name__}: {error}" for trial, error in self.failures}
+            left = {key: why for key, why in (failed | found).items() if key not in finished}
+            if left:
+                write_json(self.folder / FAILURES_FILE, left)
+            elif failed:
+                (self.folder / FAILURES_FILE).unlink()
 
     def _work(
         self, missing: Sequence[Trial], records: Path | None

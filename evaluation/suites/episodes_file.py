@@ -19,7 +19,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
-from lidarium.mapping.files.guarded_reading import read_bytes, reason
+from lidarium.mapping.files.guarded_reading import read_bytes, read_text, reading, reason
 from lidarium.mapping.files.output import lock_file
 from lidarium.mapping.geometry.bounds import shown
 
@@ -36,11 +36,14 @@ FAILURES_FILE = "failed.json"
 
 def read_failures(folder: Path) -> dict[str, str]:
     """Return the errors of episodes that failed, and have not finished since, by their keys."""
-    try:
-        found = json.loads(read_bytes(folder / FAILURES_FILE))
-    except (OSError, ValueError):  # none, or no file of ours
+    path = folder / FAILURES_FILE
+    if not path.exists():
         return {}
-    return {str(key): str(why) for key, why in found.items()} if isinstance(found, dict) else {}
+    with reading(path, "errors of episodes", "move it away, or choose another folder"):
+        found = json.loads(read_text(path))
+        if not (isinstance(found, dict) and found and all(isinstance(why, str) for why in found.values())):
+            raise ValueError("no evaluation has written it")
+        return found
 
 
 def read_episodes(path: Path) -> list[dict[str, Any]]:

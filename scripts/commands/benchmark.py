@@ -102,8 +102,7 @@ def _run(
 ) -> bool:
     """Run what is missing of a task, keep what failed, and return whether it was interrupted.
 
-    A policy that cannot run in the task's world fails there alone; one that does not observe what the task is about
-    is absent.
+    A policy that cannot run in the task fails there only; one that lacks the task's observations does not take part.
     """
     from lidarium.evaluation.suites.campaign import Campaign
 

@@ -177,7 +177,7 @@ def check_floor(spec: str | Path) -> None:
         return
     collection = str(spec).partition(":")[0]
     if collection not in COLLECTIONS or spec not in real_floors(collection):
-        _load_named(str(spec))  # says what is wrong with the name
+        _load_named(str(spec))  # raises the error of an unknown name
 
 
 def set_floors(name: str) -> tuple[str, ...]:

@@ -55,7 +55,7 @@ def test_episodes_that_failed_are_told(rows, directory_of):
     folder = directory_of(rows)
     (folder / "failed.json").write_text(json.dumps({"default | clinic": "ValueError: no"}))
     assert read_episodes(folder).warnings == (
-        "1 episodes failed and are missing, first default | clinic: ValueError: no.",
+        "Failed episodes, which are missing here: 1, first default | clinic: ValueError: no.",
     )
 
 

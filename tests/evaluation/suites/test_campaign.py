@@ -131,6 +131,15 @@ def test_a_suite_file_of_someone_else_is_refused_and_left(tmp_path, content):
     assert (tmp_path / "suite.json").read_text() == content
 
 
+@pytest.mark.parametrize("content", ["{}", "[1]", '{"1": 2}', "my notes"])
+def test_a_file_of_errors_of_someone_else_is_refused_and_left(folder, tmp_path, content):
+    shutil.copytree(folder, tmp_path / "copy")
+    (tmp_path / "copy" / "failed.json").write_text(content)
+    with pytest.raises(ValueError, match=r"failed\.json.*move it away"):
+        list(Campaign(suite(), tmp_path / "copy").run())
+    assert (tmp_path / "copy" / "failed.json").read_text() == content
+
+
 def test_other_settings_and_other_versions_are_refused(folder, tmp_path):
     other = suite(variants={"default": {"horizon_s": 6.0, "resolution": 0.05, "noise": "datasheet"}})
     with pytest.raises(ValueError, match=r"noise = its default.*noise = datasheet"):
