@@ -1,9 +1,11 @@
-"""The head of a Ray cluster that no longer answers (Ray itself is not needed)."""
+"""What needs no Ray: a head of a cluster that no longer answers, and a machine with another version."""
 
 import socket
+from functools import partial
 
 import pytest
 
+import lidarium
 from lidarium.evaluation.suites import on_ray
 
 
@@ -20,3 +22,9 @@ def test_a_head_that_answers_no_more_is_told_after_a_while(monkeypatch):
     with pytest.raises(on_ray.ClusterLostError, match="finished episodes are kept"):
         ask_until_lost(head)
     assert head.is_lost
+
+
+def test_another_version_on_a_machine_is_named():
+    with pytest.raises(on_ray.OtherVersionError, match=r"has lidarium .*, this is 9\.9"):
+        on_ray._done(partial(max, 1), 2, "9.9", "")
+    assert on_ray._done(partial(max, 1), 2, lidarium.__version__, "") == 2

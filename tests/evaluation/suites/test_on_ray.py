@@ -3,12 +3,10 @@
 import json
 import signal
 import socket
-from functools import partial
 
 import pytest
 
 from lidarium.benchmarks.studies.machines import local_cluster
-from lidarium.evaluation.suites import on_ray as module
 from lidarium.evaluation.suites.campaign import Campaign
 from lidarium.evaluation.suites.episodes_file import TIMINGS
 from lidarium.evaluation.suites.on_ray import _Recorded, on_ray
@@ -83,11 +81,6 @@ def test_what_a_task_raises_is_its_result(cluster):
 
 def _reciprocal(number):
     return 1.0 / number
-
-
-def test_another_version_on_a_machine_is_named():
-    with pytest.raises(module.OtherVersionError, match=r"has lidarium .*, this is 9\.9"):
-        module._done(partial(max, 1), 2, "9.9")
 
 
 def test_an_address_that_does_not_answer_is_refused(tmp_path, capsys):
