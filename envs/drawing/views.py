@@ -44,7 +44,7 @@ class FloorViews:
 
     def __init__(self, floor: Floor, radius: float, height: float, colours: Sequence[Colour]) -> None:
         self.floor, self._size, self._colours = floor, (radius, height), list(colours)
-        self._walls = np.array([solid.z_high >= floor.ceiling for solid in floor.solids], np.bool_)
+        self._walls = np.array([floor.is_wall(solid) for solid in floor.solids], np.bool_)
         self._section, self._whole = section_of(floor, CUT_M), faces_of(floor)
 
     def from_above(self, poses: NDArray[np.float64], size: tuple[int, int]) -> Frame:

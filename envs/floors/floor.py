@@ -196,6 +196,8 @@ class Floor:
         Goal of robots that have one [m].
     ceiling : float
         Height of the ceiling, to which solids without a height reach [m].
+    wall_height : float
+        Height of walls that end below the ceiling [m]; infinite by default, when all reach it.
     areas : Raster or None
         Solid cells of a picture with several free areas, of which one is the floor; see ``areas.around``.
     left_out_m2 : float
@@ -211,6 +213,7 @@ class Floor:
     starts: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 3)))
     goal: tuple[float, float] | None = None
     ceiling: float = CEILING
+    wall_height: float = math.inf
     areas: Raster | None = None
     left_out_m2: float = 0.0
     remark: str = ""
@@ -244,6 +247,10 @@ class Floor:
             raise ValueError(f"floor {self.name!r} has goal {self.goal}; want (x, y) in metres")
         starts.flags.writeable = False
         object.__setattr__(self, "starts", starts)
+
+    def is_wall(self, solid: Solid) -> bool:
+        """Return whether a solid is a wall: it reaches the ceiling, or is as high as walls; others are furniture."""
+        return solid.z_high >= self.ceiling or math.isclose(solid.z_high, self.wall_height, abs_tol=1e-3)
 
     def raster(self, resolution: float, z_low: float, z_high: float) -> Raster:
         """Return the solid cells at one height.

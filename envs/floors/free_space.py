@@ -252,7 +252,7 @@ class _BuildingMeasures:
     loops : int
         Independent cycles on which a robot of radius 0.30 m can drive around walls; furniture is not counted.
     clutter : float
-        Share of the area between the walls that is under furniture, all that ends below the ceiling.
+        Share of the area between the walls that is under furniture; see ``Floor.is_wall``.
     rooms : int
         Spaces that openings up to 1.1 m wide separate, halls and corridors included.
     left_out_m2 : (n,) float64
@@ -273,7 +273,7 @@ def measure_building(floor: Floor) -> _BuildingMeasures:
     """Measure a floor at a resolution of 0.05 m."""
     walls = floor
     if floor.solids:
-        walls = Floor(floor.name, floor.bounds, tuple(solid for solid in floor.solids if solid.z_high >= floor.ceiling))
+        walls = Floor(floor.name, floor.bounds, tuple(filter(floor.is_wall, floor.solids)))
     empty = walls.raster(_RESOLUTION, 0.0, _BODY_HEIGHT)
     full = floor.raster(_RESOLUTION, 0.0, _BODY_HEIGHT)
     space = configuration_space(empty, MEASURED_RADIUS)

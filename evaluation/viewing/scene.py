@@ -57,7 +57,7 @@ class _Mesh(NamedTuple):
 def floor_meshes(floor: Floor, height: float) -> dict[Colour, _Mesh]:
     """Return the obstacles of a floor, cut at a height [m], by colour; the ground is left out."""
     faces = section_of(floor, height)
-    is_wall = np.array([solid.z_high >= floor.ceiling for solid in floor.solids], np.bool_)
+    is_wall = np.array([floor.is_wall(solid) for solid in floor.solids], np.bool_)
     colours = np.rint(owner_colours(faces, is_wall)).astype(np.int64)
     stands = np.flatnonzero(faces.owners != GROUND)
     if not len(stands):

@@ -90,6 +90,7 @@ def load_drawn(path: Path) -> Floor:
             np.array(starts).reshape(-1, 3),
             None if goal is None else (goal[0], goal[1]),
             float(plan.get("ceiling", CEILING)),
+            height,
         )
 
 

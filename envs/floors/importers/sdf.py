@@ -111,7 +111,17 @@ def load(path: Path, resolution: float | None, *, skip_meshes: bool = False) -> 
     bounds = float(low[0]), float(low[1]), float(high[0]), float(high[1])
     check_extent(str(path), bounds, points.reshape(-1, 1, 2))
     everything = (*_surroundings(path, solids, low, high), *solids)
-    return Floor(floor_name(path), bounds, everything, ceiling=ceiling, remark="; ".join(remarks))
+    wall_height = _wall_height(solids, ceiling)
+    return Floor(floor_name(path), bounds, everything, ceiling=ceiling, wall_height=wall_height, remark="; ".join(remarks))
+
+
+def _wall_height(solids: list[Solid], ceiling: float) -> float:
+    """Return the height at which the longest outlines end, if no solid reaches the ceiling; otherwise infinity."""
+    lengths: dict[float, float] = {}
+    for solid in solids:
+        height = round(solid.z_high, 3)
+        lengths[height] = lengths.get(height, 0.0) + float(np.hypot(*(solid.edges[:, 2:] - solid.edges[:, :2]).T).sum())
+    return math.inf if max(lengths) >= ceiling else max(lengths, key=lambda height: lengths[height])
 
 
 def _listed(names: list[str]) -> str:

@@ -184,6 +184,14 @@ def test_clutter_is_what_furniture_covers():
     assert measure_building(Floor("none", (0.0, 0.0, 4.0, 4.0))).clutter == 0.0
 
 
+def test_walls_below_the_ceiling_are_no_furniture():
+    walls = (wall(3.9, 0.0, 0.2, 1.55, z_high=1.3), wall(3.9, 2.45, 0.2, 1.55, z_high=1.3))
+    shelf = wall(0.5, 0.5, 2.0, 0.4, z_high=1.8)
+    found = measure_building(Floor("low", (0.0, 0.0, 8.0, 4.0), (*walls, shelf), wall_height=1.3))
+    assert found.rooms == 2
+    assert found.clutter == pytest.approx(0.8 / 31.4, rel=0.05)
+
+
 def test_a_floor_without_room_is_refused():
     with pytest.raises(ValueError, match=r"floor 'narrow' has no room for a robot of radius 0\.3 m"):
         measure_building(Floor("narrow", (0.0, 0.0, 0.4, 5.0)))

@@ -175,6 +175,15 @@ def test_what_gazebos_reader_takes_is_read(tmp_path):
         load_file(tmp_path / "hall.world")
 
 
+def test_low_walls_are_no_furniture(tmp_path):
+    low = WALLS.replace(" 2.5</size>", " 1.0</size>").replace("<pose>0 0 1.25", "<pose>0 0 0.5")
+    middle = box("middle", 3.0, 1.4, 0.1, 2.6, high=1.0)
+    furniture = box("shelf", 5.0, 3.5, 1.0, 0.5, high=1.6) + box("table", 1.0, 3.5, 1.0, 0.5, high=0.7)
+    described = describe_floor(load_file(world(tmp_path, model(low + middle + furniture))))
+    assert (described["rooms"], described["loops"]) == (1, 0)
+    assert described["clutter"] == pytest.approx(1.0 / (5.8 * 3.8 - 0.26), rel=0.1)
+
+
 def test_ground_and_ceiling_are_no_obstacles(tmp_path):
     empty = free_area(load_file(world(tmp_path, model(WALLS))), 0.0, 1.0)
     ground = box("ground", 3, 2, 20, 20, high=0.2, z=0.0)
