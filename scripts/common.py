@@ -3,6 +3,7 @@
 Their options, their answers, and how they report progress.
 """
 
+import json
 import math
 import sys
 import time
@@ -45,9 +46,18 @@ class Command:
     compiles: ClassVar[bool] = False
     """Whether the command calls kernels, which the first start compiles."""
 
+    writes: ClassVar[bool] = True
+    """Whether the command has files for ``out``."""
+
     def __post_init__(self) -> None:
         if self.seed < 0:
             raise ValueError(f"seed is {self.seed}; want zero or more")
+
+    def refuse(self, why: str, *names: str) -> None:
+        """Refuse options that are given and have no effect, for the reason that is told."""
+        for name in names:
+            if name in self.given:
+                raise ValueError(f"--{name.replace('_', '-')} is given, but {why}; leave it out")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -198,6 +208,52 @@ def _aligned(cell: str, width: int, is_number: bool) -> str:
 def file_name(name: str) -> str:
     """Return a name in which letters unfit for file names are replaced."""
     return "".join(letter if letter.isalnum() or letter in "._-" else "-" for letter in name).strip(".-") or "floor"
+
+
+@dataclass(frozen=True, slots=True)
+class Outputs:
+    """The files that a command writes into a folder.
+
+    Attributes
+    ----------
+    names : tuple of str
+        Their names, with wildcards as in ``map-[0-9].yaml``.
+    result : str
+        The JSON file among them by which a folder of the same command is known.
+    key : str
+        A key that the file has.
+    """
+
+    names: tuple[str, ...]
+    result: str
+    key: str
+
+    def check(self, folder: Path, inputs: Iterable[Path | str | None]) -> None:
+        """Check that the files can be written, and replace nothing but those of the same command."""
+        check_output(folder, self.names, inputs)
+        if not self._is_ours(folder) and (others := self._there(folder, self.names)):
+            raise ValueError(
+                f"{others[0]} is not of an earlier call of this command, and would be replaced; choose another folder "
+                "with --out, or remove it"
+            )
+
+    def clear(self, folder: Path, names: Iterable[str] | None = None) -> None:
+        """Remove the files, or some of them, if they are of an earlier call."""
+        if self._is_ours(folder):
+            for path in self._there(folder, self.names if names is None else names):
+                path.unlink()
+
+    def _there(self, folder: Path, names: Iterable[str]) -> list[Path]:
+        return [path for name in names for path in sorted(folder.glob(name)) if path.is_file()]
+
+    def _is_ours(self, folder: Path) -> bool:
+        from lidarium.mapping.files.guarded_reading import read_text
+
+        try:
+            found = json.loads(read_text(folder / self.result))
+        except (OSError, ValueError):
+            return False
+        return isinstance(found, dict) and self.key in found
 
 
 def check_output(folder: Path, names: Iterable[str], inputs: Iterable[Path | str | None]) -> None:

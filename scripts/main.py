@@ -120,6 +120,8 @@ def _answered(words: list[str]) -> int:
         find_installed()
     execute = COMMANDS[words[0]]
     command = _options(execute, words[0], words[1:])
+    if isinstance(command, Command) and not command.writes:
+        command.refuse("the command writes no files", "out")
     if command.compiles:
         announce_compiling()
     answer = execute(command)

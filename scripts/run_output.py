@@ -6,7 +6,7 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from lidarium.scripts.common import table
+from lidarium.scripts.common import Outputs, table
 from lidarium.scripts.transforms import PlacedMaps, transforms
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ TEAM_FILES = (
 )
 """Files that a run writes or not, by its team; those of an earlier run in the same folder go, by exact names."""
 
-RUN_FILES = (RESULT, RECORD, *FILMS, *TEAM_FILES, "map.yaml", "map.pgm", "run.png")
+OUTPUTS = Outputs((RESULT, RECORD, *FILMS, *TEAM_FILES, "map.yaml", "map.pgm", "run.png"), RESULT, "ended_because")
 
 VIEW_SIZE = 900, 1200
 """Rows and columns of the picture from above [pixels]."""
@@ -49,11 +49,11 @@ def write_run(
     from lidarium.evaluation.episodes.events import decision_lines
     from lidarium.evaluation.truth.beliefs import team_log_odds
     from lidarium.mapping.files.map_files import write_ros_map
-    from lidarium.mapping.files.output import check_written, clear_earlier, write_json, write_text
+    from lidarium.mapping.files.output import check_written, write_json, write_text
     from lidarium.mapping.grids.occupancy import three_levels
 
     env = episode.env
-    clear_earlier(folder, RESULT, (RECORD, *(film for film in FILMS if film not in films), *TEAM_FILES))
+    OUTPUTS.clear(folder, (RECORD, *(film for film in FILMS if film not in films), *TEAM_FILES))
     write_json(folder / RESULT, result)
     if recorder is not None:
         from lidarium.evaluation.record import write_record

@@ -342,6 +342,11 @@ def read_carmen_log(path: Path, field_of_view: float | None = None) -> LaserLog:
             raise ValueError(f"{path} holds no scans; want a CARMEN log with FLASER or ROBOTLASER1 lines")
         _drop_repeated(content)
         check_metres(np.concatenate([scan.ranges for scan, _ in content.scans]).astype(np.float32), str(path))
+        if field_of_view is not None and all(scan.beams for scan, _ in content.scans):
+            raise ValueError(
+                f"{path} states the directions of all its beams (ROBOTLASER1), and field_of_view is "
+                f"{field_of_view:.4g} rad; leave it out"
+            )
         _give_directions(content, field_of_view)
         return made_usable(_log(path, content), str(path))
 

@@ -17,6 +17,9 @@ if TYPE_CHECKING:
 MAX_IMAGE_BYTES = 1 << 29
 """Longest file of a picture."""
 
+IMAGE_SUFFIXES = (".png", ".pgm", ".bmp", ".jpg", ".jpeg", ".tif", ".tiff")
+"""Endings of the names of pictures that can be read."""
+
 MAX_PIXELS = 25_000_000
 """Most pixels of a picture, 5,000 x 5,000: a floor is made of them in a second and 300 MB."""
 

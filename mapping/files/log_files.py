@@ -38,7 +38,7 @@ def read_log(path: Path | str, topic: str | None = None, field_of_view: float | 
     FileNotFoundError
         If the file does not exist.
     ValueError
-        If the file is not a log or holds no usable scan.
+        If the file is not a log or holds no usable scan, or an option is given for which the format has no use.
 
     Examples
     --------
@@ -51,9 +51,19 @@ def read_log(path: Path | str, topic: str | None = None, field_of_view: float | 
     """
     path = Path(path)
     if is_bag(path):
+        _refuse(path, "field_of_view", field_of_view, "bags state the directions of beams")
         return read_bag_log(path, topic)
+    _refuse(path, "topic", topic, "it is no bag")
+    if path.suffix.lower() == ".npz" or path.name.lower().endswith((".dat", ".dat.gz")):
+        _refuse(path, "field_of_view", field_of_view, "its format states the directions of beams")
     if path.suffix.lower() == ".npz":
         return read_npz_log(path)
     if path.name.lower().endswith((".dat", ".dat.gz")):
         return read_mines_log(path)
     return read_carmen_log(path, field_of_view)
+
+
+def _refuse(path: Path, name: str, value: object, why: str) -> None:
+    """Refuse an option that a format has no use for."""
+    if value is not None:
+        raise ValueError(f"{name} is {value!r} for {path}, but {why}; leave it out")

@@ -23,7 +23,7 @@ import yaml
 from numpy.typing import NDArray
 
 from lidarium.mapping.files.guarded_reading import read_text, reading, shortened
-from lidarium.mapping.files.images import read_image
+from lidarium.mapping.files.images import IMAGE_SUFFIXES, read_image
 from lidarium.mapping.files.output import write_whole
 from lidarium.mapping.geometry.bounds import Rule, shown, within
 
@@ -301,10 +301,12 @@ def write_ros_map(
             f"map {name!r} has levels {np.unique(levels)[:6]}; want only {OCCUPIED} occupied, {UNKNOWN} "
             f"unknown, {FREE} free"
         )
-    if len(origin) != 3 or not np.isfinite(origin).all():
-        raise ValueError(f"map {name!r} has origin {origin}; want (x, y, yaw) in metres and radians")
-    if not (math.isfinite(resolution) and resolution > 0.0):
-        raise ValueError(f"map {name!r} has a resolution of {resolution} m; want a positive number")
+    if len(origin) != 3 or not (np.abs(origin) <= MAX_COORDINATE_M).all():
+        raise ValueError(
+            f"map {name!r} has origin {origin}; want (x, y, yaw) in metres and radians, {MAX_COORDINATE_M:,.0f} at most"
+        )
+    if not RESOLUTION.hold(resolution):
+        raise ValueError(f"map {name!r} has a resolution of {resolution} m; want {RESOLUTION.wanted}")
     table = np.zeros(256, dtype=np.uint8)
     for level, grey in _PGM_LEVELS.items():
         table[level] = grey
@@ -351,6 +353,8 @@ def cropped(
 
 
 def _read_header(path: Path) -> dict[str, Any]:
+    if path.suffix.lower() in IMAGE_SUFFIXES:
+        raise ValueError(f"{path} is an image; want the yaml file of a ROS map, or load_floor for a plain image")
     header = _read_yaml(path)
     if not isinstance(header, dict):
         raise ValueError(f"{path} has no keys; want the yaml file of a ROS map with {', '.join(_REQUIRED)}")

@@ -143,17 +143,6 @@ def check_written(folder: Path, names: Iterable[str]) -> None:
             )
 
 
-def clear_earlier(folder: Path, marker: str, names: Iterable[str]) -> None:
-    """Remove files of an earlier run of the same command from a folder.
-
-    ``names`` may have wildcards. Nothing is removed if the folder lacks ``marker``, the result file of such a run.
-    """
-    if (Path(folder) / marker).is_file():
-        for path in (each for name in names for each in Path(folder).glob(name)):
-            if path.is_file():
-                path.unlink()
-
-
 def write_text(path: Path, text: str) -> None:
     """Write a text file (UTF-8)."""
     with whole_file(path) as beside:

@@ -79,8 +79,8 @@ def merge_maps(
         sides differ, all maps are resampled to the coarsest.
     settings : MergeSettings, optional
         Settings; defaults if None.
-    question : Question, optional
-        A guess for two maps, and what is reported of each pair.
+    question : MergeQuestion, optional
+        A guess for two maps, whether they are joined in any case, and what is reported of each pair.
 
     Returns
     -------

@@ -430,7 +430,7 @@ def read_cloud(
     if kind in ("PGM", "PNG"):
         if intrinsics is None:
             raise ValueError(f"{path} is a depth image; want the intrinsics of its camera")
-        camera = Intrinsics(*intrinsics) if isinstance(intrinsics, tuple) else intrinsics
+        camera = intrinsics if isinstance(intrinsics, Intrinsics) else Intrinsics(*_four_numbers(intrinsics))
         return _checked_cloud(read_depth_image(path, camera, scale or MILLIMETRES, pose))
     if kind == "NPZ":
         content = _read_npz(path)
@@ -440,6 +440,13 @@ def read_cloud(
         with reading(path, f"a whole {kind} file"):
             content = _PARSERS[kind](without_mark(read_bytes(path)))
     return _cloud_of(content, scale, str(path))
+
+
+def _four_numbers(given: Sequence[float]) -> list[float]:
+    numbers = np.asarray(given, np.float64).ravel().tolist()
+    if len(numbers) != 4:
+        raise ValueError(f"intrinsics are {numbers}; want the four numbers fx, fy, cx and cy")
+    return [float(number) for number in numbers]
 
 
 def _cloud_of(content: Content, scale: float | None, source: str) -> PointCloud:

@@ -441,11 +441,15 @@ def _by_distance(points: NDArray[np.float64]) -> NDArray[np.float64]:
 
 TEXT_SUFFIX, BINARY_SUFFIX = ".txt", ".smap"
 
+_LARGEST_POINT_M = 0.02
+"""Maximum side of a point's box, which the binary form rounds outwards to centimetres [m]."""
+
 
 def write_sparse_map(path: Path, sparse_map: SparseMap, graph: _GraphEdges | None = None) -> None:
     """Write a map, whole or not at all.
 
-    The thesis's text if the name ends in ``.txt``, the binary form if it ends in ``.smap``.
+    The thesis's text if the name ends in ``.txt``, the binary form if it ends in ``.smap``. A map with boxes that have
+    a size does not fit into a text: paths would lead through them.
     """
     if path.suffix == BINARY_SUFFIX:
         _write_binary(path, sparse_map, graph)
@@ -453,6 +457,11 @@ def write_sparse_map(path: Path, sparse_map: SparseMap, graph: _GraphEdges | Non
         raise ValueError(f"{path} is no name for a sparse map; want one that ends in {BINARY_SUFFIX} or {TEXT_SUFFIX}")
     elif graph is not None:
         raise ValueError(f"{path} is a text, which keeps no graph; want a name that ends in {BINARY_SUFFIX}")
+    elif sized := int((np.ptp(sparse_map.boxes, axis=1) > _LARGEST_POINT_M).any(axis=1).sum()):
+        raise ValueError(
+            f"{path} is a text, which keeps the centres of boxes alone, and {sized:,} boxes of the map have a size; "
+            f"want a name that ends in {BINARY_SUFFIX}"
+        )
     else:
         _write_text(path, sparse_map)
 

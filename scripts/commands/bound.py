@@ -6,7 +6,9 @@ from typing import Annotated, Any, ClassVar
 
 from tyro.conf import Positional, arg
 
-from lidarium.scripts.common import DONE, NO, Answer, TeamCommand, check_output, table
+from lidarium.scripts.common import DONE, NO, Answer, Outputs, TeamCommand, table
+
+OUTPUTS = Outputs(("bound.json", "bound.png"), "bound.json", "longest_m")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,10 +43,8 @@ def execute(command: _Bound) -> Answer:
     from lidarium.mapping.files.output import write_json
 
     if command.out is not None:
-        check_output(command.out, ("bound.json", "bound.png"), (command.floor,))
-    for name in ("merging", "plans_sparsely", "supervisor"):
-        if getattr(command, name):
-            raise ValueError(f"--{name.replace('_', '-')} is given, but no policy drives in a bound; leave it out")
+        OUTPUTS.check(command.out, (command.floor,))
+    command.refuse("no policy drives in a bound", "merging", "plans_sparsely", "supervisor")
     if command.rounds < 0:
         raise ValueError(f"rounds is {command.rounds}; want zero or more")
     options = {**command.team_options, "robots": command.robots, "stop_coverage": command.coverage}

@@ -1,5 +1,6 @@
 """`lidarium drive`: drive a robot by hand in a browser, beside the score of a policy."""
 
+import itertools
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -7,9 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 from tyro.conf import Positional, Suppress, arg
 
 from lidarium.scripts.commands import run
-from lidarium.scripts.common import Answer, check_output, notify
+from lidarium.scripts.common import Answer, notify
 from lidarium.scripts.options import PORT
-from lidarium.scripts.run_output import RUN_FILES
+from lidarium.scripts.run_output import OUTPUTS, RESULT
 
 if TYPE_CHECKING:
     from lidarium.evaluation.viewing.hand import Times
@@ -56,7 +57,8 @@ def execute(command: Drive) -> Answer:
     from lidarium.scripts.options import check_view
 
     check_view(command)
-    check_output(run.folder_of(command, Path(command.floor).stem), RUN_FILES, (command.floor,))
+    command = replace(command, out=command.out or _next_folder(run.folder_of(command, Path(command.floor).stem)))
+    OUTPUTS.check(run.folder_of(command, ""), (command.floor,))
     of_others = command.policy or "tour_frontier"
     others, options = None, run.policy_options_of(command, of_others)
     if command.robots > 1:
@@ -68,6 +70,12 @@ def execute(command: Drive) -> Answer:
         notify(f"drive robot_0 at {address_of(server)}; Ctrl-C ends the run and keeps what was driven")
         view = DrivenView(server, policy, NAME, hand, beside=beside)
         return run.answer(command, policy, options if others else {}, [view])
+
+
+def _next_folder(folder: Path) -> Path:
+    """Return a folder without a run: nobody drives the same way again."""
+    numbered = (folder if number == 1 else folder.with_name(f"{folder.name}-{number}") for number in itertools.count(1))
+    return next(each for each in numbered if not (each / RESULT).exists())
 
 
 def _score(command: Drive) -> "Times":

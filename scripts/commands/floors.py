@@ -15,7 +15,7 @@ from lidarium.scripts.common import (
     INTERRUPTED,
     Answer,
     Command,
-    check_output,
+    Outputs,
     counted,
     file_name,
     table,
@@ -197,7 +197,7 @@ def _show_floor(command: _Show) -> Answer:
     )
     if command.out is not None:
         stem = file_name(floor.name)
-        check_output(command.out, (f"{stem}.png", f"{stem}.json"), (command.name,))
+        _outputs((f"{stem}.json", f"{stem}.png")).check(command.out, (command.name,))
     result = describe_floor(floor)
     about = about_floor(command.name) if command.name in floor_names() else ""
     files = []
@@ -319,6 +319,10 @@ It is that of the robots' lasers.
 """
 
 
+FINE_M, LEAST_KEPT = 0.025, 0.9
+"""Side of cells with which a map is compared [m], and the share of the free floor that it has at least."""
+
+
 def write_floor(command: Command, floor: "Floor", resolution: float, source: Path | None = None) -> Answer:
     """Write a floor as a ROS map and a picture, with its figures; it was read from ``source``."""
     from lidarium.envs.floors.catalogue.names import describe_floor
@@ -327,15 +331,30 @@ def write_floor(command: Command, floor: "Floor", resolution: float, source: Pat
 
     stem = file_name(floor.name)
     folder = command.out or Path("floors") / stem
-    files = [f"{stem}.{kind}" for kind in ("yaml", "pgm", "png", "json")]
-    check_output(folder, files, (source,))
+    files = [f"{stem}.{kind}" for kind in ("json", "yaml", "pgm", "png")]
+    _outputs(files).check(folder, (source,))
     raster = floor.raster(resolution, LASER_HEIGHT, LASER_HEIGHT)
     result = describe_floor(floor)
+    free, whole = (
+        float((each.solid == 0).sum()) * each.resolution**2
+        for each in (raster, floor.raster(min(FINE_M, resolution), LASER_HEIGHT, LASER_HEIGHT))
+    )
+    if free == 0.0:
+        raise ValueError(f"map-resolution is {resolution} m, by which no cell is free; want a smaller one")
+    if is_coarse := not LEAST_KEPT * whole <= free <= whole / LEAST_KEPT:
+        coarse = f"in cells of {resolution:g} m the map has {free:.1f} m2 of free floor, instead of {whole:.1f} m2"
+        result["remark"] = "; ".join(filter(None, (result["remark"], coarse)))
     write_ros_map(folder, stem, _levels(raster.solid, resolution), (*raster.origin, 0.0), resolution)
     _save_picture(folder / f"{stem}.png", floor)
     write_result(command, f"{stem}.json", result, folder)
     check_written(folder, files)
-    return Answer(result, floor_description(result, folder, files), verdict_of_reach(result))
+    text = floor_description(result, folder, files)
+    return Answer(result, text, DOUBTFUL if is_coarse else verdict_of_reach(result))
+
+
+def _outputs(files: Sequence[str]) -> Outputs:
+    """Return the files that are written of a floor; the first is the one with its figures."""
+    return Outputs(tuple(files), files[0], "sha256")
 
 
 def verdict_of_reach(result: dict[str, Any]) -> int:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from tyro.conf import Positional
 
-from lidarium.scripts.common import DONE, DOUBTFUL, NO, Answer, Command, check_output, file_name, table
+from lidarium.scripts.common import DONE, DOUBTFUL, NO, Answer, Command, Outputs, file_name, table
 from lidarium.scripts.transforms import PlacedMaps, transforms
 
 if TYPE_CHECKING:
@@ -22,8 +22,11 @@ if TYPE_CHECKING:
     from lidarium.mapping.merging.settings import MergeSettings
 
 DEFAULT_FOLDER = Path("merged")
-RESULT, MAPS, REGIONS = "transforms.json", ("map.yaml", "map.pgm", "map-*.yaml", "map-*.pgm"), "regions.png"
-FILES = (RESULT, *MAPS, "merge.png", REGIONS)
+RESULT, REGIONS = "transforms.json", "regions.png"
+MAPS = tuple(f"map{number}.{kind}" for number in ("", "-[0-9]", "-[0-9][0-9]") for kind in ("yaml", "pgm"))
+OUTPUTS = Outputs((RESULT, *MAPS, "merge.png", REGIONS), RESULT, "pairs")
+
+ROS_MAPS = (".yaml", ".yml")
 
 LEAST_SCALE = 0.01
 """Minimum scale that can be given, and one over the maximum."""
@@ -111,7 +114,9 @@ def execute(command: _Merge) -> Answer:
     from lidarium.mapping.merging.settings import TOLERANCES, merge_settings
 
     out = command.out or DEFAULT_FOLDER
-    check_output(out, FILES, command.maps)
+    OUTPUTS.check(out, command.maps)
+    if all(path.suffix.lower() in ROS_MAPS for path in command.maps):
+        command.refuse("ROS maps state theirs", "resolution")
     images = _read(command)
     settings = merge_settings(command.mode, max(image.resolution for image in images.values()))
     if command.mode == "default":
@@ -216,7 +221,7 @@ def _read(command: _Merge) -> "dict[str, MapImage]":
 
     images: dict[str, MapImage] = {}
     for path in command.maps:
-        if path.suffix.lower() in (".yaml", ".yml"):
+        if path.suffix.lower() in ROS_MAPS:
             image = read_ros_map(path)
         elif command.resolution is None:
             raise ValueError(f"{path} is an image without a scale; pass --resolution with its metres per pixel")
@@ -312,13 +317,13 @@ def write_merged(
     """
     from lidarium.evaluation.drawing.merge_picture import save_merge_picture
     from lidarium.mapping.files.map_files import write_ros_map
-    from lidarium.mapping.files.output import check_written, clear_earlier, write_json
+    from lidarium.mapping.files.output import check_written, write_json
     from lidarium.mapping.geometry.rigid import Transform
 
     files = []
     joined = [group for group in merged.groups() if len(group) > 1]
     fused_maps = [bent.fused for bent in deformed] or [merged.fused(group) for group in joined]
-    clear_earlier(out, RESULT, FILES)
+    OUTPUTS.clear(out)
     for number, (group, fused) in enumerate(zip(joined, fused_maps, strict=True)):
         name = "map" if number == 0 else f"map-{number + 1}"
         origin = corner_of(images[group[0]]) @ Transform(*fused.origin)

@@ -8,11 +8,13 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Protocol
 from tyro.conf import Positional, arg
 
 from lidarium.scripts.commands.sparse_map import numbers_of
-from lidarium.scripts.common import DONE, NO, Answer, Command, check_output, notify, table
+from lidarium.scripts.common import DONE, NO, Answer, Command, Outputs, notify, table
 
 if TYPE_CHECKING:
     from lidarium.mapping.sparse.graph import TopologicalGraph
     from lidarium.mapping.sparse.sparse_map import SparseMap
+
+OUTPUTS = Outputs(("path.json", "path.png", "path_3d.png"), "path.json", "graph")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,7 +83,7 @@ def execute(command: _Plan) -> Answer:
     from lidarium.mapping.sparse.planning import check_on_map, map_bounds, plan
 
     if command.out is not None:
-        check_output(command.out, ("path.json", "path.png", "path_3d.png"), (command.map,))
+        OUTPUTS.check(command.out, (command.map,))
     start, goal = (
         np.array(numbers_of(name, text, (2, 3))) for name, text in (("--from", command.start), ("--to", command.goal))
     )

@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from tyro.conf import Positional
 
-from lidarium.scripts.common import Answer, Command, check_output, file_name
+from lidarium.scripts.common import Answer, Command, Outputs, file_name
 
 DEFAULT_FOLDER = Path("predicted")
 
@@ -46,7 +46,7 @@ def execute(command: _Predict) -> Answer:
 
     from lidarium.evaluation.drawing.prediction_picture import save_prediction_picture
     from lidarium.mapping.files.map_files import read_grey_map, read_ros_map, write_ros_map
-    from lidarium.mapping.files.output import write_arrays
+    from lidarium.mapping.files.output import write_arrays, write_json
     from lidarium.mapping.prediction.levels import UNKNOWN
     from lidarium.mapping.prediction.predictors import make_predictor
     from lidarium.mapping.prediction.whole_maps import predict_map
@@ -57,7 +57,8 @@ def execute(command: _Predict) -> Answer:
         raise ValueError(f"{command.map} is {'a ROS map that states its scale' if is_ros else 'no ROS map'}; {want}")
     out = command.out or DEFAULT_FOLDER
     name = file_name(command.map.stem)
-    check_output(out, (f"{name}.yaml", f"{name}.pgm", "probability.npz", "prediction.png"), (command.map,))
+    files = (f"{name}.yaml", f"{name}.pgm", "probability.npz", "prediction.png", "prediction.json")
+    Outputs(files, "prediction.json", "expected_free_m2").check(out, (command.map,))
     if command.resolution is None:
         image = read_ros_map(command.map)
     else:
@@ -84,8 +85,9 @@ def execute(command: _Predict) -> Answer:
         "expected_free_m2": round(expected, 2),
         "predictor": command.predictor,
     }
+    write_json(out / "prediction.json", result)
     text = (
         f"{known:.1f} m2 are known to be free, and {expected:.1f} m2 more are expected behind the border; "
-        f"{written}, probability.npz and prediction.png are in {out}"
+        f"{written}, probability.npz, prediction.png and prediction.json are in {out}"
     )
     return Answer(result, text)

@@ -59,11 +59,16 @@ def execute(command: _Replay) -> Answer:
     from lidarium.evaluation.record import read_record
     from lidarium.mapping.files.output import check_writable, write_json
 
-    given = (command.picture, command.html, command.mcap, command.demonstrations)
-    files = [path for path in given if path is not None]
+    asked = {".png": command.picture, ".html": command.html, ".mcap": command.mcap, ".npz": command.demonstrations}
+    files = [path for path in asked.values() if path is not None]
     for folder in (command.out, *(path.parent for path in files)):
         if folder is not None:
             check_writable(folder)
+    for suffix, path in asked.items():
+        if path is not None and path.suffix.lower() != suffix:
+            raise ValueError(f"{path} is no name for this file; want one that ends in {suffix}")
+        if path is not None and path.resolve() == command.file.resolve():
+            raise ValueError(f"{path} is read, and would be overwritten; choose another name")
     command.check_films()
     record = read_record(command.file)
     answer = _drawn(command, record) if files or command.films else _run_again(command, record)

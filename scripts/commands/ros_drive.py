@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from lidarium.scripts.common import DONE, DOUBTFUL, INTERRUPTED, Answer, notify, table
 from lidarium.scripts.options import RosOptions, check_supervised, open_graph, policy_options, supervisor_options
+from lidarium.scripts.run_output import OUTPUTS, RESULT, TEAM_FILES
 
 if TYPE_CHECKING:
     from lidarium.agents.policy import Policy
@@ -88,10 +89,9 @@ class _RosDrive(RosOptions):
 def execute(command: _RosDrive) -> Answer:
     """Drive until the policy ends, the time is over, or Ctrl-C; then stop all robots."""
     import lidarium
-    from lidarium.mapping.files.output import check_writable
 
     out = command.out or DEFAULT_FOLDER
-    check_writable(out)
+    OUTPUTS.check(out, ())
     options = policy_options(command.policy_set)
     if command.supervisor:
         options |= supervisor_options(command.supervisor)
@@ -271,11 +271,11 @@ def _result(
 
 
 def _write(out: Path, episode: "Episode", result: dict[str, Any]) -> list[str]:
-    from lidarium.mapping.files.output import check_written, clear_earlier, write_json
-    from lidarium.scripts.run_output import RESULT, TEAM_FILES, write_team
+    from lidarium.mapping.files.output import check_written, write_json
+    from lidarium.scripts.run_output import write_team
 
     out.mkdir(parents=True, exist_ok=True)
-    clear_earlier(out, RESULT, TEAM_FILES)
+    OUTPUTS.clear(out, TEAM_FILES)
     write_json(out / RESULT, result)
     files = [RESULT, *write_team(out, episode)]
     check_written(out, files)

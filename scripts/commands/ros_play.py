@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import ClassVar
 
 from tyro.conf import Positional
 
@@ -12,6 +13,8 @@ from lidarium.scripts.options import RosOptions, open_graph
 @dataclass(frozen=True, kw_only=True)
 class _RosPlay(RosOptions):
     """Play the scans, odometry and transforms of a bag of ROS 2 as live topics (extra ros), with `/clock`."""
+
+    writes: ClassVar[bool] = False
 
     bag: Positional[Path]
     """the bag: .mcap, .db3, or a folder of these"""

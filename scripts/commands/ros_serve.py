@@ -21,6 +21,7 @@ class _RosServe(RosOptions, TeamCommand):
     """
 
     compiles: ClassVar[bool] = True
+    writes: ClassVar[bool] = False
 
     floor: str = "apartment"
     """name in the catalogue, building:SEED, set:NAME, or a file"""
@@ -50,6 +51,7 @@ def execute(command: _RosServe) -> Answer:
     import lidarium
     from lidarium.envs.settings.making import make_settings
 
+    command.refuse("robots are driven from outside", "merging", "plans_sparsely", "supervisor")
     graph = open_graph(command, "lidarium_robots")
     from lidarium.envs.ros.serving import TeamServer
 

@@ -14,7 +14,6 @@ from lidarium.scripts.common import (
     Answer,
     Progress,
     TeamCommand,
-    check_output,
     compile_first,
     file_name,
     notify,
@@ -27,7 +26,7 @@ from lidarium.scripts.options import (
     policy_options,
     supervisor_options,
 )
-from lidarium.scripts.run_output import RUN_FILES, RunFilms, run_summary, write_run
+from lidarium.scripts.run_output import OUTPUTS, RunFilms, run_summary, write_run
 
 if TYPE_CHECKING:
     import numpy as np
@@ -129,7 +128,7 @@ def execute(command: Run) -> Answer:
     import lidarium
 
     command = _completed(command)
-    check_output(folder_of(command, Path(command.floor).stem), RUN_FILES, (command.floor,))
+    OUTPUTS.check(folder_of(command, Path(command.floor).stem), (command.floor,))
     options = policy_options_of(command, command.chosen_policy)
     policy = lidarium.policy(command.chosen_policy, **options)
     if "depth" in policy.observes and command.camera is None:

@@ -22,6 +22,7 @@ class _Serve(Command):
     """
 
     compiles: ClassVar[bool] = True
+    writes: ClassVar[bool] = False
 
     map: Positional[Path]
     """the map, as `lidarium sparse-map` writes it"""

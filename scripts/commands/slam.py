@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from tyro.conf import Positional
 
-from lidarium.scripts.common import DONE, DOUBTFUL, Answer, Command, check_output, counted, notify, table
+from lidarium.scripts.common import DONE, DOUBTFUL, Answer, Command, Outputs, counted, notify, table
 
 if TYPE_CHECKING:
     import numpy as np
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 DEFAULT_FOLDER = Path("slam")
 FILES = ("map.yaml", "map.pgm", "trajectory.tum", "slam.json")
 SPLINES = "splines.npz"
+OUTPUTS = Outputs((*FILES, SPLINES), "slam.json", "path_m")
 MOST_FAR = 0.05
 """Share of scans that may be too far from the last one for a localizer on splines."""
 
@@ -119,7 +120,11 @@ def execute(command: _Slam) -> Answer:
         option = f"--{min(ignored).replace('_', '-')}"
         raise ValueError(f"{option} is set and the localizer {command.localizer}; want --localizer slam")
     out = command.out or DEFAULT_FOLDER
-    check_output(out, (*FILES, SPLINES), (command.log, command.start_map, command.reference, command.relations))
+    OUTPUTS.check(out, (command.log, command.start_map, command.reference, command.relations))
+    if command.relations is None:
+        command.refuse("there are no --relations", "relation_poses")
+        if command.reference is None:
+            command.refuse("there is neither --reference nor --relations", "clock_shift")
     log = _log(command)
     reference = None if command.reference is None else _reference(command, log)
     relations = None if command.relations is None else _relations(command, log)
@@ -353,7 +358,7 @@ def _against_relations(
 def _write(out: Path, log: "LaserLog", followed: "_AnyFollowed", result: dict[str, Any]) -> tuple[str, ...]:
     """Write the results; return the names of the files."""
     from lidarium.mapping.files.map_files import cropped, write_ros_map
-    from lidarium.mapping.files.output import check_written, clear_earlier, write_json
+    from lidarium.mapping.files.output import check_written, write_json
     from lidarium.mapping.files.spline_files import write_spline_map
     from lidarium.mapping.files.trajectories import write_tum
     from lidarium.mapping.localization.slam.localizer import Slam
@@ -362,7 +367,7 @@ def _write(out: Path, log: "LaserLog", followed: "_AnyFollowed", result: dict[st
     slam = followed.slam
     files: tuple[str, ...] = FILES
     grid = slam.map if isinstance(slam, Slam) else slam.grid
-    clear_earlier(out, "slam.json", (*FILES, SPLINES))
+    OUTPUTS.clear(out)
     if not isinstance(slam, Slam):
         write_spline_map(out / SPLINES, slam.map)
         files = (*files, SPLINES)

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from lidarium.mapping.sparse.sparse_map import SparseMap
 
 DEFAULT_MAP = Path("sparse_map") / "map.smap"
-SUFFIXES = (".smap", ".txt")
+SUFFIXES, DEPTH_IMAGES = (".smap", ".txt"), (".png", ".pgm")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -77,6 +77,7 @@ def execute(command: _SparseMapping) -> Answer:
 
     if not command.clouds:
         raise ValueError("no cloud is named; want at least one file")
+    _refuse_idle_options(command)
     path, clouds = command.map_path, command.clouds[0]
     files = [each.name for each in (path, *picture_paths(path))]
     beside = clouds.iterdir() if clouds.is_dir() else ()  # poses, times
@@ -119,6 +120,25 @@ def execute(command: _SparseMapping) -> Answer:
         ("files", ", ".join([str(path), *pictures])),
     ]
     return Answer(result, table(facts), DOUBTFUL if told.is_doubtful else DONE)
+
+
+def _refuse_idle_options(command: _SparseMapping) -> None:
+    """Refuse options that the files have no use for, and a text that would not hold the map."""
+    if command.map_path.suffix == ".txt" and command.mode != "thesis":
+        raise ValueError(
+            f"{command.map_path} is a text, which keeps the centres of boxes alone; want a name that ends in .smap, "
+            "or --mode thesis"
+        )
+    least = command.least_motion
+    if least is not None and not 0.0 <= least < float("inf"):
+        raise ValueError(f"least-motion is {least}; want zero or more metres")
+    is_folder = command.clouds[0].is_dir()
+    if len(command.clouds) == 1 and not is_folder:
+        command.refuse("a single cloud has no frame before it", "least_motion")
+    if not is_folder and not command.poses:
+        command.refuse("there are no poses", "world_to_camera")
+    if not is_folder and all(path.suffix.lower() not in DEPTH_IMAGES for path in command.clouds):
+        command.refuse("there are no depth images", "intrinsics")
 
 
 @dataclass

@@ -54,6 +54,8 @@ def execute(command: _EditSparseMap) -> Answer:
 
     if not (command.remove or command.add or command.join):
         raise ValueError("nothing is to be edited; want --add, --remove or --join")
+    if command.join is None:
+        command.refuse("no map is joined", "at")
     path = command.map_path
     files = [each.name for each in (path, *picture_paths(path))]
     check_output(path.parent, files, (command.map, command.join))

@@ -35,6 +35,7 @@ from lidarium.mapping.grids.scan_geometry import ScanGeometry
 from lidarium.mapping.sparse.graph import build_graph
 from lidarium.mapping.sparse.map_files import _GraphEdges, write_sparse_map
 from lidarium.mapping.sparse.mapper.full import map_cloud
+from lidarium.mapping.sparse.settings import MapperSettings
 from lidarium.mapping.sparse.swept_body import SweptBody
 from lidarium.mapping.splines.features import observe, scan_points
 from lidarium.mapping.splines.spline_map import SplineMap
@@ -298,7 +299,7 @@ def _clouds(folder: Path) -> None:
     sparse_map = map_cloud(points, 32)
     graph = build_graph(sparse_map.free, sparse_map.boxes, SweptBody(radius=0.2, height=0.5))
     write_sparse_map(folder / "sparse.smap", sparse_map, _GraphEdges(graph.nodes, graph.edges))
-    write_sparse_map(folder / "sparse_text.txt", sparse_map)
+    write_sparse_map(folder / "sparse_text.txt", map_cloud(points, 32, MapperSettings(mode="thesis")))
 
 
 def _trees(folder: Path) -> None:

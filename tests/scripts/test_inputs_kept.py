@@ -50,14 +50,43 @@ def test_no_command_writes_over_what_it_reads(words, name, folder, monkeypatch, 
     assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
 
 
+@pytest.mark.parametrize(
+    ("words", "name"),
+    [
+        ("merge in/map.yaml in/other.yaml", "map.yaml"),
+        ("merge in/map.yaml in/other.yaml", "map-2.pgm"),
+        ("predict in/other.yaml", "other.pgm"),
+        ("slam in/log.npz", "map.pgm"),
+        ("run --floor in/map.yaml --horizon-s 1", "merged.yaml"),
+        ("floors show in/plan.png --resolution 0.05", "plan.json"),
+        ("floors import in/other.yaml", "other.png"),
+        ("bound in/map.yaml", "bound.png"),
+        ("plan in/edited.smap --from 0,0 --to 1,1", "path.png"),
+    ],
+)
+def test_no_command_replaces_files_of_others(words, name, folder, monkeypatch, capsys):
+    """Another program's result of the same name makes them no files of the command."""
+    monkeypatch.chdir(folder)
+    (folder / "out").mkdir()
+    shutil.copytree(folder, folder / "in", ignore=lambda *_: ["in", "out"])
+    for other in (name, "result.json", "transforms.json", "slam.json"):
+        (folder / "out" / other).write_text('{"mine": 1}')
+    assert main([*words.split(), "--out", "out"]) == 2
+    assert "is not of an earlier call of this command, and would be replaced" in capsys.readouterr().err
+    kept = (name, "result.json", "transforms.json", "slam.json")
+    assert {path.name: path.read_text() for path in (folder / "out").iterdir()} == dict.fromkeys(kept, '{"mine": 1}')
+
+
 def test_maps_that_do_not_join_leave_no_map_of_those_that_did(folder, tmp_path):
     out, elsewhere = tmp_path / "out", room(blank(), 20, 20, 90, 130)
     far = write_ros_map(folder, "far", elsewhere, (0.0, 0.0, 0.0), RESOLUTION)
     assert main(["merge", str(folder / "map.yaml"), str(folder / "other.yaml"), "--out", str(out)]) == 0
     assert (out / "map.pgm").exists()
-    (out / "map-of-mine.txt").write_text("kept")
+    for name in ("map-of-mine.txt", "map-kitchen.yaml", "map-kitchen.pgm"):
+        (out / name).write_text("kept")
     assert main(["merge", str(folder / "map.yaml"), str(far), "--out", str(out)]) == 3
-    assert sorted(path.name for path in out.iterdir()) == ["map-of-mine.txt", "merge.png", "transforms.json"]
+    kept_ones = ["map-kitchen.pgm", "map-kitchen.yaml", "map-of-mine.txt"]
+    assert sorted(path.name for path in out.iterdir()) == [*kept_ones, "merge.png", "transforms.json"]
 
 
 def test_a_run_alone_leaves_no_map_of_an_earlier_team(tmp_path):

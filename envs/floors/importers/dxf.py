@@ -7,11 +7,12 @@ References
 Autodesk, DXF Reference: Group Codes in Numerical Order; ENTITIES Section.
 """
 
+import codecs
 import io
 import logging
 import re
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -43,6 +44,8 @@ _PLAIN = {
 }
 """Codes of entities that are read here; with others, as a bulge or another plane, they are left."""
 
+_VERSION = re.compile(rb"\$ACADVER\s+1\s+AC(\d{4})")
+_CODE_PAGE = re.compile(rb"\$DWGCODEPAGE\s+3\s+ANSI_(\d+)", re.IGNORECASE)
 _ENTITY = re.compile(r"^[ \t]*0[ \t]*\n[ \t]*[A-Z]", re.MULTILINE)
 
 Polyline = NDArray[np.float64]
@@ -219,10 +222,11 @@ def load(path: Path, resolution: float | None, *, layers: Sequence[str] = ()) ->
     if not content.rstrip(b"\r\n\0 ").endswith(b"EOF"):
         raise ValueError(f"{path} has no EOF at its end; want a whole DXF drawing")
     maximum = {part: max(minimum, len(content) // _BYTES[part]) for part, minimum in _MIN_ALLOWED.items()}
-    sifted = _sift(content.decode("utf-8", "surrogateescape").replace("\r\n", "\n"))
+    encoding = _encoding(content)
+    sifted = _sift(content.decode(encoding, "surrogateescape").replace("\r\n", "\n"))
     if sifted.entities > maximum["parsed"]:
         raise ValueError(_too_dense(path, maximum["parsed"], "entities beside straight walls"))
-    document = _document(path, sifted)
+    document = _document(path, sifted, encoding)
     unit = _unit(document)
     scale = unit if resolution is None else resolution
     if scale is None:
@@ -240,16 +244,27 @@ def load(path: Path, resolution: float | None, *, layers: Sequence[str] = ()) ->
     if not np.isfinite(segments).all():
         raise ValueError(f"{path} has lines that lead nowhere; want finite coordinates")
     wide, high = np.ptp(segments.reshape(-1, 2), axis=0).tolist()
+    remarks = [f"{shows.meshes} meshes are left out"] if shows.meshes else []
     if resolution is not None or _MIN_SIDE_M <= max(wide, high) <= _MAX_SIDE_M:
-        return floor_of_lines(path, segments, np.zeros((0, 4)))
+        return replace(floor_of_lines(path, segments, np.zeros((0, 4))), remark="; ".join(remarks))
     remark = (
         f"by the unit of its header, {scale:g} m, the drawing is {wide:,.0f} x {high:,.0f} m; "
         "if that is wrong, give --resolution, the metres of a unit"
     )
     try:
-        return replace(floor_of_lines(path, segments, np.zeros((0, 4))), remark=remark)
+        return replace(floor_of_lines(path, segments, np.zeros((0, 4))), remark="; ".join([*remarks, remark]))
     except ValueError as error:
         raise ValueError(f"{error}; {remark}") from error
+
+
+def _encoding(content: bytes) -> str:
+    """Return the encoding of a drawing: UTF-8 since release 2007 (AC1021), before that the page of its header."""
+    version, page = _VERSION.search(content), _CODE_PAGE.search(content)
+    if version is None or int(version[1]) >= 1021 or page is None:
+        return "utf-8"
+    with suppress(LookupError):
+        return codecs.lookup(f"cp{page[1].decode()}").name
+    return "utf-8"
 
 
 def _limited(path: Path, lines: Iterable[NDArray[np.float64]], maximum: int) -> Iterator[NDArray[np.float64]]:
@@ -266,7 +281,7 @@ def _too_dense(path: Path, maximum: int, parts: str) -> str:
     return f"{path} has more than {maximum:,} {parts}, too many for its size; want a plan"
 
 
-def _document(path: Path, sifted: _Sifted) -> Any:  # noqa: ANN401
+def _document(path: Path, sifted: _Sifted, encoding: str) -> Any:  # noqa: ANN401
     """Return the rest of a drawing; ezdxf is imported here, since few need it."""
     try:
         import ezdxf
@@ -280,7 +295,7 @@ def _document(path: Path, sifted: _Sifted) -> Any:  # noqa: ANN401
     except (AssertionError, DXFError, *READING_ERRORS):
         pass
     with _damage(path):
-        return recover.read(io.BytesIO(sifted.text.encode("utf-8", "surrogateescape")))[0]
+        return recover.read(io.BytesIO(sifted.text.encode(encoding, "surrogateescape")))[0]
 
 
 @contextmanager
@@ -316,6 +331,9 @@ def _walls(
             ends = entity.dxf.start, entity.dxf.end
             start, end = ends if matrix is None else map(matrix.transform, ends)
             yield np.array([(start.x, start.y), (end.x, end.y)])
+            continue
+        if entity.dxftype() == "POLYLINE" and (entity.is_polygon_mesh or entity.is_poly_face_mesh):
+            shows.meshes += 1
             continue
         drawn = make_path(entity)
         for part in (drawn if matrix is None else drawn.transform(matrix)).sub_paths():
@@ -378,12 +396,19 @@ def _entities(path: Path, document: Any, maximum: int, shows: "_Layers") -> Iter
 
 
 class _Layers:
-    """The layers of a drawing whose entities count: the chosen ones, otherwise all that are on and not frozen."""
+    """The layers of a drawing whose entities count: the chosen ones, otherwise all that are on and not frozen.
+
+    Attributes
+    ----------
+    meshes : int
+        Meshes on them, which are left out.
+    """
 
     def __init__(self, document: Any, chosen: Sequence[str]) -> None:  # noqa: ANN401
         self._layers = document.layers
         self._chosen = {name.lower() for name in chosen}
         self._met: set[str] = set()
+        self.meshes = 0
 
     def hold(self, name: str, *, is_insert: bool = False) -> bool:
         """Return whether the entities of a layer count; entities of a block have layers of their own."""

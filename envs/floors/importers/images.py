@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 
 from lidarium.envs.floors.floor import Floor
 from lidarium.envs.floors.importers.common import floor_of_cells
-from lidarium.mapping.files.images import read_image
+from lidarium.mapping.files.images import IMAGE_SUFFIXES, read_image
 from lidarium.mapping.files.map_files import MAP_SERVER_GREYS, MIDDLE_GREYS, unknown_grey
 
-SUFFIXES = (".png", ".pgm", ".bmp", ".jpg", ".jpeg", ".tif", ".tiff")
+SUFFIXES = IMAGE_SUFFIXES
 
 DUNGEON_RESOLUTION = 0.1
 _DUNGEON_FREE_ABOVE = 150

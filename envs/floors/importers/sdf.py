@@ -112,7 +112,9 @@ def load(path: Path, resolution: float | None, *, skip_meshes: bool = False) -> 
     check_extent(str(path), bounds, points.reshape(-1, 1, 2))
     everything = (*_surroundings(path, solids, low, high), *solids)
     wall_height = _wall_height(solids, ceiling)
-    return Floor(floor_name(path), bounds, everything, ceiling=ceiling, wall_height=wall_height, remark="; ".join(remarks))
+    return Floor(
+        floor_name(path), bounds, everything, ceiling=ceiling, wall_height=wall_height, remark="; ".join(remarks)
+    )
 
 
 def _wall_height(solids: list[Solid], ceiling: float) -> float:

@@ -8,6 +8,7 @@ import math
 import operator
 import re
 import xml.etree.ElementTree as ElementTree
+from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -20,7 +21,7 @@ from svgelements import Arc, CubicBezier, Matrix, PathSegment, QuadraticBezier
 from lidarium.envs.floors.drawing import fill_shapes, ring_edges, strip_edges
 from lidarium.envs.floors.floor import Floor, check_extent
 from lidarium.envs.floors.importers.common import MAX_POINTS, few_enough, floor_of_cells, read_text
-from lidarium.envs.floors.importers.svg_styles import StyleSheet, declared, light_of, share_of
+from lidarium.envs.floors.importers.svg_styles import StyleSheet, declared, light_of, settled, share_of
 from lidarium.mapping.files.images import MAX_PIXELS
 from lidarium.mapping.geometry.bounds import shown
 
@@ -246,7 +247,12 @@ _OF_STYLE = (
     "fill-rule",
     "stroke-linecap",
 )
-_HAS_STYLE = frozenset(("class", "style", *_OF_STYLE))
+_UNREAD = ("clip-path", "mask", "stroke-dasharray", "systemLanguage", "transform-origin")
+"""Attributes and properties that are not understood."""
+
+_NAMED = frozenset(("class", "style", *_OF_STYLE, *_UNREAD))
+"""Attributes without any of which an element looks as those around it."""
+
 _DEFAULTS = {
     "fill": "black",
     "stroke": "none",
@@ -371,12 +377,15 @@ class _Drawing:
         self._named = {name: each for each in root.iter() if (name := each.get("id"))}
         self._sheet = StyleSheet("".join("".join(each.itertext()) for each in root.iter() if _kind(each) == "style"))
         self._pictures = self._drawn = 0
+        self._unread: Counter[str] = Counter()
         self._painted: tuple[Style | None, tuple[bool | None, bool | None]] = None, (None, None)
 
     def remarks(self) -> Iterator[str]:
         """Yield the parts of the drawing that are left out."""
         if self._pictures:
             yield f"{self._pictures} pictures in the drawing are left out"
+        for name, count in sorted(self._unread.items()):
+            yield f"{name}, which {count} elements have, is not read: they are drawn as without it"
         if self._sheet.unread:
             yield f"{self._sheet.unread} rules of its style sheet are not understood and left out"
 
@@ -442,11 +451,13 @@ class _Drawing:
         Opacity is not inherited: that of a group is of all in it.
         """
         element = path[-1]
-        if self._sheet.is_empty and _HAS_STYLE.isdisjoint(element.attrib):
+        if self._sheet.is_empty and _NAMED.isdisjoint(element.attrib):
             return inherited
+        given = settled(self._sheet.declared(path) | declared(element.get("style", "")))
+        self._unread.update(name for name in _UNREAD if (given.get(name) or element.get(name, "none")) != "none")
+        self._unread.update({"transform in a style": 1} if given.get("transform", "none") != "none" else {})
         own = {name: value for name in _OF_STYLE if (value := element.get(name)) is not None}
-        own |= {name: value for name, value in self._sheet.declared(path).items() if name in _OF_STYLE}
-        own |= {name: value for name, value in declared(element.get("style", "")).items() if name in _OF_STYLE}
+        own |= {name: value for name, value in given.items() if name in _OF_STYLE}
         opacity = share_of(own.pop("opacity", "1"), 1.0) * float(inherited["opacity"])
         own = {name: inherited[name] if value.strip() == "inherit" else value for name, value in own.items()}
         return {**inherited, **own, "opacity": str(opacity)}
@@ -487,7 +498,7 @@ class _Drawing:
         found = []
         for stop in gradient:
             if _kind(stop) == "stop":
-                given = {**stop.attrib, **self._sheet.declared((stop,)), **declared(stop.get("style", ""))}
+                given = settled({**stop.attrib, **self._sheet.declared((stop,)), **declared(stop.get("style", ""))})
                 light, opacity = light_of(given.get("stop-color", "black"))
                 found.append((light, opacity * share_of(given.get("stop-opacity", "1"), 1.0)))
         other = self._named.get(_link(gradient))

@@ -24,9 +24,20 @@ whether it is directly in the element of the part before."""
 
 
 def declared(text: str) -> Declarations:
-    """Return the declarations of a style."""
-    pairs = (declaration.partition(":") for declaration in text.split(";"))
-    return {name.strip(): value.replace("!important", "").strip() for name, _, value in pairs}
+    """Return the declarations of a style; important ones are there a second time, under ``!`` and their name."""
+    found: Declarations = {}
+    for declaration in text.split(";"):
+        name, _, value = (part.strip() for part in declaration.partition(":"))
+        plain = value.replace("!important", "").strip()
+        found[name] = plain
+        if plain != value:
+            found[f"!{name}"] = plain
+    return found
+
+
+def settled(merged: Declarations) -> Declarations:
+    """Return the values that count of declarations of which later ones took precedence: important ones, if any."""
+    return {name: merged.get(f"!{name}", value) for name, value in merged.items() if not name.startswith("!")}
 
 
 class StyleSheet:

@@ -3,6 +3,7 @@
 import os
 import struct
 import zlib
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -260,6 +261,12 @@ def test_binary_is_a_third_of_the_thesis_form():
 
 def test_names_say_the_form(tmp_path):
     known = some_map()
+    with pytest.raises(
+        ValueError, match=r"room\.txt is a text, .* and \d+ boxes of the map have a size; want .*\.smap"
+    ):
+        write_sparse_map(tmp_path / "room.txt", known)
+    centres = np.repeat(known.centres[:, None], 2, axis=1)
+    known = replace(known, occupied=occupied_codes(centres))
     for name in ("room.txt", "room.smap"):
         write_sparse_map(tmp_path / name, known)
         assert len(read_sparse_map(tmp_path / name)[0].occupied) == 60

@@ -50,6 +50,13 @@ def test_a_run_by_hand_is_written_with_a_record_that_repeats(server, tmp_path, c
     assert json.loads(capsys.readouterr().out)["policy"] == "by_hand"
 
 
+def test_a_second_drive_keeps_the_first(server, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for number in (1, 2):
+        assert main([*SHORT, "--beside", "none"]) == 0
+        assert len(list((tmp_path / "runs").glob("apartment-by_hand-0*/episode.npz"))) == number
+
+
 def test_nothing_is_run_beside_if_nothing_is_wanted(server, tmp_path, capsys):
     assert main([*SHORT, "--beside", "none", "--out", str(tmp_path)]) == 0
     assert "explores the floor first" not in capsys.readouterr().err

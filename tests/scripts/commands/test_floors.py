@@ -38,6 +38,13 @@ def test_the_list_is_json_too(capsys, tmp_path):
     assert result == json.loads((tmp_path / "floors.json").read_text())
 
 
+def test_a_map_too_coarse_for_its_floor_is_doubtful(tmp_path, capsys):
+    command = ["floors", "generate", "--seed", "3", "--kind", "apartment", "--out", str(tmp_path), "--json"]
+    assert main([*command, "--map-resolution", "0.5"]) == 4
+    assert "in cells of 0.5 m the map has" in json.loads(capsys.readouterr().out)["remark"]
+    assert main([*command, "--map-resolution", "0.05"]) == 0
+
+
 def test_a_floor_is_told_in_figures_and_drawn(capsys, tmp_path):
     assert main(["floors", "show", "apartment"]) == 0
     assert "free area" in capsys.readouterr().out
@@ -124,6 +131,7 @@ def test_a_dungeon_is_imported(shared_data, tmp_path, capsys):
         (["generate", "--area", "5"], "area_m2 is 5"),
         (["generate", "--loops", "2"], "loops is 2"),
         (["generate", "--map-resolution", "0"], "resolution is 0"),
+        (["generate", "--map-resolution", "50"], "map-resolution is 50.0 m, by which no cell is free"),
         (["show", "apartmnt"], "did you mean 'apartment'?"),
         (["show", "set:train"], "is a set"),
     ],

@@ -195,6 +195,7 @@ def test_bad_headers_are_named(maps, tmp_path, capsys, key, value, word):
         (["merge", "one.yaml", "two.yaml"], "no file one.yaml"),
         (["merge", "a.png", "b.png", "--resolution", "0"], "resolution is 0"),
         (["merge", "a.png", "b.png", "--resolution", "nan"], "resolution is nan"),
+        (["merge", "a.yaml", "b.yaml", "--resolution", "0.1"], "--resolution is given, but ROS maps state theirs"),
     ],
 )
 def test_bad_arguments_are_named(arguments, word, capsys, tmp_path):

@@ -26,7 +26,8 @@ def test_a_map_is_predicted_and_what_is_known_stays(part, tmp_path, capsys):
     out = tmp_path / "out"
     assert main(["predict", str(path), "--weights", str(weights), "--out", str(out), "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
-    assert {each.name for each in out.iterdir()} == {"part.yaml", "part.pgm", "probability.npz", "prediction.png"}
+    predicted = {"probability.npz", "prediction.png", "prediction.json"}
+    assert {each.name for each in out.iterdir()} == {"part.yaml", "part.pgm", *predicted}
     with np.load(out / "probability.npz") as arrays:
         levels, probability = arrays["levels"], arrays["probability"]
     assert (probability[levels < 0] == 1.0).all()

@@ -156,8 +156,18 @@ def test_a_place_that_cannot_be_written_to_is_refused_before_the_work(record, tm
     (tmp_path / "file").write_text("mine")
     for option in ("--out", "--picture", "--video"):
         place = tmp_path / "file" / "below"
-        assert main(["replay", str(record), option, str(place if option == "--out" else place / "x")]) == 2
+        assert main(["replay", str(record), option, str(place if option == "--out" else place / "x.png")]) == 2
         assert "cannot write to" in capsys.readouterr().err
+
+
+def test_a_record_is_not_overwritten_and_files_have_the_names_of_their_kind(record, tmp_path, capsys):
+    before = record.read_bytes()
+    assert main(["replay", str(record), "--demonstrations", str(record)]) == 2
+    assert "episode.npz is read, and would be overwritten; choose another name" in capsys.readouterr().err
+    for option, suffix in (("picture", ".png"), ("html", ".html"), ("mcap", ".mcap"), ("demonstrations", ".npz")):
+        assert main(["replay", str(record), f"--{option}", str(tmp_path / "x.txt")]) == 2
+        assert f"x.txt is no name for this file; want one that ends in {suffix}" in capsys.readouterr().err
+    assert record.read_bytes() == before
 
 
 def test_a_page_is_written_with_the_episode_in_it(record, tmp_path, capsys):

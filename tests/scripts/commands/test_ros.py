@@ -19,6 +19,10 @@ from lidarium.scripts.main import main
         (["drive", "--map-resolution", "0"], "resolution"),
         (["serve", "--speed", "-1"], "speed is -1.0; want 0 to 1000"),
         (["play", "run.mcap", "--speed", "nan"], "speed is nan; want 0 to 1000"),
+        (["play", "run.mcap", "--out", "a"], "--out is given, but the command writes no files; leave it out"),
+        (["serve", "--out", "a"], "--out is given, but the command writes no files; leave it out"),
+        (["serve", "--merging"], "--merging is given, but robots are driven from outside; leave it out"),
+        (["serve", "--supervisor.period_s", "5"], "--supervisor is given, but robots are driven from outside"),
     ],
 )
 def test_options_that_make_no_sense_are_refused(words, message, capsys):

@@ -256,6 +256,10 @@ def test_a_log_begins_with_the_spline_map_of_another_run(log, tmp_path, capsys):
         (["--localizer", "splines", "--ignore-odometry"], "want --localizer slam"),
         (["--localizer", "splines", "--match-angle", "1"], "--match-angle is set and the localizer splines; want"),
         (["--localizer", "splines", "--start-map", "missing.npz"], "there is no file missing.npz"),
+        (["--clock-shift", "5"], "--clock-shift is given, but there is neither --reference nor --relations"),
+        (["--relation-poses", "before"], "--relation-poses is given, but there are no --relations"),
+        (["--topic", "/scan"], "topic is '/scan' for"),
+        (["--field-of-view", "90"], "leave it out"),
     ],
 )
 def test_options_that_do_not_fit_the_localizer_are_refused(log, tmp_path, options, message, capsys):

@@ -171,6 +171,29 @@ def test_layers_that_are_off_or_frozen_are_left_out(drawing, tmp_path):
     assert free_area(load_file(saved(drawing, tmp_path))) == pytest.approx(5.9 * 3.9, rel=0.01)
 
 
+@pytest.mark.parametrize("release", ["R2000", "R2010"])
+@pytest.mark.parametrize("is_damaged", [False, True])
+def test_names_of_layers_are_read_in_the_encoding_of_the_release(tmp_path, release, is_damaged):
+    document = ezdxf.new(release, units=4)
+    document.layers.add("Wände")
+    corners = [(0, 0), (6000, 0), (6000, 4000), (0, 4000)]
+    document.modelspace().add_lwpolyline(corners, close=True, dxfattribs={"layer": "Wände"})
+    document.modelspace().add_arc((2000, 2000), 500, 0, 180, {"layer": "Wände"})
+    document.modelspace().add_line((0, 2000), (6000, 2000), {"layer": "furniture"})
+    path = saved(document, tmp_path)
+    if is_damaged:
+        path.write_bytes(path.read_bytes().replace(b"AcDbArc", b"AcDbArk"))
+    assert free_area(load_file(path, layers=("Wände",))) == pytest.approx(5.9 * 3.9, rel=0.02)
+
+
+def test_meshes_are_left_out_and_told(drawing, tmp_path):
+    drawing.modelspace().add_polyface().append_faces([[(1000, 1000), (2000, 1000), (2000, 2000)]])
+    drawing.modelspace().add_polymesh((3, 3))
+    floor = load_file(saved(drawing, tmp_path))
+    assert free_area(floor) == pytest.approx(5.9 * 3.9, rel=0.01)
+    assert floor.remark == "2 meshes are left out"
+
+
 def test_a_drawing_without_a_unit_needs_a_resolution(drawing, tmp_path):
     drawing.header["$INSUNITS"] = 0
     path = saved(drawing, tmp_path)

@@ -199,6 +199,28 @@ def test_what_is_left_out_of_a_drawing_is_told(tmp_path):
     )
 
 
+@pytest.mark.parametrize(
+    ("attribute", "name"),
+    [
+        ('clip-path="url(#a)"', "clip-path"),
+        ('style="mask: url(#a); stroke-dasharray: none"', "mask"),
+        ('style="transform: translate(500px)"', "transform in a style"),
+        ('stroke-dasharray="2 2"', "stroke-dasharray"),
+        ('systemLanguage="de"', "systemLanguage"),
+    ],
+)
+def test_what_is_not_read_of_an_element_is_told(tmp_path, attribute, name):
+    floor = load_file(written(tmp_path, f'{ROOM}<rect x="200" y="100" width="50" height="50" {attribute}/>'), 0.01)
+    assert floor.remark == f"{name}, which 1 elements have, is not read: they are drawn as without it"
+
+
+def test_important_declarations_take_precedence(tmp_path):
+    sheet = "<style>.light {fill: white !important} .dark {fill: black}</style>"
+    for style, area in (("", 0.0), ("fill: black", 0.0), ("fill: black !important", 1.0)):
+        block = f'<rect class="light dark" x="200" y="100" width="100" height="100" style="{style}"/>'
+        assert free_area(tmp_path, sheet + ROOM + block) == pytest.approx(5.9 * 3.9 - area, abs=0.06)
+
+
 def test_a_drawing_that_uses_itself_is_refused(tmp_path):
     with pytest.raises(ValueError, match="nested more than 64 deep"):
         load_file(written(tmp_path, ROOM + '<g id="a"><use href="#a"/></g>'), 0.01)
