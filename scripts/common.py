@@ -60,6 +60,19 @@ class Command:
                 raise ValueError(f"--{name.replace('_', '-')} is given, but {why}; leave it out")
 
 
+_OPTION_OF = {
+    "occupancy.resolution": "map_resolution",
+    "known_starts": "unknown_starts",
+    "resolution": "map_resolution",
+    "max_cycles": "horizon_s",
+}
+"""Options by the names of settings that they set, if these differ."""
+
+
+_OPTIONS_ALONE = ("robots", "realism", "noise", "resolution", "max_cycles")
+"""What options set and ``set`` does not: commands depend on it, or it sets several settings."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class TeamCommand(Command):
     """Options of commands that let a team explore."""
@@ -112,6 +125,17 @@ class TeamCommand(Command):
 
     `lidarium show supervisor` lists them
     """
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for assignment in self.set if "set" in self.given else ():
+            name = assignment.partition("=")[0].strip()
+            option = _OPTION_OF.get(name, name)
+            if name in _OPTIONS_ALONE or option in self.given:
+                raise ValueError(
+                    f"--set {assignment} sets what --{option.replace('_', '-')} does; want --{option.replace('_', '-')}"
+                    " alone"
+                )
 
     @property
     def team_options(self) -> dict[str, Any]:
@@ -237,11 +261,16 @@ class Outputs:
                 "with --out, or remove it"
             )
 
-    def clear(self, folder: Path, names: Iterable[str] | None = None) -> None:
-        """Remove the files, or some of them, if they are of an earlier call."""
-        if self._is_ours(folder):
-            for path in self._there(folder, self.names if names is None else names):
-                path.unlink()
+    def clear(self, folder: Path, names: Iterable[str] | None = None) -> list[str]:
+        """Remove the files, or some of them, if they are of an earlier call; return their names.
+
+        The result stays, to be replaced before others are written: so an interrupted call leaves a known folder.
+        """
+        wanted = [name for name in (self.names if names is None else names) if name != self.result]
+        found = self._there(folder, wanted) if self._is_ours(folder) else []
+        for path in found:
+            path.unlink()
+        return [path.name for path in found]
 
     def _there(self, folder: Path, names: Iterable[str]) -> list[Path]:
         return [path for name in names for path in sorted(folder.glob(name)) if path.is_file()]

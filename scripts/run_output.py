@@ -6,7 +6,7 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from lidarium.scripts.common import Outputs, table
+from lidarium.scripts.common import Outputs, notify, table
 from lidarium.scripts.transforms import PlacedMaps, transforms
 
 if TYPE_CHECKING:
@@ -53,7 +53,9 @@ def write_run(
     from lidarium.mapping.grids.occupancy import three_levels
 
     env = episode.env
-    OUTPUTS.clear(folder, (RECORD, *(film for film in FILMS if film not in films), *TEAM_FILES))
+    if old := OUTPUTS.clear(folder, (RECORD, *(film for film in FILMS if film not in films))):
+        notify(f"removed from {folder}, as they are of an earlier run: {', '.join(old)}")
+    OUTPUTS.clear(folder, TEAM_FILES)
     write_json(folder / RESULT, result)
     if recorder is not None:
         from lidarium.evaluation.record import write_record

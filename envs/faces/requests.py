@@ -44,16 +44,29 @@ def seeds_of(seed: int | Sequence[int | None] | NDArray[np.integer] | None, epis
     return [checked_seed(one) for one in seed]
 
 
-def episodes_of(options: dict[str, Any] | None, episodes: int) -> NDArray[np.int64]:
+def episodes_of(options: dict[str, Any] | None, episodes: int, robots: int = 1) -> NDArray[np.int64]:
     """Return which episodes begin: those of the mask in option ``episodes``, or all.
+
+    Gymnasium's ``reset_mask`` is a mask of rows, those of an episode alike.
 
     Raises
     ------
     ValueError
-        If the mask is not (episodes,) bool with at least one True.
+        If the mask is not (episodes,) bool with at least one True, or there are two.
     """
-    check_options(options, (*OPTIONS, "episodes"))
-    mask = (options or {}).get("episodes")
+    check_options(options, (*OPTIONS, "episodes", "reset_mask"))
+    options = options or {}
+    mask = options.get("episodes")
+    if (of_rows := options.get("reset_mask")) is not None:
+        if mask is not None:
+            raise ValueError("options episodes and reset_mask are given; want one of them")
+        rows = np.asarray(of_rows)
+        if rows.shape != (episodes * robots,) or (rows.reshape(episodes, robots) != rows[::robots, None]).any():
+            raise ValueError(
+                f"option reset_mask is {of_rows!r}; want {episodes * robots} booleans, one for each row, the same for "
+                "all robots of an episode"
+            )
+        mask = rows[::robots]
     if mask is None:
         return np.arange(episodes)
     chosen = np.asarray(mask)

@@ -161,11 +161,12 @@ class ExplorationVectorEnv(BatchFace, VectorEnv[Any, NDArray[Any], NDArray[Any]]
             generators go on.
         options : dict, optional
             ``floor``, ``starts``, ``goal`` as for ``ExplorationEnv.reset``, one for all or a sequence with one per
-            episode, and ``episodes`` (episodes,) bool: which ones begin, all by default. Others are ignored.
+            episode, and ``episodes`` (episodes,) bool: which ones begin, all by default; or Gymnasium's ``reset_mask``
+            (rows,), the same for all robots of an episode. Others are ignored.
         """
         self._check_open()
         batch = self.batch
-        chosen = episodes_of(options, batch.episodes)
+        chosen = episodes_of(options, batch.episodes, batch.robots)
         seeds = seeds_of(seed, batch.episodes)
         batch.begin(
             chosen,

@@ -72,6 +72,9 @@ REALISM.register(
 )
 
 
+NOISE_NAMES = ("noise_floor", "noise_share")
+"""Settings of a laser's noise."""
+
 CYCLES = Rule(int, bounds=within(1, 10**9))
 """Rule for the number of steps of an episode."""
 
@@ -121,12 +124,17 @@ def make_settings(settings: ExplorationSettings | None = None, **options: Any) -
     base = settings or ExplorationSettings()
     assigned = options.pop("assigned", ())
     realism = options.pop("realism", None)
+    is_noise_given = "noise" in options
+    _check_resolutions(options)
     if realism is not None:
-        options = {**REALISM[realism], **options}
+        implied = dict(REALISM[realism])
+        if _has_resolution(options.get("occupancy")):
+            implied.pop("resolution", None)
+        options = {**implied, **options}
     for name in options:
         _check_kinds(name, options.get("kinds", base.kinds))
+    options |= _lasers(options, base, is_noise_given)
     options = {name: _part(name, value) for name, value in options.items()}
-    options |= _lasers(options, base)
     resolution = options.pop("resolution", None)
     if resolution is not None:
         check_values({"resolution": resolution}, OCCUPANCY.bounds, "the maps")
@@ -145,6 +153,21 @@ def make_settings(settings: ExplorationSettings | None = None, **options: Any) -
         chosen = options.get("localization", base.localization)
         options["localizer"] = localizer_settings(chosen, options["localizer"])
     return assign(replace(base, **options), assigned)
+
+
+def _check_resolutions(options: Mapping[str, Any]) -> None:
+    """Check that the cell of the maps is not given twice."""
+    occupancy = options.get("occupancy")
+    if options.get("resolution") is not None and isinstance(occupancy, Mapping) and _has_resolution(occupancy):
+        raise ValueError(
+            f"resolution is {shown(options['resolution'])} and occupancy has a resolution of "
+            f"{shown(occupancy['resolution'])}; want one of them"
+        )
+
+
+def _has_resolution(occupancy: Any) -> bool:  # noqa: ANN401
+    """Return whether settings of the maps have their cell."""
+    return isinstance(occupancy, OccupancySettings) or (isinstance(occupancy, Mapping) and "resolution" in occupancy)
 
 
 def _check_kinds(name: str, kinds: Any) -> None:  # noqa: ANN401
@@ -177,21 +200,33 @@ def _horizon(max_cycles: Any, options: Mapping[str, Any], base: ExplorationSetti
     return float(max_cycles * time_step)
 
 
-def _lasers(options: dict[str, Any], base: ExplorationSettings) -> dict[str, Any]:
-    """Take ``lidar``, ``lidars`` and ``noise`` out of the options, and return the settings that they make."""
+def _lasers(options: dict[str, Any], base: ExplorationSettings, is_noise_given: bool) -> dict[str, Any]:
+    """Take ``lidar``, ``lidars`` and ``noise`` out of the options, and return the settings that they make.
+
+    The noise of a realism, which is not given itself, leaves given lasers alone that state theirs.
+    """
+    keeps = not is_noise_given and not options.keys().isdisjoint({"lidar", "lidars"})
     lidars = options.pop("lidars", () if "lidar" in options else base.lidars)
     lidar, noise = options.pop("lidar", base.lidar), options.pop("noise", None)
     if isinstance(lidar, list | tuple) and lidar:
         lidar, lidars = base.lidar, lidar
-    is_list = isinstance(lidars, list | tuple)
-    lidars = checked_lidars([_part("lidar", each) for each in lidars] if is_list else lidars)
+    given = [lidar, *(lidars if isinstance(lidars, list | tuple) else ())]
+    lidar, *made = (_part("lidar", each) for each in given)
+    lidars = checked_lidars(made if isinstance(lidars, list | tuple) else lidars)
     if noise is not None:
         noise_floor, noise_share = NOISE[noise]
         lidar, *lidars = (
-            replace(each, noise_floor=noise_floor, noise_share=noise_share) if isinstance(each, Lidar) else each
-            for each in (lidar, *lidars)
+            replace(each, noise_floor=noise_floor, noise_share=noise_share)
+            if isinstance(each, Lidar) and not (keeps and _states_noise(stated, each))
+            else each
+            for each, stated in zip((lidar, *lidars), given, strict=True)
         )
     return {"lidar": lidar, "lidars": lidars}
+
+
+def _states_noise(given: Any, lidar: Lidar) -> bool:  # noqa: ANN401
+    """Return whether a laser was given with its noise: by its values, or as one that is noisy."""
+    return lidar.is_noisy or (isinstance(given, Mapping) and not given.keys().isdisjoint(NOISE_NAMES))
 
 
 def _part(name: str, value: Any) -> Any:  # noqa: ANN401
@@ -258,5 +293,9 @@ def value_of(text: str) -> Any:  # noqa: ANN401
         return None
     try:
         return tomllib.loads(f"value = {text}")["value"]
-    except (ValueError, RecursionError):  # text needs no quotes
+    except (ValueError, RecursionError) as error:  # text needs no quotes
+        if text.startswith(("[", "{")):
+            raise ValueError(
+                f'{shown(text)} is no list or table as in TOML; want names in quotes, as in kinds=["kobuki"]'
+            ) from error
         return text

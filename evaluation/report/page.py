@@ -25,7 +25,7 @@ from lidarium.evaluation.report.sections import Section
 from lidarium.evaluation.report.tables import as_text
 from lidarium.evaluation.suites.trial import DEFAULT_VARIANT
 from lidarium.mapping.files.guarded_reading import printable
-from lidarium.mapping.files.output import write_text
+from lidarium.mapping.files.output import check_not_read, write_text
 
 _DIGITS = 4
 _OF_GROUP = ("times", "over_bound", "values", "comparisons", "coverage_over_time", "profiles", "by_floor")
@@ -204,7 +204,8 @@ def replay(
     Raises
     ------
     ValueError
-        If the record is of another version, the floor is not found, or the end is not the recorded one.
+        If the record is of another version, the floor is not found, the end is not the recorded one, or a file to be
+        written is the record.
 
     Examples
     --------
@@ -213,6 +214,8 @@ def replay(
     >>> lidarium.replay(recorded).scorer.time
     5.0
     """
+    if not isinstance(record, EpisodeRecord):
+        check_not_read(record, (html, film))
     found = record if isinstance(record, EpisodeRecord) else read_record(Path(record))
     env = rerun(found, floor)
     if html is not None:

@@ -172,6 +172,13 @@ def write_json(path: Path, content: Mapping[str, Any]) -> None:
     write_text(path, as_json(content))
 
 
+def check_not_read(read: Path | str, written: Iterable[Path | str | None]) -> None:
+    """Check that a file that is read is none of those that are written."""
+    for path in written:
+        if path is not None and Path(path).resolve() == Path(read).resolve():
+            raise ValueError(f"{path} is read, and would be overwritten; choose another name")
+
+
 def check_writable(folder: Path) -> None:
     """Check that files can be written to a folder that need not exist yet.
 

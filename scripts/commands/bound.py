@@ -49,12 +49,10 @@ def execute(command: _Bound) -> Answer:
         raise ValueError(f"rounds is {command.rounds}; want zero or more")
     options = {**command.team_options, "robots": command.robots, "stop_coverage": command.coverage}
     settings = make_settings(**options)
-    for option, asked, given in (
-        ("--robots", command.robots, settings.robots),
-        ("--coverage", command.coverage, settings.stop_coverage),
-    ):
-        if given != asked:
-            raise ValueError(f"--set gives another value, {given}, than {option}, {asked}; want {option} alone")
+    if settings.stop_coverage != command.coverage:
+        raise ValueError(
+            f"--set stop_coverage={settings.stop_coverage} sets what --coverage does; want --coverage alone"
+        )
     starts = starts_for(command.floor, settings, command.seed, command.resolution)
     floor = load_floor(command.floor, command.resolution)
     found = known_floor_bound(floor, settings, starts, command.rounds, command.seed)

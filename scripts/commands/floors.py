@@ -202,8 +202,8 @@ def _show_floor(command: _Show) -> Answer:
     about = about_floor(command.name) if command.name in floor_names() else ""
     files = []
     if command.out is not None:
-        _save_picture(command.out / f"{stem}.png", floor)
         write_result(command, f"{stem}.json", result)
+        _save_picture(command.out / f"{stem}.png", floor)
         files = [f"{stem}.json", f"{stem}.png"]
     return Answer(result, floor_description(result, command.out, files, about), verdict_of_reach(result))
 
@@ -344,9 +344,9 @@ def write_floor(command: Command, floor: "Floor", resolution: float, source: Pat
     if is_coarse := not LEAST_KEPT * whole <= free <= whole / LEAST_KEPT:
         coarse = f"in cells of {resolution:g} m the map has {free:.1f} m2 of free floor, instead of {whole:.1f} m2"
         result["remark"] = "; ".join(filter(None, (result["remark"], coarse)))
+    write_result(command, f"{stem}.json", result, folder)
     write_ros_map(folder, stem, _levels(raster.solid, resolution), (*raster.origin, 0.0), resolution)
     _save_picture(folder / f"{stem}.png", floor)
-    write_result(command, f"{stem}.json", result, folder)
     check_written(folder, files)
     text = floor_description(result, folder, files)
     return Answer(result, text, DOUBTFUL if is_coarse else verdict_of_reach(result))

@@ -324,6 +324,7 @@ def write_merged(
     joined = [group for group in merged.groups() if len(group) > 1]
     fused_maps = [bent.fused for bent in deformed] or [merged.fused(group) for group in joined]
     OUTPUTS.clear(out)
+    write_json(out / RESULT, result)
     for number, (group, fused) in enumerate(zip(joined, fused_maps, strict=True)):
         name = "map" if number == 0 else f"map-{number + 1}"
         origin = corner_of(images[group[0]]) @ Transform(*fused.origin)
@@ -331,7 +332,6 @@ def write_merged(
         files += [f"{name}.yaml", f"{name}.pgm"]
     corners = {name: corner_of(image) for name, image in images.items()}
     save_merge_picture(out / "merge.png", merged, corners, deformed)
-    write_json(out / RESULT, result)
     files += [RESULT, "merge.png"]
     check_written(out, files)
     return files

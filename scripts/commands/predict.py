@@ -71,21 +71,21 @@ def execute(command: _Predict) -> Answer:
         "origin": np.array(found.image.origin),
         "resolution": np.array(found.image.resolution),
     }
-    write_arrays(out / "probability.npz", arrays)
-    save_prediction_picture(out / "prediction.png", found, f"{command.map.stem}, predicted")
-    written = write_ros_map(out, name, found.image.levels, found.image.origin, found.image.resolution)
     is_unknown = found.levels == UNKNOWN
     area = found.image.resolution**2
     known = float((found.levels < 0).sum()) * area
     expected = float(found.probability[is_unknown].sum()) * area
     result = {
-        "map": str(written),
+        "map": str(out / f"{name}.yaml"),
         "resolution": found.image.resolution,
         "known_free_m2": round(known, 2),
         "expected_free_m2": round(expected, 2),
         "predictor": command.predictor,
     }
     write_json(out / "prediction.json", result)
+    write_arrays(out / "probability.npz", arrays)
+    save_prediction_picture(out / "prediction.png", found, f"{command.map.stem}, predicted")
+    written = write_ros_map(out, name, found.image.levels, found.image.origin, found.image.resolution)
     text = (
         f"{known:.1f} m2 are known to be free, and {expected:.1f} m2 more are expected behind the border; "
         f"{written}, probability.npz, prediction.png and prediction.json are in {out}"

@@ -57,7 +57,7 @@ class _Replay(FilmFiles, Command):
 def execute(command: _Replay) -> Answer:
     """Run a record again, or draw it."""
     from lidarium.evaluation.record import read_record
-    from lidarium.mapping.files.output import check_writable, write_json
+    from lidarium.mapping.files.output import check_not_read, check_writable, write_json
 
     asked = {".png": command.picture, ".html": command.html, ".mcap": command.mcap, ".npz": command.demonstrations}
     files = [path for path in asked.values() if path is not None]
@@ -67,8 +67,11 @@ def execute(command: _Replay) -> Answer:
     for suffix, path in asked.items():
         if path is not None and path.suffix.lower() != suffix:
             raise ValueError(f"{path} is no name for this file; want one that ends in {suffix}")
-        if path is not None and path.resolve() == command.file.resolve():
-            raise ValueError(f"{path} is read, and would be overwritten; choose another name")
+    check_not_read(command.file, (*files, *command.films))
+    if not command.films:
+        command.refuse("no film is asked for", "film_speed", "film_width", "film_fps")
+        if command.picture is None and command.html is None:
+            command.refuse("neither picture, page nor film is asked for", "prediction")
     command.check_films()
     record = read_record(command.file)
     answer = _drawn(command, record) if files or command.films else _run_again(command, record)

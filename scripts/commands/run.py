@@ -128,6 +128,8 @@ def execute(command: Run) -> Answer:
     import lidarium
 
     command = _completed(command)
+    if not command.films:
+        command.refuse("no film is asked for", "film_shows", "film_speed", "film_width", "film_fps")
     OUTPUTS.check(folder_of(command, Path(command.floor).stem), (command.floor,))
     options = policy_options_of(command, command.chosen_policy)
     policy = lidarium.policy(command.chosen_policy, **options)

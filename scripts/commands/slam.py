@@ -368,13 +368,13 @@ def _write(out: Path, log: "LaserLog", followed: "_AnyFollowed", result: dict[st
     files: tuple[str, ...] = FILES
     grid = slam.map if isinstance(slam, Slam) else slam.grid
     OUTPUTS.clear(out)
+    write_json(out / "slam.json", result)
     if not isinstance(slam, Slam):
         write_spline_map(out / SPLINES, slam.map)
         files = (*files, SPLINES)
     levels, origin = cropped(grid.levels(), grid.origin, grid.settings.resolution)
     write_ros_map(out, "map", levels, (*origin, 0.0), grid.settings.resolution)
     write_tum(out / "trajectory.tum", log.stamps, followed.poses)
-    write_json(out / "slam.json", result)
     check_written(out, files)
     return files
 

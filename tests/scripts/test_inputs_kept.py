@@ -89,11 +89,12 @@ def test_maps_that_do_not_join_leave_no_map_of_those_that_did(folder, tmp_path):
     assert sorted(path.name for path in out.iterdir()) == [*kept_ones, "merge.png", "transforms.json"]
 
 
-def test_a_run_alone_leaves_no_map_of_an_earlier_team(tmp_path):
+def test_a_run_alone_leaves_no_map_of_an_earlier_team(tmp_path, capsys):
     for robots in ("2 --record", "1"):
         (tmp_path / "robot_closeup.png").write_bytes(b"mine")
         words = f"run --floor scene_room --policy nearest_frontier --robots {robots} --horizon-s 2 --out"
         assert main([*words.split(), str(tmp_path)]) == 0
+    assert "as they are of an earlier run: episode.npz" in capsys.readouterr().err
     assert not list(tmp_path.glob("robot_1.*"))
     assert not (tmp_path / "transforms.json").exists()
     assert not (tmp_path / "episode.npz").exists()

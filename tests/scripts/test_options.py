@@ -334,8 +334,27 @@ def test_options_of_several_words_may_be_given_again():
     )
 
 
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ("--set robots=2", "--set robots=2 sets what --robots does; want --robots alone"),
+        ("--set realism=lab", "want --realism alone"),
+        ("--set resolution=0.1", "want --map-resolution alone"),
+        ("--horizon-s 2 --set horizon_s=4", "want --horizon-s alone"),
+        ("--localization truth --set localization=slam", "want --localization alone"),
+        ("--map-resolution 0.05 --set occupancy.resolution=0.1", "want --map-resolution alone"),
+        ("--set kinds=[service]", "'[service]' is no list or table as in TOML; want names in quotes"),
+        ("--film-shows maps", "--film-shows is given, but no film is asked for; leave it out"),
+    ],
+)
+def test_options_that_contradict_each_other_or_have_no_effect_are_refused(words, message, tmp_path, capsys):
+    assert main(["run", "--policy", "random_walk", *words.split(), "--out", str(tmp_path)]) == 2
+    assert message in " ".join(capsys.readouterr().err.split())
+    assert not list(tmp_path.iterdir())
+
+
 def test_all_settings_count_if_the_option_is_repeated(tmp_path, capsys):
-    words = ["run", "--policy", "random_walk", "--set", "people=2", "--set", "horizon_s=1", "--set", "robots=1"]
+    words = ["run", "--policy", "random_walk", "--set", "people=2", "--set", "horizon_s=1", "--robots", "1"]
     assert main([*words, "--out", str(tmp_path)]) == 0
     assert "0 contacts by robots, 0 by people" in capsys.readouterr().out
     result = json.loads((tmp_path / "result.json").read_text())

@@ -21,6 +21,12 @@ def test_one_seed_counts_on_by_episode():
 def test_a_mask_chooses_episodes():
     assert episodes_of(None, 3).tolist() == [0, 1, 2]
     assert episodes_of({"episodes": np.array([True, False, True])}, 3).tolist() == [0, 2]
+    assert episodes_of({"reset_mask": np.array([False, False, True, True])}, 2, robots=2).tolist() == [1]
+    for mask in ([True, False, True, True], [True, False]):
+        with pytest.raises(ValueError, match="want 4 booleans, one for each row, the same for all robots"):
+            episodes_of({"reset_mask": np.array(mask)}, 2, robots=2)
+    with pytest.raises(ValueError, match="episodes and reset_mask are given; want one of them"):
+        episodes_of({"reset_mask": np.ones(2, bool), "episodes": np.ones(2, bool)}, 2)
     for bad in ([False, False, False], [True, True], [1, 0, 1]):
         with pytest.raises(ValueError, match="want a mask of 3 booleans, at least one of them True"):
             episodes_of({"episodes": bad}, 3)

@@ -7,6 +7,7 @@ import pytest
 
 from lidarium.envs.settings import ExplorationSettings, make_settings
 from lidarium.envs.settings.battery import BATTERIES
+from lidarium.envs.settings.lidar import Lidar
 from lidarium.envs.settings.making import assign
 from lidarium.evaluation.episodes.settings_identity import settings_sha256
 from lidarium.mapping.localization.settings import SlamSettings
@@ -17,6 +18,20 @@ def test_parts_are_given_by_name_by_value_or_by_a_mapping():
     assert (by_mapping.reward.time, by_mapping.reward.area) == (0.5, 1.0)
     assert (by_mapping.radio.kind, by_mapping.radio.reach) == ("range", 3.0)
     assert make_settings(radio="signal").radio.kind == "signal"
+
+
+def test_a_realism_leaves_alone_what_is_given():
+    noisy, other = {"noise_floor": 0.5}, Lidar(noise_floor=0.2)
+    for lidar, expected in ((noisy, 0.5), (other, 0.2), ({"noise_floor": 0.0}, 0.0), ({"beams": 180}, 0.01)):
+        assert make_settings(realism="lab", lidar=lidar).lidar.noise_floor == expected
+        assert make_settings(realism="lab", noise="none", lidar=lidar).lidar.noise_floor == 0.0
+    assert make_settings(realism="ideal", lidar=other).lidar.noise_floor == 0.2
+    assert make_settings(make_settings(lidar=other), realism="ideal").lidar.noise_floor == 0.0
+    lidars = make_settings(robots=2, realism="lab", lidar=[noisy, {}]).lidars
+    assert [each.noise_floor for each in lidars] == [0.5, 0.01]
+    assert make_settings(realism="fast", occupancy={"resolution": 0.05}).occupancy.resolution == 0.05
+    with pytest.raises(ValueError, match=r"resolution is 0\.05 and occupancy has a resolution of 0\.1; want one"):
+        make_settings(resolution=0.05, occupancy={"resolution": 0.1})
 
 
 def test_what_json_holds_of_settings_makes_the_same_settings():

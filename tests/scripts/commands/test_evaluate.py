@@ -75,7 +75,7 @@ def test_a_file_says_what_to_run(tmp_path, capsys):
         (["none.toml", "--policy-set", "learned.weights=x"], "--policy-set is ('learned.weights=x',), and the suite"),
         (["--preset", "dare", "--bounds"], "--bounds is True, and the preset dare sets it"),
         (["--noise", "loud"], "loud"),
-        (["--robots", "1", "2", "--set", "robots=3"], "has 3 robots, and the suite 1; want --robots alone"),
+        (["--robots", "1", "2", "--set", "robots=3"], "--set robots=3 sets what --robots does; want --robots alone"),
     ],
 )
 def test_bad_input_is_named_and_nothing_is_written(arguments, message, tmp_path, capsys, monkeypatch):

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from page_reader import replay_of_page
 
+import lidarium
 from lidarium.mapping.files.map_files import write_ros_map
 from lidarium.scripts.main import main
 
@@ -164,6 +165,11 @@ def test_a_record_is_not_overwritten_and_files_have_the_names_of_their_kind(reco
     before = record.read_bytes()
     assert main(["replay", str(record), "--demonstrations", str(record)]) == 2
     assert "episode.npz is read, and would be overwritten; choose another name" in capsys.readouterr().err
+    with pytest.raises(ValueError, match=r"episode\.npz is read, and would be overwritten; choose another name"):
+        lidarium.replay(record, html=record)
+    for option in ("--film-speed", "--prediction"):
+        assert main(["replay", str(record), option, *(["2"] if option == "--film-speed" else [])]) == 2
+        assert f"{option} is given, but n" in capsys.readouterr().err
     for option, suffix in (("picture", ".png"), ("html", ".html"), ("mcap", ".mcap"), ("demonstrations", ".npz")):
         assert main(["replay", str(record), f"--{option}", str(tmp_path / "x.txt")]) == 2
         assert f"x.txt is no name for this file; want one that ends in {suffix}" in capsys.readouterr().err
