@@ -105,6 +105,11 @@ POLICIES.register(
     "at the level of frontiers: two robots that share a network trained by MAPPO",
 )
 POLICIES.register(
+    "zoo:mappo-4",
+    "lidarium.agents.zoo.policy:mappo_4",
+    "at the level of frontiers: four robots that share a network trained by MAPPO",
+)
+POLICIES.register(
     "zoo:signal-2",
     "lidarium.agents.zoo.policy:signal_2",
     "as zoo:ppo-2, trained with radio links that break behind walls",

@@ -58,6 +58,11 @@ def mappo_2(weights: str | Path = "") -> ZooTeam:
     return ZooTeam("mappo-2", weights)
 
 
+def mappo_4(weights: str | Path = "") -> ZooTeam:
+    """Return the team of four that was trained by MAPPO."""
+    return ZooTeam("mappo-4", weights)
+
+
 def signal_2(weights: str | Path = "") -> ZooTeam:
     """Return the team of two that was trained by PPO with a radio that breaks."""
     return ZooTeam("signal-2", weights)

@@ -108,8 +108,22 @@ def rows_file(name: str) -> str:
     return f"{name}.rows.jsonl.xz"
 
 
-NOT_SHIPPED = (*TIMINGS, "record", "operating", "given_up", "d_sum85_m", "d_sum90_m", "d_sum95_m")
-"""What differs between two runs of one episode, lists that no table shows, and sums that no project reports."""
+NOT_SHIPPED = (
+    *TIMINGS,
+    *("record", "operating", "given_up"),
+    *("d85_m", "d90_m", "d95_m", "d_sum85_m", "d_sum90_m", "d_sum95_m", "d_sum99_m", "n85", "n90", "n95"),
+    *(
+        "path_balance",
+        "balance",
+        "c_known_final",
+        "c_valid_final",
+        "overlap_eb",
+        "overlap_mv",
+        "overlap_mx_85",
+        "overlap_mx_95",
+    ),
+)
+"""What differs between two runs of one episode, and lists and figures of other projects that no page shows."""
 
 
 def packed(rows: Iterable[Row]) -> bytes:

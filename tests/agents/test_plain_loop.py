@@ -21,7 +21,7 @@ NEEDS = {
     "zoo:ppo-2": {"observe": ("frontier_gains", "teammates")},
     "zoo:tours-2": {"observe": ("teammates",)},
 }
-ALIKE = {"zoo:ppo-4", "zoo:mappo-2", "zoo:signal-2"}
+ALIKE = {"zoo:ppo-4", "zoo:mappo-2", "zoo:mappo-4", "zoo:signal-2"}
 """Policies that differ from ``zoo:ppo-2`` by their weights alone."""
 
 NAMES = sorted(set(policy_names()) - ALIKE)

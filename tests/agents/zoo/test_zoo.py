@@ -14,6 +14,7 @@ NAMES = {
     "zoo:ppo-2": "frontier",
     "zoo:ppo-4": "frontier",
     "zoo:mappo-2": "frontier",
+    "zoo:mappo-4": "frontier",
     "zoo:signal-2": "frontier",
 }
 
