@@ -40,9 +40,9 @@ TEAMS = {
     "mappo-4": 5,
     "qmix-4": 2,
     "signal-2": 5,
-    "supervised-2": 5,
+    "supervised-2": 2,
 }
-"""Number of trainings by team, whose own number is its size in training; two of those that do not learn."""
+"""Number of trainings by team, whose own number is its size in training; two of those that do not learn or take long."""
 
 AGAIN = ("ppo-2", "0")
 """Training of a shipped network that is made again, to see what comes out on another day."""
