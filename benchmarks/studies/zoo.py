@@ -42,7 +42,7 @@ TEAMS = {
     "signal-2": 5,
     "supervised-2": 2,
 }
-"""Number of trainings by team, whose own number is its size in training; two of those that do not learn or take long."""
+"""Number of trainings by team, whose own number is its size in training; two if they do not learn or take long."""
 
 AGAIN = ("ppo-2", "0")
 """Training of a shipped network that is made again, to see what comes out on another day."""
@@ -85,8 +85,6 @@ these trainings, and other seeds may lie beyond them. The best team is chosen on
 
 ## Figures
 
-| figure | to reach | measured | reached |
-|---|---:|---:|---|
 {goals}
 
 {tables}
@@ -369,7 +367,8 @@ def _on_all_floors(lines: Sequence[Line]) -> str:
         return ""
     tables = "\n\n".join(f"Teams of {robots}:\n\n{_table(_by_policy(lines, robots))}" for robots in SIZES)
     number = len({line["floor"] for line in lines})
-    return f"## All floors\n\nShipped teams and classic policies on {number} floors.\n\n{tables}\n\n"
+    goals = "\n".join([GOALS, *_goals(lines, SIZES)])
+    return f"## All floors\n\nShipped teams and classic policies on {number} floors.\n\n{goals}\n\n{tables}\n\n"
 
 
 def _worlds(lines: Sequence[Line]) -> str:
@@ -397,10 +396,13 @@ def _best(found: Mapping[str, Sequence[Line]], is_by_tours: bool) -> str | None:
     return min(teams, key=lambda name: _slowness(name, found), default=None)
 
 
-def _goals(lines: Sequence[Line]) -> str:
-    """Return a row for each figure that was to be reached."""
+GOALS = "| figure | to reach | measured | reached |\n|---|---:|---:|---|"
+
+
+def _goals(lines: Sequence[Line], sizes: Sequence[int]) -> list[str]:
+    """Return a row for each figure that was to be reached, of teams of some sizes."""
     rows = []
-    for robots, is_by_tours in itertools.product((*SIZES, LARGE), (False, True)):
+    for robots, is_by_tours in itertools.product(sizes, (False, True)):
         found = _by_policy(lines, robots)
         best = _best(found, is_by_tours)
         if best is None:
@@ -425,7 +427,7 @@ def _goals(lines: Sequence[Line]) -> str:
                 f"| {robots} robots, `{best}`: runs that reach 99 % | as many as `{NEAREST}` "
                 f"| {100 * reached[0]:.1f} % ({100 * reached[1]:.1f} %) | {_said(reached[0] >= reached[1], True)} |"
             )
-    return "\n".join(rows)
+    return rows
 
 
 def _again(folder: Path, runs: Sequence[Line]) -> Iterator[str]:
@@ -515,7 +517,7 @@ def page(folder: Path) -> str:
         floors=len({line["floor"] for line in lines}),
         all_floors=len({line["floor"] for line in whole or lines}),
         horizon=HORIZON_S,
-        goals="\n".join((_goals(lines), *_again(folder, few))),
+        goals="\n".join([GOALS, *_goals(lines, (*SIZES, LARGE)), *_again(folder, few)]),
         whole=_on_all_floors(whole),
         tables="\n\n".join(f"## Teams of {robots}\n\n{_table(_by_policy(lines, robots))}" for robots in SIZES),
         large=_table(_by_policy(lines, LARGE)),
