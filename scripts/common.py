@@ -280,7 +280,7 @@ class Outputs:
 
         try:
             found = json.loads(read_text(folder / self.result))
-        except (OSError, ValueError):
+        except (OSError, ValueError, RecursionError):
             return False
         return isinstance(found, dict) and self.key in found
 

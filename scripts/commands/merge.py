@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 DEFAULT_FOLDER = Path("merged")
 RESULT, REGIONS = "transforms.json", "regions.png"
 MAPS = tuple(f"map{number}.{kind}" for number in ("", "-[0-9]", "-[0-9][0-9]") for kind in ("yaml", "pgm"))
-OUTPUTS = Outputs((RESULT, *MAPS, "merge.png", REGIONS), RESULT, "pairs")
+OUTPUTS = Outputs((RESULT, *MAPS, "merge.png", REGIONS), RESULT, "remarks")  # which that of a run lacks
 
 ROS_MAPS = (".yaml", ".yml")
 

@@ -77,6 +77,17 @@ def test_no_command_replaces_files_of_others(words, name, folder, monkeypatch, c
     assert {path.name: path.read_text() for path in (folder / "out").iterdir()} == dict.fromkeys(kept, '{"mine": 1}')
 
 
+def test_a_merge_replaces_no_map_of_a_run(folder, tmp_path, capsys):
+    out = tmp_path / "run"
+    run = "run --floor scene_room --policy nearest_frontier --robots 2 --unknown-starts --horizon-s 2 --out"
+    assert main([*run.split(), str(out)]) == 0
+    before = (out / "map.pgm").read_bytes()
+    assert (out / "transforms.json").exists()
+    assert main(["merge", str(folder / "map.yaml"), str(folder / "other.yaml"), "--out", str(out)]) == 2
+    assert "is not of an earlier call of this command" in capsys.readouterr().err
+    assert (out / "map.pgm").read_bytes() == before
+
+
 def test_maps_that_do_not_join_leave_no_map_of_those_that_did(folder, tmp_path):
     out, elsewhere = tmp_path / "out", room(blank(), 20, 20, 90, 130)
     far = write_ros_map(folder, "far", elsewhere, (0.0, 0.0, 0.0), RESOLUTION)
