@@ -5,7 +5,8 @@ Every pair is tried; accepted and consistent pairs form groups with one map each
 
 import itertools
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -33,6 +34,7 @@ from lidarium.mapping.merging.pair import (
     verify_pair,
 )
 from lidarium.mapping.merging.settings import TOLERANCES, MergeSettings
+from lidarium.registry import unknown
 
 _MIN_GROWTH_M = 0.05
 """Offsets that a scale explains below this are those of cells and noise [m]."""
@@ -61,10 +63,25 @@ class Question:
     is_explained: bool = True
 
 
+def _question(given: Mapping[str, Any]) -> Question:
+    """Return a question of a mapping."""
+    known = [each.name for each in fields(Question)]
+    for name in given:
+        if name not in known:
+            raise ValueError(unknown("question", name, known))
+    guess = given.get("guess")
+    if guess is None or isinstance(guess, Transform):
+        return Question(**given)
+    numbers = np.asarray(guess, np.float64)
+    if numbers.shape != (3,) or not np.isfinite(numbers).all():
+        raise ValueError(f"guess is {guess!r}; want x, y and theta in metres and radians")
+    return Question(**{**given, "guess": Transform(*numbers.tolist())})
+
+
 def merge_maps(
     maps: Mapping[str, tuple[ArrayLike, float]],
     settings: MergeSettings | None = None,
-    question: Question | None = None,
+    question: Question | Mapping[str, Any] | None = None,
 ) -> Merged:
     """Merge maps of robots that do not know each other's start.
 
@@ -79,8 +96,10 @@ def merge_maps(
         sides differ, all maps are resampled to the coarsest.
     settings : MergeSettings, optional
         Settings; defaults if None.
-    question : MergeQuestion, optional
-        A guess for two maps, whether they are joined in any case, and what is reported of each pair.
+    question : mapping, optional
+        Some of: ``guess``, about how the second map's lower left corner lies in the first map, (x, y, theta) [m, rad];
+        ``is_forced``, whether two maps are joined by the best transform whatever speaks against it, default False;
+        ``is_explained``, whether pairs that join at once have confidence and doubt, too, default True.
 
     Returns
     -------
@@ -90,7 +109,7 @@ def merge_maps(
     Raises
     ------
     ValueError
-        If there are no maps, one is not a map, or a guess is given for other than two maps.
+        If there are no maps, one is not a map, a question is unknown, or a guess is given for other than two maps.
 
     Examples
     --------
@@ -103,7 +122,8 @@ def merge_maps(
     >>> sorted(merged.pairs)
     [('a', 'b')]
     """
-    settings, question = settings or MergeSettings(), question or Question()
+    settings = settings or MergeSettings()
+    question = question if isinstance(question, Question) else _question(question or {})
     if not maps:
         raise ValueError("there are no maps to merge; want at least one")
     if len(maps) != 2 and (question.guess is not None or question.is_forced):

@@ -57,9 +57,7 @@ if TYPE_CHECKING:
     from lidarium.mapping.files.log_files import read_log
     from lidarium.mapping.files.map_files import read_ros_map as read_map
     from lidarium.mapping.files.map_files import write_ros_map as write_map
-    from lidarium.mapping.geometry.rigid import Transform
     from lidarium.mapping.localization.slam.following import run_slam
-    from lidarium.mapping.merging.merger import Question as MergeQuestion
     from lidarium.mapping.merging.merger import merge_maps
     from lidarium.mapping.merging.settings import MergeSettings
     from lidarium.mapping.point_clouds.cloud_files import read_cloud
@@ -89,7 +87,6 @@ _FACE: dict[str, str] = {
     "FrontierPolicy": "lidarium.training.reinforcement.frontier_policy",
     "Lidar": "lidarium.envs.settings.lidar",
     "MapperSettings": "lidarium.mapping.sparse.settings",
-    "MergeQuestion": "lidarium.mapping.merging.merger:Question",
     "MergeSettings": "lidarium.mapping.merging.settings",
     "MergedMaps": "lidarium.envs.faces.merged_maps",
     "MergingSettings": "lidarium.envs.faces.team_exchange",
@@ -107,7 +104,6 @@ _FACE: dict[str, str] = {
     "Supervised": "lidarium.agents.supervisor.policy",
     "SweptBody": "lidarium.mapping.sparse.swept_body",
     "Target": "lidarium.envs.onboard.radio.messages",
-    "Transform": "lidarium.mapping.geometry.rigid",
     "VelocityLevel": "lidarium.envs.levels.velocity",
     "WaypointLevel": "lidarium.envs.levels.waypoint",
     "build_graph": "lidarium.mapping.sparse.graph",

@@ -185,3 +185,17 @@ def test_pairs_that_join_have_a_confidence_and_rivals():
     mirrored = np.concatenate([half, half[:, ::-1]], axis=1)
     merged = merge_maps({"p": (mirrored, RESOLUTION), "q": (np.rot90(mirrored).copy(), RESOLUTION)})
     assert all(pair.doubt or not pair.is_accepted for pair in merged.pairs.values())
+
+
+def test_questions_are_given_by_their_names():
+    maps, poses = parts()
+    two = {name: maps[name] for name in ("west", "middle")}
+    true = poses["west"] @ poses["middle"].inverse()
+    guess = (true.x + 0.2, true.y - 0.1, true.theta + 0.05)
+    found = lidarium.merge_maps(two, question={"guess": guess})
+    by_transform = merge_maps(two, question=merger.Question(guess=Transform(*guess)))
+    assert found.tree.lookup("west", "middle") == by_transform.tree.lookup("west", "middle") is not None
+    with pytest.raises(ValueError, match="unknown question 'gues'; did you mean 'guess'"):
+        lidarium.merge_maps(two, question={"gues": guess})
+    with pytest.raises(ValueError, match=r"guess is \(1\.0, 2\.0\); want x, y and theta in metres and radians"):
+        lidarium.merge_maps(two, question={"guess": (1.0, 2.0)})

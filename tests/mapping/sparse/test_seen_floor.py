@@ -273,8 +273,9 @@ def test_steps_that_no_floor_has_are_refused(tmp_path):
 def test_the_command_line_tells_of_maps_that_do_not_know_their_floor(tmp_path, capsys):
     cloud = np.concatenate([floor_points(holes=[(2.5, -1.0, 3.5, 6.0)]), pallet(2.5, 0.0, 3.5, 5.0)])
     np.savez(tmp_path / "cloud.npz", xyz=cloud)
-    for name in ("map.smap", "map.txt"):
-        assert main(["sparse-map", str(tmp_path / "cloud.npz"), "--out", str(tmp_path / name)]) == 0
+    for name, mode in (("map.smap", "default"), ("map.txt", "thesis")):
+        command = ["sparse-map", str(tmp_path / "cloud.npz"), "--mode", mode, "--out", str(tmp_path / name)]
+        assert main(command) == 0
     capsys.readouterr()
     request = ["--from", "1,2", "--to", "5,2", "--json"]
     assert main(["plan", str(tmp_path / "map.smap"), *request]) == 3
