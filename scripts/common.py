@@ -257,7 +257,7 @@ class Outputs:
         check_output(folder, self.names, inputs)
         if not self._is_ours(folder) and (others := self._there(folder, self.names)):
             raise ValueError(
-                f"{others[0]} is not of an earlier call of this command, and would be replaced; choose another folder "
+                f"{others[0]} was not written by this command, and would be replaced; choose another folder "
                 "with --out, or remove it"
             )
 

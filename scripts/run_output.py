@@ -54,7 +54,7 @@ def write_run(
 
     env = episode.env
     if old := OUTPUTS.clear(folder, (RECORD, *(film for film in FILMS if film not in films))):
-        notify(f"removed from {folder}, as they are of an earlier run: {', '.join(old)}")
+        notify(f"removed files of an earlier run from {folder}: {', '.join(old)}")
     OUTPUTS.clear(folder, TEAM_FILES)
     write_json(folder / RESULT, result)
     if recorder is not None:

@@ -66,7 +66,7 @@ def execute(command: _Replay) -> Answer:
             check_writable(folder)
     for suffix, path in asked.items():
         if path is not None and path.suffix.lower() != suffix:
-            raise ValueError(f"{path} is no name for this file; want one that ends in {suffix}")
+            raise ValueError(f"{path} does not fit as a name; want one that ends in {suffix}")
     check_not_read(command.file, (*files, *command.films))
     if not command.films:
         command.refuse("no film is asked for", "film_speed", "film_width", "film_fps")

@@ -72,7 +72,7 @@ def test_no_command_replaces_files_of_others(words, name, folder, monkeypatch, c
     for other in (name, "result.json", "transforms.json", "slam.json"):
         (folder / "out" / other).write_text('{"mine": 1}')
     assert main([*words.split(), "--out", "out"]) == 2
-    assert "is not of an earlier call of this command, and would be replaced" in capsys.readouterr().err
+    assert "was not written by this command, and would be replaced" in capsys.readouterr().err
     kept = (name, "result.json", "transforms.json", "slam.json")
     assert {path.name: path.read_text() for path in (folder / "out").iterdir()} == dict.fromkeys(kept, '{"mine": 1}')
 
@@ -84,7 +84,7 @@ def test_a_merge_replaces_no_map_of_a_run(folder, tmp_path, capsys):
     before = (out / "map.pgm").read_bytes()
     assert (out / "transforms.json").exists()
     assert main(["merge", str(folder / "map.yaml"), str(folder / "other.yaml"), "--out", str(out)]) == 2
-    assert "is not of an earlier call of this command" in capsys.readouterr().err
+    assert "was not written by this command" in capsys.readouterr().err
     assert (out / "map.pgm").read_bytes() == before
 
 
@@ -105,7 +105,7 @@ def test_a_run_alone_leaves_no_map_of_an_earlier_team(tmp_path, capsys):
         (tmp_path / "robot_closeup.png").write_bytes(b"mine")
         words = f"run --floor scene_room --policy nearest_frontier --robots {robots} --horizon-s 2 --out"
         assert main([*words.split(), str(tmp_path)]) == 0
-    assert "as they are of an earlier run: episode.npz" in capsys.readouterr().err
+    assert "removed files of an earlier run from" in capsys.readouterr().err
     assert not list(tmp_path.glob("robot_1.*"))
     assert not (tmp_path / "transforms.json").exists()
     assert not (tmp_path / "episode.npz").exists()

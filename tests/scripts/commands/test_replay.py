@@ -172,7 +172,7 @@ def test_a_record_is_not_overwritten_and_files_have_the_names_of_their_kind(reco
         assert f"{option} is given, but n" in capsys.readouterr().err
     for option, suffix in (("picture", ".png"), ("html", ".html"), ("mcap", ".mcap"), ("demonstrations", ".npz")):
         assert main(["replay", str(record), f"--{option}", str(tmp_path / "x.txt")]) == 2
-        assert f"x.txt is no name for this file; want one that ends in {suffix}" in capsys.readouterr().err
+        assert f"x.txt does not fit as a name; want one that ends in {suffix}" in capsys.readouterr().err
     assert record.read_bytes() == before
 
 
