@@ -385,7 +385,7 @@ class _Drawing:
         if self._pictures:
             yield f"{self._pictures} pictures in the drawing are left out"
         for name, count in sorted(self._unread.items()):
-            yield f"{name}, which {count} elements have, is not read: they are drawn as without it"
+            yield f"elements drawn without their {name}, which is not understood: {count}"
         if self._sheet.unread:
             yield f"{self._sheet.unread} rules of its style sheet are not understood and left out"
 

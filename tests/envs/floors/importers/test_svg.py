@@ -211,7 +211,7 @@ def test_what_is_left_out_of_a_drawing_is_told(tmp_path):
 )
 def test_what_is_not_read_of_an_element_is_told(tmp_path, attribute, name):
     floor = load_file(written(tmp_path, f'{ROOM}<rect x="200" y="100" width="50" height="50" {attribute}/>'), 0.01)
-    assert floor.remark == f"{name}, which 1 elements have, is not read: they are drawn as without it"
+    assert floor.remark == f"elements drawn without their {name}, which is not understood: 1"
 
 
 def test_important_declarations_take_precedence(tmp_path):
