@@ -296,6 +296,6 @@ def value_of(text: str) -> Any:  # noqa: ANN401
     except (ValueError, RecursionError) as error:  # text needs no quotes
         if text.startswith(("[", "{")):
             raise ValueError(
-                f'{shown(text)} is no list or table as in TOML; want names in quotes, as in kinds=["kobuki"]'
+                f'{shown(text)} is not a valid TOML list or table; put names in quotes, as in kinds=["kobuki"]'
             ) from error
         return text

@@ -53,7 +53,7 @@ def read_log(path: Path | str, topic: str | None = None, field_of_view: float | 
     if is_bag(path):
         _refuse(path, "field_of_view", field_of_view, "bags state the directions of beams")
         return read_bag_log(path, topic)
-    _refuse(path, "topic", topic, "it is no bag")
+    _refuse(path, "topic", topic, "only bags have topics")
     if path.suffix.lower() == ".npz" or path.name.lower().endswith((".dat", ".dat.gz")):
         _refuse(path, "field_of_view", field_of_view, "its format states the directions of beams")
     if path.suffix.lower() == ".npz":

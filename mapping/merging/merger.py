@@ -97,9 +97,9 @@ def merge_maps(
     settings : MergeSettings, optional
         Settings; defaults if None.
     question : mapping, optional
-        Some of: ``guess``, about how the second map's lower left corner lies in the first map, (x, y, theta) [m, rad];
-        ``is_forced``, whether two maps are joined by the best transform whatever speaks against it, default False;
-        ``is_explained``, whether pairs that join at once have confidence and doubt, too, default True.
+        Any of: ``guess``, the approximate pose (x, y, theta) of the second map's lower left corner in the first one
+        [m, rad]; ``is_forced``, whether two maps are joined by the best transform whatever speaks against it, default
+        False; ``is_explained``, whether pairs that join at once have confidence and doubt, too, default True.
 
     Returns
     -------

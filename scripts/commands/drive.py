@@ -73,7 +73,7 @@ def execute(command: Drive) -> Answer:
 
 
 def _next_folder(folder: Path) -> Path:
-    """Return a folder without a run: nobody drives the same way again."""
+    """Return a folder without a run, since a drive by hand cannot be repeated."""
     numbered = (folder if number == 1 else folder.with_name(f"{folder.name}-{number}") for number in itertools.count(1))
     return next(each for each in numbered if not (each / RESULT).exists())
 

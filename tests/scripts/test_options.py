@@ -343,7 +343,7 @@ def test_options_of_several_words_may_be_given_again():
         ("--horizon-s 2 --set horizon_s=4", "want --horizon-s alone"),
         ("--localization truth --set localization=slam", "want --localization alone"),
         ("--map-resolution 0.05 --set occupancy.resolution=0.1", "want --map-resolution alone"),
-        ("--set kinds=[service]", "'[service]' is no list or table as in TOML; want names in quotes"),
+        ("--set kinds=[service]", "'[service]' is not a valid TOML list or table; put names in quotes"),
         ("--film-shows maps", "--film-shows is given, but no film is asked for; leave it out"),
     ],
 )
