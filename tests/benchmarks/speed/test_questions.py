@@ -90,7 +90,7 @@ def test_plans_of_tours_and_decisions_at_their_level_are_measured(monkeypatch):
 
 
 def test_a_window_is_predicted_alike_by_the_peer():
-    torch = pytest.importorskip("torch")
+    torch = pytest.importorskip("torch", reason="torch is not installed: extra [rl]")
     threads = torch.get_num_threads()
     levels = predicted_window.half_seen_room()
     found = predicted_window.by_torch(levels)()
